@@ -1,0 +1,115 @@
+!> Small text helpers: numbers to text, lower case, the nearest word of a list.
+module fw_text
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: to_text, lower_case, nearest_word, join, string_type
+
+   !> A text of its own length, for lists of texts.
+   type :: string_type
+      character(:), allocatable :: text
+   end type string_type
+
+   !> Shortest readable text of a number.
+   interface to_text
+      module procedure integer_to_text
+      module procedure real_to_text
+      module procedure logical_to_text
+   end interface to_text
+
+contains
+
+   pure function integer_to_text(number) result(text)
+      integer, intent(in) :: number
+      character(:), allocatable :: text
+      character(32) :: buffer
+
+      write (buffer, '(i0)') number
+      text = trim(buffer)
+   end function integer_to_text
+
+   !> A real that reads back to the same bits, without needless digits.
+   pure function real_to_text(number) result(text)
+      real(wp), intent(in) :: number
+      character(:), allocatable :: text
+      character(32) :: buffer
+      real(wp) :: back
+      integer :: status
+
+      write (buffer, '(g0.6)') number
+      read (buffer, *, iostat=status) back
+      if (status /= 0 .or. abs(back - number) > 0.0_wp) write (buffer, '(es24.16e3)') number
+      text = trim(adjustl(buffer))
+   end function real_to_text
+
+   pure function logical_to_text(flag) result(text)
+      logical, intent(in) :: flag
+      character(:), allocatable :: text
+
+      text = trim(merge('.true. ', '.false.', flag))
+   end function logical_to_text
+
+   pure function lower_case(text) result(lower)
+      character(*), intent(in) :: text
+      character(len(text)) :: lower
+      integer :: i, code
+
+      do i = 1, len(text)
+         code = iachar(text(i:i))
+         if (code >= iachar('A') .and. code <= iachar('Z')) code = code + 32
+         lower(i:i) = achar(code)
+      end do
+   end function lower_case
+
+   !> The word of a list with the smallest edit distance, or '' where none is near.
+   pure function nearest_word(word, words) result(nearest)
+      character(*), intent(in) :: word
+      type(string_type), intent(in) :: words(:)
+      character(:), allocatable :: nearest
+      integer :: i, distance, best
+
+      nearest = ''
+      best = max(2, len(word)/3) + 1
+      do i = 1, size(words)
+         distance = edit_distance(word, words(i)%text)
+         if (distance >= best) cycle
+         best = distance
+         nearest = words(i)%text
+      end do
+   end function nearest_word
+
+   !> Levenshtein distance, one row at a time.
+   pure integer function edit_distance(a, b) result(distance)
+      character(*), intent(in) :: a, b
+      integer :: row(0:len(b)), i, j, diagonal, above
+
+      row = [(j, j=0, len(b))]
+      do i = 1, len(a)
+         diagonal = row(0)
+         row(0) = i
+         do j = 1, len(b)
+            above = row(j)
+            row(j) = min(above + 1, row(j - 1) + 1, &
+                         diagonal + merge(0, 1, a(i:i) == b(j:j)))
+            diagonal = above
+         end do
+      end do
+      distance = row(len(b))
+   end function edit_distance
+
+   !> The texts of a list with a separator between them.
+   pure function join(words, separator) result(text)
+      type(string_type), intent(in) :: words(:)
+      character(*), intent(in) :: separator
+      character(:), allocatable :: text
+      integer :: i
+
+      text = ''
+      do i = 1, size(words)
+         if (i > 1) text = text//separator
+         text = text//words(i)%text
+      end do
+   end function join
+
+end module fw_text
