@@ -1,0 +1,35 @@
+!> What is known of one solution point; results leave the library as a list of these.
+module fw_point
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: point_type
+
+   type :: point_type
+      !> Angular frequency of the excitation [rad/s].
+      real(wp) :: omega = 0.0_wp
+      !> Fourier coefficients (0, c1, s1, ...) of the observed quantities (2H+1, n_observed).
+      real(wp), allocatable :: coefficients(:, :)
+      !> Largest magnitude over the period (n_observed).
+      real(wp), allocatable :: amplitude(:)
+      logical :: converged = .false.
+      integer :: iterations = 0
+      !> norm(R)/norm(F) at the end.
+      real(wp) :: residual = 0.0_wp
+      !> Time spent on the point [s].
+      real(wp) :: seconds = 0.0_wp
+      !> Fourier coefficients of the contact forces (3, n_pairs, 2H+1) [force].
+      real(wp), allocatable :: force(:, :, :)
+      !> Share of the period in stick, slip and open (3, n_pairs).
+      real(wp), allocatable :: fraction(:, :)
+      !> Friction energy per cycle (n_pairs) [force * length].
+      real(wp), allocatable :: dissipation(:)
+      !> Observed quantities over one period, only when asked for (n_time, n_observed).
+      real(wp), allocatable :: history(:, :)
+      !> Contact forces and relative displacements over one period, only when asked for
+      !> (3, n_pairs, n_time).
+      real(wp), allocatable :: force_history(:, :, :), slip_history(:, :, :)
+   end type point_type
+
+end module fw_point

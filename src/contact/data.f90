@@ -1,0 +1,57 @@
+!> Contact pairs and nonlinear springs as data: which dofs they join and with which constants.
+!>
+!> Sign convention: u_r = u(side_1) - u(side_2), components (t1, t2, n) with n pointing from
+!> side 2 to side 1, so that u_n > 0 opens. Forces stand on the left-hand side of the equation
+!> of motion; lambda_n <= 0 is compression.
+module fw_contact_data
+   use fw_kinds, only: wp
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: contact_type, spring_type
+   public :: law_words, law_dlft, law_dlft_velocity, law_penalty
+   public :: memory_words, memory_assembly, memory_carried
+
+   character(*), parameter :: law_words(*) = &
+      [character(13) :: 'dlft', 'dlft_velocity', 'penalty']
+   integer, parameter :: law_dlft = 1, law_dlft_velocity = 2, law_penalty = 3
+
+   character(*), parameter :: memory_words(*) = [character(8) :: 'assembly', 'carried']
+   integer, parameter :: memory_assembly = 1, memory_carried = 2
+
+   !> Contact pairs (group &contact, /contact of a model file).
+   type :: contact_type
+      integer :: n_pairs = 0
+      integer :: law = law_dlft
+      !> Signed dof numbers of (t1, t2, n), 0 where there is none (3, n_pairs).
+      integer, allocatable :: side_1(:, :), side_2(:, :)
+      !> Friction coefficient (n_pairs).
+      real(wp), allocatable :: mu(:)
+      !> Initial gap, negative for an interference [length] (n_pairs).
+      real(wp), allocatable :: gap(:)
+      !> Area of the pair [length**2] (n_pairs).
+      real(wp), allocatable :: area(:)
+      !> Constant compressive force of pairs without a normal dof [force] (n_pairs).
+      real(wp), allocatable :: normal_load(:)
+      !> Stiffnesses of the penalty law [force/length] (n_pairs).
+      real(wp), allocatable :: tangential_stiffness(:), normal_stiffness(:)
+      !> Multiplies the automatic penalty of the DLFT laws.
+      real(wp) :: penalty_scale = 1.0_wp
+      !> Where the march through the period starts.
+      integer :: memory = memory_assembly
+      !> Coordinates of the pairs, for pictures (3, n_pairs), and the names of their patches.
+      real(wp), allocatable :: position(:, :)
+      type(string_type), allocatable :: patch(:)
+   end type contact_type
+
+   !> Nonlinear springs: force coefficient * u_r**power (group &spring).
+   type :: spring_type
+      integer :: n_springs = 0
+      !> Signed dof numbers, 0 for ground (n_springs).
+      integer, allocatable :: side_1(:), side_2(:)
+      real(wp), allocatable :: coefficient(:)
+      integer, allocatable :: power(:)
+   end type spring_type
+
+end module fw_contact_data

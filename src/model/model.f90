@@ -1,0 +1,23 @@
+!> A linear structure: M u'' + C u' + K u = f_0 + f_c cos(omega t) + f_s sin(omega t), with the
+!> quantities that are observed of it. Read-only once built; may be shared between threads.
+module fw_model
+   use fw_kinds, only: wp
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: model_type
+
+   type :: model_type
+      integer :: n_dof = 0
+      !> Mass, stiffness and viscous damping (n_dof, n_dof), symmetric. Effective values: the
+      !> terms of rotation and of Rayleigh and modal damping are in them.
+      real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
+      !> Loads, scaled (n_dof) [force].
+      real(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
+      !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
+      real(wp), allocatable :: observe_matrix(:, :)
+      type(string_type), allocatable :: observe_name(:)
+   end type model_type
+
+end module fw_model
