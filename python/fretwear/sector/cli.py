@@ -1,0 +1,96 @@
+"""Command line of the sector generator.
+
+Every parameter of the geometry, the material and the discretisation is an option of the same
+name with dashes. Exit status: 0 done, 2 usage, 3 parameters not accepted, 5 file not written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from dataclasses import fields
+from typing import Any
+
+from .. import __version__
+from .model import FullModel, ReducedModel, build_full, reduce_model
+from .model_file import write_model
+from .parameters import Discretisation, Geometry, Material, SectorParameters, patch_grid
+
+__all__ = ["main"]
+
+_GROUPS: tuple[type, ...] = (Geometry, Material, Discretisation)
+_BAD_PARAMETER, _NOT_WRITTEN = 3, 5
+_RPM = math.pi / 30.0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Generate a model file as told by the command line; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        parameters = _parameters(options)
+    except ValueError as error:
+        print(f"fretwear.sector: {error}", file=sys.stderr)
+        return _BAD_PARAMETER
+    started = time.perf_counter()
+    full = build_full(parameters)
+    reduced = reduce_model(full)
+    try:
+        write_model(reduced, options.output, options.title)
+        if options.picture:
+            from .picture import draw_sector  # matplotlib only where a picture is wanted
+
+            draw_sector(full, options.picture)
+    except OSError as error:
+        print(f"fretwear.sector: cannot write: {error}", file=sys.stderr)
+        return _NOT_WRITTEN
+    if not options.quiet:
+        _summary(full, reduced, options.output, time.perf_counter() - started)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m fretwear.sector", allow_abbrev=False,
+        description="Generate the reduced model of a bladed-disk sector with a dovetail root "
+                    "(units mm, tonne, s, N).")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help="model file to write")
+    parser.add_argument("--pairs", type=int, metavar="N",
+                        help="contact pairs on both flanks, such as 16, 48, 768; sets the patches "
+                             "of a flank to the most nearly square grid")
+    parser.add_argument("--picture", metavar="PNG", help="also draw the mesh")
+    parser.add_argument("--title", help="title stored in the file")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no summary")
+    parser.add_argument("--version", action="version", version=f"fretwear {__version__}")
+    for group in _GROUPS:
+        section = parser.add_argument_group(group.__name__.lower())
+        for item in fields(group):
+            section.add_argument(
+                "--" + item.name.replace("_", "-"), metavar="X", default=None,
+                type=int if isinstance(item.default, int) else float,
+                help=f"{item.metadata['help']} (default {item.default})")
+    return parser
+
+
+def _parameters(options: argparse.Namespace) -> SectorParameters:
+    """Parameters with what the command line overrides."""
+    given: dict[type, dict[str, Any]] = {
+        group: {item.name: value for item in fields(group)
+                if (value := getattr(options, item.name)) is not None} for group in _GROUPS}
+    if options.pairs is not None:
+        patches = given[Discretisation]
+        if {"axial_patches", "slope_patches"} & patches.keys():
+            raise ValueError("--pairs cannot be combined with --axial-patches or --slope-patches")
+        patches["axial_patches"], patches["slope_patches"] = patch_grid(options.pairs)
+    return SectorParameters(Geometry(**given[Geometry]), Material(**given[Material]),
+                            Discretisation(**given[Discretisation]))
+
+
+def _summary(full: FullModel, reduced: ReducedModel, path: str, seconds: float) -> None:
+    print(f"{path}: {len(reduced.mass)} coordinates, {reduced.n_pairs} pairs, from "
+          f"{len(full.free)} free degrees of freedom in {seconds:.1f} s")
+    print("stuck frequencies [Hz]")
+    for rpm in (0.0, 2000.0, 4400.0, 8000.0):
+        values = reduced.frequencies(rpm * _RPM)[:5]
+        print(f"  {rpm:6.0f} rpm" + "".join(f"{value:10.2f}" for value in values))

@@ -1,0 +1,96 @@
+"""Model file (HDF5, format_version 1) of a reduced sector.
+
+The contact coordinates are degrees of freedom of the reduced model: side_1 holds their numbers
+and side_2 is the ground. Strings have fixed length, which Fortran reads without pointers.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import ReducedModel
+from .parameters import Discretisation, Geometry, Material, SectorParameters
+
+__all__ = ["read_parameters", "write_model"]
+
+FORMAT, FORMAT_VERSION, UNIT_SYSTEM = "fretwear-model", 1, "mm-tonne-s-N"
+
+
+def write_model(model: ReducedModel, path: str | Path, title: str | None = None) -> None:
+    """Write a reduced sector as a model file.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The sector.
+    path : str or Path
+        Target; an older file of that name is replaced once the new one is complete.
+    title : str, optional
+        Title attribute.
+    """
+    path = Path(path)
+    partial = path.with_name(path.name + ".part")
+    try:
+        with h5py.File(partial, "w") as file:
+            _write_attributes(file, model, title)
+            for name, data in _datasets(model).items():
+                # Filters pay for themselves on matrices only.
+                packed = {"compression": "gzip", "compression_opts": 9, "shuffle": True}
+                file.create_dataset(name, data=data, **(packed if data.size > 10_000 else {}))
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read_parameters(path: str | Path) -> SectorParameters:
+    """Parameters from which a model file was generated."""
+    with h5py.File(path, "r") as file:
+        if "parameters" not in file.attrs:
+            raise ValueError(f"{path}: no attribute 'parameters'; was it written by fretwear.sector?")
+        groups = json.loads(bytes(file.attrs["parameters"]))
+    return SectorParameters(Geometry(**groups["geometry"]), Material(**groups["material"]),
+                            Discretisation(**groups["discretisation"]))
+
+
+def _write_attributes(file: h5py.File, model: ReducedModel, title: str | None) -> None:
+    default = f"Bladed-disk sector with a dovetail root, {model.n_pairs} contact pairs"
+    file.attrs["format"] = np.bytes_(FORMAT)
+    file.attrs["format_version"] = np.int32(FORMAT_VERSION)
+    file.attrs["title"] = np.bytes_((title or default).encode())
+    file.attrs["unit_system"] = np.bytes_(UNIT_SYSTEM)
+    # Not part of the format; makes the file reproducible.
+    file.attrs["parameters"] = np.bytes_(json.dumps(asdict(model.parameters)).encode())
+
+
+def _datasets(model: ReducedModel) -> dict[str, NDArray]:
+    """Datasets of the model file by name."""
+    n_pairs, n = model.n_pairs, len(model.mass)
+    return {
+        "mass": model.mass,
+        "stiffness": model.stiffness,
+        "stiffness_rotation": model.stiffness_rotation,
+        "contact/side_1": np.arange(1, 3 * n_pairs + 1, dtype=np.int32).reshape(n_pairs, 3),
+        "contact/side_2": np.zeros((n_pairs, 3), dtype=np.int32),
+        "contact/mu": np.full(n_pairs, model.parameters.material.mu),
+        "contact/gap": np.zeros(n_pairs),
+        "contact/area": model.area,
+        "contact/position": model.position,
+        "contact/patch": _strings(model.patch),
+        "load/static": np.zeros(n),
+        "load/cosine": model.cosine,
+        "load/sine": np.zeros(n),
+        "load/static_rotation": model.static_rotation,
+        "observe/name": _strings(model.observe_name),
+        "observe/matrix": model.observe_matrix,
+    }
+
+
+def _strings(values: Iterable[str]) -> NDArray[np.bytes_]:
+    return np.array([value.encode("ascii") for value in values])
