@@ -1,0 +1,101 @@
+!> Batched real transforms through FFTW along the second index of (row, instant) arrays.
+module fw_fft
+   use, intrinsic :: iso_c_binding
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: fft_type
+
+#include <fftw3.f03>
+
+   !> A pair of plans with their own buffers; belongs to one thread.
+   type :: fft_type
+      integer :: n_rows = 0
+      integer :: n_time = 0
+      real(c_double), allocatable :: values(:, :)
+      complex(c_double_complex), allocatable :: spectrum(:, :)
+      type(c_ptr) :: forward = c_null_ptr
+      type(c_ptr) :: backward = c_null_ptr
+   contains
+      procedure :: plan
+      procedure :: synthesise
+      procedure :: analyse
+      final :: destroy
+   end type fft_type
+
+contains
+
+   !> Plan transforms of n_rows rows with n_time instants (not thread-safe).
+   subroutine plan(self, n_rows, n_time)
+      class(fft_type), intent(inout) :: self
+      integer, intent(in) :: n_rows, n_time
+      integer(c_int) :: length(1), rows
+
+      self%n_rows = n_rows
+      self%n_time = n_time
+      allocate (self%values(n_rows, n_time), self%spectrum(n_rows, n_time/2 + 1))
+      length = int(n_time, c_int)
+      rows = int(n_rows, c_int)
+      self%forward = fftw_plan_many_dft_r2c(1_c_int, length, rows, self%values, length, rows, &
+                                            1_c_int, self%spectrum, length/2 + 1, rows, 1_c_int, &
+                                            FFTW_MEASURE)
+      self%backward = fftw_plan_many_dft_c2r(1_c_int, length, rows, self%spectrum, length/2 + 1, &
+                                             rows, 1_c_int, self%values, length, rows, 1_c_int, &
+                                             FFTW_MEASURE)
+   end subroutine plan
+
+   !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.
+   subroutine synthesise(self, harmonic, column, coefficients, values)
+      class(fft_type), intent(inout) :: self
+      integer, intent(in) :: harmonic(:), column(:)
+      real(wp), intent(in) :: coefficients(self%n_rows, *)
+      real(wp), intent(inout) :: values(self%n_rows, *)
+      integer :: i
+
+      self%spectrum = (0.0_wp, 0.0_wp)
+      do i = 1, size(harmonic)
+         if (harmonic(i) == 0) then
+            self%spectrum(:, 1) = cmplx(coefficients(:self%n_rows, column(i)), kind=wp)
+         else
+            self%spectrum(:, harmonic(i) + 1) = 0.5_wp* &
+               cmplx(coefficients(:self%n_rows, column(i)), &
+                     -coefficients(:self%n_rows, column(i) + 1), wp)
+         end if
+      end do
+      call fftw_execute_dft_c2r(self%backward, self%spectrum, self%values)
+      values(:, :self%n_time) = self%values
+   end subroutine synthesise
+
+   !> Coefficients of the retained harmonics from values at the instants.
+   subroutine analyse(self, harmonic, column, values, coefficients)
+      class(fft_type), intent(inout) :: self
+      integer, intent(in) :: harmonic(:), column(:)
+      real(wp), intent(in) :: values(self%n_rows, *)
+      real(wp), intent(inout) :: coefficients(self%n_rows, *)
+      integer :: i
+      real(wp) :: weight
+
+      self%values = values(:, :self%n_time)
+      call fftw_execute_dft_r2c(self%forward, self%values, self%spectrum)
+      weight = 1.0_wp/real(self%n_time, wp)
+      do i = 1, size(harmonic)
+         if (harmonic(i) == 0) then
+            coefficients(:, column(i)) = weight*real(self%spectrum(:, 1), wp)
+         else
+            coefficients(:, column(i)) = 2.0_wp*weight*real(self%spectrum(:, harmonic(i) + 1), wp)
+            coefficients(:, column(i) + 1) = -2.0_wp*weight*aimag(self%spectrum(:, harmonic(i) + 1))
+         end if
+      end do
+   end subroutine analyse
+
+   subroutine destroy(self)
+      type(fft_type), intent(inout) :: self
+
+      if (c_associated(self%forward)) call fftw_destroy_plan(self%forward)
+      if (c_associated(self%backward)) call fftw_destroy_plan(self%backward)
+      self%forward = c_null_ptr
+      self%backward = c_null_ptr
+   end subroutine destroy
+
+end module fw_fft

@@ -1,0 +1,170 @@
+!> Fourier operators on a set of harmonics and n_time uniform instants tau_k = 2 pi k / n_time:
+!>
+!>   u(tau) = u_0 + sum_n uc_n cos(n tau) + us_n sin(n tau),   coefficients (0, c1, s1, c2, s2, ..)
+!>
+!> Arrays are (row, coefficient) and (row, instant): rows (coordinates, pairs) lie innermost, so
+!> that both transforms are one matrix product over all rows, and kernels run along the rows.
+!> Long transforms of many harmonics go through FFTW instead (see `use_fft`).
+module fw_fourier
+   use fw_kinds, only: wp
+   use fw_kinds, only: pi
+   use fw_lapack, only: dgemm
+   use fw_fft, only: fft_type
+   implicit none (type, external)
+   private
+
+   public :: fourier_type, new_fourier, coefficient_count, fft_pays
+
+   type :: fourier_type
+      !> Retained harmonics, ascending (n_retained); 0 is among them unless only odd ones are.
+      integer, allocatable :: harmonic(:)
+      integer :: n_retained = 0
+      !> Real coefficients per row.
+      integer :: n_coefficients = 0
+      integer :: n_time = 0
+      !> Column of the constant or cosine coefficient of each retained harmonic; the sine
+      !> coefficient follows it (n_retained).
+      integer, allocatable :: column(:)
+      !> Values of the base functions at the instants, and the weights of the analysis
+      !> (n_coefficients, n_time).
+      real(wp), allocatable :: synthesis(:, :), analysis(:, :)
+      logical :: use_fft = .false.
+      type(fft_type), allocatable :: fft
+   contains
+      procedure :: to_time
+      procedure :: to_coefficients
+      procedure :: differentiate
+      procedure :: has_constant
+      procedure :: prepare_fft
+   end type fourier_type
+
+contains
+
+   !> Real coefficients of all harmonics 0..n_harmonics: 2H+1.
+   pure integer function coefficient_count(n_harmonics)
+      integer, intent(in) :: n_harmonics
+
+      coefficient_count = 2*n_harmonics + 1
+   end function coefficient_count
+
+   !> Operators for the harmonics 0..n_harmonics, or only the odd ones.
+   !> n_time must be at least 2 n_harmonics + 1.
+   pure function new_fourier(n_harmonics, n_time, odd_only) result(self)
+      integer, intent(in) :: n_harmonics, n_time
+      logical, intent(in), optional :: odd_only
+      type(fourier_type) :: self
+      integer :: i, step
+
+      step = 1
+      if (present(odd_only)) step = merge(2, 1, odd_only)
+      self%harmonic = [(i, i=step - 1, n_harmonics, step)]
+      self%n_retained = size(self%harmonic)
+      self%n_time = n_time
+      allocate (self%column(self%n_retained))
+      self%n_coefficients = 0
+      do i = 1, self%n_retained
+         self%column(i) = self%n_coefficients + 1
+         self%n_coefficients = self%n_coefficients + merge(1, 2, self%harmonic(i) == 0)
+      end do
+      call fill_operators(self)
+   end function new_fourier
+
+   !> Angles are reduced in integer arithmetic, so that high harmonics keep full precision.
+   pure subroutine fill_operators(self)
+      type(fourier_type), intent(inout) :: self
+      integer :: i, k, n, column
+      real(wp) :: angle
+
+      allocate (self%synthesis(self%n_coefficients, self%n_time))
+      do k = 1, self%n_time
+         do i = 1, self%n_retained
+            n = self%harmonic(i)
+            column = self%column(i)
+            angle = 2.0_wp*pi*real(modulo(n*(k - 1), self%n_time), wp)/real(self%n_time, wp)
+            self%synthesis(column, k) = cos(angle)
+            if (n > 0) self%synthesis(column + 1, k) = sin(angle)
+         end do
+      end do
+      self%analysis = (2.0_wp/real(self%n_time, wp))*self%synthesis
+      if (self%has_constant()) self%analysis(1, :) = 1.0_wp/real(self%n_time, wp)
+   end subroutine fill_operators
+
+   pure logical function has_constant(self)
+      class(fourier_type), intent(in) :: self
+
+      has_constant = .false.
+      if (self%n_retained > 0) has_constant = self%harmonic(1) == 0
+   end function has_constant
+
+   !> Plan the transforms of arrays with n_rows rows through FFTW (not thread-safe: call it while
+   !> building a system, outside parallel regions).
+   subroutine prepare_fft(self, n_rows)
+      class(fourier_type), intent(inout) :: self
+      integer, intent(in) :: n_rows
+
+      self%use_fft = .true.
+      allocate (self%fft)
+      call self%fft%plan(n_rows, self%n_time)
+   end subroutine prepare_fft
+
+   !> Whether FFTW beats the matrix product for this many coefficients and instants.
+   !> Measured by bench/transforms: the product runs at the speed of dgemm, the strided
+   !> transform does not, so that it pays only for long transforms of many harmonics.
+   pure logical function fft_pays(n_coefficients, n_time)
+      integer, intent(in) :: n_coefficients, n_time
+
+      fft_pays = n_coefficients > 80 .and. n_time > 256
+   end function fft_pays
+
+   !> Values (n_rows, n_time) at the instants from coefficients (n_rows, n_coefficients).
+   subroutine to_time(self, n_rows, coefficients, values)
+      class(fourier_type), intent(inout) :: self
+      integer, intent(in) :: n_rows
+      real(wp), intent(in) :: coefficients(n_rows, *)
+      real(wp), intent(inout) :: values(n_rows, *)
+
+      if (self%use_fft) then
+         call self%fft%synthesise(self%harmonic, self%column, coefficients, values)
+      else
+         call dgemm('N', 'N', n_rows, self%n_time, self%n_coefficients, 1.0_wp, coefficients, &
+                    n_rows, self%synthesis, self%n_coefficients, 0.0_wp, values, n_rows)
+      end if
+   end subroutine to_time
+
+   !> Coefficients (n_rows, n_coefficients) of values (n_rows, n_time) at the instants.
+   subroutine to_coefficients(self, n_rows, values, coefficients)
+      class(fourier_type), intent(inout) :: self
+      integer, intent(in) :: n_rows
+      real(wp), intent(in) :: values(n_rows, *)
+      real(wp), intent(inout) :: coefficients(n_rows, *)
+
+      if (self%use_fft) then
+         call self%fft%analyse(self%harmonic, self%column, values, coefficients)
+      else
+         call dgemm('N', 'T', n_rows, self%n_coefficients, self%n_time, 1.0_wp, values, n_rows, &
+                    self%analysis, self%n_coefficients, 0.0_wp, coefficients, n_rows)
+      end if
+   end subroutine to_coefficients
+
+   !> Coefficients of du/dtau from those of u (n_rows, n_coefficients).
+   pure subroutine differentiate(self, n_rows, coefficients, derivative)
+      class(fourier_type), intent(in) :: self
+      integer, intent(in) :: n_rows
+      real(wp), intent(in) :: coefficients(n_rows, *)
+      real(wp), intent(inout) :: derivative(n_rows, *)
+      integer :: i, column
+      real(wp) :: n
+
+      do i = 1, self%n_retained
+         column = self%column(i)
+         n = real(self%harmonic(i), wp)
+         if (self%harmonic(i) == 0) then
+            derivative(:, column) = 0.0_wp
+         else
+            derivative(:, column) = n*coefficients(:, column + 1)
+            derivative(:, column + 1) = -n*coefficients(:, column)
+         end if
+      end do
+   end subroutine differentiate
+
+end module fw_fourier

@@ -1,0 +1,118 @@
+!> Explicit interfaces to the BLAS and LAPACK routines in use, so that every call is checked.
+module fw_lapack
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd, dgecon
+   public :: dlange
+
+   interface
+      subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+         import :: wp
+         character, intent(in) :: transa, transb
+         integer, intent(in) :: m, n, k, lda, ldb, ldc
+         real(wp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
+         real(wp), intent(inout) :: c(ldc, *)
+      end subroutine dgemm
+
+      subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
+         import :: wp
+         character, intent(in) :: trans
+         integer, intent(in) :: m, n, lda, incx, incy
+         real(wp), intent(in) :: alpha, beta, a(lda, *), x(*)
+         real(wp), intent(inout) :: y(*)
+      end subroutine dgemv
+
+      subroutine zgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+         import :: wp
+         character, intent(in) :: transa, transb
+         integer, intent(in) :: m, n, k, lda, ldb, ldc
+         complex(wp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
+         complex(wp), intent(inout) :: c(ldc, *)
+      end subroutine zgemm
+
+      subroutine zgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
+         import :: wp
+         character, intent(in) :: trans
+         integer, intent(in) :: m, n, lda, incx, incy
+         complex(wp), intent(in) :: alpha, beta, a(lda, *), x(*)
+         complex(wp), intent(inout) :: y(*)
+      end subroutine zgemv
+
+      subroutine dgetrf(m, n, a, lda, ipiv, info)
+         import :: wp
+         integer, intent(in) :: m, n, lda
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*), info
+      end subroutine dgetrf
+
+      subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         character, intent(in) :: trans
+         integer, intent(in) :: n, nrhs, lda, ldb, ipiv(*)
+         real(wp), intent(in) :: a(lda, *)
+         real(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dgetrs
+
+      subroutine zgetrf(m, n, a, lda, ipiv, info)
+         import :: wp
+         integer, intent(in) :: m, n, lda
+         complex(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*), info
+      end subroutine zgetrf
+
+      subroutine zgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         character, intent(in) :: trans
+         integer, intent(in) :: n, nrhs, lda, ldb, ipiv(*)
+         complex(wp), intent(in) :: a(lda, *)
+         complex(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine zgetrs
+
+      subroutine dsyevd(jobz, uplo, n, a, lda, w, work, lwork, iwork, liwork, info)
+         import :: wp
+         character, intent(in) :: jobz, uplo
+         integer, intent(in) :: n, lda, lwork, liwork
+         real(wp), intent(inout) :: a(lda, *)
+         real(wp), intent(out) :: w(*)
+         real(wp), intent(inout) :: work(*)
+         integer, intent(inout) :: iwork(*)
+         integer, intent(out) :: info
+      end subroutine dsyevd
+
+      subroutine dsygvd(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, iwork, liwork, info)
+         import :: wp
+         integer, intent(in) :: itype, n, lda, ldb, lwork, liwork
+         character, intent(in) :: jobz, uplo
+         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         real(wp), intent(out) :: w(*)
+         real(wp), intent(inout) :: work(*)
+         integer, intent(inout) :: iwork(*)
+         integer, intent(out) :: info
+      end subroutine dsygvd
+
+      subroutine dgecon(norm, n, a, lda, anorm, rcond, work, iwork, info)
+         import :: wp
+         character, intent(in) :: norm
+         integer, intent(in) :: n, lda
+         real(wp), intent(in) :: a(lda, *), anorm
+         real(wp), intent(out) :: rcond
+         real(wp), intent(inout) :: work(*)
+         integer, intent(inout) :: iwork(*)
+         integer, intent(out) :: info
+      end subroutine dgecon
+
+      function dlange(norm, m, n, a, lda, work) result(value)
+         import :: wp
+         character, intent(in) :: norm
+         integer, intent(in) :: m, n, lda
+         real(wp), intent(in) :: a(lda, *)
+         real(wp), intent(inout) :: work(*)
+         real(wp) :: value
+      end function dlange
+   end interface
+
+end module fw_lapack

@@ -1,0 +1,131 @@
+!> Dense linear algebra above LAPACK: factors that are kept and used many times, and symmetric
+!> eigenproblems.
+module fw_linalg
+   use fw_kinds, only: wp
+   use fw_lapack, only: dgetrf
+   use fw_lapack, only: dgetrs
+   use fw_lapack, only: zgetrf
+   use fw_lapack, only: zgetrs
+   use fw_lapack, only: dsygvd
+   implicit none (type, external)
+   private
+
+   public :: lu_type, complex_lu_type, solve_symmetric_eigen
+
+   !> LU factors of a real matrix. The storage only grows, so that refactoring does not allocate.
+   type :: lu_type
+      integer :: n = 0
+      real(wp), allocatable :: matrix(:, :)
+      integer, allocatable :: pivot(:)
+   contains
+      procedure :: reserve => reserve_real
+      procedure :: factor => factor_real
+      procedure :: solve => solve_real
+   end type lu_type
+
+   !> LU factors of a complex matrix; as lu_type.
+   type :: complex_lu_type
+      integer :: n = 0
+      complex(wp), allocatable :: matrix(:, :)
+      integer, allocatable :: pivot(:)
+   contains
+      procedure :: reserve => reserve_complex
+      procedure :: factor => factor_complex
+      procedure :: solve => solve_complex
+   end type complex_lu_type
+
+contains
+
+   !> Make room for order n; the caller then fills matrix(1:n, 1:n).
+   pure subroutine reserve_real(self, n)
+      class(lu_type), intent(inout) :: self
+      integer, intent(in) :: n
+
+      self%n = n
+      if (allocated(self%matrix)) then
+         if (size(self%matrix, 1) >= n) return
+         deallocate (self%matrix, self%pivot)
+      end if
+      allocate (self%matrix(n, n), self%pivot(n))
+   end subroutine reserve_real
+
+   !> Factor the matrix in place; singular is true where a pivot is exactly zero.
+   subroutine factor_real(self, singular)
+      class(lu_type), intent(inout) :: self
+      logical, intent(out) :: singular
+      integer :: info
+
+      call dgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
+      singular = info /= 0
+   end subroutine factor_real
+
+   !> Solve in place for one right-hand side (n).
+   subroutine solve_real(self, b)
+      class(lu_type), intent(in) :: self
+      real(wp), intent(inout), contiguous :: b(:)
+      integer :: info
+
+      call dgetrs('N', self%n, 1, self%matrix, size(self%matrix, 1), self%pivot, b, size(b), info)
+   end subroutine solve_real
+
+   !> Make room for order n; the caller then fills matrix(1:n, 1:n).
+   pure subroutine reserve_complex(self, n)
+      class(complex_lu_type), intent(inout) :: self
+      integer, intent(in) :: n
+
+      self%n = n
+      if (allocated(self%matrix)) then
+         if (size(self%matrix, 1) >= n) return
+         deallocate (self%matrix, self%pivot)
+      end if
+      allocate (self%matrix(n, n), self%pivot(n))
+   end subroutine reserve_complex
+
+   !> Factor the matrix in place; singular is true where a pivot is exactly zero.
+   subroutine factor_complex(self, singular)
+      class(complex_lu_type), intent(inout) :: self
+      logical, intent(out) :: singular
+      integer :: info
+
+      call zgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
+      singular = info /= 0
+   end subroutine factor_complex
+
+   !> Solve in place for n_right right-hand sides (n, n_right).
+   subroutine solve_complex(self, n_right, b)
+      class(complex_lu_type), intent(in) :: self
+      integer, intent(in) :: n_right
+      complex(wp), intent(inout), contiguous :: b(:, :)
+      integer :: info
+
+      call zgetrs('N', self%n, n_right, self%matrix, size(self%matrix, 1), self%pivot, &
+                  b, size(b, 1), info)
+   end subroutine solve_complex
+
+   !> Eigenpairs of a x = value b x with b positive definite, ascending; x^T b x = 1.
+   !> `done` is false where b is not positive definite (to working precision).
+   subroutine solve_symmetric_eigen(a, b, values, vectors, done)
+      !> Symmetric matrices (n, n).
+      real(wp), intent(in) :: a(:, :), b(:, :)
+      !> Eigenvalues (n) and eigenvectors in columns (n, n).
+      real(wp), intent(out), allocatable :: values(:), vectors(:, :)
+      logical, intent(out) :: done
+      real(wp), allocatable :: factor(:, :), work(:)
+      integer, allocatable :: iwork(:)
+      real(wp) :: room(1)
+      integer :: n, info, iroom(1)
+
+      n = size(a, 1)
+      allocate (values(n))
+      vectors = a
+      factor = b
+      done = .true.
+      if (n == 0) return
+      call dsygvd(1, 'V', 'U', n, vectors, n, factor, n, values, room, -1, iroom, -1, info)
+      allocate (work(int(room(1))), iwork(iroom(1)))
+      call dsygvd(1, 'V', 'U', n, vectors, n, factor, n, values, work, size(work), &
+                  iwork, size(iwork), info)
+      done = info == 0
+   end subroutine solve_symmetric_eigen
+
+end module fw_linalg

@@ -1,0 +1,242 @@
+!> The basis in which a structure is condensed: u = T_q q + T_i xi, with the relative coordinates
+!> q and modes xi of the structure with q held; all matrices, loads and observations in it.
+module fw_reduction
+   use fw_kinds, only: wp
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_lapack, only: dgemm
+   use fw_linalg, only: solve_symmetric_eigen
+   use fw_model, only: model_type
+   use fw_relative, only: relative_type
+   implicit none (type, external)
+   private
+
+   public :: reduction_type, new_reduction
+
+   type :: reduction_type
+      integer :: n_coordinates = 0
+      integer :: n_internal = 0
+      !> Internal modes kept as coordinates, behind the relative ones.
+      integer :: n_kept = 0
+      !> Blocks of the coordinates (n_coordinates, n_coordinates).
+      real(wp), allocatable :: k_qq(:, :), m_qq(:, :), c_qq(:, :)
+      !> Coupling blocks (n_coordinates, n_internal).
+      real(wp), allocatable :: k_qi(:, :), m_qi(:, :), c_qi(:, :)
+      !> Diagonals of the internal modes (n_internal).
+      real(wp), allocatable :: k_i(:), m_i(:), c_i(:)
+      !> Internal damping, only where it is not diagonal (n_internal, n_internal).
+      real(wp), allocatable :: c_ii(:, :)
+      !> Static, cosine and sine loads in columns (n_coordinates, 3), (n_internal, 3).
+      real(wp), allocatable :: load_q(:, :), load_i(:, :)
+      !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
+      real(wp), allocatable :: observe_q(:, :), observe_i(:, :)
+   end type reduction_type
+
+   !> Internal damping counts as diagonal where what is off the diagonal is round-off.
+   real(wp), parameter :: off_diagonal_tolerance = 1.0e-12_wp
+   !> A mode with a smaller damping ratio counts as undamped: near its resonance the condensed
+   !> stiffness would lose more than half of the digits.
+   real(wp), parameter :: undamped_ratio = 1.0e-7_wp
+   !> Relative stiffness below which an internal mode is free.
+   real(wp), parameter :: free_stiffness = 1.0e-11_wp
+
+contains
+
+   !> Build the basis; errors where the structure has a part that nothing holds.
+   subroutine new_reduction(model, relative, harmonic, omega_range, self, error)
+      type(model_type), intent(in) :: model
+      type(relative_type), intent(in) :: relative
+      integer, intent(in) :: harmonic(:)
+      !> Lowest and highest frequency of the run [rad/s].
+      real(wp), intent(in) :: omega_range(2)
+      type(reduction_type), intent(out) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: t_q(:, :), t_i(:, :)
+      logical, allocatable :: keep(:)
+
+      call split_basis(relative, t_q, t_i)
+      call internal_modes(model, t_q, t_i, self, error)
+      if (allocated(error)) return
+      call transform(model, t_q, t_i, self)
+      keep = undamped_resonances(self, harmonic, omega_range)
+      if (any(keep)) then
+         call move_to_coordinates(keep, t_q, t_i, self)
+         call transform(model, t_q, t_i, self)
+      end if
+      self%n_kept = count(keep)
+      call check_free_modes(self, error)
+   end subroutine new_reduction
+
+   !> u = t_q q + t_i eta of the relative coordinates, before any mode.
+   subroutine split_basis(relative, t_q, t_i)
+      type(relative_type), intent(in) :: relative
+      real(wp), intent(out), allocatable :: t_q(:, :), t_i(:, :)
+      integer :: j
+
+      allocate (t_q(relative%n_dof, relative%n_coordinates), source=0.0_wp)
+      allocate (t_i(relative%n_dof, size(relative%free)), source=0.0_wp)
+      t_q(relative%pivot, :) = relative%c
+      t_i(relative%pivot, :) = -relative%r
+      do j = 1, size(relative%free)
+         t_i(relative%free(j), j) = 1.0_wp
+      end do
+   end subroutine split_basis
+
+   !> Modes of the structure with q held. With K_ii positive definite they come from
+   !> M x = theta K x, so that massless dofs are no exception; otherwise from a shifted pencil.
+   subroutine internal_modes(model, t_q, t_i, self, error)
+      type(model_type), intent(in) :: model
+      real(wp), intent(inout), allocatable :: t_q(:, :), t_i(:, :)
+      type(reduction_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: shift_trials(*) = [0.0_wp, 1.0e-3_wp, 1.0_wp, 1.0e3_wp]
+      real(wp), allocatable :: k(:, :), m(:, :), modes(:, :), k_iq(:, :)
+      real(wp) :: shift
+      integer :: trial
+      logical :: done
+
+      self%n_internal = size(t_i, 2)
+      k = congruence(t_i, model%stiffness, t_i)
+      m = congruence(t_i, model%mass, t_i)
+      do trial = 1, size(shift_trials)
+         shift = shift_trials(trial)*norm2(k)/max(norm2(m), tiny(1.0_wp))
+         call solve_symmetric_eigen(m, k + shift*m, self%m_i, modes, done)
+         if (done) exit
+      end do
+      if (.not. done) then
+         call fatal_error(error, 'the structure with its contact held has a part without both '// &
+                          'stiffness and mass (or a mass that is not positive); check the mass '// &
+                          'and stiffness matrices', status_input)
+         return
+      end if
+      self%k_i = 1.0_wp - shift*self%m_i
+      where (abs(self%k_i) < free_stiffness) self%k_i = 0.0_wp
+      t_i = product_of(t_i, modes)
+      if (trial > 1) return
+      ! Static constraint modes: K_qi vanishes, and Z_r(0) is exact.
+      k_iq = congruence(t_i, model%stiffness, t_q)
+      t_q = t_q - product_of(t_i, k_iq)
+   end subroutine internal_modes
+
+   !> All blocks in the basis.
+   subroutine transform(model, t_q, t_i, self)
+      type(model_type), intent(in) :: model
+      real(wp), intent(in) :: t_q(:, :), t_i(:, :)
+      type(reduction_type), intent(inout) :: self
+      real(wp), allocatable :: loads(:, :), damping(:, :)
+      integer :: j
+
+      self%n_coordinates = size(t_q, 2)
+      self%n_internal = size(t_i, 2)
+      self%k_qq = congruence(t_q, model%stiffness, t_q)
+      self%m_qq = congruence(t_q, model%mass, t_q)
+      self%c_qq = congruence(t_q, model%damping, t_q)
+      self%k_qi = congruence(t_q, model%stiffness, t_i)
+      self%m_qi = congruence(t_q, model%mass, t_i)
+      self%c_qi = congruence(t_q, model%damping, t_i)
+      damping = congruence(t_i, model%damping, t_i)
+      self%c_i = [(damping(j, j), j=1, self%n_internal)]
+      do j = 1, self%n_internal
+         damping(j, j) = 0.0_wp
+      end do
+      if (allocated(self%c_ii)) deallocate (self%c_ii)
+      if (norm2(damping) > off_diagonal_tolerance*norm2(self%c_i)) then
+         do j = 1, self%n_internal
+            damping(j, j) = self%c_i(j)
+         end do
+         self%c_ii = damping
+      end if
+      loads = reshape([model%load_static, model%load_cosine, model%load_sine], [model%n_dof, 3])
+      self%load_q = matmul(transpose(t_q), loads)
+      self%load_i = matmul(transpose(t_i), loads)
+      self%observe_q = product_of(model%observe_matrix, t_q)
+      self%observe_i = product_of(model%observe_matrix, t_i)
+   end subroutine transform
+
+   !> Internal modes that have no damping and whose frequency a harmonic may hit.
+   pure function undamped_resonances(self, harmonic, omega_range) result(keep)
+      type(reduction_type), intent(in) :: self
+      integer, intent(in) :: harmonic(:)
+      real(wp), intent(in) :: omega_range(2)
+      logical :: keep(self%n_internal)
+      real(wp), parameter :: margin = 1.0e-2_wp
+      real(wp) :: frequency
+      integer :: j
+
+      keep = .false.
+      do j = 1, self%n_internal
+         if (self%k_i(j) <= 0.0_wp .or. self%m_i(j) <= 0.0_wp) cycle
+         frequency = sqrt(self%k_i(j)/self%m_i(j))
+         if (self%c_i(j) > 2.0_wp*undamped_ratio*sqrt(self%k_i(j)*self%m_i(j))) cycle
+         keep(j) = any(frequency >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
+                       frequency <= (1.0_wp + margin)*harmonic*omega_range(2))
+      end do
+   end function undamped_resonances
+
+   subroutine move_to_coordinates(keep, t_q, t_i, self)
+      logical, intent(in) :: keep(:)
+      real(wp), intent(inout), allocatable :: t_q(:, :), t_i(:, :)
+      type(reduction_type), intent(inout) :: self
+      integer, allocatable :: kept(:), others(:)
+      real(wp), allocatable :: wider(:, :)
+      integer :: j, m
+
+      kept = pack([(j, j=1, size(keep))], keep)
+      others = pack([(j, j=1, size(keep))], .not. keep)
+      m = size(t_q, 2)
+      allocate (wider(size(t_q, 1), m + size(kept)))
+      wider(:, :m) = t_q
+      wider(:, m + 1:) = t_i(:, kept)
+      t_q = wider
+      t_i = t_i(:, others)
+      self%k_i = self%k_i(others)
+      self%m_i = self%m_i(others)
+   end subroutine move_to_coordinates
+
+   !> A free internal mode has no static position: refuse a static load on it.
+   subroutine check_free_modes(self, error)
+      type(reduction_type), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: round_off = 1.0e-9_wp
+      integer :: j
+
+      do j = 1, self%n_internal
+         if (abs(self%k_i(j)) > 0.0_wp) cycle
+         if (abs(self%load_i(j, 1)) > round_off*norm2(self%load_i) .and. &
+             abs(self%load_i(j, 1)) > 0.0_wp) then
+            call fatal_error(error, '&load static pushes a part of the structure that neither '// &
+                             'stiffness nor contact holds; hold it or remove the load', &
+                             status_input)
+            return
+         end if
+      end do
+   end subroutine check_free_modes
+
+   !> a^T b c for b (n, n).
+   function congruence(a, b, c) result(value)
+      real(wp), intent(in) :: a(:, :), b(:, :), c(:, :)
+      real(wp), allocatable :: value(:, :)
+      real(wp), allocatable :: half(:, :)
+      integer :: n
+
+      n = size(b, 1)
+      half = product_of(b, c)
+      allocate (value(size(a, 2), size(c, 2)))
+      if (size(value) == 0) return
+      call dgemm('T', 'N', size(a, 2), size(c, 2), n, 1.0_wp, a, n, half, n, 0.0_wp, &
+                 value, size(a, 2))
+   end function congruence
+
+   !> a b.
+   function product_of(a, b) result(value)
+      real(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp), allocatable :: value(:, :)
+
+      allocate (value(size(a, 1), size(b, 2)))
+      if (size(value) == 0) return
+      call dgemm('N', 'N', size(a, 1), size(b, 2), size(a, 2), 1.0_wp, a, size(a, 1), &
+                 b, max(1, size(b, 1)), 0.0_wp, value, size(a, 1))
+   end function product_of
+
+end module fw_reduction

@@ -1,0 +1,182 @@
+!> Relative coordinates: rows u(side_1) - u(side_2) of signed dof numbers, reduced to an
+!> independent set q, and the change of variables u = T (q, eta) that carries it.
+!>
+!> Gauss-Jordan elimination keeps C and R with  u(pivot) = C q - R eta,  u(free) = eta, where the
+!> pivots are one dof a coordinate. Rows that depend on earlier ones (a chain whose masses rub
+!> both each other and the ground) become combinations of the coordinates.
+module fw_relative
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: relative_type, new_relative
+
+   type :: relative_type
+      integer :: n_dof = 0
+      !> Rows given, and independent coordinates among them.
+      integer :: n_rows = 0
+      integer :: n_coordinates = 0
+      !> Row r is sum_e coefficient(e) q(coordinate(e)), e = first(r) .. first(r+1)-1.
+      integer, allocatable :: first(:), coordinate(:)
+      real(wp), allocatable :: coefficient(:)
+      !> Dofs that are eliminated (n_coordinates) and the others.
+      integer, allocatable :: pivot(:), free(:)
+      !> u(pivot) = c q - r eta  (n_coordinates, n_coordinates) and (n_coordinates, n_free).
+      real(wp), allocatable :: c(:, :), r(:, :)
+   contains
+      procedure :: is_coordinate
+   end type relative_type
+
+   !> Entries below this are round-off of the elimination, which adds and subtracts +-1.
+   real(wp), parameter :: negligible = 1.0e-10_wp
+
+contains
+
+   !> Build the coordinates of the given rows; a row with both sides 0 is refused by the caller.
+   subroutine new_relative(n_dof, side_1, side_2, self)
+      integer, intent(in) :: n_dof
+      !> Signed dof numbers, 0 for ground (n_rows).
+      integer, intent(in) :: side_1(:), side_2(:)
+      type(relative_type), intent(out) :: self
+      real(wp), allocatable :: echelon(:, :), row(:), combination(:)
+      integer :: r, m, n_rows
+
+      n_rows = size(side_1)
+      self%n_dof = n_dof
+      self%n_rows = n_rows
+      allocate (echelon(n_rows, n_dof), source=0.0_wp)
+      allocate (self%c(n_rows, n_rows), source=0.0_wp)
+      allocate (self%pivot(n_rows), self%first(n_rows + 1), row(n_dof), combination(n_rows))
+      allocate (self%coordinate(0), self%coefficient(0))
+      m = 0
+      self%first(1) = 1
+      do r = 1, n_rows
+         row = 0.0_wp
+         call add_side(row, side_1(r), 1.0_wp)
+         call add_side(row, side_2(r), -1.0_wp)
+         call reduce(self, m, echelon, row, combination)
+         if (maxval(abs(row)) > negligible) then
+            call append(self, m, echelon, row, combination)
+            self%coordinate = [self%coordinate, m]
+            self%coefficient = [self%coefficient, 1.0_wp]
+         else
+            call express(self, m, combination)
+         end if
+         self%first(r + 1) = size(self%coordinate) + 1
+      end do
+      call finish(self, m, echelon)
+   end subroutine new_relative
+
+   !> Whether a row is a coordinate of its own.
+   pure logical function is_coordinate(self, row)
+      class(relative_type), intent(in) :: self
+      integer, intent(in) :: row
+
+      is_coordinate = self%first(row + 1) - self%first(row) == 1
+      if (is_coordinate) is_coordinate = row_of(self, self%coordinate(self%first(row))) == row
+   end function is_coordinate
+
+   !> The row that introduced a coordinate.
+   pure integer function row_of(self, coordinate)
+      type(relative_type), intent(in) :: self
+      integer, intent(in) :: coordinate
+      integer :: r
+
+      row_of = 0
+      do r = 1, self%n_rows
+         if (self%first(r + 1) - self%first(r) /= 1) cycle
+         if (self%coordinate(self%first(r)) == coordinate) then
+            row_of = r
+            return
+         end if
+      end do
+   end function row_of
+
+   pure subroutine add_side(row, side, sign)
+      real(wp), intent(inout) :: row(:)
+      integer, intent(in) :: side
+      real(wp), intent(in) :: sign
+
+      if (side == 0) return
+      row(abs(side)) = row(abs(side)) + sign*real(merge(1, -1, side > 0), wp)
+   end subroutine add_side
+
+   !> Subtract the echelon rows from a row; `combination` holds what was subtracted.
+   subroutine reduce(self, m, echelon, row, combination)
+      type(relative_type), intent(in) :: self
+      integer, intent(in) :: m
+      real(wp), intent(in) :: echelon(:, :)
+      real(wp), intent(inout) :: row(:)
+      real(wp), intent(out) :: combination(:)
+      integer :: i
+
+      combination = 0.0_wp
+      do i = 1, m
+         combination(i) = row(self%pivot(i))
+      end do
+      do i = 1, m
+         if (abs(combination(i)) > 0.0_wp) row = row - combination(i)*echelon(i, :)
+      end do
+   end subroutine reduce
+
+   !> Make an independent row the next echelon row and clear its pivot column above.
+   subroutine append(self, m, echelon, row, combination)
+      type(relative_type), intent(inout) :: self
+      integer, intent(inout) :: m
+      real(wp), intent(inout) :: echelon(:, :)
+      real(wp), intent(in) :: row(:), combination(:)
+      integer :: i, column
+      real(wp) :: scale, factor
+
+      column = maxloc(abs(row), dim=1)
+      scale = 1.0_wp/row(column)
+      echelon(m + 1, :) = scale*row
+      do i = 1, m
+         if (abs(combination(i)) > 0.0_wp) then
+            self%c(m + 1, :m) = self%c(m + 1, :m) - scale*combination(i)*self%c(i, :m)
+         end if
+      end do
+      m = m + 1
+      self%c(m, m) = scale
+      self%pivot(m) = column
+      do i = 1, m - 1
+         factor = echelon(i, column)
+         if (abs(factor) <= 0.0_wp) cycle
+         echelon(i, :) = echelon(i, :) - factor*echelon(m, :)
+         self%c(i, :m) = self%c(i, :m) - factor*self%c(m, :m)
+      end do
+   end subroutine append
+
+   !> Write a dependent row as a combination of the coordinates.
+   subroutine express(self, m, combination)
+      type(relative_type), intent(inout) :: self
+      integer, intent(in) :: m
+      real(wp), intent(in) :: combination(:)
+      real(wp) :: weight
+      integer :: j
+
+      do j = 1, m
+         weight = dot_product(combination(:m), self%c(:m, j))
+         if (abs(weight) <= negligible) cycle
+         self%coordinate = [self%coordinate, j]
+         self%coefficient = [self%coefficient, weight]
+      end do
+   end subroutine express
+
+   subroutine finish(self, m, echelon)
+      type(relative_type), intent(inout) :: self
+      integer, intent(in) :: m
+      real(wp), intent(in) :: echelon(:, :)
+      logical, allocatable :: is_free(:)
+      integer :: i
+
+      self%n_coordinates = m
+      self%pivot = self%pivot(:m)
+      self%c = self%c(:m, :m)
+      allocate (is_free(self%n_dof), source=.true.)
+      is_free(self%pivot) = .false.
+      self%free = pack([(i, i=1, self%n_dof)], is_free)
+      self%r = echelon(:m, self%free)
+   end subroutine finish
+
+end module fw_relative
