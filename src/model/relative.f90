@@ -23,8 +23,8 @@ module fw_relative
       integer, allocatable :: pivot(:), free(:)
       !> u(pivot) = c q - r eta  (n_coordinates, n_coordinates) and (n_coordinates, n_free).
       real(wp), allocatable :: c(:, :), r(:, :)
-   contains
-      procedure :: is_coordinate
+      !> Whether a row introduced a coordinate, or depends on earlier rows (n_rows).
+      logical, allocatable :: independent(:)
    end type relative_type
 
    !> Entries below this are round-off of the elimination, which adds and subtracts +-1.
@@ -47,7 +47,7 @@ contains
       allocate (echelon(n_rows, n_dof), source=0.0_wp)
       allocate (self%c(n_rows, n_rows), source=0.0_wp)
       allocate (self%pivot(n_rows), self%first(n_rows + 1), row(n_dof), combination(n_rows))
-      allocate (self%coordinate(0), self%coefficient(0))
+      allocate (self%coordinate(0), self%coefficient(0), self%independent(n_rows))
       m = 0
       self%first(1) = 1
       do r = 1, n_rows
@@ -55,7 +55,8 @@ contains
          call add_side(row, side_1(r), 1.0_wp)
          call add_side(row, side_2(r), -1.0_wp)
          call reduce(self, m, echelon, row, combination)
-         if (maxval(abs(row)) > negligible) then
+         self%independent(r) = maxval(abs(row)) > negligible
+         if (self%independent(r)) then
             call append(self, m, echelon, row, combination)
             self%coordinate = [self%coordinate, m]
             self%coefficient = [self%coefficient, 1.0_wp]
@@ -66,31 +67,6 @@ contains
       end do
       call finish(self, m, echelon)
    end subroutine new_relative
-
-   !> Whether a row is a coordinate of its own.
-   pure logical function is_coordinate(self, row)
-      class(relative_type), intent(in) :: self
-      integer, intent(in) :: row
-
-      is_coordinate = self%first(row + 1) - self%first(row) == 1
-      if (is_coordinate) is_coordinate = row_of(self, self%coordinate(self%first(row))) == row
-   end function is_coordinate
-
-   !> The row that introduced a coordinate.
-   pure integer function row_of(self, coordinate)
-      type(relative_type), intent(in) :: self
-      integer, intent(in) :: coordinate
-      integer :: r
-
-      row_of = 0
-      do r = 1, self%n_rows
-         if (self%first(r + 1) - self%first(r) /= 1) cycle
-         if (self%coordinate(self%first(r)) == coordinate) then
-            row_of = r
-            return
-         end if
-      end do
-   end function row_of
 
    pure subroutine add_side(row, side, sign)
       real(wp), intent(inout) :: row(:)

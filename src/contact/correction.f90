@@ -1,0 +1,84 @@
+!> The correction kernel that every contact law shares: from predicted forces y(t) to contact
+!> forces lambda(t) in separation, stick or slip, marched through the instants of a period.
+!>
+!> With p = max(-y_n, 0) and d = y_t - x, x the corrected position in units of force:
+!>
+!>   open   p = 0            lambda = 0,                           x = y_t
+!>   stick  |d| <= mu p      lambda_t = d,          lambda_n = -p, x unchanged
+!>   slip   otherwise        lambda_t = mu p d/|d|, lambda_n = -p, x = y_t - lambda_t
+!>
+!> Source: Nacivet, Pierre, Thouverez, Jezequel (2003), A dynamic Lagrangian frequency-time method.
+!> Arrays are (pair, component, instant) with components (t1, t2, n): pairs lie innermost, so that
+!> one instant of many pairs is one vector operation.
+module fw_correction
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: march_turn_1d, march_turn_2d
+
+contains
+
+   !> One turn for pairs first..last with one tangential direction.
+   pure subroutine march_turn_1d(n_pairs, n_time, first, last, mu, y, x, lambda, margin, pressure)
+      integer, intent(in) :: n_pairs, n_time, first, last
+      real(wp), intent(in) :: mu(n_pairs), y(n_pairs, 3, n_time)
+      !> Corrected position at the start, then at the end of the turn.
+      real(wp), intent(inout) :: x(n_pairs, 2)
+      real(wp), intent(inout) :: lambda(n_pairs, 3, n_time)
+      !> Smallest mu p - |d| and smallest p so far: negative margin means that the pair slipped.
+      real(wp), intent(inout) :: margin(n_pairs), pressure(n_pairs)
+      integer :: i, k
+      real(wp) :: p, d, limit, force
+
+      do k = 1, n_time
+         !$omp simd private(p, d, limit, force)
+         do i = first, last
+            p = max(-y(i, 3, k), 0.0_wp)
+            limit = mu(i)*p
+            d = y(i, 1, k) - x(i, 1)
+            force = max(-limit, min(limit, d))
+            ! x stays to the last bit where the pair sticks, so that stick wears nothing.
+            x(i, 1) = merge(x(i, 1), y(i, 1, k) - force, abs(d) <= limit)
+            lambda(i, 1, k) = force
+            lambda(i, 3, k) = -p
+            margin(i) = min(margin(i), limit - abs(d))
+            pressure(i) = min(pressure(i), p)
+         end do
+      end do
+   end subroutine march_turn_1d
+
+   !> One turn for pairs first..last with two tangential directions.
+   pure subroutine march_turn_2d(n_pairs, n_time, first, last, mu, y, x, lambda, margin, pressure)
+      integer, intent(in) :: n_pairs, n_time, first, last
+      real(wp), intent(in) :: mu(n_pairs), y(n_pairs, 3, n_time)
+      !> As march_turn_1d.
+      real(wp), intent(inout) :: x(n_pairs, 2)
+      real(wp), intent(inout) :: lambda(n_pairs, 3, n_time)
+      real(wp), intent(inout) :: margin(n_pairs), pressure(n_pairs)
+      integer :: i, k
+      real(wp) :: p, d1, d2, length, limit, scale
+      logical :: sticks
+
+      do k = 1, n_time
+         !$omp simd private(p, d1, d2, length, limit, scale, sticks)
+         do i = first, last
+            p = max(-y(i, 3, k), 0.0_wp)
+            limit = mu(i)*p
+            d1 = y(i, 1, k) - x(i, 1)
+            d2 = y(i, 2, k) - x(i, 2)
+            length = sqrt(d1**2 + d2**2)
+            sticks = length <= limit
+            scale = merge(1.0_wp, limit/max(length, tiny(1.0_wp)), sticks)
+            lambda(i, 1, k) = scale*d1
+            lambda(i, 2, k) = scale*d2
+            lambda(i, 3, k) = -p
+            x(i, 1) = merge(x(i, 1), y(i, 1, k) - scale*d1, sticks)
+            x(i, 2) = merge(x(i, 2), y(i, 2, k) - scale*d2, sticks)
+            margin(i) = min(margin(i), limit - length)
+            pressure(i) = min(pressure(i), p)
+         end do
+      end do
+   end subroutine march_turn_2d
+
+end module fw_correction

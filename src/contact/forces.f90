@@ -1,0 +1,226 @@
+!> Contact forces of all pairs over a period, in the frequency domain: predicted forces in,
+!> contact forces and their exact derivative out (alternating frequency/time).
+!>
+!> A system fills `prediction` (coefficients of y), calls `evaluate`, reads `force`; after
+!> `linearize` the derivative of each pair is in `jacobian`, or is the identity (pair_stuck) or
+!> zero (pair_open) and not stored.
+module fw_forces
+   use fw_kinds, only: wp
+   use fw_correction, only: march_turn_1d
+   use fw_correction, only: march_turn_2d
+   use fw_correction_derivative, only: march_derivative
+   use fw_fourier, only: fourier_type
+   use fw_lapack, only: dgemm
+   implicit none (type, external)
+   private
+
+   public :: forces_type, new_forces
+   public :: pair_stuck, pair_open, pair_mixed
+
+   !> Stuck and closed, or open, at every instant of every turn; or anything else.
+   integer, parameter :: pair_stuck = 1, pair_open = 2, pair_mixed = 3
+   !> Pairs marched together: one cache line, and a whole number of vector registers.
+   integer, parameter :: block_size = 8
+   !> Turns after which a march that is not periodic is given up; a random sample needed 4.
+   integer, parameter :: max_turns = 100
+   !> A march is periodic when x repeats to this part of the largest force of the pair.
+   real(wp), parameter :: periodic_tolerance = 1.0e-14_wp
+
+   type :: forces_type
+      integer :: n_pairs = 0
+      !> Friction coefficient (n_pairs).
+      real(wp), allocatable :: mu(:)
+      !> Which of t1, t2, n exist (3, n_pairs).
+      logical, allocatable :: present(:, :)
+      logical :: two_directions = .false.
+      !> Coefficients of predicted and contact forces (n_pairs, 3, n_coefficients).
+      real(wp), allocatable :: prediction(:, :, :), force(:, :, :)
+      !> The same at the instants (n_pairs, 3, n_time).
+      real(wp), allocatable :: prediction_time(:, :, :), force_time(:, :, :)
+      !> Corrected position [force] where the march starts, and after its last turn (n_pairs, 2).
+      real(wp), allocatable :: x_start(:, :), x(:, :)
+      !> Smallest mu p - |d|, smallest p and turns needed (n_pairs).
+      real(wp), allocatable :: margin(:), pressure(:)
+      integer, allocatable :: turns(:)
+      !> pair_stuck, pair_open or pair_mixed (n_pairs).
+      integer, allocatable :: state(:)
+      !> Transposed derivative of the force by the prediction of each pair:
+      !> (coefficient, component) of the input, then of the output, pair.
+      real(wp), allocatable :: jacobian(:, :, :)
+   contains
+      procedure :: evaluate
+      procedure :: linearize
+      procedure :: always_closed
+      procedure :: fractions
+   end type forces_type
+
+contains
+
+   !> Room for the forces of pairs; the march starts from x = 0, the unstrained assembly.
+   pure function new_forces(mu, present, fourier) result(self)
+      !> Friction coefficient (n_pairs).
+      real(wp), intent(in) :: mu(:)
+      !> Which components exist (3, n_pairs).
+      logical, intent(in) :: present(:, :)
+      type(fourier_type), intent(in) :: fourier
+      type(forces_type) :: self
+      integer :: n, nc, nt
+
+      n = size(mu)
+      nc = fourier%n_coefficients
+      nt = fourier%n_time
+      self%n_pairs = n
+      self%mu = mu
+      self%present = present
+      self%two_directions = any(present(2, :))
+      allocate (self%prediction(n, 3, nc), self%force(n, 3, nc), source=0.0_wp)
+      allocate (self%prediction_time(n, 3, nt), self%force_time(n, 3, nt), source=0.0_wp)
+      allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
+      allocate (self%margin(n), self%pressure(n), source=0.0_wp)
+      allocate (self%turns(n), source=0)
+      allocate (self%state(n), source=pair_stuck)
+   end function new_forces
+
+   !> Contact forces from the predicted ones.
+   subroutine evaluate(self, fourier)
+      class(forces_type), intent(inout) :: self
+      type(fourier_type), intent(inout) :: fourier
+      integer :: first, n_blocks, block
+
+      if (self%n_pairs == 0) return
+      call fourier%to_time(3*self%n_pairs, self%prediction, self%prediction_time)
+      n_blocks = (self%n_pairs + block_size - 1)/block_size
+      !$omp parallel do default(none) shared(self, n_blocks, fourier) private(first, block) &
+      !$omp schedule(static) if(n_blocks > 2)
+      do block = 1, n_blocks
+         first = (block - 1)*block_size + 1
+         call march(self, fourier%n_time, first, min(first + block_size - 1, self%n_pairs))
+      end do
+      !$omp end parallel do
+      call fourier%to_coefficients(3*self%n_pairs, self%force_time, self%force)
+      where (self%margin >= 0.0_wp .and. self%pressure > 0.0_wp)
+         self%state = pair_stuck
+      else where (maxval(-self%force_time(:, 3, :), dim=2) <= 0.0_wp)
+         self%state = pair_open
+      else where
+         self%state = pair_mixed
+      end where
+   end subroutine evaluate
+
+   !> March pairs first..last until their state repeats after a period.
+   subroutine march(self, n_time, first, last)
+      class(forces_type), intent(inout) :: self
+      integer, intent(in) :: n_time, first, last
+      integer :: turn, i
+      real(wp) :: start(first:last, 2), scale
+      logical :: periodic
+
+      self%x(first:last, :) = self%x_start(first:last, :)
+      self%margin(first:last) = huge(1.0_wp)
+      self%pressure(first:last) = huge(1.0_wp)
+      do turn = 1, max_turns
+         start = self%x(first:last, :)
+         if (self%two_directions) then
+            call march_turn_2d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
+                               self%x, self%force_time, self%margin, self%pressure)
+         else
+            call march_turn_1d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
+                               self%x, self%force_time, self%margin, self%pressure)
+         end if
+         periodic = .true.
+         do i = first, last
+            scale = abs(self%x(i, 1)) + abs(self%x(i, 2))
+            if (any(abs(self%x(i, :) - start(i, :)) > periodic_tolerance*scale)) periodic = .false.
+         end do
+         if (periodic) exit
+      end do
+      self%turns(first:last) = min(turn, max_turns)
+   end subroutine march
+
+   !> Derivatives of all mixed pairs at the last evaluated prediction.
+   subroutine linearize(self, fourier)
+      class(forces_type), intent(inout) :: self
+      type(fourier_type), intent(in) :: fourier
+      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :)
+      real(wp) :: x(2)
+      integer :: i, nc
+
+      if (.not. any(self%state == pair_mixed)) return
+      nc = fourier%n_coefficients
+      if (.not. allocated(self%jacobian)) allocate (self%jacobian(3*nc, 3*nc, self%n_pairs))
+      !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, x, i)
+      allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
+      !$omp do schedule(dynamic)
+      do i = 1, self%n_pairs
+         if (self%state(i) /= pair_mixed) cycle
+         y = self%prediction_time(i, :, :)
+         x = self%x_start(i, :)
+         call march_derivative(fourier%n_time, nc, self%turns(i), fourier%synthesis, y, &
+                               self%mu(i), self%present(:, i), x, rows, dx)
+         call project(self%jacobian(:, :, i), fourier, rows, y(3, :), self%present(3, i))
+      end do
+      !$omp end do
+      !$omp end parallel
+   end subroutine linearize
+
+   !> From rows at the instants to the transposed derivative between coefficients.
+   subroutine project(jacobian, fourier, rows, y_n, has_normal)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
+      real(wp), intent(in) :: rows(3*fourier%n_coefficients, 2, fourier%n_time)
+      real(wp), intent(in) :: y_n(fourier%n_time)
+      logical, intent(in) :: has_normal
+      integer :: nc, c, k, j
+
+      nc = fourier%n_coefficients
+      do c = 1, 2
+         call dgemm('N', 'T', 3*nc, nc, fourier%n_time, 1.0_wp, rows(1, c, 1), 6*nc, &
+                    fourier%analysis, nc, 0.0_wp, jacobian(1, (c - 1)*nc + 1), 3*nc)
+      end do
+      jacobian(:, 2*nc + 1:) = 0.0_wp
+      if (.not. has_normal) return
+      do k = 1, fourier%n_time
+         if (y_n(k) >= 0.0_wp) cycle
+         do j = 1, nc
+            jacobian(2*nc + 1:, 2*nc + j) = jacobian(2*nc + 1:, 2*nc + j) + &
+                                            fourier%analysis(j, k)*fourier%synthesis(:, k)
+         end do
+      end do
+   end subroutine project
+
+   !> Whether a pair bears at every instant.
+   elemental logical function always_closed(self, pair)
+      class(forces_type), intent(in) :: self
+      integer, intent(in) :: pair
+
+      always_closed = self%pressure(pair) > 0.0_wp
+   end function always_closed
+
+   !> Share of the period that each pair spends in stick, slip and open (3, n_pairs).
+   pure subroutine fractions(self, share)
+      class(forces_type), intent(in) :: self
+      real(wp), intent(out) :: share(:, :)
+      integer :: i, k, n_time
+      real(wp) :: tangential, limit
+      ! A slipping force lies on the cone to round-off.
+      real(wp), parameter :: on_cone = 1.0_wp - 1.0e-12_wp
+
+      n_time = size(self%force_time, 3)
+      share = 0.0_wp
+      do k = 1, n_time
+         do i = 1, self%n_pairs
+            limit = -self%mu(i)*self%force_time(i, 3, k)
+            tangential = norm2(self%force_time(i, 1:2, k))
+            if (self%force_time(i, 3, k) >= 0.0_wp) then
+               share(3, i) = share(3, i) + 1.0_wp
+            else if (tangential < on_cone*limit .or. self%margin(i) >= 0.0_wp) then
+               share(1, i) = share(1, i) + 1.0_wp
+            else
+               share(2, i) = share(2, i) + 1.0_wp
+            end if
+         end do
+      end do
+      share = share/real(n_time, wp)
+   end subroutine fractions
+
+end module fw_forces
