@@ -1,0 +1,92 @@
+!> The linear problem of a Newton step: dense LU for small ones, GMRES with the system's
+!> preconditioner for large ones.
+module fw_linear_step
+   use fw_kinds, only: wp
+   use fw_krylov, only: gmres_type
+   use fw_linalg, only: lu_type
+   use fw_solver_options, only: linear_auto
+   use fw_solver_options, only: linear_lu
+   use fw_solver_options, only: linear_krylov
+   use fw_system, only: nonlinear_system
+   implicit none (type, external)
+   private
+
+   public :: linear_step_type
+
+   !> Unknowns up to which LU is the faster; measured by bench/run.py (docs/benchmarks.md).
+   integer, parameter :: lu_pays_up_to = 200
+
+   type :: linear_step_type
+      integer :: kind = linear_auto
+      type(lu_type) :: lu
+      type(gmres_type) :: gmres
+      real(wp), allocatable :: rhs(:), solution(:)
+      !> Work done so far.
+      integer :: factorizations = 0
+      integer :: krylov_iterations = 0
+   contains
+      procedure :: solve
+   end type linear_step_type
+
+contains
+
+   !> step = -J^-1 r at the last point of the system.
+   subroutine solve(self, system, r, tolerance, step, done)
+      class(linear_step_type), intent(inout) :: self
+      class(nonlinear_system), intent(inout) :: system
+      real(wp), intent(in), contiguous :: r(:)
+      !> Relative residual asked of an iterative solution.
+      real(wp), intent(in) :: tolerance
+      real(wp), intent(out), contiguous :: step(:)
+      logical, intent(out) :: done
+      integer :: n
+
+      call system%linearize(n)
+      call reserve(self, n)
+      call system%reduce(r, self%rhs)
+      done = .true.
+      self%solution = 0.0_wp
+      if (n > 0) then
+         if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_pays_up_to)) then
+            call solve_lu(self, system, n, done)
+         else
+            call system%build_preconditioner()
+            call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
+            self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+            ! A last resort that costs more, but only where GMRES has failed.
+            if (.not. done .and. self%kind /= linear_krylov) call solve_lu(self, system, n, done)
+            done = .true.
+         end if
+      end if
+      call system%expand(r, self%solution, step)
+   end subroutine solve
+
+   subroutine solve_lu(self, system, n, done)
+      type(linear_step_type), intent(inout) :: self
+      class(nonlinear_system), intent(inout) :: system
+      integer, intent(in) :: n
+      logical, intent(out) :: done
+      logical :: singular
+
+      call self%lu%reserve(n)
+      call system%assemble(self%lu%matrix)
+      call self%lu%factor(singular)
+      self%factorizations = self%factorizations + 1
+      done = .not. singular
+      if (singular) return
+      self%solution = self%rhs
+      call self%lu%solve(self%solution)
+   end subroutine solve_lu
+
+   subroutine reserve(self, n)
+      type(linear_step_type), intent(inout) :: self
+      integer, intent(in) :: n
+
+      if (allocated(self%rhs)) then
+         if (size(self%rhs) == n) return
+         deallocate (self%rhs, self%solution)
+      end if
+      allocate (self%rhs(n), self%solution(n))
+   end subroutine reserve
+
+end module fw_linear_step
