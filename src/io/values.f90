@@ -1,0 +1,188 @@
+!> Namelist values as numbers, the ranges they may lie in, and numbers as namelist text.
+module fw_values
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use fw_kinds, only: wp
+   use fw_text, only: lower_case, to_text
+   implicit none (type, external)
+   private
+
+   public :: range_type, new_range, read_real, read_integer, read_logical
+   public :: number_text, quoted_text
+
+   !> What a number may be: strictly above, or from `least` to `most`.
+   type :: range_type
+      !> What is accepted, in words: `a real above 0`.
+      character(:), allocatable :: accepts
+      real(wp) :: above = -huge(1.0_wp)
+      real(wp) :: least = -huge(1.0_wp)
+      real(wp) :: most = huge(1.0_wp)
+   contains
+      procedure :: holds
+   end type range_type
+
+contains
+
+   !> A range with its description; bounds not given do not bind.
+   function new_range(kind, above, least, most) result(range)
+      !> `a real`, `an integer` or the like.
+      character(*), intent(in) :: kind
+      real(wp), intent(in), optional :: above, least, most
+      type(range_type) :: range
+
+      range%accepts = kind
+      if (present(above)) then
+         range%above = above
+         range%accepts = range%accepts//' above '//number_text(above)
+      end if
+      if (present(least)) then
+         range%least = least
+         range%accepts = range%accepts//' of at least '//number_text(least)
+      end if
+      if (present(most)) then
+         range%most = most
+         if (range%accepts /= kind) range%accepts = range%accepts//' and'
+         range%accepts = range%accepts//' of at most '//number_text(most)
+      end if
+   end function new_range
+
+   pure logical function holds(self, number)
+      class(range_type), intent(in) :: self
+      real(wp), intent(in) :: number
+
+      holds = ieee_is_finite(number) .and. number > self%above .and. number >= self%least &
+              .and. number <= self%most
+   end function holds
+
+   !> A finite real; Fortran d-exponents are understood.
+   subroutine read_real(text, number, ok)
+      character(*), intent(in) :: text
+      real(wp), intent(out) :: number
+      logical, intent(out) :: ok
+      character(:), allocatable :: lower
+      integer :: mark, status
+
+      number = 0.0_wp
+      lower = lower_case(text)
+      mark = scan(lower, 'edq')
+      if (mark > 0) lower(mark:mark) = 'e'
+      ok = is_decimal(lower(:merge(mark - 1, len(lower), mark > 0)))
+      if (ok .and. mark > 0) ok = is_whole(lower(mark + 1:))
+      if (.not. ok) return
+      read (lower, *, iostat=status) number
+      ok = status == 0 .and. ieee_is_finite(number)
+   end subroutine read_real
+
+   subroutine read_integer(text, number, ok)
+      character(*), intent(in) :: text
+      integer, intent(out) :: number
+      logical, intent(out) :: ok
+      integer :: status
+
+      number = 0
+      ok = is_whole(text)
+      if (.not. ok) return
+      read (text, *, iostat=status) number
+      ok = status == 0
+   end subroutine read_integer
+
+   subroutine read_logical(text, flag, ok)
+      character(*), intent(in) :: text
+      logical, intent(out) :: flag
+      logical, intent(out) :: ok
+
+      flag = .false.
+      ok = .true.
+      select case (lower_case(text))
+      case ('.true.', 't', 'true', '.t.')
+         flag = .true.
+      case ('.false.', 'f', 'false', '.f.')
+         flag = .false.
+      case default
+         ok = .false.
+      end select
+   end subroutine read_logical
+
+   !> The shortest usual text that reads back to the same bits.
+   function number_text(number) result(text)
+      real(wp), intent(in) :: number
+      character(:), allocatable :: text
+      integer, parameter :: trials(*) = [6, 15, 16, 17]
+      character(40) :: buffer, form
+      real(wp) :: back
+      integer :: i
+
+      do i = 1, size(trials)
+         write (form, '(a, i0, a)') '(es40.', trials(i) - 1, 'e3)'
+         write (buffer, form) number
+         read (buffer, *) back
+         if (abs(back - number) <= 0.0_wp) exit
+      end do
+      text = plain_text(adjustl(buffer))
+   end function number_text
+
+   !> `1.250000E-002` as `0.0125`, `1.000000E-008` as `1e-8`.
+   function plain_text(scientific) result(text)
+      character(*), intent(in) :: scientific
+      character(:), allocatable :: text
+      character(:), allocatable :: sign, digits
+      integer :: mark, exponent
+
+      mark = index(scientific, 'E')
+      sign = scientific(:merge(1, 0, scientific(1:1) == '-'))
+      digits = scientific(len(sign) + 1:len(sign) + 1)//scientific(len(sign) + 3:mark - 1)
+      digits = digits(:max(1, verify(digits, '0', back=.true.)))
+      read (scientific(mark + 1:), *) exponent
+      if (exponent >= 0 .and. exponent < 6) then
+         if (len(digits) < exponent + 1) digits = digits//repeat('0', exponent + 1 - len(digits))
+         text = sign//digits(:exponent + 1)
+         if (len(digits) > exponent + 1) text = text//'.'//digits(exponent + 2:)
+      else if (exponent < 0 .and. exponent > -4) then
+         text = sign//'0.'//repeat('0', -exponent - 1)//digits
+      else
+         text = sign//digits(1:1)
+         if (len(digits) > 1) text = text//'.'//digits(2:)
+         text = text//'e'//to_text(exponent)
+      end if
+   end function plain_text
+
+   !> A text in quotes, as a namelist wants it.
+   pure function quoted_text(text) result(quoted)
+      character(*), intent(in) :: text
+      character(:), allocatable :: quoted
+      integer :: i
+
+      quoted = "'"
+      do i = 1, len(text)
+         quoted = quoted//text(i:i)
+         if (text(i:i) == "'") quoted = quoted//"'"
+      end do
+      quoted = quoted//"'"
+   end function quoted_text
+
+   !> Digits with at most one point and a sign before them.
+   pure logical function is_decimal(text)
+      character(*), intent(in) :: text
+      integer :: point
+
+      point = index(text, '.')
+      if (point == 0) then
+         is_decimal = is_whole(text)
+      else
+         is_decimal = is_whole(text(:point - 1)//'0'//text(point + 1:)) &
+                      .and. scan(text, '0123456789') > 0
+      end if
+   end function is_decimal
+
+   !> Digits with a sign before them or none.
+   pure logical function is_whole(text)
+      character(*), intent(in) :: text
+      integer :: first
+
+      is_whole = .false.
+      if (len(text) == 0) return
+      first = merge(2, 1, scan(text(1:1), '+-') > 0)
+      if (first > len(text)) return
+      is_whole = verify(text(first:), '0123456789') == 0
+   end function is_whole
+
+end module fw_values
