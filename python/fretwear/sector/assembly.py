@@ -16,7 +16,7 @@ from skfem import Basis, ElementHex2, FacetBasis, MeshHex1
 
 from .parameters import Material
 
-__all__ = ["Assembly", "facet_means"]
+__all__ = ["Assembly", "FacetMeans", "facet_means"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -55,10 +55,6 @@ class Assembly:
                           for b in self._basis.basis]).transpose(1, 2, 0)
         weighted = shape * (self.material.density * self._weight)[:, :, None]
         return self._scatter(np.matmul(shape.transpose(0, 2, 1), weighted), 1)
-
-    def mass(self) -> sp.csr_array:
-        """Mass matrix [tonne], (3 n_nodes, 3 n_nodes)."""
-        return sp.csr_array(sp.kron(self.scalar_mass(), sp.identity(3)))
 
     def stiffness(self) -> sp.csr_array:
         """Linear elastic stiffness [N/mm], (3 n_nodes, 3 n_nodes)."""

@@ -7,11 +7,14 @@ name with dashes. Exit status: 0 done, 2 usage, 3 parameters not accepted, 5 fil
 from __future__ import annotations
 
 import argparse
+import difflib
 import math
+import re
 import sys
 import time
 from dataclasses import fields
-from typing import Any
+from pathlib import Path
+from typing import Any, NoReturn
 
 from .. import __version__
 from .model import FullModel, ReducedModel, build_full, reduce_model
@@ -21,8 +24,19 @@ from .parameters import Discretisation, Geometry, Material, SectorParameters, pa
 __all__ = ["main"]
 
 _GROUPS: tuple[type, ...] = (Geometry, Material, Discretisation)
-_BAD_PARAMETER, _NOT_WRITTEN = 3, 5
+_USAGE, _BAD_PARAMETER, _NOT_WRITTEN = 2, 3, 5
 _RPM = math.pi / 30.0
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser that names the nearest option instead of printing all of them."""
+
+    def error(self, message: str) -> NoReturn:
+        known = [text for action in self._actions for text in action.option_strings]
+        wrong = re.findall(r"--[\w-]+", message) if "unrecognized" in message else []
+        near = [match for text in wrong for match in difflib.get_close_matches(text, known, 1)]
+        hint = f"; did you mean {', '.join(near)}?" if near else ""
+        self.exit(_USAGE, f"fretwear.sector: {message}{hint} (--help lists all options)\n")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -33,6 +47,11 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         print(f"fretwear.sector: {error}", file=sys.stderr)
         return _BAD_PARAMETER
+    for target in filter(None, (options.output, options.picture)):
+        # Said before the work, not after it.
+        if not Path(target).absolute().parent.is_dir():
+            print(f"fretwear.sector: no folder to write {target} into", file=sys.stderr)
+            return _NOT_WRITTEN
     started = time.perf_counter()
     full = build_full(parameters)
     reduced = reduce_model(full)
@@ -51,8 +70,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m fretwear.sector", allow_abbrev=False,
+    parser = _Parser(
+        prog="python -m fretwear.sector", usage="%(prog)s -o FILE [--pairs N] [options]",
+        allow_abbrev=False,
         description="Generate the reduced model of a bladed-disk sector with a dovetail root "
                     "(units mm, tonne, s, N).")
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help="model file to write")

@@ -13,11 +13,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .assembly import facet_means
+from .assembly import FacetMeans, facet_means
 from .mesh import BLADE, DISK, SectorMesh
 from .parameters import Geometry, SectorParameters
 
-__all__ = ["FLANKS", "ContactRows", "Tip", "contact_rows", "flank_frame", "held_nodes", "tip_rows"]
+__all__ = ["FLANKS", "ContactRows", "Tip", "boundary_facets", "contact_rows", "flank_facets",
+           "flank_frame", "held_nodes", "tip_rows"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -96,12 +97,12 @@ def contact_rows(sector: SectorMesh, parameters: SectorParameters) -> ContactRow
                        blade.centroid, frame, names)
 
 
-def _body_means(sector: SectorMesh, parameters: SectorParameters, body: int):
-    """Patch averages on the flanks of one body."""
+def flank_facets(sector: SectorMesh, parameters: SectorParameters, body: int) -> tuple[Ints, Ints]:
+    """Facets on the flanks of one body and the pair (from 0) to which each belongs."""
     g, d = parameters.geometry, parameters.discretisation
-    facets, centre = _boundary(sector, body)
+    facets, centre = boundary_facets(sector, body)
     per_flank = d.axial_patches * d.slope_patches
-    found, groups = [], []
+    found, pairs = [], []
     for number, (_, side) in enumerate(FLANKS):
         up, _, normal = flank_frame(g, side)
         offset = centre - np.array([side * g.root_half_width, g.flank_radius, 0.0])
@@ -110,11 +111,17 @@ def _body_means(sector: SectorMesh, parameters: SectorParameters, body: int):
         row = np.floor(along[on_flank] * d.slope_patches).astype(np.int64)
         column = np.floor((centre[on_flank, 2] / g.axial_length + 0.5) * d.axial_patches)
         found.append(facets[on_flank])
-        groups.append(number * per_flank + row * d.axial_patches + column.astype(np.int64))
-    return facet_means(sector.mesh, np.concatenate(found), np.concatenate(groups), d.n_pairs)
+        pairs.append(number * per_flank + row * d.axial_patches + column.astype(np.int64))
+    return np.concatenate(found), np.concatenate(pairs)
 
 
-def _boundary(sector: SectorMesh, body: int) -> tuple[Ints, Floats]:
+def _body_means(sector: SectorMesh, parameters: SectorParameters, body: int) -> FacetMeans:
+    """Patch averages on the flanks of one body."""
+    facets, pairs = flank_facets(sector, parameters, body)
+    return facet_means(sector.mesh, facets, pairs, parameters.discretisation.n_pairs)
+
+
+def boundary_facets(sector: SectorMesh, body: int) -> tuple[Ints, Floats]:
     """Boundary facets of one body and their centres (n, 3)."""
     mesh = sector.mesh
     facets = mesh.boundary_facets()
@@ -134,7 +141,7 @@ def held_nodes(nodes: Floats, geometry: Geometry) -> NDArray[np.bool_]:
 
 def tip_rows(sector: SectorMesh, geometry: Geometry) -> Tip:
     """Averages over the tip face and the unit force normal to the chord there."""
-    facets, centre = _boundary(sector, BLADE)
+    facets, centre = boundary_facets(sector, BLADE)
     facets = facets[np.abs(centre[:, 1] - geometry.tip_radius) < _ON_SURFACE]
     average = facet_means(sector.mesh, facets, np.zeros(len(facets), dtype=np.int64), 1)
     mean = sp.csr_array(sp.kron(average.rows, sp.identity(3)))
