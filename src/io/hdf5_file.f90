@@ -1,0 +1,184 @@
+!> HDF5 files and the inspection of what they hold, with errors as values.
+!>
+!> Shapes are written in messages as h5py shows them; the arrays of the library carry the same
+!> dimensions in reversed order, because HDF5 counts the slowest dimension first.
+!> HDF5 itself is not thread-safe here: one thread at a time may use this layer.
+module fw_hdf5_file
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_error, only: status_io
+   use fw_text, only: to_text
+   use hdf5, only: hid_t
+   use hdf5, only: hsize_t
+   use hdf5, only: h5open_f
+   use hdf5, only: h5eset_auto_f
+   use hdf5, only: h5iis_valid_f
+   use hdf5, only: h5fopen_f
+   use hdf5, only: h5fcreate_f
+   use hdf5, only: h5fclose_f
+   use hdf5, only: h5fflush_f
+   use hdf5, only: h5fis_hdf5_f
+   use hdf5, only: h5f_acc_rdonly_f
+   use hdf5, only: h5f_acc_excl_f
+   use hdf5, only: h5f_acc_trunc_f
+   use hdf5, only: h5f_scope_local_f
+   use hdf5, only: h5lexists_f
+   use hdf5, only: h5oexists_by_name_f
+   use hdf5, only: h5t_native_double
+   implicit none (type, external)
+   private
+
+   public :: hdf5_file, dataset_failure, shape_text
+
+   !> An open file. A copy shares the handle: pass it along, never store two.
+   type :: hdf5_file
+      integer(hid_t) :: id = -1_hid_t
+      character(:), allocatable :: path
+      !> Exit status of a failed access: what is read is input, what is written is output.
+      integer :: status = status_input
+   contains
+      procedure :: open_read
+      procedure :: create
+      procedure :: flush
+      procedure :: close
+      procedure :: exists
+   end type hdf5_file
+
+contains
+
+   !> Open an existing file for reading.
+   subroutine open_read(self, path, error)
+      class(hdf5_file), intent(out) :: self
+      character(*), intent(in) :: path
+      !> status_io where the file cannot be read, status_input where it is no sound HDF5 file.
+      type(error_type), allocatable, intent(out) :: error
+      logical :: found
+      integer :: status
+
+      self%path = path
+      call start_library()
+      inquire (file=path, exist=found)
+      if (.not. found) then
+         call fatal_error(error, path//': no such file', status_io)
+         return
+      end if
+      call h5fis_hdf5_f(path, found, status)
+      if (status < 0) then
+         call fatal_error(error, path//': cannot be read (a folder, or not permitted?)', status_io)
+      else if (.not. found) then
+         call fatal_error(error, path//': is not an HDF5 file', status_input)
+      end if
+      if (allocated(error)) return
+      call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)
+      if (status >= 0) return
+      self%id = -1_hid_t
+      call fatal_error(error, path//': the HDF5 file is truncated, damaged or still being '// &
+                       'written; expected a complete file', status_input)
+   end subroutine open_read
+
+   !> Create a file for writing.
+   subroutine create(self, path, error, exclusive)
+      class(hdf5_file), intent(out) :: self
+      character(*), intent(in) :: path
+      !> status_io where the file cannot be created.
+      type(error_type), allocatable, intent(out) :: error
+      !> Fail where the file exists already (default: replace it).
+      logical, intent(in), optional :: exclusive
+      integer :: status, access_flag
+
+      self%path = path
+      self%status = status_io
+      call start_library()
+      access_flag = h5f_acc_trunc_f
+      if (present(exclusive)) access_flag = merge(h5f_acc_excl_f, h5f_acc_trunc_f, exclusive)
+      call h5fcreate_f(path, access_flag, self%id, status)
+      if (status >= 0) return
+      self%id = -1_hid_t
+      call fatal_error(error, path//': cannot be created (does the folder exist, is it '// &
+                       'writable, is the file in use?)', status_io)
+   end subroutine create
+
+   !> Hand everything written so far to the operating system.
+   subroutine flush(self, error)
+      class(hdf5_file), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: status
+
+      call h5fflush_f(self%id, h5f_scope_local_f, status)
+      if (status < 0) call fatal_error(error, self%path//': writing failed (disk full?)', status_io)
+   end subroutine flush
+
+   !> Close the file; harmless where it is not open.
+   subroutine close(self, error)
+      class(hdf5_file), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: status
+
+      if (self%id < 0) return
+      call h5fclose_f(self%id, status)
+      self%id = -1_hid_t
+      if (status < 0) call fatal_error(error, self%path//': closing failed (disk full?)', status_io)
+   end subroutine close
+
+   !> Is there an object of this absolute name, such as '/contact/mu'?
+   logical function exists(self, name)
+      class(hdf5_file), intent(in) :: self
+      character(*), intent(in) :: name
+      integer :: i, status
+
+      ! HDF5 answers for the last link only, so every group on the way is asked for first.
+      exists = .true.
+      do i = 2, len(name)
+         if (name(i:i) /= '/') cycle
+         call h5lexists_f(self%id, name(:i - 1), exists, status)
+         exists = exists .and. status >= 0
+         if (.not. exists) return
+      end do
+      if (name == '/') return
+      call h5lexists_f(self%id, name, exists, status)
+      exists = exists .and. status >= 0
+      if (.not. exists) return
+      call h5oexists_by_name_f(self%id, name, exists, status)
+      exists = exists .and. status >= 0
+   end function exists
+
+   !> Raise an error about a dataset: `text` continues "<file>: dataset <name> ".
+   subroutine dataset_failure(file, name, text, error)
+      class(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name, text
+      type(error_type), allocatable, intent(out) :: error
+
+      call fatal_error(error, file%path//': dataset '//name//' '//text, file%status)
+   end subroutine dataset_failure
+
+   !> A shape as h5py shows it, from the dimensions in the order of Fortran.
+   pure function shape_text(dims) result(text)
+      integer(hsize_t), intent(in) :: dims(:)
+      character(:), allocatable :: text
+      character(24) :: number
+      integer :: i
+
+      text = '('
+      do i = size(dims), 1, -1
+         write (number, '(i0)') dims(i)
+         text = text//trim(number)
+         if (i > 1) text = text//', '
+      end do
+      if (size(dims) == 1) text = text//','
+      text = text//')'
+   end function shape_text
+
+   !> Start HDF5 once and switch off its own printing of errors.
+   subroutine start_library()
+      logical :: started
+      integer :: status
+
+      ! The predefined types are valid handles if and only if the library runs; starting it a
+      ! second time would leak a set of them.
+      call h5iis_valid_f(h5t_native_double, started, status)
+      if (status < 0 .or. .not. started) call h5open_f(status)
+      call h5eset_auto_f(0, status)
+   end subroutine start_library
+
+end module fw_hdf5_file

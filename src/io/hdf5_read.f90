@@ -1,0 +1,207 @@
+!> Reading datasets of real numbers and integers, rank 0 to 4.
+module fw_hdf5_read
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use fw_error, only: error_type
+   use fw_hdf5_dataset, only: dataset_type
+   use fw_hdf5_dataset, only: open_dataset
+   use fw_hdf5_dataset, only: read_dataset_raw
+   use fw_hdf5_dataset, only: kind_real
+   use fw_hdf5_dataset, only: kind_integer
+   use fw_hdf5_file, only: hdf5_file
+   use fw_hdf5_file, only: dataset_failure
+   use fw_kinds, only: wp
+   use fw_kinds, only: i8
+   use hdf5, only: h5kind_to_type
+   use hdf5, only: h5_real_kind
+   use hdf5, only: h5_integer_kind
+   implicit none (type, external)
+   private
+
+   public :: read_dataset
+
+   !> `call read_dataset(file, name, values, error)`: values of any real or integer type in the
+   !> file are converted; the rank must agree; integers that do not fit are an error.
+   interface read_dataset
+      module procedure read_real_0
+      module procedure read_real_1
+      module procedure read_real_2
+      module procedure read_real_3
+      module procedure read_real_4
+      module procedure read_integer_0
+      module procedure read_integer_1
+      module procedure read_integer_2
+      module procedure read_integer_3
+      module procedure read_integer_4
+   end interface read_dataset
+
+contains
+
+   subroutine read_real_0(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), intent(out) :: values
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+      real(wp) :: found(1)
+
+      values = 0
+      call open_dataset(file, name, kind_real, 0, dataset, error)
+      if (allocated(error)) return
+      call fill_real(file, name, dataset, 1, found, error)
+      if (.not. allocated(error)) values = found(1)
+   end subroutine read_real_0
+
+   subroutine read_real_1(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_real, 1, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1)))
+      call fill_real(file, name, dataset, size(values), values, error)
+   end subroutine read_real_1
+
+   subroutine read_real_2(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: values(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_real, 2, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1), dataset%dims(2)))
+      call fill_real(file, name, dataset, size(values), values, error)
+   end subroutine read_real_2
+
+   subroutine read_real_3(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: values(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_real, 3, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3)))
+      call fill_real(file, name, dataset, size(values), values, error)
+   end subroutine read_real_3
+
+   subroutine read_real_4(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: values(:, :, :, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_real, 4, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3), dataset%dims(4)))
+      call fill_real(file, name, dataset, size(values), values, error)
+   end subroutine read_real_4
+
+   subroutine read_integer_0(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(out) :: values
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+      integer :: found(1)
+
+      values = 0
+      call open_dataset(file, name, kind_integer, 0, dataset, error)
+      if (allocated(error)) return
+      call fill_integer(file, name, dataset, 1, found, error)
+      if (.not. allocated(error)) values = found(1)
+   end subroutine read_integer_0
+
+   subroutine read_integer_1(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, allocatable, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_integer, 1, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1)))
+      call fill_integer(file, name, dataset, size(values), values, error)
+   end subroutine read_integer_1
+
+   subroutine read_integer_2(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, allocatable, intent(out) :: values(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_integer, 2, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1), dataset%dims(2)))
+      call fill_integer(file, name, dataset, size(values), values, error)
+   end subroutine read_integer_2
+
+   subroutine read_integer_3(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, allocatable, intent(out) :: values(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_integer, 3, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3)))
+      call fill_integer(file, name, dataset, size(values), values, error)
+   end subroutine read_integer_3
+
+   subroutine read_integer_4(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, allocatable, intent(out) :: values(:, :, :, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(dataset_type) :: dataset
+
+      call open_dataset(file, name, kind_integer, 4, dataset, error)
+      if (allocated(error)) return
+      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3), dataset%dims(4)))
+      call fill_integer(file, name, dataset, size(values), values, error)
+   end subroutine read_integer_4
+
+   !> Fill an array of any rank, passed by its first element, and close the dataset.
+   subroutine fill_real(file, name, dataset, n, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      type(dataset_type), intent(in) :: dataset
+      integer, intent(in) :: n
+      real(wp), intent(out), target :: values(n)
+      type(error_type), allocatable, intent(out) :: error
+
+      call read_dataset_raw(file, name, dataset, h5kind_to_type(wp, h5_real_kind), &
+                            c_loc(values), error)
+   end subroutine fill_real
+
+   !> As fill_real. Read as 64 bits, because HDF5 clips silently what does not fit.
+   subroutine fill_integer(file, name, dataset, n, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      type(dataset_type), intent(in) :: dataset
+      integer, intent(in) :: n
+      integer, intent(out) :: values(n)
+      type(error_type), allocatable, intent(out) :: error
+      integer(i8), allocatable, target :: wide(:)
+
+      allocate (wide(n), source=0_i8)
+      call read_dataset_raw(file, name, dataset, h5kind_to_type(i8, h5_integer_kind), &
+                            c_loc(wide), error)
+      if (allocated(error)) return
+      if (any(wide > huge(0) .or. wide < -huge(0))) then
+         call dataset_failure(file, name, 'holds an integer that does not fit 32 bits', error)
+         return
+      end if
+      values = int(wide)
+   end subroutine fill_integer
+
+end module fw_hdf5_read

@@ -1,0 +1,214 @@
+!> Writing datasets of real numbers and integers, rank 0 to 4.
+module fw_hdf5_write
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use, intrinsic :: iso_c_binding, only: c_ptr
+   use fw_error, only: error_type
+   use fw_hdf5_file, only: hdf5_file
+   use fw_hdf5_file, only: dataset_failure
+   use fw_kinds, only: wp
+   use hdf5, only: hid_t
+   use hdf5, only: hsize_t
+   use hdf5, only: h5dcreate_f
+   use hdf5, only: h5dwrite_f
+   use hdf5, only: h5dclose_f
+   use hdf5, only: h5screate_f
+   use hdf5, only: h5screate_simple_f
+   use hdf5, only: h5sclose_f
+   use hdf5, only: h5s_scalar_f
+   use hdf5, only: h5pcreate_f
+   use hdf5, only: h5pclose_f
+   use hdf5, only: h5pset_create_inter_group_f
+   use hdf5, only: h5p_default_f
+   use hdf5, only: h5p_link_create_f
+   use hdf5, only: h5kind_to_type
+   use hdf5, only: h5_real_kind
+   use hdf5, only: h5_integer_kind
+   implicit none (type, external)
+   private
+
+   public :: write_dataset, new_dataset, new_space, write_dataset_raw
+
+   !> `call write_dataset(file, name, values, error)`: h5py shows the dimensions of `values`
+   !> in reversed order. Groups on the way are created.
+   interface write_dataset
+      module procedure write_real_0
+      module procedure write_real_1
+      module procedure write_real_2
+      module procedure write_real_3
+      module procedure write_real_4
+      module procedure write_integer_0
+      module procedure write_integer_1
+      module procedure write_integer_2
+      module procedure write_integer_3
+      module procedure write_integer_4
+   end interface write_dataset
+
+contains
+
+   !> Create a dataset and the groups above it.
+   subroutine new_dataset(file, name, type_id, space, id, error, creation)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer(hid_t), intent(in) :: type_id, space
+      integer(hid_t), intent(out) :: id
+      type(error_type), allocatable, intent(out) :: error
+      !> Dataset creation property list (chunks, fill value).
+      integer(hid_t), intent(in), optional :: creation
+      integer(hid_t) :: links, properties
+      integer :: status, ignored
+
+      properties = h5p_default_f
+      if (present(creation)) properties = creation
+      call h5pcreate_f(h5p_link_create_f, links, status)
+      call h5pset_create_inter_group_f(links, 1, status)
+      call h5dcreate_f(file%id, name, type_id, space, id, status, properties, links)
+      call h5pclose_f(links, ignored)
+      if (status < 0) call dataset_failure(file, name, 'cannot be created (name taken, or disk '// &
+                                           'full?)', error)
+   end subroutine new_dataset
+
+   !> A dataspace; no dimensions make a scalar.
+   integer(hid_t) function new_space(dims) result(space)
+      integer, intent(in) :: dims(:)
+      integer :: status
+
+      if (size(dims) == 0) then
+         call h5screate_f(h5s_scalar_f, space, status)
+      else
+         call h5screate_simple_f(size(dims), int(dims, hsize_t), space, status)
+      end if
+   end function new_space
+
+   !> Create a dataset and write all its elements from an address.
+   subroutine write_dataset_raw(file, name, dims, type_id, address, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in) :: dims(:)
+      integer(hid_t), intent(in) :: type_id
+      type(c_ptr), intent(in) :: address
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: space, id
+      integer :: status, ignored
+
+      space = new_space(dims)
+      call new_dataset(file, name, type_id, space, id, error)
+      call h5sclose_f(space, status)
+      if (allocated(error)) return
+      if (product(dims) > 0) call h5dwrite_f(id, type_id, address, status)
+      call h5dclose_f(id, ignored)
+      if (status < 0) call dataset_failure(file, name, 'cannot be written (disk full?)', error)
+   end subroutine write_dataset_raw
+
+   subroutine write_real_0(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), intent(in) :: values
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_real(file, name, [integer ::], [values], error)
+   end subroutine write_real_0
+
+   subroutine write_real_1(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), intent(in), contiguous :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_real(file, name, shape(values), values, error)
+   end subroutine write_real_1
+
+   subroutine write_real_2(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), intent(in), contiguous :: values(:, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_real(file, name, shape(values), values, error)
+   end subroutine write_real_2
+
+   subroutine write_real_3(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), intent(in), contiguous :: values(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_real(file, name, shape(values), values, error)
+   end subroutine write_real_3
+
+   subroutine write_real_4(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      real(wp), intent(in), contiguous :: values(:, :, :, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_real(file, name, shape(values), values, error)
+   end subroutine write_real_4
+
+   subroutine write_integer_0(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in) :: values
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_integer(file, name, [integer ::], [values], error)
+   end subroutine write_integer_0
+
+   subroutine write_integer_1(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in), contiguous :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_integer(file, name, shape(values), values, error)
+   end subroutine write_integer_1
+
+   subroutine write_integer_2(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in), contiguous :: values(:, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_integer(file, name, shape(values), values, error)
+   end subroutine write_integer_2
+
+   subroutine write_integer_3(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in), contiguous :: values(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_integer(file, name, shape(values), values, error)
+   end subroutine write_integer_3
+
+   subroutine write_integer_4(file, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in), contiguous :: values(:, :, :, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_integer(file, name, shape(values), values, error)
+   end subroutine write_integer_4
+
+   subroutine put_real(file, name, dims, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in) :: dims(:)
+      real(wp), intent(in), target :: values(product(dims))
+      type(error_type), allocatable, intent(out) :: error
+
+      call write_dataset_raw(file, name, dims, h5kind_to_type(wp, h5_real_kind), &
+                             c_loc(values), error)
+   end subroutine put_real
+
+   subroutine put_integer(file, name, dims, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in) :: dims(:)
+      integer, intent(in), target :: values(product(dims))
+      type(error_type), allocatable, intent(out) :: error
+
+      call write_dataset_raw(file, name, dims, h5kind_to_type(kind(0), h5_integer_kind), &
+                             c_loc(values), error)
+   end subroutine put_integer
+
+end module fw_hdf5_write
