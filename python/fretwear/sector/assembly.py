@@ -32,17 +32,21 @@ class Assembly:
     ----------
     nodes : (3, n_nodes)
         Positions of the 27-node grid [mm].
+    cell_nodes : (n_elements, 27) int
+        Nodes of each element.
+    weight : (n_elements, n_points)
+        Volumes of the integration points [mm^3].
     """
 
     def __init__(self, mesh: MeshHex1, material: Material) -> None:
         self.mesh, self.material = mesh, material
         self._basis = Basis(mesh, ElementHex2(), intorder=INTEGRATION_ORDER)
         self.nodes: Floats = self._basis.doflocs
-        self._cell_nodes: Ints = self._basis.element_dofs.T.astype(np.int64)
+        self.cell_nodes: Ints = self._basis.element_dofs.T.astype(np.int64)
         # Gradients (element, point, component, node): products over points become matmuls.
         self._grad = np.ascontiguousarray(
             np.array([np.asarray(b[0].grad) for b in self._basis.basis]).transpose(2, 3, 1, 0))
-        self._weight: Floats = self._basis.dx
+        self.weight: Floats = self._basis.dx
 
     @property
     def n_nodes(self) -> int:
@@ -51,9 +55,9 @@ class Assembly:
 
     def scalar_mass(self) -> sp.csr_array:
         """Mass matrix of one displacement component [tonne], (n_nodes, n_nodes)."""
-        shape = np.array([np.broadcast_to(np.asarray(b[0].value), self._weight.shape)
+        shape = np.array([np.broadcast_to(np.asarray(b[0]), self.weight.shape)
                           for b in self._basis.basis]).transpose(1, 2, 0)
-        weighted = shape * (self.material.density * self._weight)[:, :, None]
+        weighted = shape * (self.material.density * self.weight)[:, :, None]
         return self._scatter(np.matmul(shape.transpose(0, 2, 1), weighted), 1)
 
     def stiffness(self) -> sp.csr_array:
@@ -62,7 +66,7 @@ class Assembly:
         n_cells, n_points, _, n_local = self._grad.shape
         flat = self._grad.reshape(n_cells, n_points, 3 * n_local)
         # products[e, i, a, j, b] = integral of d_i phi_a d_j phi_b
-        products = np.matmul(flat.transpose(0, 2, 1), flat * self._weight[:, :, None])
+        products = np.matmul(flat.transpose(0, 2, 1), flat * self.weight[:, :, None])
         products = products.reshape(n_cells, 3, n_local, 3, n_local)
         trace = shear * np.einsum("eiaib->eab", products)
         cells = np.empty((n_cells, n_local, 3, n_local, 3))
@@ -85,12 +89,12 @@ class Assembly:
         (3 n_nodes, 3 n_nodes) matrix [N/mm], or N/mm per (rad/s)^2
         """
         lame, shear = _lame(self.material)
-        local = displacement.reshape(-1, 3)[self._cell_nodes]
+        local = displacement.reshape(-1, 3)[self.cell_nodes]
         gradient = np.einsum("eqia,eaj->eqij", self._grad, local, optimize=True)
         strain = 0.5 * (gradient + gradient.swapaxes(-1, -2))
         stress = 2.0 * shear * strain
         stress += lame * np.einsum("eqii->eq", strain)[..., None, None] * np.eye(3)
-        pulled = np.matmul(stress * self._weight[:, :, None, None], self._grad)
+        pulled = np.matmul(stress * self.weight[:, :, None, None], self._grad)
         n_cells, n_points, _, n_local = self._grad.shape
         flat = self._grad.reshape(n_cells, 3 * n_points, n_local)
         cells = np.matmul(flat.transpose(0, 2, 1), pulled.reshape(n_cells, 3 * n_points, n_local))
@@ -98,7 +102,7 @@ class Assembly:
 
     def _scatter(self, cells: Floats, n_components: int) -> sp.csr_array:
         """Sum element matrices into a sparse matrix that is symmetric to the last bit."""
-        number = (n_components * self._cell_nodes[:, :, None] + np.arange(n_components))
+        number = (n_components * self.cell_nodes[:, :, None] + np.arange(n_components))
         number = number.reshape(len(cells), -1)
         rows = np.repeat(number, number.shape[1], axis=1).ravel()
         columns = np.tile(number, (1, number.shape[1])).ravel()
@@ -143,7 +147,7 @@ def facet_means(mesh: MeshHex1, facets: Ints, group: Ints, n_groups: int) -> Fac
     order = np.argsort(facets)
     facets, group = facets[order], group[order]
     basis = FacetBasis(mesh, ElementHex2(), facets=facets, intorder=INTEGRATION_ORDER)
-    shape = np.array([np.broadcast_to(np.asarray(b[0].value), basis.dx.shape) for b in basis.basis])
+    shape = np.array([np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis])
     integral = np.einsum("afq,fq->af", shape, basis.dx)
     rows = np.broadcast_to(group, integral.shape)
     area = np.bincount(group, weights=basis.dx.sum(axis=1), minlength=n_groups)
