@@ -37,6 +37,8 @@ module fw_forces
       real(wp), allocatable :: prediction(:, :, :), force(:, :, :)
       !> The same at the instants (n_pairs, 3, n_time).
       real(wp), allocatable :: prediction_time(:, :, :), force_time(:, :, :)
+      !> Constant part of the predicted normal force: preload, or stiffness times gap (n_pairs).
+      real(wp), allocatable :: offset(:)
       !> Corrected position [force] where the march starts, and after its last turn (n_pairs, 2).
       real(wp), allocatable :: x_start(:, :), x(:, :)
       !> Smallest mu p - |d|, smallest p and turns needed (n_pairs).
@@ -76,7 +78,7 @@ contains
       allocate (self%prediction(n, 3, nc), self%force(n, 3, nc), source=0.0_wp)
       allocate (self%prediction_time(n, 3, nt), self%force_time(n, 3, nt), source=0.0_wp)
       allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
-      allocate (self%margin(n), self%pressure(n), source=0.0_wp)
+      allocate (self%margin(n), self%pressure(n), self%offset(n), source=0.0_wp)
       allocate (self%turns(n), source=0)
       allocate (self%state(n), source=pair_stuck)
    end function new_forces
@@ -85,10 +87,13 @@ contains
    subroutine evaluate(self, fourier)
       class(forces_type), intent(inout) :: self
       type(fourier_type), intent(inout) :: fourier
-      integer :: first, n_blocks, block
+      integer :: first, n_blocks, block, k
 
       if (self%n_pairs == 0) return
       call fourier%to_time(3*self%n_pairs, self%prediction, self%prediction_time)
+      do k = 1, fourier%n_time
+         self%prediction_time(:, 3, k) = self%prediction_time(:, 3, k) + self%offset
+      end do
       n_blocks = (self%n_pairs + block_size - 1)/block_size
       !$omp parallel do default(none) shared(self, n_blocks, fourier) private(first, block) &
       !$omp schedule(static) if(n_blocks > 2)

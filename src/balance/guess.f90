@@ -1,0 +1,167 @@
+!> First guess of a solution: the linear one with every pair closed and stuck, but open where that
+!> would take tension on average.
+module fw_guess
+   use fw_kinds, only: wp
+   use fw_hbm, only: hbm_system
+   use fw_hbm, only: to_complex
+   use fw_hbm, only: to_real
+   use fw_linalg, only: complex_lu_type
+   implicit none (type, external)
+   private
+
+   public :: stuck_guess, free_guess
+
+   !> Rounds of opening pairs under tension; each opens at least one pair or is the last.
+   integer, parameter :: max_rounds = 20
+
+contains
+
+   !> The linear solution with pairs stuck where they bear (n_coordinates * n_coefficients).
+   subroutine stuck_guess(system, x)
+      type(hbm_system), intent(in) :: system
+      real(wp), intent(out), contiguous :: x(:)
+      logical :: closed(system%contact%n_pairs)
+      real(wp) :: tension(system%contact%n_pairs)
+      integer :: round
+
+      closed = .true.
+      do round = 1, max_rounds
+         call linear_solution(system, closed, x, tension)
+         if (.not. any(closed .and. tension > 0.0_wp)) exit
+         closed = closed .and. .not. tension > 0.0_wp
+      end do
+   end subroutine stuck_guess
+
+   !> The linear solution without any contact force.
+   subroutine free_guess(system, x)
+      type(hbm_system), intent(in) :: system
+      real(wp), intent(out), contiguous :: x(:)
+      logical :: closed(system%contact%n_pairs)
+      real(wp) :: tension(system%contact%n_pairs)
+
+      closed = .false.
+      call linear_solution(system, closed, x, tension)
+   end subroutine free_guess
+
+   !> Solve with closed pairs stuck; tension is their mean normal force (positive: it pulls).
+   subroutine linear_solution(system, closed, x, tension)
+      type(hbm_system), intent(in) :: system
+      logical, intent(in) :: closed(:)
+      real(wp), intent(out), contiguous :: x(:)
+      real(wp), intent(out) :: tension(:)
+      complex(wp), allocatable :: q(:, :), force(:)
+      complex(wp), allocatable :: stiffness(:, :)
+      logical :: held(system%structure%n_coordinates)
+      integer :: h, m
+
+      m = system%structure%n_coordinates
+      allocate (q(m, system%fourier%n_retained), source=(0.0_wp, 0.0_wp))
+      tension = 0.0_wp
+      do h = 1, system%fourier%n_retained
+         stiffness = system%structure%stiffness(:, :, h)
+         force = system%structure%load(:, h)
+         held = .false.
+         call close_pairs(system, closed, system%fourier%harmonic(h), stiffness, force, held, q(:, h))
+         call solve_free(stiffness, force, held, q(:, h))
+         if (system%fourier%harmonic(h) == 0) call mean_tension(system, q(:, h), tension)
+      end do
+      call to_real_vector(system, q, x)
+   end subroutine linear_solution
+
+   !> Rigid pairs hold their coordinates (at minus the gap); elastic ones add their stiffness.
+   subroutine close_pairs(system, closed, harmonic, stiffness, force, held, q)
+      type(hbm_system), intent(in) :: system
+      logical, intent(in) :: closed(:)
+      integer, intent(in) :: harmonic
+      complex(wp), intent(inout) :: stiffness(:, :), force(:), q(:)
+      logical, intent(inout) :: held(:)
+      integer :: i, c, e, f, row
+      real(wp) :: gap
+
+      associate (r => system%joint%relative)
+         do i = 1, size(closed)
+            if (.not. closed(i)) cycle
+            do c = 1, 3
+               row = system%joint%row(c, i)
+               if (row == 0) cycle
+               ! Without friction or load a pair holds nothing tangentially.
+               if (c < 3 .and. .not. system%contact%mu(i) > 0.0_wp) cycle
+               gap = merge(system%gap(i) + system%depth(i), 0.0_wp, c == 3 .and. harmonic == 0)
+               do e = r%first(row), r%first(row + 1) - 1
+                  if (system%rigid) then
+                     held(r%coordinate(e)) = .true.
+                     q(r%coordinate(e)) = -gap
+                     cycle
+                  end if
+                  force(r%coordinate(e)) = force(r%coordinate(e)) - &
+                                           r%coefficient(e)*system%stiffness(i, c)*gap
+                  do f = r%first(row), r%first(row + 1) - 1
+                     stiffness(r%coordinate(e), r%coordinate(f)) = &
+                        stiffness(r%coordinate(e), r%coordinate(f)) + &
+                        r%coefficient(e)*r%coefficient(f)*system%stiffness(i, c)
+                  end do
+               end do
+            end do
+         end do
+      end associate
+   end subroutine close_pairs
+
+   !> Solve for the coordinates that are not held.
+   subroutine solve_free(stiffness, force, held, q)
+      complex(wp), intent(in) :: stiffness(:, :), force(:)
+      logical, intent(in) :: held(:)
+      complex(wp), intent(inout) :: q(:)
+      type(complex_lu_type) :: lu
+      complex(wp), allocatable :: rhs(:, :)
+      integer, allocatable :: free(:), fixed(:)
+      logical :: singular
+      integer :: j
+
+      free = pack([(j, j=1, size(held))], .not. held)
+      fixed = pack([(j, j=1, size(held))], held)
+      if (size(free) == 0) return
+      allocate (rhs(size(free), 1))
+      rhs(:, 1) = force(free) - matmul(stiffness(free, fixed), q(fixed))
+      call lu%reserve(size(free))
+      lu%matrix = stiffness(free, free)
+      call lu%factor(singular)
+      if (singular) return
+      call lu%solve(1, rhs)
+      q(free) = rhs(:, 1)
+   end subroutine solve_free
+
+   !> Mean normal force of every pair at a static position.
+   subroutine mean_tension(system, q, tension)
+      type(hbm_system), intent(in) :: system
+      complex(wp), intent(in) :: q(:)
+      real(wp), intent(out) :: tension(:)
+      integer :: i, row, first, last
+
+      tension = 0.0_wp
+      associate (r => system%joint%relative)
+         do i = 1, size(tension)
+            row = system%joint%row(3, i)
+            if (row == 0) cycle
+            first = r%first(row)
+            last = r%first(row + 1) - 1
+            if (system%rigid) then
+               tension(i) = system%load(r%coordinate(first), 1) - &
+                            real(dot_product(conjg(system%structure%stiffness(r%coordinate(first), :, 1)), q), wp)
+            else
+               tension(i) = system%stiffness(i, 3)* &
+                            (sum(r%coefficient(first:last)*real(q(r%coordinate(first:last)), wp)) + &
+                             system%gap(i) + system%depth(i))
+            end if
+         end do
+      end associate
+   end subroutine mean_tension
+
+   subroutine to_real_vector(system, q, x)
+      type(hbm_system), intent(in) :: system
+      complex(wp), intent(in) :: q(:, :)
+      real(wp), intent(out) :: x(size(q, 1), system%fourier%n_coefficients)
+
+      call to_real(system%fourier, size(q, 1), q, x)
+   end subroutine to_real_vector
+
+end module fw_guess

@@ -1,0 +1,374 @@
+!> Harmonic balance with alternating frequency/time:
+!>
+!>   R(q) = Z_r q + f_springs(q) + B^T lambda(y) - F_r,
+!>
+!> with the prediction of the contact forces  y = F_r - Z_r q - f_springs + eps (q + gap)  (dlft)
+!> or  y = k (q + gap)  (penalty). Unknowns are (coordinate, coefficient), coordinates innermost.
+module fw_hbm
+   use fw_kinds, only: wp
+   use fw_condensation, only: condensation_type
+   use fw_condensation, only: new_condensation
+   use fw_contact_data, only: contact_type
+   use fw_contact_data, only: spring_type
+   use fw_contact_data, only: law_penalty
+   use fw_error, only: error_type
+   use fw_forces, only: forces_type
+   use fw_forces, only: new_forces
+   use fw_fourier, only: fourier_type
+   use fw_joint, only: joint_type
+   use fw_lapack, only: zgemv
+   use fw_linalg, only: complex_lu_type
+   use fw_polynomial, only: springs_type
+   use fw_polynomial, only: new_springs
+   use fw_system, only: nonlinear_system
+   implicit none (type, external)
+   private
+
+   public :: hbm_system, new_hbm, to_complex, to_real
+
+   type, extends(nonlinear_system) :: hbm_system
+      type(joint_type) :: joint
+      type(condensation_type) :: structure
+      type(fourier_type) :: fourier
+      type(forces_type) :: contact
+      type(springs_type) :: springs
+      !> The contact law predicts from equilibrium (dlft) or from stiffness alone (penalty).
+      logical :: rigid = .true.
+      !> Prediction stiffness: eps, or the penalty stiffness (n_pairs, 3) [force/length].
+      real(wp), allocatable :: stiffness(:, :)
+      !> Gap and wear depth (n_pairs) [length]; load of pairs without a normal dof (n_pairs).
+      real(wp), allocatable :: gap(:), depth(:), normal_load(:)
+      !> Let pairs that stick leave the linear problem.
+      logical :: skip_stuck = .true.
+      !> F - Z q - f_springs, and the loads (n_coordinates, n_coefficients).
+      real(wp), allocatable :: balance(:, :), load(:, :)
+      !> Workspace (n_coordinates, n_retained).
+      complex(wp), allocatable :: complex_in(:, :), complex_out(:, :)
+      ! The remaining linear problem, see fw_hbm_linear.
+      integer :: n_active = 0
+      integer :: n_used = 0
+      integer, allocatable :: used(:), place(:)
+      complex(wp), allocatable :: active_stiffness(:, :, :)
+      real(wp), allocatable :: active_out(:, :), pair_in(:, :), pair_out(:, :)
+      type(complex_lu_type), allocatable :: preconditioner(:)
+   contains
+      procedure :: set_frequency
+      procedure :: residual
+      procedure :: linearize
+      procedure :: reduce
+      procedure :: expand
+      procedure :: apply
+      procedure :: build_preconditioner
+      procedure :: precondition
+      procedure :: assemble
+   end type hbm_system
+
+   ! The linear problem of a Newton step.
+   interface
+      module subroutine linearize(self, n_linear)
+         class(hbm_system), intent(inout) :: self
+         integer, intent(out) :: n_linear
+      end subroutine linearize
+
+      module subroutine reduce(self, r, rhs)
+         class(hbm_system), intent(inout) :: self
+         real(wp), intent(in), contiguous :: r(:)
+         real(wp), intent(out), contiguous :: rhs(:)
+      end subroutine reduce
+
+      module subroutine expand(self, r, solution, step)
+         class(hbm_system), intent(inout) :: self
+         real(wp), intent(in), contiguous :: r(:), solution(:)
+         real(wp), intent(out), contiguous :: step(:)
+      end subroutine expand
+
+      module subroutine apply(self, vector, product)
+         class(hbm_system), intent(inout) :: self
+         real(wp), intent(in), contiguous :: vector(:)
+         real(wp), intent(out), contiguous :: product(:)
+      end subroutine apply
+
+      module subroutine build_preconditioner(self)
+         class(hbm_system), intent(inout) :: self
+      end subroutine build_preconditioner
+
+      module subroutine precondition(self, vector)
+         class(hbm_system), intent(inout) :: self
+         real(wp), intent(inout), contiguous :: vector(:)
+      end subroutine precondition
+
+      module subroutine assemble(self, matrix)
+         class(hbm_system), intent(inout) :: self
+         real(wp), intent(inout), contiguous :: matrix(:, :)
+      end subroutine assemble
+   end interface
+
+contains
+
+   !> Build the system of a joint; call set_frequency before the first residual.
+   subroutine new_hbm(joint, structure, fourier, contact, springs, self)
+      type(joint_type), intent(in) :: joint
+      type(condensation_type), intent(in) :: structure
+      type(fourier_type), intent(in) :: fourier
+      type(contact_type), intent(in) :: contact
+      type(spring_type), intent(in) :: springs
+      type(hbm_system), intent(out) :: self
+      integer :: m, nc, nh
+
+      self%joint = joint
+      self%structure = structure
+      self%fourier = fourier
+      self%rigid = contact%law /= law_penalty
+      m = structure%n_coordinates
+      nc = fourier%n_coefficients
+      nh = fourier%n_retained
+      self%n = m*nc
+      if (contact%n_pairs > 0) then
+         self%contact = new_forces(contact%mu, joint%row > 0, fourier)
+         self%gap = contact%gap
+         self%normal_load = merge(contact%normal_load, 0.0_wp, contact%side_1(3, :) == 0 .and. &
+                                  contact%side_2(3, :) == 0)
+      else
+         self%contact = new_forces([real(wp) ::], joint%row > 0, fourier)
+         allocate (self%gap(0), self%normal_load(0))
+      end if
+      allocate (self%depth(contact%n_pairs), source=0.0_wp)
+      if (springs%n_springs > 0) then
+         self%springs = new_springs(springs%coefficient, springs%power, fourier)
+      else
+         self%springs = new_springs([real(wp) ::], [integer ::], fourier)
+      end if
+      call set_stiffness(self, contact)
+      allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
+      allocate (self%complex_in(m, nh), self%complex_out(m, nh), source=(0.0_wp, 0.0_wp))
+      allocate (self%active_out(m, nc), self%used(m), self%place(m))
+      allocate (self%pair_in(3*nc, contact%n_pairs), source=0.0_wp)
+      allocate (self%pair_out(3*nc, contact%n_pairs), source=0.0_wp)
+      allocate (self%preconditioner(nh))
+   end subroutine new_hbm
+
+   !> eps of the order of the local static stiffness, one for both tangential directions (the
+   !> friction law is isotropic) and one for the normal.
+   subroutine set_stiffness(self, contact)
+      type(hbm_system), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+      real(wp) :: stiffness(3)
+      integer :: i, c, n_tangential
+
+      allocate (self%stiffness(contact%n_pairs, 3), source=0.0_wp)
+      do i = 1, contact%n_pairs
+         if (self%rigid) then
+            stiffness = 0.0_wp
+            do c = 1, 3
+               if (self%joint%row(c, i) > 0) stiffness(c) = local_stiffness(self, coordinate_of(self, c, i))
+            end do
+            n_tangential = count(self%joint%row(1:2, i) > 0)
+            stiffness(1:2) = sum(stiffness(1:2))/real(max(1, n_tangential), wp)
+            self%stiffness(i, :) = contact%penalty_scale*stiffness
+         else
+            if (any(self%joint%row(1:2, i) > 0)) self%stiffness(i, 1:2) = contact%tangential_stiffness(i)
+            if (self%joint%row(3, i) > 0) self%stiffness(i, 3) = contact%normal_stiffness(i)
+         end if
+      end do
+   end subroutine set_stiffness
+
+   !> Static stiffness of a coordinate, or the dynamic one where nothing holds it statically.
+   real(wp) function local_stiffness(self, coordinate) result(stiffness)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: coordinate
+      real(wp) :: dynamic
+      real(wp), parameter :: unheld = 1.0e-6_wp
+      integer :: h
+
+      stiffness = abs(self%structure%static_stiffness(coordinate))
+      h = findloc(self%structure%harmonic, 1, dim=1)
+      dynamic = abs(self%structure%stiffness(coordinate, coordinate, h))
+      if (stiffness <= unheld*dynamic) stiffness = dynamic
+   end function local_stiffness
+
+   !> Coordinate of a component that is one.
+   pure integer function coordinate_of(self, component, pair) result(coordinate)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: component, pair
+
+      associate (r => self%joint%relative)
+         coordinate = r%coordinate(r%first(self%joint%row(component, pair)))
+      end associate
+   end function coordinate_of
+
+   !> Bring matrices and loads to a frequency.
+   subroutine set_frequency(self, omega, error)
+      class(hbm_system), intent(inout) :: self
+      real(wp), intent(in) :: omega
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%structure%update(omega, error)
+      if (allocated(error)) return
+      call to_real(self%fourier, self%structure%n_coordinates, self%structure%load, self%load)
+      self%reference = load_norm(self)
+   end subroutine set_frequency
+
+   !> The norm to which residuals are compared: that of the vibratory load. A large static load
+   !> must not hide the vibration, but its round-off must not forbid convergence either.
+   real(wp) function load_norm(self)
+      type(hbm_system), intent(in) :: self
+      real(wp), parameter :: static_share = 1.0e-5_wp
+      real(wp) :: static
+
+      static = 0.0_wp
+      load_norm = norm2(self%load)
+      if (self%fourier%has_constant()) then
+         load_norm = norm2(self%load(:, 2:))
+         static = norm2(self%load(:, 1))
+      end if
+      load_norm = max(load_norm, static_share*static)
+      if (load_norm <= 0.0_wp) load_norm = norm2(self%normal_load) + norm2(self%stiffness(:, 3)*self%gap)
+      if (load_norm <= 0.0_wp) load_norm = 1.0_wp
+   end function load_norm
+
+   !> R(x); see the module header.
+   subroutine residual(self, x, r)
+      class(hbm_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: r(:)
+      integer :: m, nc
+
+      m = self%structure%n_coordinates
+      nc = self%fourier%n_coefficients
+      call multiply_stiffness(self, m, nc, x)
+      if (self%springs%n_springs > 0) call add_springs(self, m, nc, x)
+      if (self%contact%n_pairs > 0) then
+         call predict(self, m, nc, x)
+         call self%contact%evaluate(self%fourier)
+      end if
+      call collect(self, m, nc, r)
+   end subroutine residual
+
+   !> balance = F - Z q.
+   subroutine multiply_stiffness(self, m, nc, q)
+      class(hbm_system), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
+      integer :: h
+      complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+
+      call to_complex(self%fourier, m, q, self%complex_in)
+      !$omp parallel do default(none) shared(self, m) private(h) if(m > 40)
+      do h = 1, self%fourier%n_retained
+         call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, &
+                    self%complex_in(1, h), 1, zero, self%complex_out(1, h), 1)
+      end do
+      !$omp end parallel do
+      call to_real(self%fourier, m, self%complex_out, self%balance)
+      self%balance = self%load - self%balance
+   end subroutine multiply_stiffness
+
+   !> balance = balance - f_springs.
+   subroutine add_springs(self, m, nc, q)
+      class(hbm_system), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
+      integer :: i, e
+
+      associate (r => self%joint%relative, s => self%springs)
+         s%elongation = 0.0_wp
+         do i = 1, s%n_springs
+            do e = r%first(self%joint%spring_row(i)), r%first(self%joint%spring_row(i) + 1) - 1
+               s%elongation(i, :) = s%elongation(i, :) + r%coefficient(e)*q(r%coordinate(e), :)
+            end do
+         end do
+         call s%evaluate(self%fourier)
+         do i = 1, s%n_springs
+            do e = r%first(self%joint%spring_row(i)), r%first(self%joint%spring_row(i) + 1) - 1
+               self%balance(r%coordinate(e), :) = self%balance(r%coordinate(e), :) - &
+                                                  r%coefficient(e)*s%force(i, :)
+            end do
+         end do
+      end associate
+   end subroutine add_springs
+
+   !> Predicted contact forces.
+   subroutine predict(self, m, nc, q)
+      class(hbm_system), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
+      integer :: i, c, e, row, j
+
+      associate (r => self%joint%relative, y => self%contact%prediction)
+         do j = 1, nc
+            do c = 1, 3
+               do i = 1, self%contact%n_pairs
+                  row = self%joint%row(c, i)
+                  y(i, c, j) = 0.0_wp
+                  if (row == 0) cycle
+                  do e = r%first(row), r%first(row + 1) - 1
+                     y(i, c, j) = y(i, c, j) + &
+                                  self%stiffness(i, c)*r%coefficient(e)*q(r%coordinate(e), j)
+                  end do
+                  if (self%rigid) y(i, c, j) = y(i, c, j) + self%balance(r%coordinate(r%first(row)), j)
+               end do
+            end do
+         end do
+         self%contact%offset = merge(self%stiffness(:, 3)*(self%gap + self%depth), &
+                                     -self%normal_load, self%joint%row(3, :) > 0)
+      end associate
+   end subroutine predict
+
+   !> r = -balance + B^T lambda.
+   subroutine collect(self, m, nc, r)
+      class(hbm_system), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(out) :: r(m, nc)
+      integer :: i, c, e, row, j
+
+      r = -self%balance
+      associate (rel => self%joint%relative)
+         do j = 1, nc
+            do c = 1, 3
+               do i = 1, self%contact%n_pairs
+                  row = self%joint%row(c, i)
+                  if (row == 0) cycle
+                  do e = rel%first(row), rel%first(row + 1) - 1
+                     r(rel%coordinate(e), j) = r(rel%coordinate(e), j) + &
+                                               rel%coefficient(e)*self%contact%force(i, c, j)
+                  end do
+               end do
+            end do
+         end do
+      end associate
+   end subroutine collect
+
+   !> U_n = uc_n - i us_n of each retained harmonic (n_rows, n_retained).
+   pure subroutine to_complex(fourier, n_rows, coefficients, harmonics)
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: n_rows
+      real(wp), intent(in) :: coefficients(n_rows, *)
+      complex(wp), intent(inout) :: harmonics(n_rows, *)
+      integer :: h, k
+
+      do h = 1, fourier%n_retained
+         k = fourier%column(h)
+         if (fourier%harmonic(h) == 0) then
+            harmonics(:, h) = cmplx(coefficients(:, k), kind=wp)
+         else
+            harmonics(:, h) = cmplx(coefficients(:, k), -coefficients(:, k + 1), wp)
+         end if
+      end do
+   end subroutine to_complex
+
+   !> The inverse of to_complex.
+   pure subroutine to_real(fourier, n_rows, harmonics, coefficients)
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: n_rows
+      complex(wp), intent(in) :: harmonics(n_rows, *)
+      real(wp), intent(inout) :: coefficients(n_rows, *)
+      integer :: h, k
+
+      do h = 1, fourier%n_retained
+         k = fourier%column(h)
+         coefficients(:, k) = real(harmonics(:, h), wp)
+         if (fourier%harmonic(h) > 0) coefficients(:, k + 1) = -aimag(harmonics(:, h))
+      end do
+   end subroutine to_real
+
+end module fw_hbm

@@ -1,0 +1,450 @@
+!> The linear problem of a Newton step of harmonic balance. With A the derivative of the smooth
+!> part (Z_r and springs) and G that of the contact forces by their prediction, per pair,
+!>
+!>   J v = A v + B^T G (eps B v - B A v)  (dlft),   J v = A v + B^T G k B v  (penalty).
+!>
+!> Rows of components that stick (or stay closed) through the period read eps v = -r: their
+!> coordinates are solved at once. The others are `active`; behind them in `used` stand the
+!> coordinates whose rows of A the active pairs need still (normal forces of slipping pairs).
+submodule(fw_hbm) fw_hbm_linear
+   use fw_forces, only: pair_mixed
+   use fw_forces, only: pair_open
+   use fw_forces, only: pair_stuck
+   use fw_lapack, only: dgemv
+   implicit none (type, external)
+
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+   !> Coordinates above which the harmonics of a product are worth a thread each.
+   integer, parameter :: threads_pay_from = 40
+
+contains
+
+   module procedure linearize
+      if (self%contact%n_pairs > 0) call self%contact%linearize(self%fourier)
+      if (self%springs%n_springs > 0) call self%springs%linearize(self%fourier)
+      call choose_active(self)
+      call gather_stiffness(self)
+      n_linear = self%n_active*self%fourier%n_coefficients
+   end procedure linearize
+
+   !> Sort the coordinates into active, used and solved at once.
+   subroutine choose_active(self)
+      type(hbm_system), intent(inout) :: self
+      logical :: pinned(self%structure%n_coordinates), wanted(self%structure%n_coordinates)
+      integer :: i, c, j, k
+
+      pinned = .false.
+      wanted = .false.
+      if (self%rigid .and. self%skip_stuck) then
+         do i = 1, self%contact%n_pairs
+            do c = 1, 3
+               if (self%joint%row(c, i) == 0 .or. self%contact%state(i) == pair_open) cycle
+               j = coordinate_of(self, c, i)
+               pinned(j) = self%contact%state(i) == pair_stuck .or. &
+                           (c == 3 .and. self%contact%always_closed(i))
+               wanted(j) = self%contact%state(i) == pair_mixed
+            end do
+         end do
+      end if
+      self%place = 0
+      k = 0
+      do j = 1, self%structure%n_coordinates
+         if (pinned(j)) cycle
+         k = k + 1
+         self%used(k) = j
+         self%place(j) = k
+      end do
+      self%n_active = k
+      do j = 1, self%structure%n_coordinates
+         if (.not. (pinned(j) .and. wanted(j))) cycle
+         k = k + 1
+         self%used(k) = j
+         self%place(j) = k
+      end do
+      self%n_used = k
+   end subroutine choose_active
+
+   !> Copy the rows and columns in use, so that products run over contiguous memory.
+   subroutine gather_stiffness(self)
+      type(hbm_system), intent(inout) :: self
+      integer :: h, j, m
+
+      m = self%structure%n_coordinates
+      if (.not. allocated(self%active_stiffness)) then
+         allocate (self%active_stiffness(m, m, self%fourier%n_retained))
+      end if
+      !$omp parallel do default(none) shared(self) private(h, j) if(m > threads_pay_from)
+      do h = 1, self%fourier%n_retained
+         do j = 1, self%n_active
+            self%active_stiffness(:self%n_used, j, h) = &
+               self%structure%stiffness(self%used(:self%n_used), self%used(j), h)
+         end do
+      end do
+      !$omp end parallel do
+   end subroutine gather_stiffness
+
+   module procedure reduce
+      integer :: m, nc
+
+      m = self%structure%n_coordinates
+      nc = self%fourier%n_coefficients
+      call pinned_step(self, m, nc, r, self%balance)
+      call reduce_shaped(self, m, nc, r, rhs)
+   end procedure reduce
+
+   !> Steps of the coordinates that are solved at once; zero for the active ones.
+   subroutine pinned_step(self, m, nc, r, step)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: r(m, nc)
+      real(wp), intent(inout) :: step(m, nc)
+      integer :: i, c, j, place
+
+      step = 0.0_wp
+      if (self%n_active == m) return
+      do i = 1, self%contact%n_pairs
+         do c = 1, 3
+            if (self%joint%row(c, i) == 0) cycle
+            j = coordinate_of(self, c, i)
+            place = self%place(j)
+            if (place > 0 .and. place <= self%n_active) cycle
+            step(j, :) = -r(j, :)/self%stiffness(i, c)
+         end do
+      end do
+   end subroutine pinned_step
+
+   !> rhs = -r of the active rows, less the product of the pinned steps (in self%balance).
+   subroutine reduce_shaped(self, m, nc, r, rhs)
+      type(hbm_system), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: r(m, nc)
+      real(wp), intent(out) :: rhs(self%n_active, nc)
+      integer :: h, k
+
+      do k = 1, nc
+         rhs(:, k) = -r(self%used(:self%n_active), k)
+      end do
+      if (self%n_active == m .or. self%n_active == 0) return
+      call to_complex(self%fourier, m, self%balance, self%complex_in)
+      do h = 1, self%fourier%n_retained
+         call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, self%complex_in(1, h), 1, &
+                    zero, self%complex_out(1, h), 1)
+         self%complex_out(:self%n_used, h) = self%complex_out(self%used(:self%n_used), h)
+      end do
+      call outputs_to_real(self)
+      call contact_product(self, m, self%balance, spread_out=.true.)
+      rhs = rhs - self%active_out(:self%n_active, :)
+   end subroutine reduce_shaped
+
+   module procedure expand
+      integer :: m, nc
+
+      m = self%structure%n_coordinates
+      nc = self%fourier%n_coefficients
+      call pinned_step(self, m, nc, r, step)
+      call scatter(self, m, nc, solution, step)
+   end procedure expand
+
+   subroutine scatter(self, m, nc, solution, step)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: solution(self%n_active, nc)
+      real(wp), intent(inout) :: step(m, nc)
+
+      step(self%used(:self%n_active), :) = solution
+   end subroutine scatter
+
+   module procedure apply
+      integer :: h, k, na, nu, ld
+
+      na = self%n_active
+      nu = self%n_used
+      ld = self%structure%n_coordinates
+      call active_to_complex(self, na, vector)
+      !$omp parallel do default(none) shared(self, na, nu, ld) private(h) if(na > threads_pay_from)
+      do h = 1, self%fourier%n_retained
+         call zgemv('N', nu, na, one, self%active_stiffness(1, 1, h), ld, &
+                    self%complex_in(1, h), 1, zero, self%complex_out(1, h), 1)
+      end do
+      !$omp end parallel do
+      call outputs_to_real(self)
+      if (self%springs%n_springs > 0) call spring_product(self, na, vector)
+      if (self%contact%n_pairs > 0) call contact_product(self, na, vector, spread_out=.false.)
+      do k = 1, self%fourier%n_coefficients
+         product((k - 1)*na + 1:k*na) = self%active_out(:na, k)
+      end do
+   end procedure apply
+
+   subroutine active_to_complex(self, na, vector)
+      type(hbm_system), intent(inout) :: self
+      integer, intent(in) :: na
+      real(wp), intent(in) :: vector(na, *)
+      integer :: h, k
+
+      do h = 1, self%fourier%n_retained
+         k = self%fourier%column(h)
+         if (self%fourier%harmonic(h) == 0) then
+            self%complex_in(:na, h) = cmplx(vector(:, k), kind=wp)
+         else
+            self%complex_in(:na, h) = cmplx(vector(:, k), -vector(:, k + 1), wp)
+         end if
+      end do
+   end subroutine active_to_complex
+
+   !> active_out = real form of complex_out, rows in use.
+   subroutine outputs_to_real(self)
+      type(hbm_system), intent(inout) :: self
+      integer :: h, k, nu
+
+      nu = self%n_used
+      do h = 1, self%fourier%n_retained
+         k = self%fourier%column(h)
+         self%active_out(:nu, k) = real(self%complex_out(:nu, h), wp)
+         if (self%fourier%harmonic(h) > 0) self%active_out(:nu, k + 1) = -aimag(self%complex_out(:nu, h))
+      end do
+   end subroutine outputs_to_real
+
+   !> active_out = active_out + derivative of the springs times vector.
+   subroutine spring_product(self, na, vector)
+      type(hbm_system), intent(inout) :: self
+      integer, intent(in) :: na
+      real(wp), intent(in) :: vector(na, *)
+      integer :: i, e, k, nc, place
+
+      nc = self%fourier%n_coefficients
+      associate (r => self%joint%relative, s => self%springs, row => self%joint%spring_row)
+         do i = 1, s%n_springs
+            ! The spring's own workspaces are free between evaluations.
+            s%elongation(i, :) = 0.0_wp
+            do e = r%first(row(i)), r%first(row(i) + 1) - 1
+               place = self%place(r%coordinate(e))
+               if (place == 0 .or. place > na) cycle
+               s%elongation(i, :) = s%elongation(i, :) + r%coefficient(e)*vector(place, :nc)
+            end do
+            do k = 1, nc
+               s%force(i, k) = dot_product(s%jacobian(:, k, i), s%elongation(i, :))
+            end do
+            do e = r%first(row(i)), r%first(row(i) + 1) - 1
+               place = self%place(r%coordinate(e))
+               if (place == 0) cycle
+               self%active_out(place, :) = self%active_out(place, :) + r%coefficient(e)*s%force(i, :)
+            end do
+         end do
+      end associate
+   end subroutine spring_product
+
+   !> active_out = active_out + B^T G (eps B v - B A v), A v being in active_out.
+   subroutine contact_product(self, n_rows, vector, spread_out)
+      type(hbm_system), intent(inout) :: self
+      integer, intent(in) :: n_rows
+      real(wp), intent(in) :: vector(n_rows, *)
+      !> The vector holds all coordinates, not just the active ones.
+      logical, intent(in) :: spread_out
+      integer :: i, n
+
+      n = 3*self%fourier%n_coefficients
+      !$omp parallel do default(none) shared(self, n_rows, vector, spread_out, n) private(i) &
+      !$omp schedule(static) if(self%contact%n_pairs > 8)
+      do i = 1, self%contact%n_pairs
+         if (self%contact%state(i) == pair_open) cycle
+         call gather_inputs(self, i, n_rows, vector, spread_out, self%pair_in(:, i))
+         if (self%contact%state(i) == pair_mixed) then
+            call dgemv('T', n, n, 1.0_wp, self%contact%jacobian(1, 1, i), n, self%pair_in(1, i), 1, &
+                       0.0_wp, self%pair_out(1, i), 1)
+         else
+            self%pair_out(:, i) = self%pair_in(:, i)
+         end if
+      end do
+      !$omp end parallel do
+      call add_outputs(self)
+   end subroutine contact_product
+
+   !> Derivative of the prediction of a pair: eps B v - B A v, or k B v.
+   subroutine gather_inputs(self, pair, n_rows, vector, spread_out, inputs)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: pair, n_rows
+      real(wp), intent(in) :: vector(n_rows, *)
+      logical, intent(in) :: spread_out
+      real(wp), intent(out) :: inputs(self%fourier%n_coefficients, 3)
+      integer :: c, e, row, nc, place
+
+      nc = self%fourier%n_coefficients
+      inputs = 0.0_wp
+      associate (r => self%joint%relative)
+         do c = 1, 3
+            row = self%joint%row(c, pair)
+            if (row == 0) cycle
+            do e = r%first(row), r%first(row + 1) - 1
+               place = merge(r%coordinate(e), self%place(r%coordinate(e)), spread_out)
+               if (place == 0 .or. place > n_rows) cycle
+               inputs(:, c) = inputs(:, c) + self%stiffness(pair, c)*r%coefficient(e)*vector(place, :nc)
+            end do
+            if (.not. self%rigid) cycle
+            place = self%place(r%coordinate(r%first(row)))
+            if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
+         end do
+      end associate
+   end subroutine gather_inputs
+
+   !> Pairs may share coordinates (penalty), so that this stays in one thread.
+   subroutine add_outputs(self)
+      type(hbm_system), intent(inout) :: self
+      integer :: i, c, e, row, nc, place
+
+      nc = self%fourier%n_coefficients
+      associate (r => self%joint%relative)
+         do i = 1, self%contact%n_pairs
+            if (self%contact%state(i) == pair_open) cycle
+            do c = 1, 3
+               row = self%joint%row(c, i)
+               if (row == 0) cycle
+               do e = r%first(row), r%first(row + 1) - 1
+                  place = self%place(r%coordinate(e))
+                  if (place == 0 .or. place > self%n_active) cycle
+                  self%active_out(place, :) = self%active_out(place, :) + r%coefficient(e)* &
+                                              self%pair_out((c - 1)*nc + 1:c*nc, i)
+               end do
+            end do
+         end do
+      end associate
+   end subroutine add_outputs
+
+   !> Per harmonic, the matrix with each G replaced by its mean over cosine and sine.
+   module procedure build_preconditioner
+      integer :: h
+      logical :: singular
+
+      !$omp parallel do default(none) shared(self) private(h, singular) schedule(dynamic)
+      do h = 1, self%fourier%n_retained
+         call self%preconditioner(h)%reserve(self%n_active)
+         associate (m => self%preconditioner(h)%matrix, na => self%n_active)
+            m(:na, :na) = self%active_stiffness(:na, :na, h)
+            call add_mean_springs(self, h, m)
+            call add_mean_contact(self, h, m)
+         end associate
+         call self%preconditioner(h)%factor(singular)
+      end do
+      !$omp end parallel do
+   end procedure build_preconditioner
+
+   !> Mean over cosine and sine of a block of a transposed derivative, as a complex factor.
+   pure complex(wp) function mean_block(block, harmonic, input, output) result(mean)
+      real(wp), intent(in) :: block(:, :)
+      integer, intent(in) :: harmonic
+      !> Columns of the cosine coefficient in the input and the output.
+      integer, intent(in) :: input, output
+
+      if (harmonic == 0) then
+         mean = cmplx(block(input, output), kind=wp)
+      else
+         mean = 0.5_wp*cmplx(block(input, output) + block(input + 1, output + 1), &
+                             block(input + 1, output) - block(input, output + 1), wp)
+      end if
+   end function mean_block
+
+   subroutine add_mean_springs(self, h, m)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h
+      complex(wp), intent(inout) :: m(:, :)
+      integer :: i, e, f, k
+      complex(wp) :: mean
+
+      k = self%fourier%column(h)
+      associate (r => self%joint%relative, row => self%joint%spring_row, place => self%place)
+         do i = 1, self%springs%n_springs
+            mean = mean_block(self%springs%jacobian(:, :, i), self%fourier%harmonic(h), k, k)
+            do e = r%first(row(i)), r%first(row(i) + 1) - 1
+               do f = r%first(row(i)), r%first(row(i) + 1) - 1
+                  if (max(place(r%coordinate(e)), place(r%coordinate(f))) > self%n_active) cycle
+                  if (min(place(r%coordinate(e)), place(r%coordinate(f))) == 0) cycle
+                  m(place(r%coordinate(e)), place(r%coordinate(f))) = &
+                     m(place(r%coordinate(e)), place(r%coordinate(f))) + &
+                     r%coefficient(e)*r%coefficient(f)*mean
+               end do
+            end do
+         end do
+      end associate
+   end subroutine add_mean_springs
+
+   subroutine add_mean_contact(self, h, m)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h
+      complex(wp), intent(inout) :: m(:, :)
+      integer :: i, c_out, c_in, k, nc
+      complex(wp) :: mean
+
+      k = self%fourier%column(h)
+      nc = self%fourier%n_coefficients
+      do i = 1, self%contact%n_pairs
+         if (self%contact%state(i) == pair_open) cycle
+         do c_out = 1, 3
+            if (self%joint%row(c_out, i) == 0) cycle
+            do c_in = 1, 3
+               if (self%joint%row(c_in, i) == 0) cycle
+               if (self%contact%state(i) == pair_mixed) then
+                  mean = mean_block(self%contact%jacobian(:, :, i), self%fourier%harmonic(h), &
+                                    (c_in - 1)*nc + k, (c_out - 1)*nc + k)
+               else
+                  mean = merge(one, zero, c_in == c_out)
+               end if
+               call add_rows(self, h, i, c_out, c_in, mean, m)
+            end do
+         end do
+      end do
+   end subroutine add_mean_contact
+
+   !> m(out, :) = m(out, :) + mean (eps e_in - A(in, :)), or + mean k e_in.
+   subroutine add_rows(self, h, pair, c_out, c_in, mean, m)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h, pair, c_out, c_in
+      complex(wp), intent(in) :: mean
+      complex(wp), intent(inout) :: m(:, :)
+      integer :: e, f, p_out, p_in
+
+      associate (r => self%joint%relative, row => self%joint%row, na => self%n_active)
+         do e = r%first(row(c_out, pair)), r%first(row(c_out, pair) + 1) - 1
+            p_out = self%place(r%coordinate(e))
+            if (p_out == 0 .or. p_out > na) cycle
+            do f = r%first(row(c_in, pair)), r%first(row(c_in, pair) + 1) - 1
+               p_in = self%place(r%coordinate(f))
+               if (p_in == 0) cycle
+               if (self%rigid) m(p_out, :na) = m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h)
+               if (p_in > na) cycle
+               m(p_out, p_in) = m(p_out, p_in) + r%coefficient(e)*r%coefficient(f)* &
+                                self%stiffness(pair, c_in)*mean
+            end do
+         end do
+      end associate
+   end subroutine add_rows
+
+   module procedure precondition
+      integer :: h, k, na
+
+      na = self%n_active
+      call active_to_complex(self, na, vector)
+      !$omp parallel do default(none) shared(self) private(h) if(na > threads_pay_from)
+      do h = 1, self%fourier%n_retained
+         call self%preconditioner(h)%solve(1, self%complex_in(:, h:h))
+      end do
+      !$omp end parallel do
+      do h = 1, self%fourier%n_retained
+         k = self%fourier%column(h)
+         vector((k - 1)*na + 1:k*na) = real(self%complex_in(:na, h), wp)
+         if (self%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) = -aimag(self%complex_in(:na, h))
+      end do
+   end procedure precondition
+
+   !> Column by column: few unknowns, or springs, or a check of the product.
+   module procedure assemble
+      real(wp) :: unit(size(matrix, 2))
+      integer :: j, n
+
+      n = self%n_active*self%fourier%n_coefficients
+      do j = 1, n
+         unit(:n) = 0.0_wp
+         unit(j) = 1.0_wp
+         call self%apply(unit(:n), matrix(:n, j))
+      end do
+   end procedure assemble
+
+end submodule fw_hbm_linear

@@ -1,0 +1,155 @@
+!> The nonlinear coordinates of a case: which components of which pairs and which springs can move
+!> at all, and the relative coordinates that carry them.
+module fw_joint
+   use fw_kinds, only: wp
+   use fw_contact_data, only: contact_type
+   use fw_contact_data, only: spring_type
+   use fw_contact_data, only: law_penalty
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_model, only: model_type
+   use fw_relative, only: relative_type
+   use fw_relative, only: new_relative
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: joint_type, new_joint
+
+   type :: joint_type
+      type(relative_type) :: relative
+      !> Row of each component of each pair, 0 where it is absent or can never move (3, n_pairs).
+      integer, allocatable :: row(:, :)
+      !> Row of each spring (n_springs).
+      integer, allocatable :: spring_row(:)
+      !> Components given but dropped, because nothing ever moves them.
+      integer :: n_idle = 0
+      !> Whether the solution has odd harmonics only (u(t + T/2) = -u(t)).
+      logical :: half_wave_symmetric = .false.
+   end type joint_type
+
+contains
+
+   subroutine new_joint(model, contact, springs, skip_idle, self, error)
+      type(model_type), intent(in) :: model
+      type(contact_type), intent(in) :: contact
+      type(spring_type), intent(in) :: springs
+      !> Leave out components that nothing moves.
+      logical, intent(in) :: skip_idle
+      type(joint_type), intent(out) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: side_1(:), side_2(:)
+      logical, allocatable :: moving(:)
+      integer :: i, c, n_rows
+
+      moving = moving_dofs(model, contact, springs)
+      if (.not. skip_idle) moving(1:) = .true.
+      allocate (self%row(3, contact%n_pairs), source=0)
+      allocate (side_1(0), side_2(0))
+      n_rows = 0
+      do i = 1, contact%n_pairs
+         do c = 1, 3
+            if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
+            if (.not. (moving(abs(contact%side_1(c, i))) .or. &
+                       moving(abs(contact%side_2(c, i))))) then
+               self%n_idle = self%n_idle + 1
+               cycle
+            end if
+            n_rows = n_rows + 1
+            self%row(c, i) = n_rows
+            side_1 = [side_1, contact%side_1(c, i)]
+            side_2 = [side_2, contact%side_2(c, i)]
+         end do
+      end do
+      self%spring_row = [(n_rows + i, i=1, springs%n_springs)]
+      if (springs%n_springs > 0) then
+         side_1 = [side_1, springs%side_1]
+         side_2 = [side_2, springs%side_2]
+      end if
+      call new_relative(model%n_dof, side_1, side_2, self%relative)
+      self%half_wave_symmetric = symmetric(model, contact, springs, self)
+      call check_independent(contact, self, error)
+   end subroutine new_joint
+
+   !> Dofs that a load can reach through the matrices, the pairs and the springs (0:n_dof; entry
+   !> 0, the ground, never moves). What no load reaches stays at rest exactly.
+   pure function moving_dofs(model, contact, springs) result(moving)
+      type(model_type), intent(in) :: model
+      type(contact_type), intent(in) :: contact
+      type(spring_type), intent(in) :: springs
+      logical, allocatable :: moving(:)
+      integer :: i, c, n_moving
+
+      allocate (moving(0:model%n_dof), source=.false.)
+      moving(1:) = abs(model%load_static) + abs(model%load_cosine) + abs(model%load_sine) > 0.0_wp
+      do i = 1, contact%n_pairs
+         ! An interference pushes both sides.
+         if (contact%gap(i) < 0.0_wp) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) = .true.
+      end do
+      moving(0) = .false.
+      do
+         n_moving = count(moving)
+         do i = 1, model%n_dof
+            if (.not. moving(i)) cycle
+            moving(1:) = moving(1:) .or. abs(model%mass(:, i)) > 0.0_wp .or. &
+                         abs(model%stiffness(:, i)) > 0.0_wp .or. abs(model%damping(:, i)) > 0.0_wp
+         end do
+         do i = 1, contact%n_pairs
+            do c = 1, 3
+               call couple(contact%side_1(c, i), contact%side_2(c, i))
+            end do
+         end do
+         do i = 1, springs%n_springs
+            call couple(springs%side_1(i), springs%side_2(i))
+         end do
+         if (count(moving) == n_moving) exit
+      end do
+
+   contains
+
+      pure subroutine couple(side_1, side_2)
+         integer, intent(in) :: side_1, side_2
+
+         if (moving(abs(side_1)) .or. moving(abs(side_2))) moving(abs([side_1, side_2])) = .true.
+         moving(0) = .false.
+      end subroutine couple
+
+   end function moving_dofs
+
+   !> Half-wave symmetry is exact where nothing static acts, normal loads are constant and
+   !> springs are odd.
+   pure logical function symmetric(model, contact, springs, joint)
+      type(model_type), intent(in) :: model
+      type(contact_type), intent(in) :: contact
+      type(spring_type), intent(in) :: springs
+      type(joint_type), intent(in) :: joint
+
+      symmetric = all(abs(model%load_static) <= 0.0_wp)
+      if (contact%n_pairs > 0) symmetric = symmetric .and. all(joint%row(3, :) == 0)
+      if (springs%n_springs > 0) symmetric = symmetric .and. all(modulo(springs%power, 2) == 1)
+   end function symmetric
+
+   !> Rigid contact forces are determined only where the pairs move independently of each other.
+   subroutine check_independent(contact, self, error)
+      type(contact_type), intent(in) :: contact
+      type(joint_type), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: component(*) = [character(2) :: 't1', 't2', 'n']
+      integer :: i, c
+
+      if (contact%law == law_penalty) return
+      do i = 1, contact%n_pairs
+         do c = 1, 3
+            if (self%row(c, i) == 0) cycle
+            if (self%relative%independent(self%row(c, i))) cycle
+            call fatal_error(error, '&contact pair '//to_text(i)//', '//trim(component(c))// &
+                             ': its relative displacement follows from that of earlier pairs, so '// &
+                             'rigid contact forces are not determined; remove the pair or use '// &
+                             'law = ''penalty''', status_input)
+            return
+         end do
+      end do
+   end subroutine check_independent
+
+end module fw_joint

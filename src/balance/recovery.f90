@@ -1,0 +1,199 @@
+!> From a solution of the balance to what is reported of it: observed quantities, amplitudes,
+!> contact forces, states and friction energy.
+module fw_recovery
+   use fw_kinds, only: wp
+   use fw_kinds, only: pi
+   use fw_fourier, only: fourier_type
+   use fw_fourier, only: new_fourier
+   use fw_hbm, only: hbm_system
+   use fw_hbm, only: to_complex
+   use fw_point, only: point_type
+   implicit none (type, external)
+   private
+
+   public :: recover_point, recover_histories, largest_magnitude
+
+contains
+
+   !> Fill a point from the solution x; with_contact adds forces, states and dissipation.
+   subroutine recover_point(system, x, n_harmonics, with_contact, point)
+      type(hbm_system), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      !> H of the result, whatever harmonics were computed.
+      integer, intent(in) :: n_harmonics
+      logical, intent(in) :: with_contact
+      type(point_type), intent(inout) :: point
+      complex(wp), allocatable :: q(:, :), observed(:, :)
+      integer :: m, h, n, n_observed, i
+
+      m = system%structure%n_coordinates
+      n_observed = size(system%structure%basis%observe_q, 1)
+      allocate (q(m, system%fourier%n_retained), observed(n_observed, system%fourier%n_retained))
+      call to_complex(system%fourier, m, x, q)
+      call system%structure%recover(q, observed)
+      allocate (point%coefficients(2*n_harmonics + 1, n_observed), source=0.0_wp)
+      do h = 1, system%fourier%n_retained
+         n = system%fourier%harmonic(h)
+         if (n == 0) then
+            point%coefficients(1, :) = real(observed(:, h), wp)
+         else
+            point%coefficients(2*n, :) = real(observed(:, h), wp)
+            point%coefficients(2*n + 1, :) = -aimag(observed(:, h))
+         end if
+      end do
+      point%amplitude = [(largest_magnitude(point%coefficients(:, i)), i=1, n_observed)]
+      if (with_contact .and. system%contact%n_pairs > 0) call recover_contact(system, x, n_harmonics, point)
+   end subroutine recover_point
+
+   !> Forces, shares of stick, slip and open, and friction energy per cycle.
+   subroutine recover_contact(system, x, n_harmonics, point)
+      type(hbm_system), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      integer, intent(in) :: n_harmonics
+      type(point_type), intent(inout) :: point
+      type(fourier_type) :: all_harmonics
+      real(wp), allocatable :: force(:, :, :), r(:)
+      integer :: n_pairs, i, c
+
+      allocate (r(size(x)))
+      ! The contact forces of this very point, not of the last trial of the solver.
+      call system%residual(x, r)
+      n_pairs = system%contact%n_pairs
+      all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
+      allocate (force(n_pairs, 3, all_harmonics%n_coefficients))
+      call all_harmonics%to_coefficients(3*n_pairs, system%contact%force_time, force)
+      allocate (point%force(3, n_pairs, all_harmonics%n_coefficients))
+      do c = 1, 3
+         do i = 1, n_pairs
+            point%force(c, i, :) = force(i, c, :)
+         end do
+      end do
+      allocate (point%fraction(3, n_pairs))
+      call system%contact%fractions(point%fraction)
+      call dissipated_energy(system, size(system%balance, 1), x, point)
+   end subroutine recover_contact
+
+   !> Work of the contact forces over a cycle, sum_n pi n (lambda_c u_s - lambda_s u_c).
+   subroutine dissipated_energy(system, m, q, point)
+      type(hbm_system), intent(in) :: system
+      integer, intent(in) :: m
+      real(wp), intent(in) :: q(m, *)
+      type(point_type), intent(inout) :: point
+      real(wp) :: u_c, u_s
+      integer :: i, c, e, h, k, row
+
+      allocate (point%dissipation(system%contact%n_pairs), source=0.0_wp)
+      associate (r => system%joint%relative, f => system%contact%force)
+         do i = 1, system%contact%n_pairs
+            do c = 1, 3
+               row = system%joint%row(c, i)
+               if (row == 0) cycle
+               do h = 1, system%fourier%n_retained
+                  if (system%fourier%harmonic(h) == 0) cycle
+                  k = system%fourier%column(h)
+                  u_c = 0.0_wp
+                  u_s = 0.0_wp
+                  do e = r%first(row), r%first(row + 1) - 1
+                     u_c = u_c + r%coefficient(e)*q(r%coordinate(e), k)
+                     u_s = u_s + r%coefficient(e)*q(r%coordinate(e), k + 1)
+                  end do
+                  point%dissipation(i) = point%dissipation(i) + pi*system%fourier%harmonic(h)* &
+                                         (f(i, c, k)*u_s - f(i, c, k + 1)*u_c)
+               end do
+            end do
+         end do
+      end associate
+   end subroutine dissipated_energy
+
+   !> One period of the observed quantities and of the contact forces and displacements.
+   subroutine recover_histories(system, m, q, n_harmonics, point)
+      type(hbm_system), intent(inout) :: system
+      integer, intent(in) :: m
+      real(wp), intent(in) :: q(m, *)
+      integer, intent(in) :: n_harmonics
+      type(point_type), intent(inout) :: point
+      type(fourier_type) :: all_harmonics
+      real(wp), allocatable :: slip(:, :), slip_time(:, :)
+      integer :: c, e, i, k, n_pairs, n_time, row
+
+      n_pairs = system%contact%n_pairs
+      n_time = system%fourier%n_time
+      all_harmonics = new_fourier(n_harmonics, n_time)
+      point%history = matmul(transpose(all_harmonics%synthesis), point%coefficients)
+      if (n_pairs == 0) return
+      allocate (slip(3*n_pairs, system%fourier%n_coefficients), source=0.0_wp)
+      allocate (slip_time(3*n_pairs, n_time))
+      associate (r => system%joint%relative)
+         do i = 1, n_pairs
+            do c = 1, 3
+               row = system%joint%row(c, i)
+               if (row == 0) cycle
+               do e = r%first(row), r%first(row + 1) - 1
+                  slip(3*(i - 1) + c, :) = slip(3*(i - 1) + c, :) + &
+                     r%coefficient(e)*q(r%coordinate(e), :system%fourier%n_coefficients)
+               end do
+            end do
+         end do
+      end associate
+      slip_time = matmul(slip, system%fourier%synthesis)
+      point%slip_history = reshape(slip_time, [3, n_pairs, n_time])
+      allocate (point%force_history(3, n_pairs, n_time))
+      do k = 1, n_time
+         point%force_history(:, :, k) = transpose(system%contact%force_time(:, :, k))
+      end do
+   end subroutine recover_histories
+
+   !> Largest magnitude over the period of u(tau) given by (0, c1, s1, ...): a grid fine enough to
+   !> bracket every extremum, then Newton's method on the slope.
+   pure real(wp) function largest_magnitude(coefficients) result(largest)
+      real(wp), intent(in) :: coefficients(:)
+      integer, parameter :: points_per_wave = 16, newton_steps = 4
+      real(wp) :: value, slope, curvature, tau, spacing, step
+      integer :: k, i, n_grid, n_harmonics
+      real(wp), allocatable :: grid(:)
+
+      n_harmonics = (size(coefficients) - 1)/2
+      n_grid = points_per_wave*max(1, n_harmonics)
+      spacing = 2.0_wp*pi/real(n_grid, wp)
+      allocate (grid(0:n_grid + 1))
+      do k = 1, n_grid
+         call evaluate(coefficients, k*spacing, grid(k), slope, curvature)
+      end do
+      grid(0) = grid(n_grid)
+      grid(n_grid + 1) = grid(1)
+      largest = maxval(abs(grid))
+      do k = 1, n_grid
+         if (abs(grid(k)) < max(abs(grid(k - 1)), abs(grid(k + 1)))) cycle
+         ! A peak between grid points exceeds the grid by at most (H spacing)^2/8 of the largest.
+         if (abs(grid(k)) < 0.97_wp*maxval(abs(grid))) cycle
+         tau = k*spacing
+         do i = 1, newton_steps
+            call evaluate(coefficients, tau, value, slope, curvature)
+            if (abs(curvature) <= 0.0_wp) exit
+            step = -slope/curvature
+            tau = tau + max(-spacing, min(spacing, step))
+         end do
+         call evaluate(coefficients, tau, value, slope, curvature)
+         largest = max(largest, abs(value))
+      end do
+   end function largest_magnitude
+
+   pure subroutine evaluate(coefficients, tau, value, slope, curvature)
+      real(wp), intent(in) :: coefficients(:), tau
+      real(wp), intent(out) :: value, slope, curvature
+      real(wp) :: c, s
+      integer :: n
+
+      value = coefficients(1)
+      slope = 0.0_wp
+      curvature = 0.0_wp
+      do n = 1, (size(coefficients) - 1)/2
+         c = coefficients(2*n)*cos(n*tau) + coefficients(2*n + 1)*sin(n*tau)
+         s = coefficients(2*n + 1)*cos(n*tau) - coefficients(2*n)*sin(n*tau)
+         value = value + c
+         slope = slope + n*s
+         curvature = curvature - real(n, wp)**2*c
+      end do
+   end subroutine evaluate
+
+end module fw_recovery
