@@ -34,14 +34,14 @@ contains
          range%above = above
          range%accepts = range%accepts//' above '//number_text(above)
       end if
-      if (present(least)) then
-         range%least = least
-         range%accepts = range%accepts//' of at least '//number_text(least)
-      end if
-      if (present(most)) then
-         range%most = most
-         if (range%accepts /= kind) range%accepts = range%accepts//' and'
-         range%accepts = range%accepts//' of at most '//number_text(most)
+      if (present(least)) range%least = least
+      if (present(most)) range%most = most
+      if (present(least) .and. present(most)) then
+         range%accepts = kind//' from '//number_text(least)//' to '//number_text(most)
+      else if (present(least)) then
+         range%accepts = kind//' of at least '//number_text(least)
+      else if (present(most)) then
+         range%accepts = range%accepts//' and at most '//number_text(most)
       end if
    end function new_range
 
@@ -111,6 +111,11 @@ contains
       real(wp) :: back
       integer :: i
 
+      if (.not. ieee_is_finite(number)) then
+         write (buffer, *) number
+         text = trim(adjustl(buffer))
+         return
+      end if
       do i = 1, size(trials)
          write (form, '(a, i0, a)') '(es40.', trials(i) - 1, 'e3)'
          write (buffer, form) number

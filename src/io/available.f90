@@ -1,0 +1,62 @@
+!> What this version can run. The one place to change when a method arrives.
+module fw_available
+   use fw_case, only: case_type, analysis_words, analysis_frf, analysis_point
+   use fw_contact_data, only: law_words, law_dlft, law_penalty
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_harmonics_options, only: method_words, method_hbm, sampling_words, sampling_uniform
+   use fw_solver_options, only: solver_words, solver_newton, continuation_words, &
+                                continuation_natural
+   implicit none (type, external)
+   private
+
+   public :: check_available
+
+contains
+
+   !> Refuse what is valid input but cannot be run by this version.
+   subroutine check_available(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      call check('case%analysis', analysis_words, case%analysis, [analysis_frf, analysis_point])
+      call check('contact%law', law_words, case%contact%law, [law_dlft, law_penalty])
+      call check('harmonics%method', method_words, case%harmonics%method, [method_hbm])
+      call check('harmonics%sampling', sampling_words, case%harmonics%sampling, [sampling_uniform])
+      call check('solver%kind', solver_words, case%solver%kind, [solver_newton])
+      call check('sweep%continuation', continuation_words, case%sweep%continuation, &
+                 [continuation_natural])
+      call check_off('harmonics%adaptive', case%harmonics%adaptive)
+      call check_off('sweep%stability', case%sweep%stability)
+
+   contains
+
+      subroutine check(name, words, choice, available)
+         character(*), intent(in) :: name
+         character(*), intent(in) :: words(:)
+         integer, intent(in) :: choice
+         integer, intent(in) :: available(:)
+         character(:), allocatable :: list
+         integer :: i
+
+         if (allocated(error) .or. any(available == choice)) return
+         list = ''
+         do i = 1, size(available)
+            if (i > 1) list = list//' or '
+            list = list//"'"//trim(words(available(i)))//"'"
+         end do
+         call fatal_error(error, name//" = '"//trim(words(choice))//"' is not available in "// &
+                          'this version: use '//list, status_input)
+      end subroutine check
+
+      subroutine check_off(name, is_on)
+         character(*), intent(in) :: name
+         logical, intent(in) :: is_on
+
+         if (allocated(error) .or. .not. is_on) return
+         call fatal_error(error, name//' = .true. is not available in this version: use .false.', &
+                          status_input)
+      end subroutine check_off
+
+   end subroutine check_available
+
+end module fw_available

@@ -1,0 +1,117 @@
+!> Paths of files, and whole text files.
+module fw_paths
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_ptr, c_size_t, c_loc, &
+                                          c_associated
+   use fw_error, only: error_type, fatal_error, status_io
+   implicit none (type, external)
+   private
+
+   public :: read_text_file, resolve_path, directory_of, stem_of, check_writable
+
+   interface
+      function c_getcwd(buffer, size) bind(c, name='getcwd') result(pointer)
+         import :: c_ptr, c_size_t
+         implicit none (type, external)
+         type(c_ptr), value :: buffer
+         integer(c_size_t), value :: size
+         type(c_ptr) :: pointer
+      end function c_getcwd
+
+      function c_access(path, mode) bind(c, name='access') result(status)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+         integer(c_int) :: status
+      end function c_access
+   end interface
+
+contains
+
+   !> The whole content of a text file.
+   subroutine read_text_file(path, text, error)
+      character(*), intent(in) :: path
+      character(:), allocatable, intent(out) :: text
+      type(error_type), allocatable, intent(out) :: error
+      integer :: unit, status, size
+      character(256) :: reason
+
+      open (newunit=unit, file=path, access='stream', form='unformatted', status='old', &
+            action='read', iostat=status, iomsg=reason)
+      if (status == 0) then
+         inquire (unit=unit, size=size)
+         allocate (character(max(size, 0)) :: text)
+         if (size > 0) read (unit, iostat=status, iomsg=reason) text
+         close (unit)
+      end if
+      if (status /= 0) call fatal_error(error, path//': cannot be read: '//trim(reason), status_io)
+   end subroutine read_text_file
+
+   !> A path made absolute; relative ones start at `directory` ('': the current one).
+   function resolve_path(path, directory) result(resolved)
+      character(*), intent(in) :: path, directory
+      character(:), allocatable :: resolved
+
+      resolved = path
+      if (path(1:min(1, len(path))) == '/') return
+      if (len(directory) > 0) resolved = directory//path
+      if (resolved(1:min(1, len(resolved))) == '/') return
+      resolved = current_directory()//resolved
+   end function resolve_path
+
+   !> Everything up to the last slash, '' where there is none.
+   pure function directory_of(path) result(directory)
+      character(*), intent(in) :: path
+      character(:), allocatable :: directory
+
+      directory = path(:index(path, '/', back=.true.))
+   end function directory_of
+
+   !> File name without its directory and its last extension.
+   pure function stem_of(path) result(stem)
+      character(*), intent(in) :: path
+      character(:), allocatable :: stem
+      integer :: dot
+
+      stem = path(index(path, '/', back=.true.) + 1:)
+      dot = index(stem, '.', back=.true.)
+      if (dot > 1) stem = stem(:dot - 1)
+   end function stem_of
+
+   !> Refuse a result file that could not be written, before anything is computed.
+   subroutine check_writable(path, error)
+      character(*), intent(in) :: path
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int), parameter :: exists = 0, writable = 2
+      character(:), allocatable :: directory
+
+      directory = directory_of(path)
+      if (len(directory) == 0) directory = './'
+      if (c_access(directory//c_null_char, exists) /= 0) then
+         call fatal_error(error, path//': cannot be written: the directory '//directory// &
+                          ' does not exist; create it or choose another file with -o', status_io)
+      else if (c_access(path//'/.'//c_null_char, exists) == 0) then
+         call fatal_error(error, path//': cannot be written: it is a directory; choose '// &
+                          'a file with -o', status_io)
+      else if (c_access(directory//c_null_char, writable) /= 0) then
+         call fatal_error(error, path//': cannot be written: no permission in '//directory// &
+                          '; choose another file with -o', status_io)
+      end if
+   end subroutine check_writable
+
+   !> With a slash at its end; '' where the system does not tell.
+   function current_directory() result(directory)
+      character(:), allocatable :: directory
+      character(kind=c_char), target :: buffer(4096)
+      integer :: i
+
+      directory = ''
+      if (.not. c_associated(c_getcwd(c_loc(buffer), size(buffer, kind=c_size_t)))) return
+      do i = 1, size(buffer)
+         if (buffer(i) == c_null_char) exit
+         directory = directory//buffer(i)
+      end do
+      directory = directory//'/'
+   end function current_directory
+
+end module fw_paths

@@ -1,0 +1,89 @@
+!> From a namelist file to a validated case.
+module fw_read_case
+   use fw_available, only: check_available
+   use fw_case, only: case_type, analysis_wear
+   use fw_error, only: error_type
+   use fw_model_file, only: file_model_type
+   use fw_paths, only: directory_of, read_text_file, stem_of
+   use fw_read_contact, only: read_contact, read_springs
+   use fw_read_model, only: read_model, read_loads, finish_model, model_options
+   use fw_read_options, only: read_case_group, read_harmonics, read_sweep, read_solver, &
+                              read_pseudo_time, read_wear, read_time
+   use fw_read_output, only: read_output, read_observed
+   use fw_reader, only: reader_type, new_reader
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: read_case, read_case_text
+
+contains
+
+   !> Read a case from a namelist file.
+   subroutine read_case(path, overrides, case, error)
+      character(*), intent(in) :: path
+      !> `group%key=value` each, as after --set.
+      type(string_type), intent(in) :: overrides(:)
+      type(case_type), intent(out) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: text
+
+      call read_text_file(path, text, error)
+      if (.not. allocated(error)) call read_case_text(text, path, overrides, case, error)
+   end subroutine read_case
+
+   !> Read a case from namelist text.
+   subroutine read_case_text(text, path, overrides, case, error)
+      character(*), intent(in) :: text
+      !> Path for messages, for relative files and for the default name of the result file.
+      character(*), intent(in) :: path
+      type(string_type), intent(in) :: overrides(:)
+      type(case_type), intent(out) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(reader_type) :: reader
+
+      call new_reader(reader, text, path, overrides, error)
+      if (allocated(error)) return
+      call read_case_group(reader, case)
+      call read_structure(reader, path, case, error)
+      if (allocated(error)) return
+      call read_harmonics(reader, case%harmonics)
+      call read_sweep(reader, case%analysis, case%sweep)
+      call read_solver(reader, case%solver)
+      call read_pseudo_time(reader, case%pseudo_time)
+      call read_wear(reader, case%analysis, case%wear)
+      call read_time(reader, case%time)
+      case%output%file = stem_of(path)//'.h5'
+      call read_output(reader, directory_of(path), case%output)
+      call reader%finish(error)
+      if (allocated(error)) return
+      case%namelist = reader%effective()
+      call check_available(case, error)
+   end subroutine read_case_text
+
+   !> The model with its contact, springs, loads and observed quantities.
+   subroutine read_structure(reader, path, case, error)
+      type(reader_type), intent(inout) :: reader
+      character(*), intent(in) :: path
+      type(case_type), intent(inout) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(model_options) :: options
+      type(file_model_type) :: raw
+      integer :: n_dof
+
+      call read_model(reader, directory_of(path), options, raw, error)
+      if (allocated(error)) return
+      n_dof = 0
+      if (allocated(raw%stiffness)) n_dof = size(raw%stiffness, 1)
+      call read_contact(reader, n_dof, raw, case%analysis == analysis_wear, case%contact)
+      call read_springs(reader, n_dof, case%springs)
+      call read_loads(reader, options, raw)
+      call read_observed(reader, raw, n_dof, case%model)
+      call finish_model(reader, options, raw, case%model, error)
+      if (.not. allocated(case%title)) then
+         case%title = stem_of(path)
+         if (allocated(raw%title)) case%title = raw%title
+      end if
+   end subroutine read_structure
+
+end module fw_read_case

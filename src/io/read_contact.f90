@@ -1,0 +1,285 @@
+!> Contact pairs and nonlinear springs: groups &contact and &spring on top of a model file.
+module fw_read_contact
+   use fw_contact_data, only: contact_type, spring_type, law_words, law_penalty, memory_words
+   use fw_kinds, only: wp
+   use fw_model_file, only: file_model_type
+   use fw_reader, only: reader_type
+   use fw_text, only: to_text
+   use fw_values, only: number_text
+   implicit none (type, external)
+   private
+
+   public :: read_contact, read_springs
+
+   integer, parameter :: t1 = 1, t2 = 2, n = 3
+
+contains
+
+   !> Group &contact. Every array but area, position and patch leaves allocated.
+   subroutine read_contact(reader, n_dof, file_model, needs_area, contact)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_dof
+      !> What the model file holds; overridden here.
+      type(file_model_type), intent(in) :: file_model
+      !> Whether the analysis is one of wear.
+      logical, intent(in) :: needs_area
+      type(contact_type), intent(inout) :: contact
+      real(wp) :: scale
+
+      call read_n_pairs(reader, file_model, contact)
+      call reader%get_word('contact', 'law', contact%law, law_words)
+      call read_sides(reader, n_dof, contact)
+      call read_constants(reader, needs_area, contact)
+      call read_stiffnesses(reader, contact)
+      call reader%get('contact', 'penalty_scale', contact%penalty_scale, above=0.0_wp)
+      call reader%get_word('contact', 'memory', contact%memory, memory_words)
+      scale = contact%penalty_scale
+      if (contact%law == law_penalty .and. abs(scale - 1.0_wp) > 0.0_wp) then
+         call reader%refuse('contact', 'penalty_scale', "has no meaning with law = 'penalty': "// &
+                            'scale tangential_stiffness and normal_stiffness')
+      end if
+   end subroutine read_contact
+
+   !> The number of pairs, and what the file says of them where it is about the same pairs.
+   subroutine read_n_pairs(reader, file_model, contact)
+      type(reader_type), intent(inout) :: reader
+      type(file_model_type), intent(in) :: file_model
+      type(contact_type), intent(inout) :: contact
+      integer :: n_file
+
+      n_file = 0
+      if (allocated(file_model%side_1)) n_file = size(file_model%side_1, 2)
+      contact%n_pairs = n_file
+      call reader%get('contact', 'n_pairs', contact%n_pairs, least=0, most=1000000)
+      if (contact%n_pairs == n_file .and. n_file > 0) then
+         contact%side_1 = file_model%side_1
+         contact%side_2 = file_model%side_2
+         if (allocated(file_model%mu)) contact%mu = file_model%mu
+         if (allocated(file_model%gap)) contact%gap = file_model%gap
+         if (allocated(file_model%area)) contact%area = file_model%area
+         if (allocated(file_model%position)) contact%position = file_model%position
+         if (allocated(file_model%patch)) contact%patch = file_model%patch
+         call check_from_file(reader, contact)
+      else if (n_file > 0 .and. contact%n_pairs > 0 &
+               .and. .not. reader%given('contact', 'side_1')) then
+         call reader%refuse('contact', 'n_pairs', '= '//to_text(contact%n_pairs)// &
+                            ': the model file holds '//to_text(n_file)//'; give side_1 '// &
+                            'and side_2 for other pairs, or 0 for no contact')
+      else if (reader%given('contact', 'side_1') .and. .not. reader%given('contact', 'n_pairs')) then
+         call reader%refuse('contact', 'n_pairs', 'is missing: must be the number of pairs')
+      end if
+   end subroutine read_n_pairs
+
+   !> The dofs of both sides.
+   subroutine read_sides(reader, n_dof, contact)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_dof
+      type(contact_type), intent(inout) :: contact
+      logical :: from_file
+
+      from_file = allocated(contact%side_1)
+      call read_side('side_1', contact%side_1, .not. from_file .and. contact%n_pairs > 0)
+      call read_side('side_2', contact%side_2, .false.)
+      if (.not. reader%failed()) call check_sides(reader, n_dof, contact)
+
+   contains
+
+      subroutine read_side(key, side, required)
+         character(*), intent(in) :: key
+         integer, allocatable, intent(inout) :: side(:, :)
+         logical, intent(in) :: required
+         integer, allocatable :: numbers(:)
+
+         if (allocated(side)) then
+            numbers = reshape(side, [size(side)])
+         else
+            allocate (numbers(3*contact%n_pairs), source=0)
+         end if
+         call reader%get_array('contact', key, numbers, [3, contact%n_pairs], .true., &
+                               least=-n_dof, most=n_dof, required=required)
+         side = reshape(numbers, [3, contact%n_pairs])
+      end subroutine read_side
+
+   end subroutine read_sides
+
+   !> Every pair must join something to something else.
+   subroutine check_sides(reader, n_dof, contact)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_dof
+      type(contact_type), intent(in) :: contact
+      integer :: i, k
+
+      do i = 1, contact%n_pairs
+         associate (a => abs(contact%side_1(:, i)), b => abs(contact%side_2(:, i)))
+            if (all(a == 0) .and. all(b == 0)) then
+               call refuse_pair(reader, i, 'has no dof on either side: at least one must not be 0')
+            end if
+            if (any(a > n_dof) .or. any(b > n_dof)) then
+               call refuse_pair(reader, i, 'names dof '//to_text(max(maxval(a), maxval(b)))// &
+                                ': must be at most n_dof = '//to_text(n_dof))
+            end if
+            do k = t1, n
+               if (a(k) == b(k) .and. a(k) > 0) then
+                  call refuse_pair(reader, i, 'has dof '//to_text(a(k))//' on both sides: '// &
+                                   'they must differ')
+               end if
+               if (is_repeated(a, k) .or. is_repeated(b, k)) then
+                  call refuse_pair(reader, i, 'has one dof for two of its directions: t1, t2 '// &
+                                   'and n must differ on each side')
+                  exit
+               end if
+            end do
+         end associate
+      end do
+   end subroutine check_sides
+
+   pure logical function is_repeated(dofs, k)
+      integer, intent(in) :: dofs(3), k
+
+      is_repeated = dofs(k) > 0 .and. count(dofs == dofs(k)) > 1
+   end function is_repeated
+
+   subroutine refuse_pair(reader, i, message)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: i
+      character(*), intent(in) :: message
+
+      call reader%refuse('contact', 'side_1', 'and side_2: pair '//to_text(i)//' '//message)
+   end subroutine refuse_pair
+
+   !> Friction, gap, area and constant load.
+   subroutine read_constants(reader, needs_area, contact)
+      type(reader_type), intent(inout) :: reader
+      logical, intent(in) :: needs_area
+      type(contact_type), intent(inout) :: contact
+      logical :: slides(contact%n_pairs), closes(contact%n_pairs)
+      integer :: n_pairs
+
+      n_pairs = contact%n_pairs
+      slides = has_tangent(contact)
+      closes = has_normal(contact)
+      call reader%get_array('contact', 'mu', contact%mu, [n_pairs], .true., least=0.0_wp, &
+                            required=any(slides) .and. .not. allocated(contact%mu))
+      if (.not. allocated(contact%mu)) allocate (contact%mu(n_pairs), source=0.0_wp)
+      if (.not. allocated(contact%gap)) allocate (contact%gap(n_pairs), source=0.0_wp)
+      call reader%get_array('contact', 'gap', contact%gap, [n_pairs], .true.)
+      call reader%get_array('contact', 'area', contact%area, [n_pairs], .true., above=0.0_wp, &
+                            required=needs_area .and. n_pairs > 0 .and. .not. allocated(contact%area))
+      call reader%get_array('contact', 'normal_load', contact%normal_load, [n_pairs], .true., &
+                            least=0.0_wp, &
+                            required=any(slides .and. .not. closes .and. contact%mu > 0.0_wp))
+      if (.not. allocated(contact%normal_load)) then
+         allocate (contact%normal_load(n_pairs), source=0.0_wp)
+      else if (all(closes) .and. any(contact%normal_load > 0.0_wp)) then
+         call reader%refuse('contact', 'normal_load', 'has no meaning: every pair has a normal '// &
+                            'dof; press the pairs together with &load static or a negative gap')
+      end if
+      where (closes) contact%normal_load = 0.0_wp
+   end subroutine read_constants
+
+   !> Values of a model file pass no getter.
+   subroutine check_from_file(reader, contact)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(in) :: contact
+
+      if (allocated(contact%mu)) &
+         call check('mu', contact%mu, contact%mu >= 0.0_wp, 'must be at least 0')
+      if (allocated(contact%gap)) &
+         call check('gap', contact%gap, abs(contact%gap) <= huge(1.0_wp), 'must be finite')
+      if (allocated(contact%area)) &
+         call check('area', contact%area, contact%area > 0.0_wp, 'must be above 0')
+
+   contains
+
+      subroutine check(key, values, ok, accepts)
+         character(*), intent(in) :: key
+         real(wp), intent(in) :: values(:)
+         logical, intent(in) :: ok(:)
+         character(*), intent(in) :: accepts
+         integer :: i
+
+         if (size(values) /= contact%n_pairs) then
+            call reader%refuse('model', 'file', 'holds '//to_text(size(values))//' values of '// &
+                               key//': must be '//to_text(contact%n_pairs)//', one per pair')
+            return
+         end if
+         i = findloc(ok .and. abs(values) <= huge(1.0_wp), .false., 1)
+         if (i > 0) call reader%refuse('model', 'file', 'holds '//key//'('//to_text(i)//') = '// &
+                                       number_text(values(i))//': '//accepts)
+      end subroutine check
+
+   end subroutine check_from_file
+
+   !> Stiffnesses belong to the penalty law, which cannot do without them.
+   subroutine read_stiffnesses(reader, contact)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(inout) :: contact
+
+      call read_one('tangential_stiffness', contact%tangential_stiffness, any(has_tangent(contact)))
+      call read_one('normal_stiffness', contact%normal_stiffness, any(has_normal(contact)))
+
+   contains
+
+      subroutine read_one(key, values, needed)
+         character(*), intent(in) :: key
+         real(wp), allocatable, intent(inout) :: values(:)
+         logical, intent(in) :: needed
+         logical :: is_penalty
+
+         is_penalty = contact%law == law_penalty
+         call reader%get_array('contact', key, values, [contact%n_pairs], .true., above=0.0_wp, &
+                               required=is_penalty .and. needed)
+         if (allocated(values) .and. .not. is_penalty) then
+            call reader%refuse('contact', key, "belongs to law = 'penalty', but law = '"// &
+                               trim(law_words(contact%law))//"': remove it or change the law")
+         end if
+         if (.not. allocated(values)) allocate (values(contact%n_pairs), source=0.0_wp)
+      end subroutine read_one
+
+   end subroutine read_stiffnesses
+
+   !> Which pairs have a tangential dof on either side.
+   pure function has_tangent(contact) result(has)
+      type(contact_type), intent(in) :: contact
+      logical :: has(contact%n_pairs)
+
+      has = any(contact%side_1(t1:t2, :) /= 0 .or. contact%side_2(t1:t2, :) /= 0, 1)
+   end function has_tangent
+
+   !> Which pairs have a normal dof on either side.
+   pure function has_normal(contact) result(has)
+      type(contact_type), intent(in) :: contact
+      logical :: has(contact%n_pairs)
+
+      has = contact%side_1(n, :) /= 0 .or. contact%side_2(n, :) /= 0
+   end function has_normal
+
+   !> Group &spring.
+   subroutine read_springs(reader, n_dof, springs)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_dof
+      type(spring_type), intent(inout) :: springs
+      integer :: m, i
+
+      call reader%get('spring', 'n_springs', springs%n_springs, least=0, most=1000000)
+      m = springs%n_springs
+      if (reader%given('spring', 'coefficient') .and. .not. reader%given('spring', 'n_springs')) &
+         call reader%refuse('spring', 'n_springs', 'is missing: must be the number of springs')
+      allocate (springs%side_2(m), source=0)
+      allocate (springs%power(m), source=3)
+      call reader%get_array('spring', 'side_1', springs%side_1, [m], .true., least=-n_dof, &
+                            most=n_dof, required=m > 0)
+      call reader%get_array('spring', 'side_2', springs%side_2, [m], .true., least=-n_dof, most=n_dof)
+      call reader%get_array('spring', 'coefficient', springs%coefficient, [m], .true., required=m > 0)
+      call reader%get_array('spring', 'power', springs%power, [m], .true., least=1)
+      if (.not. allocated(springs%side_1)) allocate (springs%side_1(m), source=0)
+      if (.not. allocated(springs%coefficient)) allocate (springs%coefficient(m), source=0.0_wp)
+      if (reader%failed()) return
+      do i = 1, m
+         if (abs(springs%side_1(i)) /= abs(springs%side_2(i))) cycle
+         call reader%refuse('spring', 'side_1', 'and side_2: spring '//to_text(i)//' has dof '// &
+                            to_text(springs%side_1(i))//' on both sides: they must differ')
+      end do
+   end subroutine read_springs
+
+end module fw_read_contact

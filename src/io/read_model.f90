@@ -1,0 +1,257 @@
+!> The linear structure of a case: groups &model and &load, from the namelist or a model file.
+module fw_read_model
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_matrix_checks, only: check_matrix, check_vector
+   use fw_matrix_market, only: read_matrix_market_model
+   use fw_model, only: model_type
+   use fw_model_file, only: file_model_type, read_model_hdf5
+   use fw_damping, only: add_modal_damping
+   use fw_paths, only: resolve_path
+   use fw_reader, only: reader_type
+   use fw_text, only: to_text
+   use fw_values, only: quoted_text
+   implicit none (type, external)
+   private
+
+   public :: read_model, read_loads, finish_model, model_options
+
+   character(*), parameter :: source_words(*) = &
+      [character(13) :: 'inline', 'hdf5', 'matrix_market']
+   integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3
+   integer, parameter :: largest_inline = 10000
+
+   !> Keys of &model and &load that act once all is read.
+   type :: model_options
+      integer :: source = source_inline
+      character(:), allocatable :: file
+      real(wp) :: rayleigh_mass = 0.0_wp
+      real(wp) :: rayleigh_stiffness = 0.0_wp
+      !> Fraction of critical damping of every mode.
+      real(wp) :: modal_damping = 0.0_wp
+      !> [rad/s]
+      real(wp) :: rotation_speed = 0.0_wp
+      real(wp) :: static_scale = 1.0_wp
+      real(wp) :: harmonic_scale = 1.0_wp
+   end type model_options
+
+contains
+
+   !> Group &model: the matrices as they are given, before rotation and damping.
+   subroutine read_model(reader, directory, options, raw, error)
+      type(reader_type), intent(inout) :: reader
+      !> Of the namelist; relative files start there.
+      character(*), intent(in) :: directory
+      type(model_options), intent(inout) :: options
+      !> What the model consists of, whatever its source.
+      type(file_model_type), intent(out) :: raw
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n_dof
+      logical :: is_inline
+
+      call reader%require_group('model', 'the matrices: source and file, or n_dof, mass and stiffness')
+      call reader%get_word('model', 'source', options%source, source_words)
+      is_inline = options%source == source_inline
+      call reader%get('model', 'file', options%file, required=.not. is_inline)
+      n_dof = 0
+      if (.not. is_inline .and. allocated(options%file)) then
+         call read_file(reader, directory, options, raw, error)
+         if (allocated(error)) return
+         n_dof = size(raw%stiffness, 1)
+      else if (is_inline .and. allocated(options%file)) then
+         call reader%refuse('model', 'file', "is given, but source = 'inline': give source = "// &
+                            "'hdf5' or 'matrix_market', or remove file")
+      end if
+      call read_matrices(reader, is_inline, n_dof, raw)
+      call reader%get('model', 'rayleigh_mass', options%rayleigh_mass, least=0.0_wp)
+      call reader%get('model', 'rayleigh_stiffness', options%rayleigh_stiffness, least=0.0_wp)
+      call reader%get('model', 'modal_damping', options%modal_damping, least=0.0_wp)
+      call reader%get('model', 'rotation_speed', options%rotation_speed, least=0.0_wp)
+   end subroutine read_model
+
+   !> A model file; the effective input holds its absolute path.
+   subroutine read_file(reader, directory, options, raw, error)
+      type(reader_type), intent(inout) :: reader
+      character(*), intent(in) :: directory
+      type(model_options), intent(inout) :: options
+      type(file_model_type), intent(out) :: raw
+      type(error_type), allocatable, intent(out) :: error
+
+      call reader%amend('model', 'file', quoted_text(resolve_path(options%file, directory)))
+      if (options%source == source_hdf5) then
+         call read_model_hdf5(in_directory(options%file, directory), raw, error)
+      else
+         call read_matrix_market_model(in_directory(options%file, directory), raw, error)
+      end if
+   end subroutine read_file
+
+   !> The inline matrices, or the refusal of them beside a model file.
+   subroutine read_matrices(reader, is_inline, n_file, raw)
+      type(reader_type), intent(inout) :: reader
+      logical, intent(in) :: is_inline
+      !> Dofs of the model file.
+      integer, intent(in) :: n_file
+      type(file_model_type), intent(inout) :: raw
+      integer :: n_dof
+
+      n_dof = n_file
+      call reader%get('model', 'n_dof', n_dof, least=1, most=merge(largest_inline, huge(1), is_inline), &
+                      required=is_inline)
+      if (.not. is_inline .and. n_dof /= n_file) then
+         call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model file has '// &
+                            to_text(n_file)//'; remove n_dof')
+      end if
+      call read_one('mass', raw%mass, is_inline)
+      call read_one('stiffness', raw%stiffness, is_inline)
+      call read_one('damping', raw%damping, .false.)
+
+   contains
+
+      subroutine read_one(key, matrix, required)
+         character(*), intent(in) :: key
+         real(wp), allocatable, intent(inout) :: matrix(:, :)
+         logical, intent(in) :: required
+         real(wp), allocatable :: values(:)
+
+         call reader%get_array('model', key, values, [n_dof, n_dof], .false., required=required)
+         if (.not. allocated(values)) return
+         if (.not. is_inline) then
+            call reader%refuse('model', key, "is given beside a model file: remove it, or give "// &
+                               "source = 'inline'")
+         else
+            matrix = reshape(values, [n_dof, n_dof])
+         end if
+      end subroutine read_one
+
+   end subroutine read_matrices
+
+   !> Group &load: replaces the loads of a model file, then scales.
+   subroutine read_loads(reader, options, raw)
+      type(reader_type), intent(inout) :: reader
+      type(model_options), intent(inout) :: options
+      type(file_model_type), intent(inout) :: raw
+
+      call read_one('static', raw%load_static)
+      call read_one('cosine', raw%load_cosine)
+      call read_one('sine', raw%load_sine)
+      call reader%get('load', 'static_scale', options%static_scale)
+      call reader%get('load', 'harmonic_scale', options%harmonic_scale)
+
+   contains
+
+      subroutine read_one(key, load)
+         character(*), intent(in) :: key
+         real(wp), allocatable, intent(inout) :: load(:)
+         integer :: n_dof
+
+         n_dof = 0
+         if (allocated(raw%stiffness)) n_dof = size(raw%stiffness, 1)
+         if (.not. allocated(load)) allocate (load(n_dof), source=0.0_wp)
+         call reader%get_array('load', key, load, [n_dof], .true.)
+      end subroutine read_one
+
+   end subroutine read_loads
+
+   !> Check the parts and put them together: rotation, damping, scales.
+   subroutine finish_model(reader, options, raw, model, error)
+      type(reader_type), intent(inout) :: reader
+      type(model_options), intent(in) :: options
+      type(file_model_type), intent(inout) :: raw
+      type(model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+
+      call check_parts(reader, raw, options%source == source_inline)
+      if (reader%failed()) return
+      model%n_dof = size(raw%stiffness, 1)
+      model%mass = raw%mass
+      model%stiffness = raw%stiffness
+      model%load_static = raw%load_static
+      model%load_cosine = options%harmonic_scale*raw%load_cosine
+      model%load_sine = options%harmonic_scale*raw%load_sine
+      call add_rotation(reader, options%rotation_speed, raw, model)
+      model%load_static = options%static_scale*model%load_static
+      if (allocated(raw%damping)) then
+         model%damping = raw%damping
+      else
+         allocate (model%damping(model%n_dof, model%n_dof), source=0.0_wp)
+      end if
+      model%damping = model%damping + options%rayleigh_mass*model%mass &
+                      + options%rayleigh_stiffness*model%stiffness
+      if (options%modal_damping > 0.0_wp) then
+         call add_modal_damping(model%mass, model%stiffness, options%modal_damping, model%damping, &
+                                error)
+      end if
+   end subroutine finish_model
+
+   !> Centrifugal stiffness and load grow with the square of the speed.
+   subroutine add_rotation(reader, speed, raw, model)
+      type(reader_type), intent(inout) :: reader
+      real(wp), intent(in) :: speed
+      type(file_model_type), intent(in) :: raw
+      type(model_type), intent(inout) :: model
+
+      if (speed <= 0.0_wp) return
+      if (allocated(raw%stiffness_rotation)) &
+         model%stiffness = model%stiffness + speed**2*raw%stiffness_rotation
+      if (allocated(raw%load_static_rotation)) &
+         model%load_static = model%load_static + speed**2*raw%load_static_rotation
+      if (allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)) return
+      call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
+                         'stiffness_rotation and no load static_rotation: remove it, or use a '// &
+                         'model file that holds them')
+   end subroutine add_rotation
+
+   !> Finite, symmetric, of the same size.
+   subroutine check_parts(reader, raw, is_inline)
+      type(reader_type), intent(inout) :: reader
+      type(file_model_type), intent(inout) :: raw
+      logical, intent(in) :: is_inline
+      integer :: n_dof
+
+      if (reader%failed()) return
+      n_dof = size(raw%stiffness, 1)
+      call check_one('mass', raw%mass)
+      call check_one('stiffness', raw%stiffness)
+      if (allocated(raw%damping)) call check_one('damping', raw%damping)
+      if (allocated(raw%stiffness_rotation)) &
+         call check_one('stiffness_rotation', raw%stiffness_rotation)
+      call check_load('static', raw%load_static)
+      call check_load('cosine', raw%load_cosine)
+      call check_load('sine', raw%load_sine)
+      if (allocated(raw%load_static_rotation)) &
+         call check_load('static_rotation', raw%load_static_rotation)
+
+   contains
+
+      subroutine check_one(key, matrix)
+         character(*), intent(in) :: key
+         real(wp), intent(inout) :: matrix(:, :)
+         character(:), allocatable :: message
+
+         call check_matrix(matrix, n_dof, key == 'mass', message)
+         if (.not. allocated(message)) return
+         if (is_inline) call reader%refuse('model', key, message)
+         if (.not. is_inline) call reader%refuse('model', 'file', 'holds a '//key//' that '//message)
+      end subroutine check_one
+
+      subroutine check_load(key, load)
+         character(*), intent(in) :: key
+         real(wp), intent(in) :: load(:)
+         character(:), allocatable :: message
+
+         call check_vector(load, n_dof, message)
+         if (allocated(message)) &
+            call reader%refuse('model', 'file', 'holds a load '//key//' that '//message)
+      end subroutine check_load
+
+   end subroutine check_parts
+
+   pure function in_directory(file, directory) result(path)
+      character(*), intent(in) :: file, directory
+      character(:), allocatable :: path
+
+      path = file
+      if (index(file, '/') /= 1) path = directory//file
+   end function in_directory
+
+end module fw_read_model

@@ -1,0 +1,139 @@
+!> Group &output: the result file and what is observed.
+module fw_read_output
+   use fw_case, only: output_options
+   use fw_kinds, only: wp
+   use fw_model, only: model_type
+   use fw_model_file, only: file_model_type
+   use fw_namelist, only: value_type
+   use fw_paths, only: resolve_path
+   use fw_reader, only: reader_type
+   use fw_text, only: string_type, nearest_word, to_text
+   use fw_values, only: read_integer, quoted_text
+   implicit none (type, external)
+   private
+
+   public :: read_output, read_observed
+
+contains
+
+   !> Everything but `observe`. The path leaves absolute.
+   subroutine read_output(reader, directory, options)
+      type(reader_type), intent(inout) :: reader
+      !> Of the namelist; relative files start there.
+      character(*), intent(in) :: directory
+      !> `file` holds its default on entry.
+      type(output_options), intent(inout) :: options
+
+      call reader%get('output', 'file', options%file)
+      if (len_trim(options%file) == 0) then
+         call reader%refuse('output', 'file', "= '': must name a file")
+      end if
+      options%file = resolve_path(options%file, directory)
+      call reader%amend('output', 'file', quoted_text(options%file))
+      call reader%get('output', 'histories', options%histories)
+      call reader%get('output', 'contact', options%contact)
+   end subroutine read_output
+
+   !> Key `observe`: dof numbers or names of the model file; all by default.
+   subroutine read_observed(reader, raw, n_dof, model)
+      type(reader_type), intent(inout) :: reader
+      type(file_model_type), intent(in) :: raw
+      integer, intent(in) :: n_dof
+      type(model_type), intent(inout) :: model
+      type(value_type), allocatable :: chosen(:)
+      type(string_type), allocatable :: names(:)
+      real(wp), allocatable :: rows(:, :)
+      integer :: i
+
+      call reader%get_list('output', 'observe', 'dof numbers or names of observed quantities', chosen)
+      if (reader%failed()) return
+      call list_default(raw, n_dof, names, rows)
+      if (size(chosen) == 0) then
+         call move_alloc(names, model%observe_name)
+         call move_alloc(rows, model%observe_matrix)
+         return
+      end if
+      allocate (model%observe_name(size(chosen)))
+      allocate (model%observe_matrix(size(chosen), n_dof), source=0.0_wp)
+      do i = 1, size(chosen)
+         call choose(reader, chosen(i), names, rows, model%observe_name(i)%text, &
+                     model%observe_matrix(i, :))
+         call refuse_repeated(reader, model%observe_name(:i))
+      end do
+   end subroutine read_observed
+
+   !> What the model file observes, or every dof.
+   subroutine list_default(raw, n_dof, names, rows)
+      type(file_model_type), intent(in) :: raw
+      integer, intent(in) :: n_dof
+      type(string_type), allocatable, intent(out) :: names(:)
+      real(wp), allocatable, intent(out) :: rows(:, :)
+      integer :: i
+
+      if (allocated(raw%observe_matrix) .and. allocated(raw%observe_name)) then
+         names = raw%observe_name
+         rows = raw%observe_matrix
+         return
+      end if
+      allocate (names(n_dof))
+      allocate (rows(n_dof, n_dof), source=0.0_wp)
+      do i = 1, n_dof
+         names(i)%text = 'u'//to_text(i)
+         rows(i, i) = 1.0_wp
+      end do
+   end subroutine list_default
+
+   !> One value of `observe`: a dof number, or a name.
+   subroutine choose(reader, value, names, rows, name, row)
+      type(reader_type), intent(inout) :: reader
+      type(value_type), intent(in) :: value
+      type(string_type), intent(in) :: names(:)
+      real(wp), intent(in) :: rows(:, :)
+      character(:), allocatable, intent(out) :: name
+      real(wp), intent(inout) :: row(:)
+      integer :: dof, i
+      logical :: is_number
+
+      name = value%text
+      do i = 1, size(names)
+         if (names(i)%text /= value%text) cycle
+         row = rows(i, :)
+         return
+      end do
+      call read_integer(value%text, dof, is_number)
+      if (is_number .and. .not. value%quoted) then
+         name = 'u'//to_text(dof)
+         if (dof >= 1 .and. dof <= size(row)) then
+            row(dof) = 1.0_wp
+         else
+            call reader%refuse('output', 'observe', '= '//to_text(dof)// &
+                               ': must be a dof from 1 to '//to_text(size(row)))
+         end if
+      else
+         call reader%refuse('output', 'observe', '= '//quoted_text(value%text)// &
+                            ': must be a dof number or a name of the model'//near(value%text, names))
+      end if
+   end subroutine choose
+
+   subroutine refuse_repeated(reader, names)
+      type(reader_type), intent(inout) :: reader
+      type(string_type), intent(in) :: names(:)
+      integer :: i, n
+
+      n = size(names)
+      do i = 1, n - 1
+         if (names(i)%text == names(n)%text) &
+            call reader%refuse('output', 'observe', 'names '//names(n)%text//' twice')
+      end do
+   end subroutine refuse_repeated
+
+   function near(word, words) result(hint)
+      character(*), intent(in) :: word
+      type(string_type), intent(in) :: words(:)
+      character(:), allocatable :: hint
+
+      hint = nearest_word(word, words)
+      if (len(hint) > 0) hint = '; did you mean '//quoted_text(hint)//'?'
+   end function near
+
+end module fw_read_output

@@ -1,0 +1,169 @@
+!> Modal damping as a matrix: C = 2 zeta M Phi diag(omega) Phi^T M over the modes of M and K.
+!>
+!> The mass matrix may be singular. Its massless directions carry no damping; they follow the
+!> others statically, so they are condensed out of K, by a pseudo-inverse where K holds them no
+!> better than M does (a node held by its contact alone). Rows are scaled to a unit diagonal
+!> of M first, so that mixed units do not decide what counts as massless.
+module fw_damping
+   use fw_error, only: error_type, fatal_error, status_failure
+   use fw_kinds, only: wp
+   use fw_lapack, only: dgemm, dsyevd
+   implicit none (type, external)
+   private
+
+   public :: add_modal_damping
+
+   !> Eigenvalues below this share of the largest count as zero: round-off of an order 1000
+   !> matrix stays well below, a physical mass or stiffness ratio well above.
+   real(wp), parameter :: rank_tolerance = 1.0e-12_wp
+
+contains
+
+   !> Add the damping of all modes to a damping matrix.
+   subroutine add_modal_damping(mass, stiffness, ratio, damping, error)
+      !> Symmetric, positive semidefinite (n, n).
+      real(wp), intent(in) :: mass(:, :)
+      !> Symmetric (n, n); modes of negative or zero stiffness are not damped.
+      real(wp), intent(in) :: stiffness(:, :)
+      !> Fraction of critical damping of every mode.
+      real(wp), intent(in) :: ratio
+      real(wp), intent(inout) :: damping(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: scale(:), values(:), vectors(:, :), condensed(:, :), root(:, :)
+      integer :: n_free
+
+      scale = unit_scale(mass, stiffness)
+      vectors = scaled(mass, scale)
+      call solve_eigen(vectors, values, error)
+      if (allocated(error)) return
+      ! Ascending eigenvalues: the massless directions come first.
+      n_free = count(values <= rank_tolerance*max(values(size(values)), 0.0_wp))
+      if (n_free == size(values)) return
+      call condense(scaled(stiffness, scale), vectors, n_free, condensed, error)
+      if (allocated(error)) return
+      call weigh_by_mass(condensed, 1.0_wp/sqrt(values(n_free + 1:)))
+      call take_root(condensed, root, error)
+      if (allocated(error)) return
+      call weigh_by_mass(root, sqrt(values(n_free + 1:)))
+      vectors = vectors(:, n_free + 1:)
+      vectors = product_of(vectors, product_of(root, transpose(vectors)))
+      damping = damping + 2.0_wp*ratio*scaled(vectors, 1.0_wp/scale)
+   end subroutine add_modal_damping
+
+   !> Factors that bring the diagonal of M to one, and that of K where there is no mass.
+   pure function unit_scale(mass, stiffness) result(scale)
+      real(wp), intent(in) :: mass(:, :), stiffness(:, :)
+      real(wp) :: scale(size(mass, 1))
+      ! Far below any physical ratio of masses in one model, whatever the units.
+      real(wp), parameter :: no_mass = 1.0e-20_wp
+      real(wp) :: largest
+      integer :: i
+
+      largest = 0.0_wp
+      do i = 1, size(scale)
+         largest = max(largest, mass(i, i))
+      end do
+      do i = 1, size(scale)
+         scale(i) = 1.0_wp
+         if (mass(i, i) > no_mass*largest) then
+            scale(i) = 1.0_wp/sqrt(mass(i, i))
+         else if (abs(stiffness(i, i)) > 0.0_wp) then
+            scale(i) = 1.0_wp/sqrt(abs(stiffness(i, i)))
+         end if
+      end do
+   end function unit_scale
+
+   pure function scaled(matrix, scale) result(product)
+      real(wp), intent(in) :: matrix(:, :), scale(:)
+      real(wp), allocatable :: product(:, :)
+
+      product = matrix
+      call weigh_by_mass(product, scale)
+   end function scaled
+
+   !> diag(weight) A diag(weight), in place.
+   pure subroutine weigh_by_mass(matrix, weight)
+      real(wp), intent(inout) :: matrix(:, :)
+      real(wp), intent(in) :: weight(:)
+      integer :: j
+
+      do j = 1, size(weight)
+         matrix(:, j) = matrix(:, j)*weight*weight(j)
+      end do
+   end subroutine weigh_by_mass
+
+   !> Stiffness of the massive directions with the first `n_free`, massless, ones following.
+   subroutine condense(stiffness, vectors, n_free, condensed, error)
+      real(wp), intent(in) :: stiffness(:, :), vectors(:, :)
+      integer, intent(in) :: n_free
+      real(wp), allocatable, intent(out) :: condensed(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: rotated(:, :), free(:, :), coupling(:, :), values(:)
+      integer :: j
+
+      rotated = product_of(transpose(vectors), product_of(stiffness, vectors))
+      condensed = rotated(n_free + 1:, n_free + 1:)
+      if (n_free == 0) return
+      free = rotated(:n_free, :n_free)
+      call solve_eigen(free, values, error)
+      if (allocated(error)) return
+      coupling = product_of(transpose(free), rotated(:n_free, n_free + 1:))
+      do j = 1, n_free
+         if (abs(values(j)) > rank_tolerance*maxval(abs(values))) then
+            rotated(j, n_free + 1:) = coupling(j, :)/values(j)
+         else
+            rotated(j, n_free + 1:) = 0.0_wp
+         end if
+      end do
+      condensed = condensed - product_of(transpose(coupling), rotated(:n_free, n_free + 1:))
+   end subroutine condense
+
+   !> Symmetric square root, with zero for eigenvalues that are not positive.
+   subroutine take_root(matrix, root, error)
+      real(wp), intent(in) :: matrix(:, :)
+      real(wp), allocatable, intent(out) :: root(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: vectors(:, :), values(:)
+      real(wp) :: least
+      integer :: j
+
+      vectors = matrix
+      call solve_eigen(vectors, values, error)
+      if (allocated(error)) return
+      least = rank_tolerance*maxval(abs(values))
+      root = vectors
+      do j = 1, size(values)
+         root(:, j) = merge(sqrt(max(values(j), 0.0_wp)), 0.0_wp, values(j) > least)*vectors(:, j)
+      end do
+      root = product_of(root, transpose(vectors))
+   end subroutine take_root
+
+   !> Eigenvalues in ascending order; the matrix becomes its eigenvectors.
+   subroutine solve_eigen(matrix, values, error)
+      real(wp), contiguous, intent(inout) :: matrix(:, :)
+      real(wp), allocatable, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: work(:)
+      integer, allocatable :: iwork(:)
+      integer :: n, info
+
+      n = size(matrix, 1)
+      allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
+      call dsyevd('V', 'U', n, matrix, n, values, work, size(work), iwork, size(iwork), info)
+      if (info /= 0) call fatal_error(error, 'the modes for modal_damping could not be computed: '// &
+                                      'check the mass and stiffness matrices', status_failure)
+   end subroutine solve_eigen
+
+   function product_of(a, b) result(c)
+      real(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp), allocatable :: c(:, :)
+      integer :: m, n, k
+
+      m = size(a, 1)
+      n = size(b, 2)
+      k = size(a, 2)
+      allocate (c(m, n))
+      call dgemm('N', 'N', m, n, k, 1.0_wp, a, m, b, k, 0.0_wp, c, m)
+   end function product_of
+
+end module fw_damping
