@@ -1,0 +1,55 @@
+!> What fw_run says about itself.
+module fw_help
+   implicit none (type, external)
+   private
+
+   public :: write_help
+
+contains
+
+   subroutine write_help(unit)
+      integer, intent(in) :: unit
+
+      write (unit, '(a)') &
+         'Usage: fw_run [options] case.nml', &
+         '', &
+         'Periodic response of a structure with contact, friction and fretting wear by', &
+         'harmonic balance. Reads a namelist, writes an HDF5 result file.', &
+         '', &
+         'Options:', &
+         '  --set GROUP%KEY=VALUE  change one value of the namelist; may be repeated, the last', &
+         '                         one holds; words need no quotes', &
+         '  -o FILE                result file (default: name of the namelist with .h5,', &
+         '                         beside it)', &
+         '  --check                validate, print the effective input, run nothing', &
+         '  -q                     errors only', &
+         '  -v                     iterations and residual of every point', &
+         '  --help                 this text', &
+         '  --version              version number', &
+         '  --                     end of the options', &
+         '', &
+         'Groups of the namelist:'
+      write (unit, '(a)') &
+         '  &case         title, kind of analysis, threads', &
+         '  &model        mass, stiffness and damping, inline or from a file', &
+         '  &contact      contact pairs, friction, gap, contact law', &
+         '  &spring       nonlinear springs', &
+         '  &load         static and harmonic loads', &
+         '  &harmonics    method, number of harmonics, instants per period', &
+         '  &sweep        frequencies', &
+         '  &solver       nonlinear solver, tolerance', &
+         '  &pseudo_time  pseudo-time integration', &
+         '  &wear         fretting wear', &
+         '  &time         time integration', &
+         '  &output       result file, observed quantities', &
+         'All keys with their values and what each accepts: fw_run --check case.nml', &
+         '', &
+         'Examples:', &
+         '  fw_run case.nml', &
+         '  fw_run --set harmonics%n_harmonics=7 --set contact%mu=0.3 -o h7.h5 case.nml', &
+         '', &
+         'Exit status: 0 done; 2 wrong usage; 3 wrong input; 4 not converged (what was computed', &
+         'is saved); 5 a file cannot be read or written; 1 anything else.'
+   end subroutine write_help
+
+end module fw_help

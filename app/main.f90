@@ -1,0 +1,89 @@
+!> fw_run: read a case, run it, report. The only place that ends the program.
+program fw_run_program
+   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+   use fw_case, only: case_type
+   use fw_cli, only: cli_options, get_arguments, parse_arguments
+   use fw_error, only: error_type, status_ok
+   use fw_help, only: write_help
+   use fw_outcome, only: outcome_type
+   use fw_paths, only: check_writable
+   use fw_progress, only: progress_type, new_progress
+   use fw_read_case, only: read_case
+   use fw_run, only: run_case
+   use fw_text, only: string_type
+   use fw_version, only: version
+   implicit none (type, external)
+
+   integer :: status
+
+   call main(status)
+   stop status, quiet=.true.
+
+contains
+
+   subroutine main(status)
+      integer, intent(out) :: status
+      type(string_type), allocatable :: arguments(:)
+      type(cli_options) :: options
+      type(error_type), allocatable :: error
+
+      call get_arguments(arguments)
+      call parse_arguments(arguments, options, error)
+      status = status_ok
+      if (.not. allocated(error)) then
+         if (options%help) then
+            call write_help(output_unit)
+         else if (options%version) then
+            write (output_unit, '(a)') 'fw_run '//version
+         else
+            call run(options, status, error)
+         end if
+      end if
+      if (allocated(error)) call report(error, status)
+   end subroutine main
+
+   !> Validate, then either show the effective input or compute.
+   subroutine run(options, status, error)
+      type(cli_options), intent(in) :: options
+      integer, intent(inout) :: status
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: case
+      type(outcome_type) :: outcome
+      type(progress_type) :: progress
+      integer :: i
+
+      call read_case(options%input, options%overrides, case, error)
+      if (allocated(error)) return
+      if (options%check) then
+         write (output_unit, '(a)', advance='no') case%namelist
+         return
+      end if
+      call check_writable(case%output%file, error)
+      if (allocated(error)) return
+      progress = new_progress(options%quiet, options%verbose)
+      call run_case(case, progress, outcome, error)
+      if (allocated(error)) return
+      status = outcome%status
+      if (options%quiet .or. .not. allocated(outcome%summary)) return
+      do i = 1, size(outcome%summary)
+         write (output_unit, '(a)') outcome%summary(i)%text
+      end do
+   end subroutine run
+
+   !> One line of the standard error for each line of the message.
+   subroutine report(error, status)
+      type(error_type), intent(in) :: error
+      integer, intent(out) :: status
+      integer :: first, last
+
+      status = error%status
+      first = 1
+      do while (first <= len(error%message))
+         last = index(error%message(first:), new_line('a'))
+         last = merge(first + last - 2, len(error%message), last > 0)
+         write (error_unit, '(a)') 'fw_run: error: '//error%message(first:last)
+         first = last + 2
+      end do
+   end subroutine report
+
+end program fw_run_program

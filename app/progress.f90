@@ -1,0 +1,160 @@
+!> Progress on the standard error: a bar on a terminal, lines otherwise.
+module fw_progress
+   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_fortran_env, only: error_unit
+   use fw_kinds, only: wp
+   use fw_observer, only: observer_type
+   use fw_point, only: point_type
+   use fw_text, only: to_text
+   use fw_values, only: number_text
+   implicit none (type, external)
+   private
+
+   public :: progress_type, new_progress
+
+   integer, parameter :: bar_width = 30
+   !> About as many lines stand in a log for a long sweep.
+   integer, parameter :: log_lines = 20
+
+   type, extends(observer_type) :: progress_type
+      private
+      logical :: quiet = .false.
+      logical :: verbose = .false.
+      logical :: draws_bar = .false.
+      !> Whether the line of the terminal is occupied by the bar.
+      logical :: bar_is_shown = .false.
+   contains
+      procedure :: on_start
+      procedure :: on_point
+      procedure :: on_message
+      procedure :: on_end
+      procedure, private :: clear_bar
+   end type progress_type
+
+   interface
+      function c_isatty(descriptor) bind(c, name='isatty') result(answer)
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int) :: answer
+      end function c_isatty
+   end interface
+
+contains
+
+   function new_progress(quiet, verbose) result(progress)
+      logical, intent(in) :: quiet, verbose
+      type(progress_type) :: progress
+      integer(c_int), parameter :: standard_error = 2
+
+      progress%quiet = quiet
+      progress%verbose = verbose
+      progress%draws_bar = .not. verbose .and. c_isatty(standard_error) == 1
+   end function new_progress
+
+   subroutine on_start(self, case_title, n_points)
+      class(progress_type), intent(inout) :: self
+      character(*), intent(in) :: case_title
+      integer, intent(in) :: n_points
+      character(:), allocatable :: count
+
+      if (self%quiet) return
+      count = ''
+      if (n_points == 1) count = ': 1 point'
+      if (n_points > 1) count = ': '//to_text(n_points)//' points'
+      write (error_unit, '(a)') case_title//count
+   end subroutine on_start
+
+   subroutine on_point(self, index, n_points, point)
+      class(progress_type), intent(inout) :: self
+      integer, intent(in) :: index
+      integer, intent(in) :: n_points
+      type(point_type), intent(in) :: point
+      logical :: is_due
+
+      if (self%quiet) return
+      ! A point that failed is worth a line wherever it is shown.
+      is_due = self%verbose .or. .not. point%converged
+      if (.not. self%draws_bar) is_due = is_due .or. index == n_points &
+                                         .or. mod(index - 1, max(1, n_points/log_lines)) == 0
+      if (is_due) then
+         call self%clear_bar()
+         write (error_unit, '(a)') point_line(index, n_points, point, self%verbose)
+      end if
+      if (self%draws_bar) then
+         write (error_unit, '(a)', advance='no') achar(13)//bar_text(index, n_points)
+         flush (error_unit)
+         self%bar_is_shown = .true.
+      end if
+   end subroutine on_point
+
+   subroutine on_message(self, text)
+      class(progress_type), intent(inout) :: self
+      character(*), intent(in) :: text
+
+      if (self%quiet) return
+      call self%clear_bar()
+      write (error_unit, '(a)') text
+   end subroutine on_message
+
+   subroutine on_end(self)
+      class(progress_type), intent(inout) :: self
+
+      call self%clear_bar()
+   end subroutine on_end
+
+   !> Overwrite the bar with blanks and go back to the start of its line.
+   subroutine clear_bar(self)
+      class(progress_type), intent(inout) :: self
+
+      if (.not. self%bar_is_shown) return
+      write (error_unit, '(a)', advance='no') achar(13)//repeat(' ', bar_width + 30)//achar(13)
+      flush (error_unit)
+      self%bar_is_shown = .false.
+   end subroutine clear_bar
+
+   function bar_text(index, n_points) result(text)
+      integer, intent(in) :: index, n_points
+      character(:), allocatable :: text
+      integer :: filled
+
+      if (n_points < index) then
+         text = 'point '//to_text(index)
+         return
+      end if
+      filled = nint(real(bar_width)*real(index)/real(n_points))
+      text = '['//repeat('=', filled)//repeat(' ', bar_width - filled)//'] '//to_text(index)// &
+             '/'//to_text(n_points)
+   end function bar_text
+
+   function point_line(index, n_points, point, with_details) result(text)
+      integer, intent(in) :: index, n_points
+      type(point_type), intent(in) :: point
+      logical, intent(in) :: with_details
+      character(:), allocatable :: text
+
+      text = 'point '//to_text(index)
+      if (n_points >= index) text = text//' of '//to_text(n_points)
+      text = text//': omega = '//number_text(rounded(point%omega))//' rad/s'
+      if (allocated(point%amplitude)) then
+         if (size(point%amplitude) > 0) &
+            text = text//', amplitude '//number_text(rounded(maxval(point%amplitude)))
+      end if
+      if (.not. point%converged) text = text//', NOT CONVERGED'
+      if (with_details .or. .not. point%converged) then
+         text = text//', '//to_text(point%iterations)//' iterations, residual '// &
+                number_text(rounded(point%residual))
+      end if
+   end function point_line
+
+   !> Six digits are enough to read.
+   function rounded(number)
+      real(wp), intent(in) :: number
+      real(wp) :: rounded
+      character(24) :: buffer
+
+      write (buffer, '(es24.5e3)') number
+      read (buffer, *) rounded
+   end function rounded
+
+end module fw_progress

@@ -1,0 +1,55 @@
+!> How progress leaves a run: the driver calls an observer and writes nothing itself.
+module fw_observer
+   use fw_point, only: point_type
+   implicit none (type, external)
+   private
+
+   public :: observer_type
+
+   type, abstract :: observer_type
+   contains
+      !> Before the first point.
+      procedure(start_callback), deferred :: on_start
+      !> After every point, converged or not.
+      procedure(point_callback), deferred :: on_point
+      !> Something worth knowing: a fallback taken, work skipped.
+      procedure(message_callback), deferred :: on_message
+      !> After the last point, also of a run that ends early.
+      procedure(end_callback), deferred :: on_end
+   end type observer_type
+
+   abstract interface
+      subroutine start_callback(self, case_title, n_points)
+         import :: observer_type
+         implicit none (type, external)
+         class(observer_type), intent(inout) :: self
+         character(*), intent(in) :: case_title
+         !> Points to come (0: not known).
+         integer, intent(in) :: n_points
+      end subroutine start_callback
+
+      subroutine point_callback(self, index, n_points, point)
+         import :: observer_type, point_type
+         implicit none (type, external)
+         class(observer_type), intent(inout) :: self
+         !> Number of the point, from 1.
+         integer, intent(in) :: index
+         integer, intent(in) :: n_points
+         type(point_type), intent(in) :: point
+      end subroutine point_callback
+
+      subroutine message_callback(self, text)
+         import :: observer_type
+         implicit none (type, external)
+         class(observer_type), intent(inout) :: self
+         character(*), intent(in) :: text
+      end subroutine message_callback
+
+      subroutine end_callback(self)
+         import :: observer_type
+         implicit none (type, external)
+         class(observer_type), intent(inout) :: self
+      end subroutine end_callback
+   end interface
+
+end module fw_observer

@@ -1,0 +1,17 @@
+!> What a run leaves besides its result file.
+module fw_outcome
+   use fw_error, only: status_ok
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: outcome_type
+
+   type :: outcome_type
+      !> status_ok or status_not_converged.
+      integer :: status = status_ok
+      !> A short table for people, one line each.
+      type(string_type), allocatable :: summary(:)
+   end type outcome_type
+
+end module fw_outcome
