@@ -96,6 +96,8 @@ class TestFile:
                           "if (anyExceptions()) return", f'#line {number + length} "{self.path}"']
         elif word in ("test", "before", "after", "disable") and found[2] is None:
             if word == "disable":
+                if self.waiting != "test":  # pFUnit forgets a @disable that comes before
+                    raise TestFileError(f"{where}: @disable belongs behind @test")
                 self.disabled = True
             else:
                 self.waiting = word

@@ -1,0 +1,66 @@
+# Fretwear: `make` shows what there is. Every target does its own set-up.
+#
+# Every path is relative to this directory, where make runs, so that it may lie anywhere.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+.PHONY: help deps build debug run test bench clean
+
+BUILD := build/release
+RUN := build/run
+PYTHON := build/venv/bin/python
+EXAMPLE := example/blade_sector
+# Options for CMake, such as CMAKE_OPTIONS=-DCMAKE_PREFIX_PATH=/some/where
+CMAKE_OPTIONS ?=
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 16
+
+deps: build/deps.stamp ## install what is missing (system packages, build/venv)
+
+# The stamp depends on the list of what is needed and on nothing else: a second call costs nothing.
+build/deps.stamp: tools/deps.sh
+	@mkdir -p build
+	@tools/deps.sh build/venv
+	@touch $@
+
+build: build/deps.stamp ## optimised program build/release/fw_run
+	@if [ ! -f $(BUILD)/build.ninja ] || [ -n "$(CMAKE_OPTIONS)" ]; then \
+	   cmake -S . -B $(BUILD) -G Ninja -DFRETWEAR_NATIVE=ON $(CMAKE_OPTIONS); \
+	fi
+	@cmake --build $(BUILD)
+
+debug: build/deps.stamp ## build/debug: every check, and floating-point traps
+	@cmake -S . -B build/debug -G Ninja -DCMAKE_BUILD_TYPE=Debug $(CMAKE_OPTIONS)
+	@cmake --build build/debug
+
+run: $(RUN)/frf.png ## response of the blade sector with its picture, in build/run
+	@echo "results: $(RUN)/frf.h5, $(RUN)/frf_stuck.h5, $(RUN)/frf.png"
+
+# `build` always runs, and changes fw_run only where a source has changed; the recipe of fw_run is
+# empty so that make looks at its time again afterwards.
+$(BUILD)/fw_run: build ;
+
+$(RUN)/frf.h5: $(EXAMPLE)/frf.nml $(wildcard $(EXAMPLE)/*.h5) $(BUILD)/fw_run
+	@mkdir -p $(RUN)
+	$(BUILD)/fw_run -o $@ $<
+
+$(RUN)/frf_stuck.h5: $(EXAMPLE)/frf_stuck.nml $(wildcard $(EXAMPLE)/*.h5) $(BUILD)/fw_run
+	@mkdir -p $(RUN)
+	$(BUILD)/fw_run -o $@ $<
+
+$(RUN)/frf.png: $(RUN)/frf.h5 $(RUN)/frf_stuck.h5 $(wildcard python/fretwear/*.py)
+	PYTHONPATH=python MPLBACKEND=Agg $(PYTHON) -m fretwear.plots $(RUN)/frf.h5 \
+	   --linear $(RUN)/frf_stuck.h5 -o $@
+
+# The closing line has to be the last one, whatever the build said before.
+test: build ## every test; the last line counts the cases
+	@$(PYTHON) test/support/run_tests.py --build $(BUILD) --python $(PYTHON)
+
+bench: build ## error against run time
+	PYTHONPATH=python $(PYTHON) bench/run.py
+
+clean: ## remove everything built but the Python environment
+	rm -rf $(BUILD) build/debug $(RUN)

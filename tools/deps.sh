@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# Install what the build needs: compilers and libraries through the system's package manager where
+# that is allowed, Python packages into a virtual environment. Otherwise say what is missing.
+#
+#     tools/deps.sh VENV_DIRECTORY
+set -euo pipefail
+venv=$1
+python_modules=(numpy scipy h5py skfem matplotlib pytest)
+python_packages=(numpy scipy h5py scikit-fem matplotlib pytest)
+
+has_command() { command -v "$1" >/dev/null 2>&1; }
+
+# Can a Fortran program be linked with these libraries? Names differ between systems, so any of
+# the alternatives will do.
+links() {
+   local directory name
+   has_command gfortran || return 1
+   directory=$(mktemp -d)
+   echo 'end' >"$directory/probe.f90"
+   for name; do
+      if gfortran "$directory/probe.f90" -o "$directory/probe" "-l$name" 2>/dev/null; then
+         rm -r "$directory"
+         return 0
+      fi
+   done
+   rm -r "$directory"
+   return 1
+}
+
+has_venv() { python3 -c 'import venv, ensurepip' 2>/dev/null; }
+
+# Every probe with the Debian package that makes it succeed.
+missing_packages() {
+   has_command gfortran || echo gfortran
+   has_command gcc || echo gcc
+   links m || echo libc6-dev
+   has_command cmake || echo cmake
+   has_command ninja || echo ninja-build
+   has_command pkg-config || echo pkg-config
+   links openblas || echo libopenblas-dev
+   links fftw3 || echo libfftw3-dev
+   links hdf5_serial_fortran hdf5_fortran || echo libhdf5-dev
+   links sundials_cvode || echo libsundials-dev
+   links sundials_fcvode_mod || echo libsundials-fortran-dev
+   has_venv || echo python3-venv
+}
+
+install_packages() {
+   local as_root=()
+   has_command apt-get || return 1
+   if [ "$(id -u)" -ne 0 ]; then
+      has_command sudo && sudo -n true 2>/dev/null || return 1
+      as_root=(sudo -n)
+   fi
+   echo "deps: installing $*" >&2
+   # An index that is only partly reachable may still hold every package.
+   "${as_root[@]}" apt-get update -qq || true
+   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+      apt-get install -y -qq --no-install-recommends "$@" >&2
+}
+
+if ! has_command python3; then
+   echo "deps: python3 (3.9 or later) is needed" >&2
+   exit 1
+fi
+
+mapfile -t missing < <(missing_packages)
+if [ "${#missing[@]}" -gt 0 ]; then
+   install_packages "${missing[@]}" || true
+   mapfile -t missing < <(missing_packages)
+fi
+if [ "${#missing[@]}" -gt 0 ]; then
+   {
+      echo "deps: these packages (names of Debian and Ubuntu) are missing and could not be"
+      echo "installed from here. Please install them and try again:"
+      printf '   %s\n' "${missing[@]}"
+   } >&2
+   exit 1
+fi
+
+has_modules() {
+   local module
+   for module in "${python_modules[@]}"; do
+      "$1" -c "import importlib.util, sys; sys.exit(importlib.util.find_spec('$module') is None)" ||
+         return 1
+   done
+}
+
+# Where the interpreter has every module already nothing is downloaded; otherwise the environment
+# stands alone, because packages of two origins need not fit each other.
+if ! { [ -x "$venv/bin/python" ] && has_modules "$venv/bin/python"; }; then
+   rm -rf "$venv"
+   if has_modules python3; then
+      python3 -m venv --system-site-packages --without-pip "$venv"
+   else
+      python3 -m venv "$venv"
+      if ! "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+         "${python_packages[@]}"; then
+         echo "deps: pip could not install ${python_packages[*]} into $venv" >&2
+         exit 1
+      fi
+   fi
+fi
