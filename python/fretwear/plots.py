@@ -240,7 +240,7 @@ def _draw_states(axes: Axes, response: Response) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line; exit status 0 done, 2 usage, 3 file not accepted, 5 not readable or writable."""
+    """Command line; exit status 0 done, 2 usage, 3 file not accepted, 5 input or output failed."""
     parser = argparse.ArgumentParser(prog="python -m fretwear.plots", allow_abbrev=False,
                                      description="Plot the frequency response of a result file.")
     parser.add_argument("result", help="result file of a sweep")

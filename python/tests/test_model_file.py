@@ -104,6 +104,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     (["--pairs", "7"], 3, "even number"),
     (["--pairs", "16", "--axial-patches", "4"], 3, "cannot be combined"),
     (["--flank-length", "-1"], 3, "flank_length = -1.0"),
+    ([*COARSE_OPTIONS[:-1], "4000"], 3, "n_modes = 4000"),
 ])
 def test_command_line_refuses(options: list[str], status: int, message: str, tmp_path: Path,
                               capsys: pytest.CaptureFixture[str]) -> None:

@@ -75,7 +75,8 @@ def test_pulling_the_blade_outwards_closes_the_flanks(
     assert (relative[:, 0] > 0).all()
 
 
-def test_a_common_translation_leaves_no_relative_displacement(full: FullModel, assembly: Assembly) -> None:
+def test_a_common_translation_leaves_no_relative_displacement(
+        full: FullModel, assembly: Assembly) -> None:
     common = np.tile([0.3, -1.0, 0.7], assembly.n_nodes)
     assert np.abs(full.rows.matrix @ common).max() < ROUND_OFF
 

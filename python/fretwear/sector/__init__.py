@@ -6,13 +6,21 @@ Units: mm, tonne, s, N. ``generate()`` returns the reduced model, ``write_model`
 
 from .model import FullModel, ReducedModel, build_full, generate, reduce_model
 from .model_file import read_parameters, write_model
-from .parameters import Discretisation, Geometry, Material, SectorParameters, patch_grid
+from .parameters import (
+    Discretisation,
+    Geometry,
+    Material,
+    ParameterError,
+    SectorParameters,
+    patch_grid,
+)
 
 __all__ = [
     "Discretisation",
     "FullModel",
     "Geometry",
     "Material",
+    "ParameterError",
     "ReducedModel",
     "SectorParameters",
     "build_full",

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from skfem import Basis, ElementHex2, FacetBasis, MeshHex1
 
-from .parameters import Material
+from .parameters import Material, ParameterError
 
 __all__ = ["Assembly", "FacetMeans", "facet_means"]
 
@@ -43,6 +43,9 @@ class Assembly:
         self._basis = Basis(mesh, ElementHex2(), intorder=INTEGRATION_ORDER)
         self.nodes: Floats = self._basis.doflocs
         self.cell_nodes: Ints = self._basis.element_dofs.T.astype(np.int64)
+        if (self._basis.mapping.detDF(self._basis.X) <= 0.0).any():
+            raise ParameterError("Geometry: the parameters fold at least one element; move them "
+                                 "towards the defaults")
         # Gradients (element, point, component, node): products over points become matmuls.
         self._grad = np.ascontiguousarray(
             np.array([np.asarray(b[0].grad) for b in self._basis.basis]).transpose(2, 3, 1, 0))
@@ -146,7 +149,10 @@ def facet_means(mesh: MeshHex1, facets: Ints, group: Ints, n_groups: int) -> Fac
     # scikit-fem may order the facets it is given: sort here, so that the groups stay aligned.
     order = np.argsort(facets)
     facets, group = facets[order], group[order]
-    basis = FacetBasis(mesh, ElementHex2(), facets=facets, intorder=INTEGRATION_ORDER)
+    # Moved to the origin: finding the facets in their elements needs all digits of the sizes.
+    origin = mesh.p[:, mesh.facets[:, facets]].mean(axis=(1, 2))
+    near = MeshHex1(mesh.p - origin[:, None], mesh.t)
+    basis = FacetBasis(near, ElementHex2(), facets=facets, intorder=INTEGRATION_ORDER)
     shape = np.array([np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis])
     integral = np.einsum("afq,fq->af", shape, basis.dx)
     rows = np.broadcast_to(group, integral.shape)
@@ -154,4 +160,4 @@ def facet_means(mesh: MeshHex1, facets: Ints, group: Ints, n_groups: int) -> Fac
     sums = sp.csr_array(sp.coo_array((integral.ravel(), (rows.ravel(), basis.element_dofs.ravel())),
                                      shape=(n_groups, basis.doflocs.shape[1])))
     means = sp.csr_array(sp.diags_array(1.0 / area) @ sums)
-    return FacetMeans(means, area, means @ basis.doflocs.T)
+    return FacetMeans(means, area, means @ basis.doflocs.T + origin)

@@ -19,7 +19,14 @@ from typing import Any, NoReturn
 from .. import __version__
 from .model import FullModel, ReducedModel, build_full, reduce_model
 from .model_file import write_model
-from .parameters import Discretisation, Geometry, Material, SectorParameters, patch_grid
+from .parameters import (
+    Discretisation,
+    Geometry,
+    Material,
+    ParameterError,
+    SectorParameters,
+    patch_grid,
+)
 
 __all__ = ["main"]
 
@@ -43,27 +50,29 @@ def main(arguments: list[str] | None = None) -> int:
     """Generate a model file as told by the command line; returns the exit status."""
     options = _parser().parse_args(arguments)
     try:
-        parameters = _parameters(options)
-    except ValueError as error:
+        return _run(options)
+    except ParameterError as error:
         print(f"fretwear.sector: {error}", file=sys.stderr)
         return _BAD_PARAMETER
-    for target in filter(None, (options.output, options.picture)):
-        # Said before the work, not after it.
-        if not Path(target).absolute().parent.is_dir():
-            print(f"fretwear.sector: no folder to write {target} into", file=sys.stderr)
-            return _NOT_WRITTEN
-    started = time.perf_counter()
-    full = build_full(parameters)
-    reduced = reduce_model(full)
-    try:
-        write_model(reduced, options.output, options.title)
-        if options.picture:
-            from .picture import draw_sector  # matplotlib only where a picture is wanted
-
-            draw_sector(full, options.picture)
     except OSError as error:
         print(f"fretwear.sector: cannot write: {error}", file=sys.stderr)
         return _NOT_WRITTEN
+
+
+def _run(options: argparse.Namespace) -> int:
+    parameters = _parameters(options)
+    for target in filter(None, (options.output, options.picture)):
+        # Said before the work, not after it.
+        if not Path(target).absolute().parent.is_dir():
+            raise FileNotFoundError(f"no folder to write {target} into")
+    started = time.perf_counter()
+    full = build_full(parameters)
+    reduced = reduce_model(full)
+    write_model(reduced, options.output, options.title)
+    if options.picture:
+        from .picture import draw_sector  # matplotlib only where a picture is wanted
+
+        draw_sector(full, options.picture)
     if not options.quiet:
         _summary(full, reduced, options.output, time.perf_counter() - started)
     return 0
@@ -101,7 +110,8 @@ def _parameters(options: argparse.Namespace) -> SectorParameters:
     if options.pairs is not None:
         patches = given[Discretisation]
         if {"axial_patches", "slope_patches"} & patches.keys():
-            raise ValueError("--pairs cannot be combined with --axial-patches or --slope-patches")
+            raise ParameterError("--pairs cannot be combined with --axial-patches or "
+                                 "--slope-patches")
         patches["axial_patches"], patches["slope_patches"] = patch_grid(options.pairs)
     return SectorParameters(Geometry(**given[Geometry]), Material(**given[Material]),
                             Discretisation(**given[Discretisation]))

@@ -49,7 +49,8 @@ def build_mesh(parameters: SectorParameters) -> SectorMesh:
     z = np.linspace(-0.5, 0.5, disc.n_axial + 1) * geometry.axial_length
     vertices, hexes, bodies = [], [], []
     offset = 0
-    for body, blocks in ((BLADE, _blade_blocks(geometry, disc)), (DISK, _disk_blocks(geometry, disc))):
+    parts = {BLADE: _blade_blocks(geometry, disc), DISK: _disk_blocks(geometry, disc)}
+    for body, blocks in parts.items():
         points, quads = _merge(blocks)
         xyz, cells = _extrude(points, quads, z)
         if body == BLADE:

@@ -110,7 +110,8 @@ class ReducedModel:
             of its slot: rigid motions give zeros, unstable ones negative numbers -sqrt(-lambda).
         """
         if state not in ("stuck", "frictionless"):
-            raise ValueError(f"state = {state!r} is not accepted; expected 'stuck' or 'frictionless'")
+            raise ValueError(f"state = {state!r} is not accepted; expected 'stuck' or "
+                             "'frictionless'")
         n_contact = 3 * self.n_pairs
         kept = np.arange(n_contact, len(self.mass))
         if state == "frictionless":

@@ -53,7 +53,8 @@ def read_parameters(path: str | Path) -> SectorParameters:
     """Parameters from which a model file was generated."""
     with h5py.File(path, "r") as file:
         if "parameters" not in file.attrs:
-            raise ValueError(f"{path}: no attribute 'parameters'; was it written by fretwear.sector?")
+            raise ValueError(f"{path}: no attribute 'parameters'; it was not written by "
+                             "fretwear.sector")
         groups = json.loads(bytes(file.attrs["parameters"]))
     return SectorParameters(Geometry(**groups["geometry"]), Material(**groups["material"]),
                             Discretisation(**groups["discretisation"]))

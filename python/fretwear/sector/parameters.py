@@ -11,7 +11,12 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-__all__ = ["Discretisation", "Geometry", "Material", "SectorParameters", "patch_grid"]
+__all__ = ["Discretisation", "Geometry", "Material", "ParameterError", "SectorParameters",
+           "patch_grid"]
+
+
+class ParameterError(ValueError):
+    """A parameter, or a combination of them, from which no sector can be made."""
 
 
 def _par(default: float | int, text: str) -> Any:
@@ -21,7 +26,7 @@ def _par(default: float | int, text: str) -> Any:
 
 def _require(condition: bool, owner: str, name: str, value: object, accepted: str) -> None:
     if not condition:
-        raise ValueError(f"{owner}: {name} = {value!r} is not accepted; expected {accepted}")
+        raise ParameterError(f"{owner}: {name} = {value!r} is not accepted; expected {accepted}")
 
 
 def _check_numbers(obj: object, may_be_negative: tuple[str, ...] = ()) -> None:
@@ -220,7 +225,8 @@ def patch_grid(n_pairs: int) -> tuple[int, int]:
         Patches along the axis and along the slope, the first not smaller.
     """
     if n_pairs < 2 or n_pairs % 2:
-        raise ValueError(f"pairs = {n_pairs} is not accepted; expected an even number of at least 2")
+        raise ParameterError(f"pairs = {n_pairs} is not accepted; expected an even number "
+                             "of at least 2")
     per_flank = n_pairs // 2
     slope = next(k for k in range(math.isqrt(per_flank), 0, -1) if per_flank % k == 0)
     return per_flank // slope, slope

@@ -44,7 +44,8 @@ def draw_sector(full: FullModel, path: str | Path) -> None:
     _draw_solid(root, full, (BLADE,), azimuth=-30.0, elevation=30.0, top=g.platform_radius)
     _draw_section(section, full)
     titles = ("Blade and disk sector",
-              f"Blade root below the platform: {d.axial_patches} x {d.slope_patches} patches per flank",
+              "Blade root below the platform: "
+              f"{d.axial_patches} x {d.slope_patches} patches per flank",
               "Cross-section of root and slot")
     for axes, title in zip((sector, root, section), titles, strict=True):
         box = axes.get_position(original=True)
@@ -56,7 +57,7 @@ def draw_sector(full: FullModel, path: str | Path) -> None:
 
 def _draw_solid(axes: Axes, full: FullModel, bodies: tuple[int, ...], azimuth: float,
                 elevation: float, top: float = np.inf) -> None:
-    """Shaded boundary of bodies cut off at a radius [mm], seen from azimuth, elevation [degrees]."""
+    """Shaded boundary of bodies below a radius [mm], seen from azimuth, elevation [degrees]."""
     right, up, towards = _camera(azimuth, elevation)
     corners, colours = [], []
     for body in bodies:

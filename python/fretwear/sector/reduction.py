@@ -3,7 +3,7 @@
 The free blade makes K singular, so everything rests on K_a = K + kappa B^T B, which is positive
 definite. With Y = K_a^-1 B^T and S = B Y:
 
-* constraint modes Psi = Y S^-1 (B Psi = I) and contact stiffness K_rr = Psi^T K Psi = S^-1 - kappa I;
+* constraint modes Psi = Y S^-1 (B Psi = I); contact stiffness K_rr = Psi^T K Psi = S^-1 - kappa I;
 * bonded flexibility F = K_a^-1 - Y S^-1 Y^T (B F = 0): the modes of (F, M) are those of the
   structure with every pair stuck, and Psi^T f is the exact static contact force;
 * Phi^T K Psi = 0, so the stiffness of q = (u_r, eta) is block diagonal.
@@ -19,9 +19,20 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.typing import NDArray
 
+from .parameters import ParameterError
+
 __all__ = ["Bonded", "Reduction", "bonded_basis"]
 
 Floats = NDArray[np.float64]
+
+
+# Right-hand sides treated at once: fine flanks have thousands, each as long as the full model.
+_BLOCK = 256
+
+
+def _blocks(n: int) -> list[slice]:
+    """Consecutive blocks of n columns."""
+    return [slice(k, min(k + _BLOCK, n)) for k in range(0, n, _BLOCK)]
 
 
 class Bonded:
@@ -44,7 +55,9 @@ class Bonded:
         # Positive definite: diagonal pivots are safe, and a symmetric ordering fills least.
         self._factors = spl.splu(augmented, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                                  options={"SymmetricMode": True})
-        self._flexible = self._factors.solve(np.asfortranarray(contact.toarray().T))
+        self._flexible = np.empty(contact.shape[::-1], order="F")
+        for block in _blocks(contact.shape[0]):
+            self._flexible[:, block] = self._factors.solve(contact[block].toarray().T)
         compliance = contact @ self._flexible
         self._compliance = la.cho_factor(0.5 * (compliance + compliance.T))
 
@@ -102,7 +115,9 @@ class Reduction:
 
     def matrix(self, full: sp.csr_array) -> Floats:
         """T^T A T of a symmetric matrix, symmetric to the last bit."""
-        product = self.basis.T @ (full @ self.basis)
+        product = np.empty((self.basis.shape[1],) * 2)
+        for block in _blocks(len(product)):
+            product[:, block] = self.basis.T @ (full @ self.basis[:, block])
         return 0.5 * (product + product.T)
 
     def load(self, full: Floats) -> Floats:
@@ -116,6 +131,10 @@ def bonded_basis(bonded: Bonded, mass: sp.csr_array, load: Floats, n_modes: int)
     The attachment vector is what the modes leave of the static answer to the load, so it is
     orthogonal to them in mass and stiffness and the reduced stiffness stays block diagonal.
     """
+    most = mass.shape[0] - bonded.contact.shape[0] - 1  # one is left for the attachment vector
+    if n_modes >= most:
+        raise ParameterError(f"Discretisation: n_modes = {n_modes} is not accepted; expected "
+                             f"fewer than {most}, the bonded degrees of freedom of this mesh")
     omega, shapes = bonded.modes(mass, n_modes)
     rest = bonded.solve(load - mass @ (shapes @ (shapes.T @ load)))
     for _ in range(2):  # the second pass removes the round-off of the first
