@@ -1,0 +1,297 @@
+!> Datasets that grow along their first dimension as h5py shows them, one row at a time.
+!>
+!> Rows not given (skipped) read as NaN for reals and 0 otherwise. A chunk holds about 64 kB, so
+!> that a flush, which writes whole chunks, stays cheap, and never more rows than are expected.
+module fw_hdf5_append
+   use, intrinsic :: iso_c_binding, only: c_int8_t
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use, intrinsic :: iso_c_binding, only: c_ptr
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use fw_error, only: error_type
+   use fw_hdf5_file, only: hdf5_file
+   use fw_hdf5_file, only: dataset_failure
+   use fw_hdf5_write, only: new_dataset
+   use fw_kinds, only: wp
+   use fw_text, only: to_text
+   use hdf5, only: hid_t
+   use hdf5, only: hsize_t
+   use hdf5, only: size_t
+   use hdf5, only: h5dclose_f
+   use hdf5, only: h5dget_space_f
+   use hdf5, only: h5dset_extent_f
+   use hdf5, only: h5dwrite_f
+   use hdf5, only: h5kind_to_type
+   use hdf5, only: h5_integer_kind
+   use hdf5, only: h5_real_kind
+   use hdf5, only: h5pclose_f
+   use hdf5, only: h5pcreate_f
+   use hdf5, only: h5pset_chunk_f
+   use hdf5, only: h5pset_fill_value_f
+   use hdf5, only: h5p_dataset_create_f
+   use hdf5, only: h5sclose_f
+   use hdf5, only: h5screate_simple_f
+   use hdf5, only: h5sselect_hyperslab_f
+   use hdf5, only: h5s_select_set_f
+   use hdf5, only: h5s_unlimited_f
+   use hdf5, only: h5tclose_f
+   use hdf5, only: h5tcopy_f
+   use hdf5, only: h5tenum_create_f
+   use hdf5, only: h5tenum_insert_f
+   use hdf5, only: h5tget_size_f
+   implicit none (type, external)
+   private
+
+   public :: growing_dataset, growing_real, growing_integer, growing_logical
+
+   !> Kinds of elements; a logical is what h5py shows as bool.
+   integer, parameter :: growing_real = 1, growing_integer = 2, growing_logical = 3
+
+   integer, parameter :: chunk_bytes = 65536, max_chunk_rows = 1024
+
+   !> A dataset of rows, in the file while that is open. Not to be copied.
+   type :: growing_dataset
+      integer :: n_rows = 0
+      integer(hid_t), private :: id = -1_hid_t, type_id = -1_hid_t
+      character(:), allocatable, private :: name
+      !> Dimensions of a row in the order of Fortran, then 1 for the row itself.
+      integer(hsize_t), allocatable, private :: row(:)
+   contains
+      procedure :: create
+      procedure :: is_created
+      procedure :: skip
+      procedure :: close
+      !> `call dataset%append(file, values, error)`: one row, of exactly the shape created.
+      generic :: append => append_real_0, append_real_1, append_real_2, append_real_3, &
+         append_integer, append_logical
+      procedure, private :: append_real_0, append_real_1, append_real_2, append_real_3
+      procedure, private :: append_integer, append_logical
+      procedure, private :: append_flat, append_raw, grow
+   end type growing_dataset
+
+contains
+
+   !> Create the dataset without rows.
+   subroutine create(self, file, name, kind_of, row_shape, error, expected_rows)
+      class(growing_dataset), intent(out) :: self
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      !> growing_real, growing_integer or growing_logical.
+      integer, intent(in) :: kind_of
+      !> Shape of a row in Fortran, empty for scalars.
+      integer, intent(in) :: row_shape(:)
+      type(error_type), allocatable, intent(out) :: error
+      !> How many rows are likely (default: not known); more may come.
+      integer, intent(in), optional :: expected_rows
+      integer(hid_t) :: space, creation
+      integer(hsize_t) :: limit(size(row_shape) + 1), chunk(size(row_shape) + 1)
+      integer :: status
+
+      self%name = name
+      self%row = [int(row_shape, hsize_t), 1_hsize_t]
+      self%type_id = element_type(kind_of)
+      limit = self%row
+      limit(size(limit)) = h5s_unlimited_f
+      chunk = max(self%row, 1_hsize_t)
+      chunk(size(chunk)) = rows_per_chunk(self, expected_rows)
+      call h5pcreate_f(h5p_dataset_create_f, creation, status)
+      call h5pset_chunk_f(creation, size(chunk), chunk, status)
+      if (kind_of == growing_real) then
+         call h5pset_fill_value_f(creation, self%type_id, &
+                                  ieee_value(1.0_wp, ieee_quiet_nan), status)
+      end if
+      call h5screate_simple_f(size(limit), [self%row(:size(row_shape)), 0_hsize_t], space, &
+                              status, limit)
+      call new_dataset(file, name, self%type_id, space, self%id, error, creation)
+      call h5sclose_f(space, status)
+      call h5pclose_f(creation, status)
+   end subroutine create
+
+   pure logical function is_created(self)
+      class(growing_dataset), intent(in) :: self
+
+      is_created = self%id >= 0
+   end function is_created
+
+   !> Leave n rows at their fill value.
+   subroutine skip(self, file, n, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: n
+      type(error_type), allocatable, intent(out) :: error
+
+      if (n > 0) call self%grow(file, n, error)
+   end subroutine skip
+
+   !> Release the handles; harmless where nothing was created.
+   subroutine close(self)
+      class(growing_dataset), intent(inout) :: self
+      integer :: status
+
+      if (self%id < 0) return
+      call h5dclose_f(self%id, status)
+      call h5tclose_f(self%type_id, status)
+      self%id = -1_hid_t
+   end subroutine close
+
+   subroutine append_real_0(self, file, values, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      real(wp), intent(in) :: values
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%append_flat(file, [integer ::], [values], error)
+   end subroutine append_real_0
+
+   subroutine append_real_1(self, file, values, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      real(wp), intent(in), contiguous :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%append_flat(file, shape(values), values, error)
+   end subroutine append_real_1
+
+   subroutine append_real_2(self, file, values, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      real(wp), intent(in), contiguous :: values(:, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%append_flat(file, shape(values), values, error)
+   end subroutine append_real_2
+
+   subroutine append_real_3(self, file, values, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      real(wp), intent(in), contiguous :: values(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%append_flat(file, shape(values), values, error)
+   end subroutine append_real_3
+
+   subroutine append_flat(self, file, dims, values, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: dims(:)
+      real(wp), intent(in), target :: values(product(dims))
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%append_raw(file, dims, h5kind_to_type(wp, h5_real_kind), c_loc(values), error)
+   end subroutine append_flat
+
+   subroutine append_integer(self, file, values, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: values
+      type(error_type), allocatable, intent(out) :: error
+      integer, target :: buffer
+
+      buffer = values
+      call self%append_raw(file, [integer ::], h5kind_to_type(kind(0), h5_integer_kind), &
+                           c_loc(buffer), error)
+   end subroutine append_integer
+
+   subroutine append_logical(self, file, values, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      logical, intent(in) :: values
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int8_t), target :: buffer
+
+      buffer = merge(1_c_int8_t, 0_c_int8_t, values)
+      call self%append_raw(file, [integer ::], self%type_id, c_loc(buffer), error)
+   end subroutine append_logical
+
+   subroutine append_raw(self, file, dims, memory_type, address, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: dims(:)
+      integer(hid_t), intent(in) :: memory_type
+      type(c_ptr), intent(in) :: address
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: memory, space
+      integer(hsize_t) :: start(size(self%row))
+      integer :: status, ignored, n
+
+      n = size(self%row)
+      if (size(dims) /= n - 1) then
+         call dataset_failure(file, self%name, 'takes rows of another rank', error)
+      else if (any(dims /= self%row(:n - 1))) then
+         call dataset_failure(file, self%name, 'takes rows of another shape', error)
+      end if
+      if (.not. allocated(error)) call self%grow(file, 1, error)
+      if (allocated(error) .or. product(self%row) == 0) return
+      start = 0
+      start(n) = self%n_rows - 1
+      call h5dget_space_f(self%id, space, status)
+      call h5sselect_hyperslab_f(space, h5s_select_set_f, start, self%row, status)
+      call h5screate_simple_f(n, self%row, memory, status)
+      call h5dwrite_f(self%id, memory_type, address, status, memory, space)
+      call h5sclose_f(memory, ignored)
+      call h5sclose_f(space, ignored)
+      if (status < 0) call dataset_failure(file, self%name, 'cannot be written (disk full?)', error)
+   end subroutine append_raw
+
+   subroutine grow(self, file, n, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: n
+      type(error_type), allocatable, intent(out) :: error
+      integer(hsize_t) :: extent(size(self%row))
+      integer :: status
+
+      extent = self%row
+      extent(size(extent)) = self%n_rows + n
+      call h5dset_extent_f(self%id, extent, status)
+      if (status >= 0) then
+         self%n_rows = self%n_rows + n
+      else
+         call dataset_failure(file, self%name, 'cannot take row '// &
+                              to_text(self%n_rows + n), error)
+      end if
+   end subroutine grow
+
+   integer(hsize_t) function rows_per_chunk(self, expected_rows) result(rows)
+      class(growing_dataset), intent(in) :: self
+      integer, intent(in), optional :: expected_rows
+      integer(size_t) :: bytes
+      integer :: status
+
+      call h5tget_size_f(self%type_id, bytes, status)
+      rows = chunk_bytes/max(1_hsize_t, int(bytes, hsize_t)*product(self%row))
+      rows = min(rows, int(max_chunk_rows, hsize_t))
+      if (present(expected_rows)) rows = min(rows, int(expected_rows, hsize_t))
+      rows = max(rows, 1_hsize_t)
+   end function rows_per_chunk
+
+   !> The type in the file; a type of its own for logicals, as h5py has it.
+   integer(hid_t) function element_type(kind_of) result(type_id)
+      integer, intent(in) :: kind_of
+      integer(c_int8_t), target :: flag
+      integer(hid_t) :: byte
+      integer :: status
+
+      select case (kind_of)
+      case (growing_real)
+         type_id = copied(h5kind_to_type(wp, h5_real_kind))
+      case (growing_integer)
+         type_id = copied(h5kind_to_type(kind(0), h5_integer_kind))
+      case default
+         byte = h5kind_to_type(c_int8_t, h5_integer_kind)
+         call h5tenum_create_f(byte, type_id, status)
+         flag = 0
+         call h5tenum_insert_f(type_id, 'FALSE', c_loc(flag), status)
+         flag = 1
+         call h5tenum_insert_f(type_id, 'TRUE', c_loc(flag), status)
+      end select
+   end function element_type
+
+   integer(hid_t) function copied(predefined) result(type_id)
+      integer(hid_t), intent(in) :: predefined
+      integer :: status
+
+      call h5tcopy_f(predefined, type_id, status)
+   end function copied
+
+end module fw_hdf5_append
