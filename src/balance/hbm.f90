@@ -53,6 +53,7 @@ module fw_hbm
       type(complex_lu_type), allocatable :: preconditioner(:)
    contains
       procedure :: set_frequency
+      procedure :: coordinate_of
       procedure :: residual
       procedure :: linearize
       procedure :: reduce
@@ -160,7 +161,7 @@ contains
          if (self%rigid) then
             stiffness = 0.0_wp
             do c = 1, 3
-               if (self%joint%row(c, i) > 0) stiffness(c) = local_stiffness(self, coordinate_of(self, c, i))
+               if (self%joint%row(c, i) > 0) stiffness(c) = local_stiffness(self, self%coordinate_of(c, i))
             end do
             n_tangential = count(self%joint%row(1:2, i) > 0)
             stiffness(1:2) = sum(stiffness(1:2))/real(max(1, n_tangential), wp)
@@ -188,7 +189,7 @@ contains
 
    !> Coordinate of a component that is one.
    pure integer function coordinate_of(self, component, pair) result(coordinate)
-      type(hbm_system), intent(in) :: self
+      class(hbm_system), intent(in) :: self
       integer, intent(in) :: component, pair
 
       associate (r => self%joint%relative)

@@ -39,7 +39,7 @@ contains
          do i = 1, self%contact%n_pairs
             do c = 1, 3
                if (self%joint%row(c, i) == 0 .or. self%contact%state(i) == pair_open) cycle
-               j = coordinate_of(self, c, i)
+               j = self%coordinate_of(c, i)
                pinned(j) = self%contact%state(i) == pair_stuck .or. &
                            (c == 3 .and. self%contact%always_closed(i))
                wanted(j) = self%contact%state(i) == pair_mixed
@@ -105,7 +105,7 @@ contains
       do i = 1, self%contact%n_pairs
          do c = 1, 3
             if (self%joint%row(c, i) == 0) cycle
-            j = coordinate_of(self, c, i)
+            j = self%coordinate_of(c, i)
             place = self%place(j)
             if (place > 0 .and. place <= self%n_active) cycle
             step(j, :) = -r(j, :)/self%stiffness(i, c)

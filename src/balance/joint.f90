@@ -43,7 +43,7 @@ contains
       logical, allocatable :: moving(:)
       integer :: i, c, n_rows
 
-      moving = moving_dofs(model, contact, springs)
+      call find_moving_dofs(model, contact, springs, moving)
       if (.not. skip_idle) moving(1:) = .true.
       allocate (self%row(3, contact%n_pairs), source=0)
       allocate (side_1(0), side_2(0))
@@ -74,11 +74,11 @@ contains
 
    !> Dofs that a load can reach through the matrices, the pairs and the springs (0:n_dof; entry
    !> 0, the ground, never moves). What no load reaches stays at rest exactly.
-   pure function moving_dofs(model, contact, springs) result(moving)
+   subroutine find_moving_dofs(model, contact, springs, moving)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
-      logical, allocatable :: moving(:)
+      logical, intent(out), allocatable :: moving(:)
       integer :: i, c, n_moving
 
       allocate (moving(0:model%n_dof), source=.false.)
@@ -108,14 +108,14 @@ contains
 
    contains
 
-      pure subroutine couple(side_1, side_2)
+      subroutine couple(side_1, side_2)
          integer, intent(in) :: side_1, side_2
 
          if (moving(abs(side_1)) .or. moving(abs(side_2))) moving(abs([side_1, side_2])) = .true.
          moving(0) = .false.
       end subroutine couple
 
-   end function moving_dofs
+   end subroutine find_moving_dofs
 
    !> Half-wave symmetry is exact where nothing static acts, normal loads are constant and
    !> springs are odd.

@@ -146,23 +146,25 @@ contains
    subroutine linearize(self, fourier)
       class(forces_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
-      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :)
+      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :), y_n(:)
       real(wp) :: x(2)
       integer :: i, nc
 
       if (.not. any(self%state == pair_mixed)) return
       nc = fourier%n_coefficients
       if (.not. allocated(self%jacobian)) allocate (self%jacobian(3*nc, 3*nc, self%n_pairs))
-      !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, x, i)
+      !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i)
       allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
+      allocate (y_n(fourier%n_time))
       !$omp do schedule(dynamic)
       do i = 1, self%n_pairs
          if (self%state(i) /= pair_mixed) cycle
          y = self%prediction_time(i, :, :)
+         y_n = y(3, :)
          x = self%x_start(i, :)
          call march_derivative(fourier%n_time, nc, self%turns(i), fourier%synthesis, y, &
                                self%mu(i), self%present(:, i), x, rows, dx)
-         call project(self%jacobian(:, :, i), fourier, rows, y(3, :), self%present(3, i))
+         call project(self%jacobian(:, :, i), fourier, rows, y_n, self%present(3, i))
       end do
       !$omp end do
       !$omp end parallel

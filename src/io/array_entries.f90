@@ -1,6 +1,6 @@
 !> Which value of which assignment each element of an array takes.
 module fw_array_entries
-   use fw_namelist, only: namelist_type, entry_type, section_type, value_count, location
+   use fw_namelist_data, only: namelist_type, entry_type, section_type, value_count, location
    use fw_text, only: to_text
    implicit none (type, external)
    private

@@ -4,51 +4,16 @@
 !> value found. Understood: `&group ... /` (or `&end`), `!` comments, texts in either quote,
 !> repeat counts, subscripts with sections, names in any case, values over several lines.
 module fw_namelist
-   use fw_cursor, only: cursor_type, is_digit
+   use fw_cursor, only: cursor_type
    use fw_error, only: error_type, fatal_error, status_input, status_usage
-   use fw_text, only: lower_case, to_text
+   use fw_namelist_data, only: namelist_type, group_type, entry_type, value_type, &
+                               add_entry, location
+   use fw_namelist_values, only: parse_sections, parse_values
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: namelist_type, group_type, entry_type, value_type, section_type
-   public :: parse_namelist, parse_override, add_entry, value_count, location
-
-   !> One value, or `repeat` equal ones.
-   type :: value_type
-      character(:), allocatable :: text
-      logical :: quoted = .false.
-      integer :: repeat = 1
-      integer :: line = 0
-   end type value_type
-
-   !> One subscript: first to last, where `last = 0` is the end of the dimension.
-   type :: section_type
-      integer :: first = 1
-      integer :: last = 0
-   end type section_type
-
-   !> One assignment `key(subscripts) = values`.
-   type :: entry_type
-      character(:), allocatable :: group, key
-      type(section_type), allocatable :: sections(:)
-      type(value_type), allocatable :: values(:)
-      integer :: line = 0
-      !> Of an override: the option as it was typed, and its value as it was typed.
-      character(:), allocatable :: option, raw
-   end type entry_type
-
-   type :: group_type
-      character(:), allocatable :: name
-      integer :: line = 0
-   end type group_type
-
-   type :: namelist_type
-      !> Name of the file, for messages.
-      character(:), allocatable :: source
-      type(group_type), allocatable :: groups(:)
-      type(entry_type), allocatable :: entries(:)
-      integer :: n_entries = 0
-   end type namelist_type
+   public :: parse_namelist, parse_override
 
 contains
 
@@ -195,8 +160,8 @@ contains
       place = source//':'//to_text(cursor%line)//': &'//group%name
       call cursor%take_name(entry%key)
       if (len(entry%key) == 0) then
-         call fatal_error(error, place//': "'//cursor%peek()//'" stands where a key is expected: '// &
-                          'write key = value', status_input)
+         call fatal_error(error, place//': "'//cursor%peek()//'" stands where a key is '// &
+                          'expected: write key = value', status_input)
          return
       end if
       place = place//' '//entry%key
@@ -212,162 +177,6 @@ contains
       call parse_values(cursor, place, entry, error)
    end subroutine parse_entry
 
-   !> Subscripts in parentheses, if any; the cursor is left behind them.
-   subroutine parse_sections(cursor, place, entry, error)
-      type(cursor_type), intent(inout) :: cursor
-      character(*), intent(in) :: place
-      type(entry_type), intent(inout) :: entry
-      type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: content
-      logical :: ok
-      integer :: comma
-
-      allocate (entry%sections(0))
-      call cursor%skip_blank()
-      if (cursor%peek() /= '(') return
-      cursor%position = cursor%position + 1
-      call cursor%take_through(')', content, ok)
-      content = content//','
-      do while (ok .and. len(content) > 0)
-         comma = index(content, ',')
-         entry%sections = [entry%sections, to_section(content(:comma - 1), ok)]
-         content = content(comma + 1:)
-      end do
-      call cursor%skip_blank()
-      if (.not. ok) call fatal_error(error, place//': subscripts must be positive numbers or '// &
-                                     'sections such as (2), (1:3) or (:,1)', status_input)
-   end subroutine parse_sections
-
-   !> One subscript: `2`, `1:3`, `2:`, `:4` or `:`.
-   type(section_type) function to_section(text, ok) result(section)
-      character(*), intent(in) :: text
-      logical, intent(out) :: ok
-      integer :: colon, status
-
-      ok = verify(text, '0123456789: ') == 0 .and. len_trim(text) > 0
-      if (.not. ok) return
-      status = 0
-      colon = index(text, ':')
-      if (colon == 0) then
-         read (text, *, iostat=status) section%first
-         section%last = section%first
-      else
-         if (len_trim(text(:colon - 1)) > 0) read (text(:colon - 1), *, iostat=status) section%first
-         ok = status == 0
-         if (len_trim(text(colon + 1:)) > 0) then
-            read (text(colon + 1:), *, iostat=status) section%last
-            ok = ok .and. section%last >= section%first
-         end if
-      end if
-      ok = ok .and. status == 0 .and. section%first > 0 .and. index(text, ':', .true.) == colon
-   end function to_section
-
-   !> Values up to the next key or the end of the group.
-   subroutine parse_values(cursor, place, entry, error)
-      type(cursor_type), intent(inout) :: cursor
-      character(*), intent(in) :: place
-      type(entry_type), intent(inout) :: entry
-      type(error_type), allocatable, intent(out) :: error
-      type(value_type), allocatable :: values(:)
-      integer :: n
-      logical :: after_value
-
-      allocate (values(8))
-      n = 0
-      after_value = .false.
-      do
-         call cursor%skip_blank()
-         if (cursor%at_end() .or. cursor%is_at_key()) exit
-         if (cursor%in_file .and. scan(cursor%peek(), '/&') > 0) exit
-         if (cursor%peek() == ',' .and. after_value) then
-            cursor%position = cursor%position + 1
-            after_value = .false.
-            cycle
-         end if
-         if (n == size(values)) call grow(values)
-         n = n + 1
-         call parse_value(cursor, place, values(n), error)
-         if (allocated(error)) return
-         after_value = .true.
-      end do
-      if (n == 0) call fatal_error(error, place//': has no value', status_input)
-      entry%values = values(:n)
-   end subroutine parse_values
-
-   !> One value with its repeat count.
-   subroutine parse_value(cursor, place, value, error)
-      type(cursor_type), intent(inout) :: cursor
-      character(*), intent(in) :: place
-      type(value_type), intent(out) :: value
-      type(error_type), allocatable, intent(out) :: error
-      integer :: star, status
-      logical :: ok
-
-      value%line = cursor%line
-      call cursor%take_word(value%text)
-      star = index(value%text, '*')
-      ok = .true.
-      if (star > 1) then
-         ok = verify(value%text(:star - 1), '0123456789') == 0
-         if (ok) read (value%text(:star - 1), *, iostat=status) value%repeat
-         if (ok) ok = status == 0 .and. value%repeat > 0
-         value%text = value%text(star + 1:)
-      end if
-      if (ok .and. len(value%text) == 0 .and. scan(cursor%peek(), '''"') > 0) then
-         value%quoted = .true.
-         call cursor%take_quoted(value%text, ok)
-         if (.not. ok) call fatal_error(error, place//': a text is not closed by its quote in '// &
-                                        'line '//to_text(value%line), status_input)
-      else if (len(value%text) == 0 .or. .not. ok) then
-         call fatal_error(error, place//': "'//cursor%peek()//'" stands where a value is '// &
-                          'expected (line '//to_text(value%line)//')', status_input)
-      end if
-   end subroutine parse_value
-
-   !> Append an assignment.
-   subroutine add_entry(namelist, entry)
-      type(namelist_type), intent(inout) :: namelist
-      type(entry_type), intent(in) :: entry
-      type(entry_type), allocatable :: larger(:)
-
-      if (namelist%n_entries == size(namelist%entries)) then
-         allocate (larger(2*size(namelist%entries)))
-         larger(:namelist%n_entries) = namelist%entries
-         call move_alloc(larger, namelist%entries)
-      end if
-      namelist%n_entries = namelist%n_entries + 1
-      namelist%entries(namelist%n_entries) = entry
-   end subroutine add_entry
-
-   !> Number of values with the repeat counts multiplied out.
-   pure integer function value_count(entry)
-      type(entry_type), intent(in) :: entry
-      integer :: i
-
-      value_count = 0
-      do i = 1, size(entry%values)
-         if (entry%values(i)%repeat > huge(1) - value_count) then
-            value_count = huge(1)
-            return
-         end if
-         value_count = value_count + entry%values(i)%repeat
-      end do
-   end function value_count
-
-   !> Where an assignment stands: `file:line`, or the option of the command line.
-   pure function location(entry, source) result(place)
-      type(entry_type), intent(in) :: entry
-      character(*), intent(in), optional :: source
-      character(:), allocatable :: place
-
-      if (allocated(entry%option)) then
-         place = '--set '//entry%option
-      else
-         place = to_text(entry%line)
-         if (present(source)) place = source//':'//place
-      end if
-   end function location
-
    pure function at_line(namelist, line) result(place)
       type(namelist_type), intent(in) :: namelist
       integer, intent(in) :: line
@@ -375,15 +184,6 @@ contains
 
       place = namelist%source//':'//to_text(line)
    end function at_line
-
-   pure subroutine grow(values)
-      type(value_type), allocatable, intent(inout) :: values(:)
-      type(value_type), allocatable :: larger(:)
-
-      allocate (larger(2*size(values)))
-      larger(:size(values)) = values
-      call move_alloc(larger, values)
-   end subroutine grow
 
    !> Some editors begin a UTF-8 file with these three bytes.
    pure function byte_order_mark() result(mark)

@@ -4,7 +4,7 @@ module fw_read_output
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type
-   use fw_namelist, only: value_type
+   use fw_namelist_data, only: value_type
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
    use fw_text, only: string_type, nearest_word, to_text

@@ -8,10 +8,12 @@ module fw_reader
    use fw_array_entries, only: source_type, spread_entry
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp, i8
-   use fw_namelist, only: namelist_type, value_type, entry_type, parse_namelist, parse_override, &
-                          add_entry, value_count, location
+   use fw_namelist, only: parse_namelist, parse_override
+   use fw_namelist_data, only: namelist_type, value_type, entry_type, add_entry, value_count, &
+                               location
    use fw_records, only: record_list
    use fw_text, only: string_type, lower_case, nearest_word, to_text, join
+   use fw_text_list, only: append
    use fw_values, only: range_type, new_range, read_real, read_integer, read_logical, &
                         number_text, quoted_text
    implicit none (type, external)
@@ -23,6 +25,10 @@ module fw_reader
    integer(i8), parameter :: largest_array = 100000000_i8
    !> More problems than this are counted only.
    integer, parameter :: most_problems = 12
+   !> A list of mixed values has no shape to be checked against.
+   integer, parameter :: most_listed = 1000000
+
+   character(*), parameter :: real_kind = 'a finite real'
 
    type :: reader_type
       private
@@ -51,6 +57,7 @@ module fw_reader
       procedure, private :: get_text
       procedure, private :: get_reals
       procedure, private :: get_integers
+      procedure, private :: find_last
       procedure, private :: find_scalar
       procedure, private :: find_elements
       procedure, private :: refuse_value
@@ -93,7 +100,7 @@ contains
       integer :: i
       logical :: ok
 
-      range = new_range('a real', above, least, most)
+      range = new_range(real_kind, above, least, most)
       call self%find_scalar(group, key, range%accepts, required, i)
       if (i > 0) then
          call read_real(self%input%entries(i)%values(1)%text, number, ok)
@@ -218,7 +225,7 @@ contains
       integer :: k
       logical :: ok
 
-      range = new_range('a real', above, least)
+      range = new_range(real_kind, above, least)
       call self%find_elements(group, key, dims, repeats, range%accepts, required, &
                               allocated(values), source)
       if (.not. allocated(source%entry)) return
@@ -277,26 +284,26 @@ contains
       character(*), intent(in) :: group, key
       !> What is accepted, in words.
       character(*), intent(in) :: accepts
-      !> Empty where nothing is given.
+      !> Empty where nothing is given; repeat counts are multiplied out.
       type(value_type), allocatable, intent(out) :: values(:)
-      type(source_type) :: source
       character(:), allocatable :: text
       integer :: i, k
 
       allocate (values(0))
-      i = last_entry(self%input, group, key)
-      call self%find_elements(group, key, [list_size(self%input, i)], .false., accepts, .false., &
-                              .false., source)
-      if (.not. allocated(source%entry)) return
+      call self%find_last(group, key, accepts, i)
+      if (i == 0) return
+      if (value_count(self%input%entries(i)) > most_listed) then
+         call self%refuse(group, key, 'has too many values: must be '//accepts)
+         return
+      end if
+      call multiply_out(self%input%entries(i)%values, values)
       text = ''
-      do k = 1, size(source%entry)
-         if (source%entry(k) /= i) cycle
-         values = [values, self%input%entries(i)%values(source%value(k))]
+      do k = 1, size(values)
          if (k > 1) text = text//', '
-         if (values(k)%quoted .or. verify(values(k)%text, '+-0123456789') > 0) then
+         if (verify(values(k)%text, '+-0123456789') > 0) then
             text = text//quoted_text(values(k)%text)
          else
-            text = text//values(k)%text
+            text = text//shown(values(k))
          end if
       end do
       call self%amend(group, key, text)
@@ -390,9 +397,9 @@ contains
       groups = self%records%groups()
       do i = 1, size(self%input%groups)
          if (self%records%has_group(self%input%groups(i)%name)) cycle
-         self%problems = [self%problems, string_type(self%input%source//':'// &
-            to_text(self%input%groups(i)%line)//': there is no group &'// &
-            self%input%groups(i)%name//near(self%input%groups(i)%name, groups))]
+         call append(self%problems, self%input%source//':'// &
+                     to_text(self%input%groups(i)%line)//': there is no group &'// &
+                     self%input%groups(i)%name//near(self%input%groups(i)%name, groups))
       end do
       do i = 1, self%input%n_entries
          associate (entry => self%input%entries(i))
@@ -405,7 +412,9 @@ contains
             end if
          end associate
       end do
-      self%problems = [self%problems, others]
+      do i = 1, size(others)
+         call append(self%problems, others(i)%text)
+      end do
    end subroutine find_unknown
 
    !> Register a key and find its one value: an entry, or 0 for none or a refused one.
@@ -414,14 +423,30 @@ contains
       character(*), intent(in) :: group, key, accepts
       logical, intent(in), optional :: required
       integer, intent(out) :: i_entry
+
+      call self%find_last(group, key, accepts, i_entry)
+      if (i_entry == 0 .and. is_true(required) .and. .not. self%given(group, key)) then
+         call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts)
+      end if
+      if (i_entry == 0) return
+      associate (entry => self%input%entries(i_entry))
+         if (value_count(entry) == 1 .or. allocated(entry%raw)) return
+         call self%refuse(group, key, 'has '//to_text(value_count(entry))// &
+                          ' values: must be one, '//accepts)
+         i_entry = 0
+      end associate
+   end subroutine find_scalar
+
+   !> Register a key that is assigned as a whole and find its last entry.
+   subroutine find_last(self, group, key, accepts, i_entry)
+      class(reader_type), intent(inout) :: self
+      character(*), intent(in) :: group, key, accepts
+      integer, intent(out) :: i_entry
       integer :: i, first
 
       call self%records%add(group, key, accepts)
       i_entry = last_entry(self%input, group, key)
-      if (i_entry == 0) then
-         if (is_true(required)) call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts)
-         return
-      end if
+      if (i_entry == 0) return
       first = 0
       do i = 1, self%input%n_entries
          if (.not. is_entry(self%input%entries(i), group, key)) cycle
@@ -431,17 +456,10 @@ contains
          end if
          first = i
       end do
-      associate (entry => self%input%entries(i_entry))
-         if (size(entry%sections) > 0) then
-            call self%blame(i_entry, '&'//group//' '//key//' has a subscript: it is one value, '//accepts)
-            i_entry = 0
-         else if (value_count(entry) /= 1 .and. .not. allocated(entry%raw)) then
-            call self%blame(i_entry, '&'//group//' '//key//' has '//to_text(value_count(entry))// &
-                            ' values: must be one, '//accepts)
-            i_entry = 0
-         end if
-      end associate
-   end subroutine find_scalar
+      if (size(self%input%entries(i_entry)%sections) == 0) return
+      call self%refuse(group, key, 'has a subscript: must be assigned as a whole, '//accepts)
+      i_entry = 0
+   end subroutine find_last
 
    !> Register an array and find the value of each element; `source%entry` stays unallocated
    !> where nothing is given or a problem was found.
@@ -457,14 +475,18 @@ contains
 
       call self%records%add(group, key, accepts)
       if (.not. self%given(group, key)) then
-         if (is_true(required)) call self%blame(0, '&'//group//' '//key//' is missing: must be '// &
-                                                accepts//' for each of '//dims_text(dims))
+         if (.not. is_true(required)) return
+         message = dims_text(dims)//' of them'
+         if (repeats) message = 'one for all or '//dims_text(dims)
+         call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts//', '//message)
          return
       end if
+      if (any(dims == 0)) return
       ! The expected size may itself be wrong where something failed before.
       if (self%failed()) return
       if (product(int(dims, i8)) > largest_array) then
-         call self%refuse(group, key, 'would have '//dims_text(dims)//' values: too large for a namelist')
+         call self%refuse(group, key, 'would have '//dims_text(dims)// &
+                          ' values: too large for a namelist')
          return
       end if
       allocate (source%entry(product(dims)), source%value(product(dims)), source=0)
@@ -516,7 +538,7 @@ contains
          if (.not. allocated(self%input%entries(i_entry)%option)) &
             place = self%input%source//':'//to_text(line)
       end if
-      self%problems = [self%problems, string_type(place//': '//message)]
+      call append(self%problems, place//': '//message)
    end subroutine blame
 
    type(range_type) function integer_range(least, most) result(range)
@@ -550,13 +572,18 @@ contains
       i = 0
    end function last_entry
 
-   pure integer function list_size(input, i_entry)
-      type(namelist_type), intent(in) :: input
-      integer, intent(in) :: i_entry
+   subroutine multiply_out(values, repeated)
+      type(value_type), intent(in) :: values(:)
+      type(value_type), allocatable, intent(out) :: repeated(:)
+      integer :: i, n
 
-      list_size = 0
-      if (i_entry > 0) list_size = value_count(input%entries(i_entry))
-   end function list_size
+      allocate (repeated(sum(values%repeat)))
+      n = 0
+      do i = 1, size(values)
+         repeated(n + 1:n + values(i)%repeat) = values(i)
+         n = n + values(i)%repeat
+      end do
+   end subroutine multiply_out
 
    pure logical function is_true(flag)
       logical, intent(in), optional :: flag

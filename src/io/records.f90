@@ -1,6 +1,7 @@
 !> The keys that a reader asked for: what each accepts and its effective value.
 module fw_records
    use fw_text, only: string_type
+   use fw_text_list, only: append
    implicit none (type, external)
    private
 
@@ -81,7 +82,7 @@ contains
          do k = 1, size(names)
             known = known .or. names(k)%text == self%records(i)%group
          end do
-         if (.not. known) names = [names, string_type(self%records(i)%group)]
+         if (.not. known) call append(names, self%records(i)%group)
       end do
    end function groups
 
@@ -96,7 +97,7 @@ contains
       if (.not. allocated(self%records)) return
       do i = 1, size(self%records)
          if (self%records(i)%group /= group) cycle
-         names = [names, string_type(self%records(i)%key)]
+         call append(names, self%records(i)%key)
       end do
    end function keys
 

@@ -98,7 +98,8 @@ contains
       integer, intent(in) :: n_free
       real(wp), allocatable, intent(out) :: condensed(:, :)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: rotated(:, :), free(:, :), coupling(:, :), values(:)
+      real(wp), allocatable :: rotated(:, :), free(:, :), coupling(:, :), followed(:, :)
+      real(wp), allocatable :: values(:)
       integer :: j
 
       rotated = product_of(transpose(vectors), product_of(stiffness, vectors))
@@ -107,15 +108,17 @@ contains
       free = rotated(:n_free, :n_free)
       call solve_eigen(free, values, error)
       if (allocated(error)) return
-      coupling = product_of(transpose(free), rotated(:n_free, n_free + 1:))
+      coupling = rotated(:n_free, n_free + 1:)
+      coupling = product_of(transpose(free), coupling)
+      followed = coupling
       do j = 1, n_free
          if (abs(values(j)) > rank_tolerance*maxval(abs(values))) then
-            rotated(j, n_free + 1:) = coupling(j, :)/values(j)
+            followed(j, :) = coupling(j, :)/values(j)
          else
-            rotated(j, n_free + 1:) = 0.0_wp
+            followed(j, :) = 0.0_wp
          end if
       end do
-      condensed = condensed - product_of(transpose(coupling), rotated(:n_free, n_free + 1:))
+      condensed = condensed - product_of(transpose(coupling), followed)
    end subroutine condense
 
    !> Symmetric square root, with zero for eigenvalues that are not positive.
@@ -150,12 +153,13 @@ contains
       n = size(matrix, 1)
       allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
       call dsyevd('V', 'U', n, matrix, n, values, work, size(work), iwork, size(iwork), info)
-      if (info /= 0) call fatal_error(error, 'the modes for modal_damping could not be computed: '// &
-                                      'check the mass and stiffness matrices', status_failure)
+      if (info == 0) return
+      call fatal_error(error, 'the modes for modal_damping could not be computed: check the '// &
+                       'mass and stiffness matrices', status_failure)
    end subroutine solve_eigen
 
    function product_of(a, b) result(c)
-      real(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp), contiguous, intent(in) :: a(:, :), b(:, :)
       real(wp), allocatable :: c(:, :)
       integer :: m, n, k
 

@@ -24,6 +24,9 @@ module fw_linear_step
       !> Work done so far.
       integer :: factorizations = 0
       integer :: krylov_iterations = 0
+      !> Linear problems with unknowns left, and the sum of the shares that had left them.
+      integer :: n_problems = 0
+      real(wp) :: share_skipped = 0.0_wp
    contains
       procedure :: solve
    end type linear_step_type
@@ -47,6 +50,8 @@ contains
       done = .true.
       self%solution = 0.0_wp
       if (n > 0) then
+         self%n_problems = self%n_problems + 1
+         self%share_skipped = self%share_skipped + 1.0_wp - real(n, wp)/real(system%n, wp)
          if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_pays_up_to)) then
             call solve_lu(self, system, n, done)
          else

@@ -51,6 +51,8 @@ module fw_solver_options
       integer :: max_iterations = 60
       !> Try other ways to the solution where the first fails.
       logical :: fallback = .true.
+      !> Leave out work that a case does not need (stuck pairs, components that nothing moves).
+      logical :: skips = .true.
    end type solver_options
 
    !> Options of pseudo-time integration (group &pseudo_time).

@@ -1,0 +1,63 @@
+!> Analyses 'frf' and 'point': the periodic response at the frequencies of a sweep.
+module fw_frequency_response
+   use fw_kinds, only: wp
+   use fw_case, only: case_type
+   use fw_case, only: analysis_frf
+   use fw_error, only: error_type
+   use fw_hbm, only: hbm_system
+   use fw_observer, only: observer_type
+   use fw_point, only: point_type
+   use fw_point_solver, only: point_solver
+   use fw_problem, only: build_system
+   use fw_result, only: result_writer
+   use fw_summary, only: summary_type
+   implicit none (type, external)
+   private
+
+   public :: run_frequency_response
+
+contains
+
+   !> Solve every point, in the order given; each is written as soon as it is known.
+   subroutine run_frequency_response(case, observer, writer, summary, error)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+      type(result_writer), intent(inout) :: writer
+      type(summary_type), intent(inout) :: summary
+      type(error_type), allocatable, intent(out) :: error
+      type(hbm_system) :: system
+      type(point_solver) :: solver
+      type(point_type) :: point
+      integer :: k, n_points
+
+      call build_system(case, system, error)
+      if (allocated(error)) return
+      call solver%start(case, system%n)
+      n_points = 1
+      if (case%analysis == analysis_frf) n_points = case%sweep%n_points
+      call observer%on_start(case%title, n_points)
+      do k = 1, n_points
+         call solver%solve(case, system, frequency(case, k, n_points), point, error)
+         if (allocated(error)) exit
+         call writer%add_point(point, error)
+         if (allocated(error)) exit
+         call summary%add(point)
+         call observer%on_point(k, n_points, point)
+      end do
+      call observer%on_end()
+      call summary%describe_work(system, solver%newton%linear)
+   end subroutine run_frequency_response
+
+   !> Evenly spaced from start to end, both exact.
+   pure real(wp) function frequency(case, k, n_points) result(omega)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: k, n_points
+      real(wp) :: share
+
+      omega = case%sweep%start
+      if (n_points == 1) return
+      share = real(k - 1, wp)/real(n_points - 1, wp)
+      omega = (1.0_wp - share)*case%sweep%start + share*case%sweep%end
+   end function frequency
+
+end module fw_frequency_response

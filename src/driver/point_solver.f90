@@ -1,0 +1,145 @@
+!> One solution point: warm start, other guesses, intermediate frequencies, then what is reported.
+module fw_point_solver
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_kinds, only: wp
+   use fw_case, only: case_type
+   use fw_contact_data, only: memory_carried
+   use fw_error, only: error_type
+   use fw_guess, only: free_guess
+   use fw_guess, only: stuck_guess
+   use fw_hbm, only: hbm_system
+   use fw_newton, only: newton_solver
+   use fw_newton, only: solver_report
+   use fw_point, only: point_type
+   use fw_recovery, only: recover_histories
+   use fw_recovery, only: recover_point
+   implicit none (type, external)
+   private
+
+   public :: point_solver
+
+   !> Halvings of a frequency step that fails.
+   integer, parameter :: max_halvings = 6
+
+   type :: point_solver
+      type(newton_solver) :: newton
+      !> The present solution, and the last two converged ones with their frequencies.
+      real(wp), allocatable :: x(:), last(:), before(:)
+      real(wp) :: omega_last = -1.0_wp
+      real(wp) :: omega_before = -1.0_wp
+      integer :: n_converged = 0
+   contains
+      procedure :: start
+      procedure :: solve
+   end type point_solver
+
+contains
+
+   subroutine start(self, case, n)
+      class(point_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: n
+
+      self%newton%options = case%solver
+      allocate (self%x(n), self%last(n), self%before(n), source=0.0_wp)
+   end subroutine start
+
+   !> Solve at a frequency; not converging is an outcome, marked in the point.
+   subroutine solve(self, case, system, omega, point, error)
+      class(point_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(hbm_system), intent(inout) :: system
+      real(wp), intent(in) :: omega
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      integer(int64) :: clock, clock_end, rate
+
+      call system_clock(clock, rate)
+      call approach(self, system, omega, 0, report, point%iterations, error)
+      if (allocated(error)) return
+      point%omega = omega
+      point%converged = report%converged
+      point%residual = report%residual
+      call recover_point(system, self%x, case%harmonics%n_harmonics, case%output%contact, point)
+      if (case%output%histories) then
+         call recover_histories(system, size(system%balance, 1), self%x, case%harmonics%n_harmonics, point)
+      end if
+      if (report%converged .and. case%contact%memory == memory_carried) then
+         system%contact%x_start = system%contact%x
+      end if
+      call system_clock(clock_end)
+      point%seconds = real(clock_end - clock, wp)/real(rate, wp)
+   end subroutine solve
+
+   !> Newton from the best guesses known; where all fail, first go half of the way.
+   recursive subroutine approach(self, system, omega, depth, report, iterations, error)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout) :: system
+      real(wp), intent(in) :: omega
+      integer, intent(in) :: depth
+      type(solver_report), intent(out) :: report
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+
+      call system%set_frequency(omega, error)
+      if (allocated(error)) return
+      call try_guesses(self, system, omega, report, iterations)
+      if (report%converged) then
+         call remember(self, omega)
+         return
+      end if
+      if (depth == max_halvings .or. self%n_converged == 0) return
+      if (.not. self%newton%options%fallback) return
+      call approach(self, system, 0.5_wp*(self%omega_last + omega), depth + 1, report, iterations, error)
+      if (allocated(error)) return
+      call system%set_frequency(omega, error)
+      if (allocated(error) .or. .not. report%converged) return
+      call try_guesses(self, system, omega, report, iterations)
+      if (report%converged) call remember(self, omega)
+   end subroutine approach
+
+   !> Extrapolation along the sweep, the last solution, all stuck, all free.
+   subroutine try_guesses(self, system, omega, report, iterations)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout) :: system
+      real(wp), intent(in) :: omega
+      type(solver_report), intent(out) :: report
+      integer, intent(inout) :: iterations
+      integer :: guess, first
+      real(wp) :: step
+
+      first = 3
+      if (self%n_converged > 0) first = 2
+      if (self%n_converged > 1) first = 1
+      do guess = first, 4
+         select case (guess)
+         case (1)
+            step = (omega - self%omega_last)/(self%omega_last - self%omega_before)
+            self%x = self%last + step*(self%last - self%before)
+         case (2)
+            self%x = self%last
+         case (3)
+            call stuck_guess(system, self%x)
+         case (4)
+            call free_guess(system, self%x)
+         end select
+         call self%newton%solve(system, self%x, report)
+         iterations = iterations + report%iterations
+         if (report%converged .or. .not. self%newton%options%fallback) exit
+      end do
+   end subroutine try_guesses
+
+   subroutine remember(self, omega)
+      class(point_solver), intent(inout) :: self
+      real(wp), intent(in) :: omega
+
+      if (abs(omega - self%omega_last) <= 0.0_wp) return
+      self%before = self%last
+      self%omega_before = self%omega_last
+      self%last = self%x
+      self%omega_last = omega
+      self%n_converged = self%n_converged + 1
+   end subroutine remember
+
+end module fw_point_solver

@@ -1,0 +1,107 @@
+!> From a case to the system that is solved: joint, harmonics, instants, condensation.
+module fw_problem
+   use fw_kinds, only: wp
+   use fw_case, only: case_type
+   use fw_case, only: analysis_frf
+   use fw_condensation, only: condensation_type
+   use fw_condensation, only: new_condensation
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_fourier, only: fourier_type
+   use fw_fourier, only: new_fourier
+   use fw_fourier, only: fft_pays
+   use fw_harmonics_options, only: parity_all
+   use fw_harmonics_options, only: parity_odd
+   use fw_hbm, only: hbm_system
+   use fw_hbm, only: new_hbm
+   use fw_joint, only: joint_type
+   use fw_joint, only: new_joint
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: build_system, automatic_n_time
+
+   !> Instants per harmonic below which the sampling error exceeds that of the truncation: with
+   !> friction alone, and where pairs may separate or the normal load varies.
+   integer, parameter :: instants_friction = 16, instants_separation = 32
+   integer, parameter :: fewest_instants = 64
+
+contains
+
+   !> Build the system of a case at the first frequency of its sweep.
+   subroutine build_system(case, system, error)
+      type(case_type), intent(in) :: case
+      type(hbm_system), intent(out) :: system
+      type(error_type), allocatable, intent(out) :: error
+      type(joint_type) :: joint
+      type(fourier_type) :: fourier
+      type(condensation_type) :: structure
+      real(wp) :: range(2)
+
+      call new_joint(case%model, case%contact, case%springs, case%solver%skips, joint, error)
+      if (allocated(error)) return
+      call choose_harmonics(case, joint, fourier, error)
+      if (allocated(error)) return
+      range = case%sweep%start
+      if (case%analysis == analysis_frf) then
+         range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
+      end if
+      call new_condensation(case%model, joint%relative, fourier%harmonic, range, structure, error)
+      if (allocated(error)) return
+      call structure%update(case%sweep%start, error)
+      if (allocated(error)) return
+      call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
+      system%skip_stuck = case%solver%skips
+      if (fft_pays(fourier%n_coefficients, fourier%n_time)) then
+         call system%fourier%prepare_fft(3*case%contact%n_pairs)
+      end if
+   end subroutine build_system
+
+   !> Only odd harmonics where the symmetry is exact, and keeps so at the instants: their number
+   !> must be even.
+   subroutine choose_harmonics(case, joint, fourier, error)
+      type(case_type), intent(in) :: case
+      type(joint_type), intent(in) :: joint
+      type(fourier_type), intent(out) :: fourier
+      type(error_type), allocatable, intent(out) :: error
+      logical :: odd_only
+      integer :: n_time
+
+      n_time = case%harmonics%n_time
+      if (n_time == 0) n_time = automatic_n_time(case, joint)
+      odd_only = joint%half_wave_symmetric .and. modulo(n_time, 2) == 0
+      select case (case%harmonics%parity)
+      case (parity_all)
+         odd_only = .false.
+      case (parity_odd)
+         if (.not. joint%half_wave_symmetric) then
+            call fatal_error(error, '&harmonics parity = ''odd'': the response has even '// &
+                             'harmonics, because of a static load, a normal dof or an even '// &
+                             'spring power; use ''auto'' or ''all''', status_input)
+            return
+         end if
+         odd_only = .true.
+      end select
+      fourier = new_fourier(case%harmonics%n_harmonics, n_time, odd_only)
+   end subroutine choose_harmonics
+
+   !> Instants per period where the input leaves the choice. Polynomials are sampled without any
+   !> error from (power + 1) H + 1 instants on; for contact see the parameters above.
+   pure integer function automatic_n_time(case, joint) result(n_time)
+      type(case_type), intent(in) :: case
+      type(joint_type), intent(in) :: joint
+      integer :: h
+
+      h = case%harmonics%n_harmonics
+      n_time = 2*h + 2
+      if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
+      if (case%contact%n_pairs > 0) then
+         n_time = max(n_time, fewest_instants, instants_friction*h)
+         if (any(joint%row(3, :) > 0)) n_time = max(n_time, instants_separation*h)
+      end if
+      n_time = n_time + modulo(n_time, 2)
+   end function automatic_n_time
+
+end module fw_problem

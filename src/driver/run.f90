@@ -1,0 +1,63 @@
+!> Run a case: the one entry for the command line, C and Python.
+module fw_run
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_kinds, only: wp
+   use fw_available, only: check_available
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_error, only: status_not_converged
+   use fw_error, only: status_ok
+   use fw_frequency_response, only: run_frequency_response
+   use fw_observer, only: observer_type
+   use fw_outcome, only: outcome_type
+   use fw_result, only: result_writer
+   use fw_summary, only: summary_type
+   use fw_summary, only: new_summary
+   use fw_threads, only: thread_scope
+   implicit none (type, external)
+   private
+
+   public :: run_case
+
+contains
+
+   !> Run a case and write its result file. Points that did not converge make the outcome
+   !> status_not_converged; `error` is for what ends the run.
+   subroutine run_case(case, observer, outcome, error)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+      type(outcome_type), intent(out) :: outcome
+      type(error_type), allocatable, intent(out) :: error
+      type(result_writer) :: writer
+      type(summary_type) :: summary
+      type(thread_scope) :: threads
+      type(error_type), allocatable :: close_error
+      integer(int64) :: clock, clock_end, rate
+      real(wp) :: elapsed
+
+      call system_clock(clock, rate)
+      call check_available(case, error)
+      if (allocated(error)) return
+      call writer%open(case, error)
+      if (allocated(error)) return
+      call threads%enter(case%threads)
+      summary = new_summary(case)
+      call run_frequency_response(case, observer, writer, summary, error)
+      call threads%leave()
+      call system_clock(clock_end)
+      elapsed = real(clock_end - clock, wp)/real(rate, wp)
+      if (summary%n_converged < summary%n_points) outcome%status = status_not_converged
+      if (allocated(error)) then
+         if (summary%n_points == 0) then
+            call writer%discard()
+         else
+            call writer%close('failed: '//error%message, elapsed, close_error)
+         end if
+         return
+      end if
+      call writer%close(merge('complete     ', 'not converged', outcome%status == status_ok), &
+                        elapsed, error)
+      outcome%summary = summary%lines(elapsed)
+   end subroutine run_case
+
+end module fw_run

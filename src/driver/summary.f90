@@ -1,0 +1,126 @@
+!> The short table that a run ends with: how many points, the peak, the work done and what was
+!> skipped.
+module fw_summary
+   use fw_kinds, only: wp
+   use fw_kinds, only: pi
+   use fw_case, only: case_type
+   use fw_hbm, only: hbm_system
+   use fw_linear_step, only: linear_step_type
+   use fw_point, only: point_type
+   use fw_text, only: string_type
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: summary_type, new_summary
+
+   !> Observed quantities that the table shows.
+   integer, parameter :: max_shown = 6
+
+   type :: summary_type
+      integer :: n_points = 0
+      integer :: n_converged = 0
+      integer :: iterations = 0
+      type(string_type), allocatable :: name(:)
+      !> Largest amplitude of each observed quantity among converged points, and where [rad/s].
+      real(wp), allocatable :: peak(:), peak_omega(:)
+      type(string_type), allocatable :: work(:)
+   contains
+      procedure :: add
+      procedure :: describe_work
+      procedure :: lines
+   end type summary_type
+
+contains
+
+   pure function new_summary(case) result(self)
+      type(case_type), intent(in) :: case
+      type(summary_type) :: self
+
+      self%name = case%model%observe_name
+      allocate (self%peak(size(self%name)), self%peak_omega(size(self%name)), source=0.0_wp)
+      allocate (self%work(0))
+   end function new_summary
+
+   !> Take a point into account.
+   subroutine add(self, point)
+      class(summary_type), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      integer :: i
+
+      self%n_points = self%n_points + 1
+      self%iterations = self%iterations + point%iterations
+      if (.not. point%converged) return
+      self%n_converged = self%n_converged + 1
+      do i = 1, size(self%peak)
+         if (point%amplitude(i) < self%peak(i)) cycle
+         self%peak(i) = point%amplitude(i)
+         self%peak_omega(i) = point%omega
+      end do
+   end subroutine add
+
+   !> What the linear solver did, and what the case did not need.
+   subroutine describe_work(self, system, linear)
+      class(summary_type), intent(inout) :: self
+      type(hbm_system), intent(in) :: system
+      type(linear_step_type), intent(in) :: linear
+
+      self%work = [line('unknowns', to_text(system%n)//' ('//to_text(system%structure%n_coordinates)// &
+                        ' coordinates, '//to_text(system%fourier%n_coefficients)//' coefficients, '// &
+                        to_text(system%fourier%n_time)//' instants)'), &
+                   line('linear solver', to_text(linear%factorizations)//' LU factorizations, '// &
+                        to_text(linear%krylov_iterations)//' Krylov iterations')]
+      if (.not. system%fourier%has_constant()) then
+         self%work = [self%work, line('skipped', 'even harmonics (half-wave symmetry)')]
+      end if
+      if (system%joint%n_idle > 0) then
+         self%work = [self%work, line('skipped', to_text(system%joint%n_idle)// &
+                                      ' contact components that nothing moves')]
+      end if
+      if (linear%n_problems > 0 .and. linear%share_skipped > 0.0_wp) then
+         self%work = [self%work, line('skipped', 'stuck pairs, '// &
+                      to_text(nint(100.0_wp*linear%share_skipped/real(linear%n_problems, wp)))// &
+                      ' % of the unknowns of the linear problems')]
+      end if
+      if (linear%n_problems == 0) then
+         self%work = [self%work, line('skipped', 'every linear problem: the joint stays stuck')]
+      end if
+   end subroutine describe_work
+
+   !> The table (seconds: elapsed time).
+   function lines(self, seconds) result(table)
+      class(summary_type), intent(in) :: self
+      real(wp), intent(in) :: seconds
+      type(string_type), allocatable :: table(:)
+      character(80) :: text
+      integer :: i
+
+      table = [line('converged', to_text(self%n_converged)//' of '//to_text(self%n_points)//' points'), &
+               line('iterations', to_text(self%iterations))]
+      do i = 1, min(size(self%name), max_shown)
+         write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', self%peak_omega(i), &
+            ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'
+         table = [table, line('peak '//self%name(i)%text, trim(adjustl(text)))]
+      end do
+      if (size(self%name) > max_shown) then
+         table = [table, line('...', to_text(size(self%name) - max_shown)//' more in the result file')]
+      end if
+      write (text, '(f0.3, a)') seconds, ' s'
+      if (text(1:1) == '.') text = '0'//text
+      table = [table, self%work, line('time', trim(text))]
+   end function lines
+
+   pure function line(label, value)
+      character(*), intent(in) :: label, value
+      type(string_type) :: line
+      character(18) :: column
+
+      column = label
+      if (len(label) >= len(column)) then
+         line%text = label//' '//value
+      else
+         line%text = column//value
+      end if
+   end function line
+
+end module fw_summary

@@ -1,0 +1,215 @@
+!> Model files: the structure, its contact pairs, loads and observed quantities (HDF5).
+!>
+!> Datasets are named and shaped as the user guide says; here every shape is reversed, because
+!> HDF5 counts the slowest dimension first, and matrices are transposed back, so that element
+!> (i, j) is the one h5py calls [i-1, j-1].
+module fw_model_file
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: has_attribute
+   use fw_hdf5, only: read_attribute
+   use fw_kinds, only: wp
+   use fw_model_file_parts, only: read_dofs
+   use fw_model_file_parts, only: read_matrix
+   use fw_model_file_parts, only: read_names
+   use fw_model_file_parts, only: read_pair_values
+   use fw_model_file_parts, only: read_positions
+   use fw_model_file_parts, only: read_vector
+   use fw_text, only: string_type
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: file_model_type, read_model_hdf5
+
+   character(*), parameter :: format_name = 'fretwear-model'
+   integer, parameter :: known_version = 1
+
+   !> What a model file holds; a component is not allocated where the file has none.
+   type :: file_model_type
+      character(:), allocatable :: title, unit_system
+      !> Structure (n_dof, n_dof), not checked for symmetry.
+      real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
+      !> Stiffness per square of the rotation speed (n_dof, n_dof) [force/length/(rad/s)**2].
+      real(wp), allocatable :: stiffness_rotation(:, :)
+      !> Signed dof numbers of (t1, t2, n), not checked for range (3, n_pairs).
+      integer, allocatable :: side_1(:, :), side_2(:, :)
+      !> Friction coefficient, gap [length] and area [length**2] of the pairs (n_pairs).
+      real(wp), allocatable :: mu(:), gap(:), area(:)
+      !> Coordinates of the pairs (3, n_pairs) [length] and the names of their patches (n_pairs).
+      real(wp), allocatable :: position(:, :)
+      type(string_type), allocatable :: patch(:)
+      !> Loads (n_dof) [force]; the last per square of the rotation speed.
+      real(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
+      real(wp), allocatable :: load_static_rotation(:)
+      !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
+      type(string_type), allocatable :: observe_name(:)
+      real(wp), allocatable :: observe_matrix(:, :)
+   end type file_model_type
+
+contains
+
+   !> Read a model file.
+   subroutine read_model_hdf5(path, model, error)
+      character(*), intent(in) :: path
+      type(file_model_type), intent(out) :: model
+      !> status_io where the file cannot be read, status_input for what is wrong in it.
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: ignored
+      type(hdf5_file) :: file
+
+      call file%open_read(path, error)
+      if (allocated(error)) return
+      call read_header(file, model, error)
+      if (.not. allocated(error)) call read_structure(file, model, error)
+      if (.not. allocated(error)) call read_contact(file, model, error)
+      if (.not. allocated(error)) call read_loads(file, model, error)
+      if (.not. allocated(error)) call read_observed(file, model, error)
+      call file%close(ignored)
+   end subroutine read_model_hdf5
+
+   subroutine read_header(file, model, error)
+      type(hdf5_file), intent(in) :: file
+      type(file_model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: format
+      integer :: format_version
+
+      call read_attribute(file, '/', 'format', format, error)
+      if (allocated(error)) return
+      if (format /= format_name) then
+         call fatal_error(error, file%path//': attribute format is "'//format// &
+                          '", expected "'//format_name//'"', status_input)
+         return
+      end if
+      call read_attribute(file, '/', 'format_version', format_version, error)
+      if (allocated(error)) return
+      if (format_version /= known_version) then
+         call fatal_error(error, file%path//': attribute format_version is '// &
+                          to_text(format_version)//', expected '//to_text(known_version), &
+                          status_input)
+         return
+      end if
+      if (has_attribute(file, '/', 'title')) then
+         call read_attribute(file, '/', 'title', model%title, error)
+         if (allocated(error)) return
+      end if
+      if (has_attribute(file, '/', 'unit_system')) then
+         call read_attribute(file, '/', 'unit_system', model%unit_system, error)
+      end if
+   end subroutine read_header
+
+   subroutine read_structure(file, model, error)
+      type(hdf5_file), intent(in) :: file
+      type(file_model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n
+
+      call read_matrix(file, '/mass', 0, model%mass, error, required=.true.)
+      if (allocated(error)) return
+      n = size(model%mass, 1)
+      call read_matrix(file, '/stiffness', n, model%stiffness, error, required=.true.)
+      if (allocated(error)) return
+      call read_matrix(file, '/damping', n, model%damping, error)
+      if (allocated(error)) return
+      call read_matrix(file, '/stiffness_rotation', n, model%stiffness_rotation, error)
+   end subroutine read_structure
+
+   subroutine read_contact(file, model, error)
+      type(hdf5_file), intent(in) :: file
+      type(file_model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n
+
+      if (.not. file%exists('/contact')) return
+      call read_dofs(file, '/contact/side_1', -1, model%side_1, error)
+      if (allocated(error)) return
+      n = size(model%side_1, 2)
+      call read_dofs(file, '/contact/side_2', n, model%side_2, error)
+      if (allocated(error)) return
+      call read_pair_values(file, '/contact/mu', n, model%mu, error)
+      if (allocated(error)) return
+      call read_pair_values(file, '/contact/gap', n, model%gap, error)
+      if (allocated(error)) return
+      call read_pair_values(file, '/contact/area', n, model%area, error)
+      if (allocated(error)) return
+      call read_positions(file, '/contact/position', n, model%position, error)
+      if (allocated(error)) return
+      call read_names(file, '/contact/patch', n, model%patch, error)
+   end subroutine read_contact
+
+   subroutine read_loads(file, model, error)
+      type(hdf5_file), intent(in) :: file
+      type(file_model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n
+
+      n = size(model%mass, 1)
+      call read_vector(file, '/load/static', n, model%load_static, error)
+      if (allocated(error)) return
+      call read_vector(file, '/load/cosine', n, model%load_cosine, error)
+      if (allocated(error)) return
+      call read_vector(file, '/load/sine', n, model%load_sine, error)
+      if (allocated(error)) return
+      call read_vector(file, '/load/static_rotation', n, model%load_static_rotation, error)
+   end subroutine read_loads
+
+   subroutine read_observed(file, model, error)
+      type(hdf5_file), intent(in) :: file
+      type(file_model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+      logical :: by_dof, by_matrix
+
+      if (.not. file%exists('/observe')) return
+      by_dof = file%exists('/observe/dof')
+      by_matrix = file%exists('/observe/matrix')
+      if (by_dof .eqv. by_matrix) then
+         call fatal_error(error, file%path//': group /observe holds '// &
+                          trim(merge('both   ', 'neither', by_dof))// &
+                          ' of the datasets dof and matrix, expected one', status_input)
+         return
+      end if
+      call read_names(file, '/observe/name', -1, model%observe_name, error, required=.true.)
+      if (allocated(error)) return
+      if (by_matrix) then
+         call read_matrix(file, '/observe/matrix', size(model%mass, 1), model%observe_matrix, &
+                          error, n_rows=size(model%observe_name))
+      else
+         call read_observed_dofs(file, model, error)
+      end if
+   end subroutine read_observed
+
+   !> Turn signed dof numbers into rows of the observation matrix.
+   subroutine read_observed_dofs(file, model, error)
+      use fw_hdf5, only: read_dataset
+      use fw_hdf5, only: dataset_failure
+      type(hdf5_file), intent(in) :: file
+      type(file_model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: dof(:)
+      integer :: i, n
+
+      n = size(model%mass, 1)
+      call read_dataset(file, '/observe/dof', dof, error)
+      if (allocated(error)) return
+      if (size(dof) /= size(model%observe_name)) then
+         call dataset_failure(file, '/observe/dof', 'has '//to_text(size(dof))// &
+                              ' values, expected one per name: '// &
+                              to_text(size(model%observe_name)), error)
+         return
+      end if
+      allocate (model%observe_matrix(size(dof), n), source=0.0_wp)
+      do i = 1, size(dof)
+         if (dof(i) == 0 .or. abs(dof(i)) > n) then
+            call dataset_failure(file, '/observe/dof', 'holds '//to_text(dof(i))// &
+                                 ' at index '//to_text(i - 1)//', expected 1 to '//to_text(n)// &
+                                 ' or its negative', error)
+            return
+         end if
+         model%observe_matrix(i, abs(dof(i))) = real(sign(1, dof(i)), wp)
+      end do
+   end subroutine read_observed_dofs
+
+end module fw_model_file

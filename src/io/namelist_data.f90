@@ -1,0 +1,93 @@
+!> Namelist text as data: groups and assignments, each with its line.
+module fw_namelist_data
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: namelist_type, group_type, entry_type, value_type, section_type
+   public :: add_entry, value_count, location
+
+   !> One value, or `repeat` equal ones.
+   type :: value_type
+      character(:), allocatable :: text
+      logical :: quoted = .false.
+      integer :: repeat = 1
+      integer :: line = 0
+   end type value_type
+
+   !> One subscript: first to last, where `last = 0` is the end of the dimension.
+   type :: section_type
+      integer :: first = 1
+      integer :: last = 0
+   end type section_type
+
+   !> One assignment `key(subscripts) = values`.
+   type :: entry_type
+      character(:), allocatable :: group, key
+      type(section_type), allocatable :: sections(:)
+      type(value_type), allocatable :: values(:)
+      integer :: line = 0
+      !> Of an override: the option as it was typed, and its value as it was typed.
+      character(:), allocatable :: option, raw
+   end type entry_type
+
+   type :: group_type
+      character(:), allocatable :: name
+      integer :: line = 0
+   end type group_type
+
+   type :: namelist_type
+      !> Name of the file, for messages.
+      character(:), allocatable :: source
+      type(group_type), allocatable :: groups(:)
+      type(entry_type), allocatable :: entries(:)
+      integer :: n_entries = 0
+   end type namelist_type
+
+contains
+
+   !> Append an assignment.
+   subroutine add_entry(namelist, entry)
+      type(namelist_type), intent(inout) :: namelist
+      type(entry_type), intent(in) :: entry
+      type(entry_type), allocatable :: larger(:)
+
+      if (namelist%n_entries == size(namelist%entries)) then
+         allocate (larger(2*size(namelist%entries)))
+         larger(:namelist%n_entries) = namelist%entries
+         call move_alloc(larger, namelist%entries)
+      end if
+      namelist%n_entries = namelist%n_entries + 1
+      namelist%entries(namelist%n_entries) = entry
+   end subroutine add_entry
+
+   !> Number of values with the repeat counts multiplied out.
+   pure integer function value_count(entry)
+      type(entry_type), intent(in) :: entry
+      integer :: i
+
+      value_count = 0
+      do i = 1, size(entry%values)
+         if (entry%values(i)%repeat > huge(1) - value_count) then
+            value_count = huge(1)
+            return
+         end if
+         value_count = value_count + entry%values(i)%repeat
+      end do
+   end function value_count
+
+   !> Where an assignment stands: `file:line`, or the option of the command line.
+   pure function location(entry, source) result(place)
+      type(entry_type), intent(in) :: entry
+      character(*), intent(in), optional :: source
+      character(:), allocatable :: place
+
+      if (allocated(entry%option)) then
+         place = '--set '//entry%option
+      else
+         place = to_text(entry%line)
+         if (present(source)) place = source//':'//place
+      end if
+   end function location
+
+end module fw_namelist_data
