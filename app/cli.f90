@@ -3,6 +3,7 @@ module fw_cli
    use fw_error, only: error_type, fatal_error, status_usage
    use fw_paths, only: resolve_path
    use fw_text, only: string_type, nearest_word
+   use fw_text_list, only: append
    use fw_values, only: quoted_text
    implicit none (type, external)
    private
@@ -68,7 +69,8 @@ contains
       if (options%quiet .and. options%verbose) then
          call fatal_error(error, '-q and -v exclude each other'//hint, status_usage)
       else if (.not. allocated(options%input)) then
-         call fatal_error(error, 'no namelist is given: fw_run [options] case.nml'//hint, status_usage)
+         call fatal_error(error, 'no namelist is given: fw_run [options] case.nml'//hint, &
+                          status_usage)
       end if
    end subroutine parse_arguments
 
@@ -159,15 +161,15 @@ contains
       character(*), intent(in) :: name, value
       type(cli_options), intent(inout) :: options
       type(error_type), allocatable, intent(out) :: error
-      type(string_type) :: override
+      character(:), allocatable :: override
 
-      override%text = value
+      override = value
       if (len_trim(value) == 0) then
          call fatal_error(error, name//' lacks its value'//hint, status_usage)
       else if (name /= '--set') then
-         override%text = 'output%file='//quoted_text(resolve_path(value, ''))
+         override = 'output%file='//quoted_text(resolve_path(value, ''))
       end if
-      options%overrides = [options%overrides, override]
+      call append(options%overrides, override)
    end subroutine take_value
 
    subroutine set_flag(name, options, error)
@@ -194,7 +196,8 @@ contains
    pure logical function is_flag(name)
       character(*), intent(in) :: name
 
-      is_flag = any(name == [character(9) :: '--check', '--quiet', '--verbose', '--help', '--version'])
+      is_flag = any(name == [character(9) :: '--check', '--quiet', '--verbose', '--help', &
+                             '--version'])
    end function is_flag
 
    function near(name) result(text)

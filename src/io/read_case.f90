@@ -12,6 +12,7 @@ module fw_read_case
    use fw_read_output, only: read_output, read_observed
    use fw_reader, only: reader_type, new_reader
    use fw_text, only: string_type
+   use fw_values, only: quoted_text
    implicit none (type, external)
    private
 
@@ -41,11 +42,12 @@ contains
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
       type(reader_type) :: reader
+      type(file_model_type) :: raw
 
       call new_reader(reader, text, path, overrides, error)
       if (allocated(error)) return
       call read_case_group(reader, case)
-      call read_structure(reader, path, case, error)
+      call read_structure(reader, path, case, raw, error)
       if (allocated(error)) return
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep)
@@ -55,20 +57,22 @@ contains
       call read_time(reader, case%time)
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)
+      call read_observed(reader, raw, case%model)
       call reader%finish(error)
       if (allocated(error)) return
       case%namelist = reader%effective()
       call check_available(case, error)
    end subroutine read_case_text
 
-   !> The model with its contact, springs, loads and observed quantities.
-   subroutine read_structure(reader, path, case, error)
+   !> The model with its contact, springs and loads.
+   subroutine read_structure(reader, path, case, raw, error)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
+      !> The parts of the model as they were given.
+      type(file_model_type), intent(out) :: raw
       type(error_type), allocatable, intent(out) :: error
       type(model_options) :: options
-      type(file_model_type) :: raw
       integer :: n_dof
 
       call read_model(reader, directory_of(path), options, raw, error)
@@ -78,11 +82,11 @@ contains
       call read_contact(reader, n_dof, raw, case%analysis == analysis_wear, case%contact)
       call read_springs(reader, n_dof, case%springs)
       call read_loads(reader, options, raw)
-      call read_observed(reader, raw, n_dof, case%model)
       call finish_model(reader, options, raw, case%model, error)
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)
          if (allocated(raw%title)) case%title = raw%title
+         call reader%amend('case', 'title', quoted_text(case%title))
       end if
    end subroutine read_structure
 

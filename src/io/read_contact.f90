@@ -65,7 +65,8 @@ contains
          call reader%refuse('contact', 'n_pairs', '= '//to_text(contact%n_pairs)// &
                             ': the model file holds '//to_text(n_file)//'; give side_1 '// &
                             'and side_2 for other pairs, or 0 for no contact')
-      else if (reader%given('contact', 'side_1') .and. .not. reader%given('contact', 'n_pairs')) then
+      else if (reader%given('contact', 'side_1') &
+               .and. .not. reader%given('contact', 'n_pairs')) then
          call reader%refuse('contact', 'n_pairs', 'is missing: must be the number of pairs')
       end if
    end subroutine read_n_pairs
@@ -164,7 +165,8 @@ contains
       if (.not. allocated(contact%gap)) allocate (contact%gap(n_pairs), source=0.0_wp)
       call reader%get_array('contact', 'gap', contact%gap, [n_pairs], .true.)
       call reader%get_array('contact', 'area', contact%area, [n_pairs], .true., above=0.0_wp, &
-                            required=needs_area .and. n_pairs > 0 .and. .not. allocated(contact%area))
+                            required=needs_area .and. n_pairs > 0 &
+                                     .and. .not. allocated(contact%area))
       call reader%get_array('contact', 'normal_load', contact%normal_load, [n_pairs], .true., &
                             least=0.0_wp, &
                             required=any(slides .and. .not. closes .and. contact%mu > 0.0_wp))
@@ -269,8 +271,10 @@ contains
       allocate (springs%power(m), source=3)
       call reader%get_array('spring', 'side_1', springs%side_1, [m], .true., least=-n_dof, &
                             most=n_dof, required=m > 0)
-      call reader%get_array('spring', 'side_2', springs%side_2, [m], .true., least=-n_dof, most=n_dof)
-      call reader%get_array('spring', 'coefficient', springs%coefficient, [m], .true., required=m > 0)
+      call reader%get_array('spring', 'side_2', springs%side_2, [m], .true., least=-n_dof, &
+                            most=n_dof)
+      call reader%get_array('spring', 'coefficient', springs%coefficient, [m], .true., &
+                            required=m > 0)
       call reader%get_array('spring', 'power', springs%power, [m], .true., least=1)
       if (.not. allocated(springs%side_1)) allocate (springs%side_1(m), source=0)
       if (.not. allocated(springs%coefficient)) allocate (springs%coefficient(m), source=0.0_wp)

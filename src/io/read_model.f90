@@ -49,7 +49,8 @@ contains
       integer :: n_dof
       logical :: is_inline
 
-      call reader%require_group('model', 'the matrices: source and file, or n_dof, mass and stiffness')
+      call reader%require_group('model', 'the matrices: source and file, or n_dof, '// &
+                                'mass and stiffness')
       call reader%get_word('model', 'source', options%source, source_words)
       is_inline = options%source == source_inline
       call reader%get('model', 'file', options%file, required=.not. is_inline)
@@ -95,8 +96,8 @@ contains
       integer :: n_dof
 
       n_dof = n_file
-      call reader%get('model', 'n_dof', n_dof, least=1, most=merge(largest_inline, huge(1), is_inline), &
-                      required=is_inline)
+      call reader%get('model', 'n_dof', n_dof, least=1, &
+                      most=merge(largest_inline, huge(1), is_inline), required=is_inline)
       if (.not. is_inline .and. n_dof /= n_file) then
          call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model file has '// &
                             to_text(n_file)//'; remove n_dof')
@@ -230,8 +231,11 @@ contains
 
          call check_matrix(matrix, n_dof, key == 'mass', message)
          if (.not. allocated(message)) return
-         if (is_inline) call reader%refuse('model', key, message)
-         if (.not. is_inline) call reader%refuse('model', 'file', 'holds a '//key//' that '//message)
+         if (is_inline) then
+            call reader%refuse('model', key, message)
+         else
+            call reader%refuse('model', 'file', 'holds a '//key//' that '//message)
+         end if
       end subroutine check_one
 
       subroutine check_load(key, load)

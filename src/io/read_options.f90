@@ -6,16 +6,16 @@ module fw_read_options
    use fw_kinds, only: wp, pi
    use fw_reader, only: reader_type
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options, solver_words, &
-                                linear_words, jacobian_words, flow_words, scheme_words, unit_words, &
-                                unit_hertz, continuation_words, continuation_natural
+                                linear_words, jacobian_words, flow_words, scheme_words, &
+                                unit_words, unit_hertz, continuation_words, continuation_natural
    use fw_text, only: to_text
    use fw_time_options, only: time_options
    use fw_wear_options, only: wear_options, wear_scheme_words
    implicit none (type, external)
    private
 
-   public :: read_case_group, read_harmonics, read_sweep, read_solver, read_pseudo_time, read_wear, &
-             read_time
+   public :: read_case_group, read_harmonics, read_sweep, read_solver, read_pseudo_time, &
+             read_wear, read_time
 
 contains
 
@@ -37,7 +37,7 @@ contains
 
       call reader%get_word('harmonics', 'method', options%method, method_words)
       call reader%get('harmonics', 'n_harmonics', options%n_harmonics, least=0, most=10000)
-      call reader%get('harmonics', 'n_time', options%n_time, least=0, most=100000000)
+      call reader%get('harmonics', 'n_time', options%n_time, least=0)
       call reader%get_word('harmonics', 'sampling', options%sampling, sampling_words)
       call reader%get_word('harmonics', 'parity', options%parity, parity_words)
       call reader%get('harmonics', 'adaptive', options%adaptive)

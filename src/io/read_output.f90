@@ -35,26 +35,27 @@ contains
    end subroutine read_output
 
    !> Key `observe`: dof numbers or names of the model file; all by default.
-   subroutine read_observed(reader, raw, n_dof, model)
+   subroutine read_observed(reader, raw, model)
       type(reader_type), intent(inout) :: reader
       type(file_model_type), intent(in) :: raw
-      integer, intent(in) :: n_dof
+      !> Its number of dofs is known.
       type(model_type), intent(inout) :: model
       type(value_type), allocatable :: chosen(:)
       type(string_type), allocatable :: names(:)
       real(wp), allocatable :: rows(:, :)
       integer :: i
 
-      call reader%get_list('output', 'observe', 'dof numbers or names of observed quantities', chosen)
+      call reader%get_list('output', 'observe', 'dof numbers or names of observed '// &
+                           'quantities', chosen)
       if (reader%failed()) return
-      call list_default(raw, n_dof, names, rows)
+      call list_default(raw, model%n_dof, names, rows)
       if (size(chosen) == 0) then
          call move_alloc(names, model%observe_name)
          call move_alloc(rows, model%observe_matrix)
          return
       end if
       allocate (model%observe_name(size(chosen)))
-      allocate (model%observe_matrix(size(chosen), n_dof), source=0.0_wp)
+      allocate (model%observe_matrix(size(chosen), model%n_dof), source=0.0_wp)
       do i = 1, size(chosen)
          call choose(reader, chosen(i), names, rows, model%observe_name(i)%text, &
                      model%observe_matrix(i, :))
@@ -111,7 +112,8 @@ contains
          end if
       else
          call reader%refuse('output', 'observe', '= '//quoted_text(value%text)// &
-                            ': must be a dof number or a name of the model'//near(value%text, names))
+                            ': must be a dof number or a name of the model'// &
+                            near(value%text, names))
       end if
    end subroutine choose
 

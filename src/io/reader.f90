@@ -497,7 +497,8 @@ contains
       end do
       i = findloc(source%entry, 0, 1)
       if (i > 0 .and. .not. has_default .and. .not. self%failed()) then
-         call self%refuse(group, key, 'lacks element '//element_text(i, dims)//': must be '//accepts)
+         call self%refuse(group, key, 'lacks element '//element_text(i, dims)// &
+                          ': must be '//accepts)
       end if
       if (self%failed()) deallocate (source%entry)
    end subroutine find_elements
@@ -682,8 +683,8 @@ contains
       do i = 1, size(numbers)
          text = text//number_text(numbers(i))
          if (i == size(numbers)) exit
-         text = text//', '
-         if (mod(i, per_line) == 0) text = text//new_line('a')//repeat(' ', 6)
+         text = text//','//merge(new_line('a'), ' ', mod(i, per_line) == 0)
+         if (mod(i, per_line) == 0) text = text//repeat(' ', 6)
       end do
    end function real_list
 

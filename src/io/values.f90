@@ -137,7 +137,7 @@ contains
       digits = scientific(len(sign) + 1:len(sign) + 1)//scientific(len(sign) + 3:mark - 1)
       digits = digits(:max(1, verify(digits, '0', back=.true.)))
       read (scientific(mark + 1:), *) exponent
-      if (exponent >= 0 .and. exponent < 6) then
+      if (exponent >= 0 .and. exponent < 7) then
          if (len(digits) < exponent + 1) digits = digits//repeat('0', exponent + 1 - len(digits))
          text = sign//digits(:exponent + 1)
          if (len(digits) > exponent + 1) text = text//'.'//digits(exponent + 2:)

@@ -46,7 +46,7 @@ contains
       if (allocated(error)) return
       call weigh_by_mass(root, sqrt(values(n_free + 1:)))
       vectors = vectors(:, n_free + 1:)
-      vectors = product_of(vectors, product_of(root, transpose(vectors)))
+      vectors = product_of(vectors, product_of(root, vectors, 'N', 'T'), 'N', 'N')
       damping = damping + 2.0_wp*ratio*scaled(vectors, 1.0_wp/scale)
    end subroutine add_modal_damping
 
@@ -102,14 +102,14 @@ contains
       real(wp), allocatable :: values(:)
       integer :: j
 
-      rotated = product_of(transpose(vectors), product_of(stiffness, vectors))
+      rotated = product_of(vectors, product_of(stiffness, vectors, 'N', 'N'), 'T', 'N')
       condensed = rotated(n_free + 1:, n_free + 1:)
       if (n_free == 0) return
       free = rotated(:n_free, :n_free)
       call solve_eigen(free, values, error)
       if (allocated(error)) return
       coupling = rotated(:n_free, n_free + 1:)
-      coupling = product_of(transpose(free), coupling)
+      coupling = product_of(free, coupling, 'T', 'N')
       followed = coupling
       do j = 1, n_free
          if (abs(values(j)) > rank_tolerance*maxval(abs(values))) then
@@ -118,7 +118,7 @@ contains
             followed(j, :) = 0.0_wp
          end if
       end do
-      condensed = condensed - product_of(transpose(coupling), followed)
+      condensed = condensed - product_of(coupling, followed, 'T', 'N')
    end subroutine condense
 
    !> Symmetric square root, with zero for eigenvalues that are not positive.
@@ -138,7 +138,7 @@ contains
       do j = 1, size(values)
          root(:, j) = merge(sqrt(max(values(j), 0.0_wp)), 0.0_wp, values(j) > least)*vectors(:, j)
       end do
-      root = product_of(root, transpose(vectors))
+      root = product_of(root, vectors, 'N', 'T')
    end subroutine take_root
 
    !> Eigenvalues in ascending order; the matrix becomes its eigenvectors.
@@ -158,16 +158,18 @@ contains
                        'mass and stiffness matrices', status_failure)
    end subroutine solve_eigen
 
-   function product_of(a, b) result(c)
+   !> op(a) op(b), op: 'N' as it is, 'T' transposed.
+   function product_of(a, b, op_a, op_b) result(c)
       real(wp), contiguous, intent(in) :: a(:, :), b(:, :)
+      character, intent(in) :: op_a, op_b
       real(wp), allocatable :: c(:, :)
       integer :: m, n, k
 
-      m = size(a, 1)
-      n = size(b, 2)
-      k = size(a, 2)
+      m = size(a, merge(1, 2, op_a == 'N'))
+      k = size(a, merge(2, 1, op_a == 'N'))
+      n = size(b, merge(2, 1, op_b == 'N'))
       allocate (c(m, n))
-      call dgemm('N', 'N', m, n, k, 1.0_wp, a, m, b, k, 0.0_wp, c, m)
+      call dgemm(op_a, op_b, m, n, k, 1.0_wp, a, size(a, 1), b, size(b, 1), 0.0_wp, c, m)
    end function product_of
 
 end module fw_damping
