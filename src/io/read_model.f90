@@ -84,6 +84,7 @@ contains
       else
          call read_matrix_market_model(in_directory(options%file, directory), raw, error)
       end if
+      if (allocated(error)) error%message = reader%place_of('model', 'file')//': '//error%message
    end subroutine read_file
 
    !> The inline matrices, or the refusal of them beside a model file.

@@ -46,6 +46,7 @@ module fw_reader
       procedure :: get_list
       procedure :: given
       procedure :: refuse
+      procedure :: place_of
       procedure :: require_group
       procedure :: amend
       procedure :: failed
@@ -328,6 +329,19 @@ contains
 
       call self%blame(last_entry(self%input, group, key), '&'//trim(group//' '//key)//' '//message)
    end subroutine refuse
+
+   !> Where a key stands, to put before a message from elsewhere: `case.nml:12: &model file`.
+   pure function place_of(self, group, key) result(place)
+      class(reader_type), intent(in) :: self
+      character(*), intent(in) :: group, key
+      character(:), allocatable :: place
+      integer :: i
+
+      place = self%input%source
+      i = last_entry(self%input, group, key)
+      if (i > 0) place = location(self%input%entries(i), self%input%source)
+      place = place//': &'//group//' '//key
+   end function place_of
 
    !> Record a problem where a group is neither in the file nor in an override.
    subroutine require_group(self, group, purpose)

@@ -85,10 +85,12 @@ contains
    pure subroutine weigh_by_mass(matrix, weight)
       real(wp), intent(inout) :: matrix(:, :)
       real(wp), intent(in) :: weight(:)
-      integer :: j
+      integer :: i, j
 
       do j = 1, size(weight)
-         matrix(:, j) = matrix(:, j)*weight*weight(j)
+         do i = 1, size(weight)
+            matrix(i, j) = matrix(i, j)*weight(i)*weight(j)
+         end do
       end do
    end subroutine weigh_by_mass
 
