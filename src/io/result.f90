@@ -1,0 +1,160 @@
+!> Result files: one row per solution point, appended as soon as the point is known.
+!>
+!> The file is written as '<name>.part' with status 'incomplete' and takes its name when it is
+!> closed. It is flushed after every point, unless flushing would take more than a twentieth of
+!> the time: then a killed run loses at most the points of the last 20 times the time a flush
+!> takes (some milliseconds). Rows follow the order of Fortran reversed, as h5py shows them.
+module fw_result
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: write_text
+   use fw_kinds, only: wp
+   use fw_point, only: point_type
+   use fw_result_part, only: create_part
+   use fw_result_part, only: delete_part
+   use fw_result_part, only: publish_part
+   use fw_result_rows, only: row_set
+   use fw_version, only: version
+   implicit none (type, external)
+   private
+
+   public :: result_writer, result_format, result_format_version
+
+   character(*), parameter :: result_format = 'fretwear-result'
+   integer, parameter :: result_format_version = 1
+
+   !> A flush waits until this many times its own duration has passed since the last.
+   integer, parameter :: flush_patience = 20
+
+   !> Writes one result file. Not to be copied while it is open.
+   type :: result_writer
+      !> The open file, for analyses that add groups of their own.
+      type(hdf5_file) :: file
+      character(:), allocatable, private :: path
+      type(row_set), private :: rows
+      integer(int64), private :: last_flush = 0_int64, flush_duration = 0_int64
+   contains
+      procedure :: open
+      procedure :: add_point
+      procedure :: flush
+      procedure :: close
+      procedure :: discard
+   end type result_writer
+
+contains
+
+   !> Create the file with everything but the points.
+   subroutine open(self, case, error)
+      class(result_writer), intent(out) :: self
+      !> Case whose output file, title, namelist, sizes and choices of output are taken.
+      type(case_type), intent(in) :: case
+      !> status_io where the folder does not exist or is not writable.
+      type(error_type), allocatable, intent(out) :: error
+
+      self%path = case%output%file
+      call create_part(self%path, self%file, error)
+      if (allocated(error)) return
+      call write_header(self%file, case, error)
+      if (.not. allocated(error)) call self%rows%create(self%file, case, error)
+      if (.not. allocated(error)) call self%flush(error)
+      if (allocated(error)) call self%discard()
+   end subroutine open
+
+   !> Append a solution point. What it does not know (no allocated component) reads as NaN, and
+   !> harmonics it does not carry read as zero.
+   subroutine add_point(self, point, error)
+      class(result_writer), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64) :: clock
+
+      call self%rows%append(self%file, point, error)
+      if (allocated(error)) return
+      call system_clock(clock)
+      if (clock - self%last_flush >= flush_patience*self%flush_duration) call self%flush(error)
+   end subroutine add_point
+
+   !> Make what was written so far safe against the end of the program.
+   subroutine flush(self, error)
+      class(result_writer), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64) :: start
+
+      call system_clock(start)
+      call self%file%flush(error)
+      call system_clock(self%last_flush)
+      self%flush_duration = self%last_flush - start
+   end subroutine flush
+
+   !> Complete the file and give it its name.
+   subroutine close(self, status, elapsed, error)
+      class(result_writer), intent(inout) :: self
+      !> 'complete', 'not converged', or what else became of the run.
+      character(*), intent(in) :: status
+      !> Time of the whole run [s].
+      real(wp), intent(in) :: elapsed
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: close_error
+
+      call write_attribute(self%file, '/', 'elapsed', elapsed, error)
+      if (.not. allocated(error)) then
+         call write_attribute(self%file, '/', 'status', trim(status), error)
+      end if
+      call self%rows%close()
+      call self%file%close(close_error)
+      if (allocated(close_error) .and. .not. allocated(error)) then
+         call move_alloc(close_error, error)
+      end if
+      if (.not. allocated(error)) call publish_part(self%file%path, self%path, error)
+   end subroutine close
+
+   !> Give the file up: nothing of it stays.
+   subroutine discard(self)
+      class(result_writer), intent(inout) :: self
+      type(error_type), allocatable :: ignored
+
+      if (self%file%id < 0) return
+      call self%rows%close()
+      call self%file%close(ignored)
+      call delete_part(self%file%path)
+   end subroutine discard
+
+   subroutine write_header(file, case, error)
+      type(hdf5_file), intent(in) :: file
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      call write_attribute(file, '/', 'format', result_format, error)
+      if (allocated(error)) return
+      call write_attribute(file, '/', 'format_version', result_format_version, error)
+      if (allocated(error)) return
+      call write_attribute(file, '/', 'fretwear_version', version, error)
+      if (allocated(error)) return
+      call write_attribute(file, '/', 'status', 'incomplete', error)
+      if (allocated(error)) return
+      call write_attribute(file, '/', 'elapsed', 0.0_wp, error)
+      if (allocated(error)) return
+      call write_optional(file, 'title', case%title, error)
+      if (allocated(error)) return
+      call write_optional(file, 'namelist', case%namelist, error)
+      if (allocated(error) .or. .not. allocated(case%model%observe_name)) return
+      call write_text(file, '/observed/name', case%model%observe_name, error)
+   end subroutine write_header
+
+   subroutine write_optional(file, name, text, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      character(:), allocatable, intent(in) :: text
+      type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(text)) then
+         call write_attribute(file, '/', name, text, error)
+      else
+         call write_attribute(file, '/', name, '', error)
+      end if
+   end subroutine write_optional
+
+end module fw_result

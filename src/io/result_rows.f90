@@ -1,0 +1,242 @@
+!> The datasets of a result file with one row per solution point.
+module fw_result_rows
+   use fw_case, only: analysis_frf
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_hdf5, only: growing_dataset
+   use fw_hdf5, only: growing_integer
+   use fw_hdf5, only: growing_logical
+   use fw_hdf5, only: growing_real
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: write_attribute
+   use fw_kinds, only: wp
+   use fw_point, only: point_type
+   implicit none (type, external)
+   private
+
+   public :: row_set
+
+   !> The datasets.
+   integer, parameter :: d_omega = 1, d_coefficients = 2, d_amplitude = 3, d_converged = 4, &
+                         d_iterations = 5, d_residual = 6, d_seconds = 7, d_force = 8, &
+                         d_fraction = 9, d_dissipation = 10, d_observed = 11, &
+                         d_force_history = 12, d_slip_history = 13
+   integer, parameter :: n_datasets = 13
+
+   type :: row_set
+      integer, private :: n_rows = 0, n_coefficients = 1, expected = 1
+      type(growing_dataset), private :: list(n_datasets)
+   contains
+      procedure :: create
+      procedure :: append
+      procedure :: close
+      procedure, private :: new, append_contact, append_histories
+   end type row_set
+
+contains
+
+   !> Create the datasets of every point; those of histories come with the first history.
+   subroutine create(self, file, case, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: scalar(0) = [integer ::]
+      integer :: n_observed, n_pairs
+
+      n_observed = 0
+      if (allocated(case%model%observe_matrix)) n_observed = size(case%model%observe_matrix, 1)
+      self%n_coefficients = 2*case%harmonics%n_harmonics + 1
+      if (case%analysis == analysis_frf) self%expected = max(1, case%sweep%n_points)
+      call self%new(file, d_omega, '/omega', scalar, error, units='rad/s')
+      if (allocated(error)) return
+      call self%new(file, d_coefficients, '/coefficients', [n_observed, self%n_coefficients], error)
+      if (allocated(error)) return
+      call self%new(file, d_amplitude, '/amplitude', [n_observed], error)
+      if (allocated(error)) return
+      call self%new(file, d_converged, '/converged', scalar, error, kind_of=growing_logical)
+      if (allocated(error)) return
+      call self%new(file, d_iterations, '/iterations', scalar, error, kind_of=growing_integer)
+      if (allocated(error)) return
+      call self%new(file, d_residual, '/residual', scalar, error, units='1')
+      if (allocated(error)) return
+      call self%new(file, d_seconds, '/seconds', scalar, error, units='s')
+      n_pairs = case%contact%n_pairs
+      if (allocated(error) .or. .not. case%output%contact .or. n_pairs == 0) return
+      call self%new(file, d_force, '/contact/force', [3, n_pairs, self%n_coefficients], error)
+      if (allocated(error)) return
+      call self%new(file, d_fraction, '/contact/fraction', [3, n_pairs], error, units='1')
+      if (allocated(error)) return
+      call self%new(file, d_dissipation, '/contact/dissipation', [n_pairs], error)
+   end subroutine create
+
+   !> Append a row to every dataset.
+   subroutine append(self, file, point, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      self%n_rows = self%n_rows + 1
+      call self%list(d_omega)%append(file, point%omega, error)
+      if (allocated(error)) return
+      call append_coefficients(self%list(d_coefficients), file, self%n_coefficients, &
+                               point%coefficients, error)
+      if (allocated(error)) return
+      if (allocated(point%amplitude)) then
+         call self%list(d_amplitude)%append(file, point%amplitude, error)
+      else
+         call self%list(d_amplitude)%skip(file, 1, error)
+      end if
+      if (allocated(error)) return
+      call self%list(d_converged)%append(file, point%converged, error)
+      if (allocated(error)) return
+      call self%list(d_iterations)%append(file, point%iterations, error)
+      if (allocated(error)) return
+      call self%list(d_residual)%append(file, point%residual, error)
+      if (allocated(error)) return
+      call self%list(d_seconds)%append(file, point%seconds, error)
+      if (.not. allocated(error)) call self%append_contact(file, point, error)
+      if (.not. allocated(error)) call self%append_histories(file, point, error)
+   end subroutine append
+
+   subroutine close(self)
+      class(row_set), intent(inout) :: self
+      integer :: i
+
+      do i = 1, n_datasets
+         call self%list(i)%close()
+      end do
+   end subroutine close
+
+   subroutine new(self, file, i, name, row_shape, error, kind_of, units)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: i
+      character(*), intent(in) :: name
+      integer, intent(in) :: row_shape(:)
+      type(error_type), allocatable, intent(out) :: error
+      !> Kind of the elements (default: growing_real).
+      integer, intent(in), optional :: kind_of
+      character(*), intent(in), optional :: units
+      integer :: element_kind
+
+      element_kind = growing_real
+      if (present(kind_of)) element_kind = kind_of
+      call self%list(i)%create(file, name, element_kind, row_shape, error, self%expected)
+      if (allocated(error) .or. .not. present(units)) return
+      call write_attribute(file, name, 'units', units, error)
+   end subroutine new
+
+   !> (2H+1, n_observed) turned to (n_observed, 2H+1), zero for harmonics not carried.
+   subroutine append_coefficients(dataset, file, n_coefficients, coefficients, error)
+      type(growing_dataset), intent(inout) :: dataset
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: n_coefficients
+      real(wp), allocatable, intent(in) :: coefficients(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: row(:, :)
+      integer :: n
+
+      if (.not. allocated(coefficients)) then
+         call dataset%skip(file, 1, error)
+         return
+      end if
+      n = size(coefficients, 1)
+      allocate (row(size(coefficients, 2), max(n, n_coefficients)), source=0.0_wp)
+      row(:, :n) = transpose(coefficients)
+      call dataset%append(file, row, error)
+   end subroutine append_coefficients
+
+   subroutine append_contact(self, file, point, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: force(:, :, :)
+      integer :: n
+
+      if (.not. self%list(d_force)%is_created()) return
+      if (allocated(point%force)) then
+         n = size(point%force, 3)
+         allocate (force(3, size(point%force, 2), max(n, self%n_coefficients)), source=0.0_wp)
+         force(:, :, :n) = point%force
+      end if
+      call append_or_skip(self%list(d_force), file, force, error)
+      if (allocated(error)) return
+      if (allocated(point%fraction)) then
+         call self%list(d_fraction)%append(file, point%fraction, error)
+      else
+         call self%list(d_fraction)%skip(file, 1, error)
+      end if
+      if (allocated(error)) return
+      if (allocated(point%dissipation)) then
+         call self%list(d_dissipation)%append(file, point%dissipation, error)
+      else
+         call self%list(d_dissipation)%skip(file, 1, error)
+      end if
+   end subroutine append_contact
+
+   !> Histories exist from the first point that has one; the rows of other points are NaN.
+   subroutine append_histories(self, file, point, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: row(:, :, :)
+
+      if (allocated(point%history)) then
+         row = reshape(transpose(point%history), [size(point%history, 2), 1, &
+                                                  size(point%history, 1)])
+      end if
+      call append_history(self, file, d_observed, '/history/observed', row, error)
+      if (allocated(error)) return
+      call append_history(self, file, d_force_history, '/history/force', point%force_history, &
+                          error)
+      if (allocated(error)) return
+      call append_history(self, file, d_slip_history, '/history/relative_displacement', &
+                          point%slip_history, error)
+   end subroutine append_histories
+
+   !> Rows of (n, n_time) where the middle dimension is 1, of (3, n_pairs, n_time) otherwise.
+   subroutine append_history(self, file, i, name, row, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: i
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(in) :: row(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+      logical :: flat
+
+      flat = i == d_observed
+      if (.not. self%list(i)%is_created()) then
+         if (.not. allocated(row)) return
+         if (flat) then
+            call self%new(file, i, name, [size(row, 1), size(row, 3)], error)
+         else
+            call self%new(file, i, name, shape(row), error)
+         end if
+         if (.not. allocated(error)) call self%list(i)%skip(file, self%n_rows - 1, error)
+         if (allocated(error)) return
+      end if
+      if (flat .and. allocated(row)) then
+         call self%list(i)%append(file, row(:, 1, :), error)
+      else
+         call append_or_skip(self%list(i), file, row, error)
+      end if
+   end subroutine append_history
+
+   subroutine append_or_skip(dataset, file, row, error)
+      type(growing_dataset), intent(inout) :: dataset
+      type(hdf5_file), intent(in) :: file
+      real(wp), allocatable, intent(in) :: row(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(row)) then
+         call dataset%append(file, row, error)
+      else
+         call dataset%skip(file, 1, error)
+      end if
+   end subroutine append_or_skip
+
+end module fw_result_rows
