@@ -38,8 +38,6 @@ module fw_hbm
       real(wp), allocatable :: stiffness(:, :)
       !> Gap and wear depth (n_pairs) [length]; load of pairs without a normal dof (n_pairs).
       real(wp), allocatable :: gap(:), depth(:), normal_load(:)
-      !> Let pairs that stick leave the linear problem.
-      logical :: skip_stuck = .true.
       !> F - Z q - f_springs, and the loads (n_coordinates, n_coefficients).
       real(wp), allocatable :: balance(:, :), load(:, :)
       !> Workspace (n_coordinates, n_retained).

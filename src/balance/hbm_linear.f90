@@ -35,7 +35,7 @@ contains
 
       pinned = .false.
       wanted = .false.
-      if (self%rigid .and. self%skip_stuck) then
+      if (self%rigid .and. self%reduced) then
          do i = 1, self%contact%n_pairs
             do c = 1, 3
                if (self%joint%row(c, i) == 0 .or. self%contact%state(i) == pair_open) cycle

@@ -53,7 +53,7 @@ contains
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
       call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
-      system%skip_stuck = case%solver%skips
+      system%reduced = case%solver%skips
       if (fft_pays(fourier%n_coefficients, fourier%n_time)) then
          call system%fourier%prepare_fft(3*case%contact%n_pairs)
       end if

@@ -16,6 +16,10 @@ module fw_system
       integer :: n = 0
       !> Norm to which residuals are compared.
       real(wp) :: reference = 1.0_wp
+      !> Let `linearize` leave out unknowns that the system solves by itself. Where it is false,
+      !> n_linear = n, unknowns and equations keep their order, `apply` multiplies with the whole
+      !> derivative, `reduce` returns -r and `expand` the solution.
+      logical :: reduced = .true.
    contains
       procedure(evaluate_residual), deferred :: residual
       procedure(prepare_derivative), deferred :: linearize
