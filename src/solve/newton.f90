@@ -27,12 +27,12 @@ module fw_newton
    end type newton_solver
 
    !> Shortest fraction of a step that is tried.
-   integer, parameter :: max_halvings = 7
+   integer, parameter :: max_halvings = 4
    !> Relative residual asked of iterative linear solutions: Newton's last step then reaches the
    !> tolerance of the nonlinear solution from a residual of its square root.
    real(wp), parameter :: forcing = 1.0e-4_wp
    !> Steps without a new smallest residual after which the path counts as cycling.
-   integer, parameter :: patience = 15
+   integer, parameter :: patience = 6
 
 contains
 
