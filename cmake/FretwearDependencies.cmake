@@ -18,6 +18,7 @@ endif()
 find_dependency(LAPACK)
 find_dependency(OpenMP COMPONENTS Fortran)
 find_dependency(FFTW3)
+find_dependency(MINPACK)
 find_dependency(HDF5 COMPONENTS Fortran)
 set(fretwear_sundials fcvode farkode fkinsol
   fnvecserial fsunmatrixdense fsunlinsoldense fsunlinsolspgmr)

@@ -38,6 +38,7 @@ missing_packages() {
    has_command ninja || echo ninja-build
    has_command pkg-config || echo pkg-config
    links openblas || echo libopenblas-dev
+   links minpack || echo minpack-dev
    links fftw3 || echo libfftw3-dev
    links hdf5_serial_fortran hdf5_fortran || echo libhdf5-dev
    links sundials_cvode || echo libsundials-dev
