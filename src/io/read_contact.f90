@@ -79,7 +79,8 @@ contains
       logical :: from_file
 
       from_file = allocated(contact%side_1)
-      call read_side('side_1', contact%side_1, .not. from_file .and. contact%n_pairs > 0)
+      call read_side('side_1', contact%side_1, .not. (from_file .or. reader%failed()) &
+                     .and. contact%n_pairs > 0)
       call read_side('side_2', contact%side_2, .false.)
       if (.not. reader%failed()) call check_sides(reader, n_dof, contact)
 

@@ -19,7 +19,8 @@ module fw_read_model
    character(*), parameter :: source_words(*) = &
       [character(13) :: 'inline', 'hdf5', 'matrix_market']
    integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3
-   integer, parameter :: largest_inline = 10000
+   !> More dofs are taken for a mistake: the matrices are dense.
+   integer, parameter :: largest = 100000
 
    !> Keys of &model and &load that act once all is read.
    type :: model_options
@@ -97,8 +98,8 @@ contains
       integer :: n_dof
 
       n_dof = n_file
-      call reader%get('model', 'n_dof', n_dof, least=1, &
-                      most=merge(largest_inline, huge(1), is_inline), required=is_inline)
+      call reader%get('model', 'n_dof', n_dof, least=1, most=largest, &
+                      required=is_inline)
       if (.not. is_inline .and. n_dof /= n_file) then
          call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model file has '// &
                             to_text(n_file)//'; remove n_dof')

@@ -490,9 +490,10 @@ contains
       call self%records%add(group, key, accepts)
       if (.not. self%given(group, key)) then
          if (.not. is_true(required)) return
-         message = dims_text(dims)//' of them'
-         if (repeats) message = 'one for all or '//dims_text(dims)
-         call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts//', '//message)
+         message = ', '//dims_text(dims)//' of them'
+         if (repeats) message = ', one for all or '//dims_text(dims)
+         if (any(dims == 0)) message = ''
+         call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts//message)
          return
       end if
       if (any(dims == 0)) return

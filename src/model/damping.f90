@@ -46,7 +46,8 @@ contains
       if (allocated(error)) return
       call weigh_by_mass(root, sqrt(values(n_free + 1:)))
       vectors = vectors(:, n_free + 1:)
-      vectors = product_of(vectors, product_of(root, vectors, 'N', 'T'), 'N', 'N')
+      root = product_of(root, vectors, 'N', 'T')
+      vectors = product_of(vectors, root, 'N', 'N')
       damping = damping + 2.0_wp*ratio*scaled(vectors, 1.0_wp/scale)
    end subroutine add_modal_damping
 
@@ -100,11 +101,12 @@ contains
       integer, intent(in) :: n_free
       real(wp), allocatable, intent(out) :: condensed(:, :)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: rotated(:, :), free(:, :), coupling(:, :), followed(:, :)
-      real(wp), allocatable :: values(:)
+      real(wp), allocatable :: half(:, :), rotated(:, :), free(:, :)
+      real(wp), allocatable :: coupling(:, :), followed(:, :), values(:)
       integer :: j
 
-      rotated = product_of(vectors, product_of(stiffness, vectors, 'N', 'N'), 'T', 'N')
+      half = product_of(stiffness, vectors, 'N', 'N')
+      rotated = product_of(vectors, half, 'T', 'N')
       condensed = rotated(n_free + 1:, n_free + 1:)
       if (n_free == 0) return
       free = rotated(:n_free, :n_free)
