@@ -182,6 +182,8 @@ contains
          if (elements <= max_elements) elements = elements*dataset%dims(i)
       end do
       call h5dget_storage_size_f(dataset%id, stored, status)
+      ! HDF5 1.10 calls it a failure, and sets nothing, where nothing is stored.
+      if (status < 0) stored = 0
       if (elements <= max_elements) then
          if (8*elements <= large_bytes .or. 8*elements/best_compression <= stored) return
       end if

@@ -30,7 +30,7 @@ module fw_result_rows
       procedure :: create
       procedure :: append
       procedure :: close
-      procedure, private :: new, append_contact, append_histories
+      procedure, private :: new, new_late, append_contact, append_histories
    end type row_set
 
 contains
@@ -183,13 +183,8 @@ contains
       type(hdf5_file), intent(in) :: file
       type(point_type), intent(in) :: point
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: row(:, :, :)
 
-      if (allocated(point%history)) then
-         row = reshape(transpose(point%history), [size(point%history, 2), 1, &
-                                                  size(point%history, 1)])
-      end if
-      call append_history(self, file, d_observed, '/history/observed', row, error)
+      call append_observed(self, file, point%history, error)
       if (allocated(error)) return
       call append_history(self, file, d_force_history, '/history/force', point%force_history, &
                           error)
@@ -198,7 +193,28 @@ contains
                           point%slip_history, error)
    end subroutine append_histories
 
-   !> Rows of (n, n_time) where the middle dimension is 1, of (3, n_pairs, n_time) otherwise.
+   !> (n_time, n_observed) turned to (n_observed, n_time).
+   subroutine append_observed(self, file, history, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      real(wp), allocatable, intent(in) :: history(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      logical :: created
+
+      created = self%list(d_observed)%is_created()
+      if (.not. allocated(history)) then
+         if (created) call self%list(d_observed)%skip(file, 1, error)
+         return
+      end if
+      if (.not. created) then
+         call self%new_late(file, d_observed, '/history/observed', &
+                            [size(history, 2), size(history, 1)], error)
+         if (allocated(error)) return
+      end if
+      call self%list(d_observed)%append(file, transpose(history), error)
+   end subroutine append_observed
+
+   !> Rows of (3, n_pairs, n_time).
    subroutine append_history(self, file, i, name, row, error)
       class(row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -206,25 +222,27 @@ contains
       character(*), intent(in) :: name
       real(wp), allocatable, intent(in) :: row(:, :, :)
       type(error_type), allocatable, intent(out) :: error
-      logical :: flat
 
-      flat = i == d_observed
       if (.not. self%list(i)%is_created()) then
          if (.not. allocated(row)) return
-         if (flat) then
-            call self%new(file, i, name, [size(row, 1), size(row, 3)], error)
-         else
-            call self%new(file, i, name, shape(row), error)
-         end if
-         if (.not. allocated(error)) call self%list(i)%skip(file, self%n_rows - 1, error)
+         call self%new_late(file, i, name, shape(row), error)
          if (allocated(error)) return
       end if
-      if (flat .and. allocated(row)) then
-         call self%list(i)%append(file, row(:, 1, :), error)
-      else
-         call append_or_skip(self%list(i), file, row, error)
-      end if
+      call append_or_skip(self%list(i), file, row, error)
    end subroutine append_history
+
+   !> Create a dataset after the first points, whose rows stay NaN.
+   subroutine new_late(self, file, i, name, row_shape, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: i
+      character(*), intent(in) :: name
+      integer, intent(in) :: row_shape(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%new(file, i, name, row_shape, error)
+      if (.not. allocated(error)) call self%list(i)%skip(file, self%n_rows - 1, error)
+   end subroutine new_late
 
    subroutine append_or_skip(dataset, file, row, error)
       type(growing_dataset), intent(inout) :: dataset
