@@ -1,6 +1,7 @@
 !> Which value of which assignment each element of an array takes.
 module fw_array_entries
-   use fw_namelist_data, only: namelist_type, entry_type, section_type, value_count, location
+   use fw_namelist_data, only: namelist_type, entry_type, section_type, value_count, &
+                               stray_word
    use fw_text, only: to_text
    implicit none (type, external)
    private
@@ -35,6 +36,7 @@ contains
             message = 'has '//to_text(n_values)//plural(' value', n_values)//': must be '// &
                       to_text(size(elements))//count_text(dims, size(entry%sections) > 0)
             if (repeats) message = message//', or one value for all'
+            message = message//stray_word(entry)
             return
          end if
          do i = 1, size(elements)

@@ -5,7 +5,7 @@ module fw_namelist_data
    private
 
    public :: namelist_type, group_type, entry_type, value_type, section_type
-   public :: add_entry, value_count, location
+   public :: add_entry, value_count, stray_word, location
 
    !> One value, or `repeat` equal ones.
    type :: value_type
@@ -75,6 +75,23 @@ contains
          value_count = value_count + entry%values(i)%repeat
       end do
    end function value_count
+
+   !> Hint at a word among several values: it may be a key whose = was forgotten.
+   pure function stray_word(entry) result(hint)
+      type(entry_type), intent(in) :: entry
+      character(:), allocatable :: hint
+      integer :: i
+
+      hint = ''
+      do i = 2, size(entry%values)
+         associate (value => entry%values(i))
+            if (value%quoted .or. len(value%text) < 2 .or. allocated(entry%option)) cycle
+            if (scan(value%text(1:1), '.+-0123456789') > 0) cycle
+            hint = '; if '//value%text//' is a key, it lacks its ='
+            return
+         end associate
+      end do
+   end function stray_word
 
    !> Where an assignment stands: `file:line`, or the option of the command line.
    pure function location(entry, source) result(place)

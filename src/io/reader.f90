@@ -10,7 +10,7 @@ module fw_reader
    use fw_kinds, only: wp, i8
    use fw_namelist, only: parse_namelist, parse_override
    use fw_namelist_data, only: namelist_type, value_type, entry_type, add_entry, value_count, &
-                               location
+                               stray_word, location
    use fw_records, only: record_list
    use fw_text, only: string_type, lower_case, nearest_word, to_text, join
    use fw_text_list, only: append
@@ -446,7 +446,7 @@ contains
       associate (entry => self%input%entries(i_entry))
          if (value_count(entry) == 1 .or. allocated(entry%raw)) return
          call self%refuse(group, key, 'has '//to_text(value_count(entry))// &
-                          ' values: must be one, '//accepts)
+                          ' values: must be one, '//accepts//stray_word(entry))
          i_entry = 0
       end associate
    end subroutine find_scalar

@@ -30,6 +30,7 @@ contains
       real(wp), intent(inout) :: damping(:, :)
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: scale(:), values(:), vectors(:, :), condensed(:, :), root(:, :)
+      real(wp), allocatable :: half(:, :)
       integer :: n_free
 
       scale = unit_scale(mass, stiffness)
@@ -46,9 +47,10 @@ contains
       if (allocated(error)) return
       call weigh_by_mass(root, sqrt(values(n_free + 1:)))
       vectors = vectors(:, n_free + 1:)
-      root = product_of(root, vectors, 'N', 'T')
-      vectors = product_of(vectors, root, 'N', 'N')
-      damping = damping + 2.0_wp*ratio*scaled(vectors, 1.0_wp/scale)
+      call multiply('N', root, 'T', vectors, half)
+      call multiply('N', vectors, 'N', half, root)
+      call weigh_by_mass(root, 1.0_wp/scale)
+      damping = damping + 2.0_wp*ratio*root
    end subroutine add_modal_damping
 
    !> Factors that bring the diagonal of M to one, and that of K where there is no mass.
@@ -97,7 +99,7 @@ contains
 
    !> Stiffness of the massive directions with the first `n_free`, massless, ones following.
    subroutine condense(stiffness, vectors, n_free, condensed, error)
-      real(wp), intent(in) :: stiffness(:, :), vectors(:, :)
+      real(wp), contiguous, intent(in) :: stiffness(:, :), vectors(:, :)
       integer, intent(in) :: n_free
       real(wp), allocatable, intent(out) :: condensed(:, :)
       type(error_type), allocatable, intent(out) :: error
@@ -105,15 +107,15 @@ contains
       real(wp), allocatable :: coupling(:, :), followed(:, :), values(:)
       integer :: j
 
-      half = product_of(stiffness, vectors, 'N', 'N')
-      rotated = product_of(vectors, half, 'T', 'N')
+      call multiply('N', stiffness, 'N', vectors, half)
+      call multiply('T', vectors, 'N', half, rotated)
       condensed = rotated(n_free + 1:, n_free + 1:)
       if (n_free == 0) return
       free = rotated(:n_free, :n_free)
       call solve_eigen(free, values, error)
       if (allocated(error)) return
-      coupling = rotated(:n_free, n_free + 1:)
-      coupling = product_of(free, coupling, 'T', 'N')
+      followed = rotated(:n_free, n_free + 1:)
+      call multiply('T', free, 'N', followed, coupling)
       followed = coupling
       do j = 1, n_free
          if (abs(values(j)) > rank_tolerance*maxval(abs(values))) then
@@ -122,7 +124,8 @@ contains
             followed(j, :) = 0.0_wp
          end if
       end do
-      condensed = condensed - product_of(coupling, followed, 'T', 'N')
+      call multiply('T', coupling, 'N', followed, half)
+      condensed = condensed - half
    end subroutine condense
 
    !> Symmetric square root, with zero for eigenvalues that are not positive.
@@ -130,7 +133,7 @@ contains
       real(wp), intent(in) :: matrix(:, :)
       real(wp), allocatable, intent(out) :: root(:, :)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: vectors(:, :), values(:)
+      real(wp), allocatable :: vectors(:, :), scaled_vectors(:, :), values(:)
       real(wp) :: least
       integer :: j
 
@@ -138,11 +141,12 @@ contains
       call solve_eigen(vectors, values, error)
       if (allocated(error)) return
       least = rank_tolerance*maxval(abs(values))
-      root = vectors
+      scaled_vectors = vectors
       do j = 1, size(values)
-         root(:, j) = merge(sqrt(max(values(j), 0.0_wp)), 0.0_wp, values(j) > least)*vectors(:, j)
+         scaled_vectors(:, j) = vectors(:, j)* &
+                                merge(sqrt(max(values(j), 0.0_wp)), 0.0_wp, values(j) > least)
       end do
-      root = product_of(root, vectors, 'N', 'T')
+      call multiply('N', scaled_vectors, 'T', vectors, root)
    end subroutine take_root
 
    !> Eigenvalues in ascending order; the matrix becomes its eigenvectors.
@@ -162,11 +166,11 @@ contains
                        'mass and stiffness matrices', status_failure)
    end subroutine solve_eigen
 
-   !> op(a) op(b), op: 'N' as it is, 'T' transposed.
-   function product_of(a, b, op_a, op_b) result(c)
-      real(wp), contiguous, intent(in) :: a(:, :), b(:, :)
+   !> c = op(a) op(b), op: 'N' as it is, 'T' transposed.
+   subroutine multiply(op_a, a, op_b, b, c)
       character, intent(in) :: op_a, op_b
-      real(wp), allocatable :: c(:, :)
+      real(wp), contiguous, intent(in) :: a(:, :), b(:, :)
+      real(wp), allocatable, intent(out) :: c(:, :)
       integer :: m, n, k
 
       m = size(a, merge(1, 2, op_a == 'N'))
@@ -174,6 +178,6 @@ contains
       n = size(b, merge(2, 1, op_b == 'N'))
       allocate (c(m, n))
       call dgemm(op_a, op_b, m, n, k, 1.0_wp, a, size(a, 1), b, size(b, 1), 0.0_wp, c, m)
-   end function product_of
+   end subroutine multiply
 
 end module fw_damping

@@ -1,0 +1,168 @@
+"""Every kind of wrong input: the exit status, and a message with the place and the remedy."""
+import hashlib
+
+import pytest
+
+h5py = pytest.importorskip("h5py")
+np = pytest.importorskip("numpy")
+
+
+def write_model(path, **changes):
+    """A small model file; a change of None leaves the dataset out."""
+    data = {"mass": np.eye(2), "stiffness": np.array([[2.0, -1.0], [-1.0, 2.0]]),
+            "damping": 0.02*np.eye(2),
+            "contact/side_1": np.array([[2, 0, 0]]), "contact/side_2": np.array([[0, 0, 0]]),
+            "contact/mu": np.array([0.3]), "contact/gap": np.array([0.0]),
+            "load/static": np.zeros(2), "load/cosine": np.array([1.0, 0.0]),
+            "load/sine": np.zeros(2)}
+    data.update(changes)
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = "fretwear-model"
+        file.attrs["format_version"] = 1
+        file.attrs["title"] = "small"
+        file.attrs["unit_system"] = "SI"
+        for name, values in data.items():
+            if values is not None:
+                file[name] = values
+
+
+FILE_CASE = """&model
+   source = 'hdf5'
+   file = 'model.h5' /
+&contact normal_load = 1 /
+&sweep start = 0.5 end = 0.8 n_points = 3 /
+"""
+
+
+@pytest.fixture
+def with_model(fw_run):
+    fw_run.write(FILE_CASE)
+    write_model(fw_run.directory / "model.h5")
+    return fw_run
+
+
+@pytest.mark.parametrize("old, new, expected", [
+    ("n_harmonics = 3", "n_harmnics = 3",
+     ["case.nml:16: &harmonics has no key n_harmnics", "did you mean n_harmonics?"]),
+    ("&harmonics", "&harmonic", ["case.nml:15: there is no group &harmonic",
+                                 "did you mean harmonics?"]),
+    ("n_harmonics = 3", "n_harmonics = 3 n_harmonics = 5",
+     ["case.nml:16: &harmonics n_harmonics is given twice", "line 16", "keep one"]),
+    ("&load", "&sweep start = 2 /\n&load", ["group &sweep is given twice", "line 14", "join"]),
+    ("mu = 0.3", "mu = -0.3", ["case.nml:12: &contact mu(1) = -0.3", "at least 0"]),
+    ("mu = 0.3", "mu = NaN", ["case.nml:12: &contact mu(1) = NaN", "finite"]),
+    ("n_time = 64", "n_time = 6",
+     ["case.nml:17: &harmonics n_time = 6", "2*n_harmonics + 1 = 7"]),
+    ("n_time = 64", "n_time = 64.5", ["case.nml:17: &harmonics n_time = 64.5", "an integer"]),
+    ("side_1 = 2", "side_1 = 3", ["case.nml:11: &contact side_1(1,1) = 3", "from -2 to 2"]),
+    ("side_1 = 2", "side_1 = 0", ["case.nml:11: &contact side_1", "pair 1 has no dof"]),
+    ("-1  2", "1  2", ["case.nml:6: &model stiffness is not symmetric: entry (1,2) = 1, but "
+                       "entry (2,1) = -1", "must be equal"]),
+    ("-1  2", "-1  NaN", ["case.nml:7: &model stiffness(2,2) = NaN", "finite"]),
+    ("0 1\n", "0 -1\n", ["&model mass has the negative diagonal entry (2,2) = -1"]),
+    ("0 1\n", "0\n", ["case.nml:4: &model mass has 3 values", "must be 4 (2 x 2)"]),
+    ("cosine = 1 0", "cosine = 1 0 0", ["&load cosine has 3 values", "must be 2"]),
+    ("start = 0.5", "start = 0", ["case.nml:19: &sweep start = 0", "above 0"]),
+    ("end = 0.8", "", ["&sweep end is missing"]),
+    ("normal_load = 1", "", ["&contact normal_load is missing", "at least 0"]),
+    ("'test'", "'test", ["case.nml:1: &case title", "not closed"]),
+    ("n_points = 3 /", "n_points = 3", ["case.nml:18: &sweep is not closed", "/"]),
+    ("mu = 0.3", "mu 0.3", ["case.nml:11: &contact side_1 has 5 values", "if mu is a key, it lacks its ="]),
+    ("mu = 0.3", "mu = 0.3 law = 'dltf'", ["&contact law = 'dltf'", "'dlft'", "did you mean dlft?"]),
+    ("mu = 0.3", "mu = 0.3 law = 'penalty'", ["&contact tangential_stiffness is missing"]),
+    ("mu = 0.3", "mu = 0.3 tangential_stiffness = 1", ["tangential_stiffness belongs to law = 'penalty'"]),
+    ("mu = 0.3", "mu = 0.3 0.4 0.5", ["&contact mu has 3 values", "must be 1"]),
+    ("n_time = 64", "n_time = 64 adaptive = T", ["harmonics%adaptive", "not available", ".false."]),
+])
+def test_wrong_namelist(fw_run, old, new, expected):
+    fw_run.edit(old, new)
+    message = fw_run.refused()
+    for part in expected:
+        assert part in message, message
+
+
+def test_all_problems_at_once(fw_run):
+    fw_run.edit("n_time = 64", "n_time = x y = 1")
+    message = fw_run.refused("--set", "sweep%start=-1", "case.nml")
+    assert len(message.splitlines()) == 3, message
+
+
+@pytest.mark.parametrize("group", ["&model", "&sweep"])
+def test_missing_group(fw_run, group):
+    fw_run.write("\n".join("&" + part for part in ["case /", "model n_dof=1 mass=1 stiffness=1 /",
+                           "sweep start=1 end=2 n_points=2 /"] if not ("&" + part).startswith(group)))
+    assert f"case.nml: group {group} is missing" in fw_run.refused()
+
+
+@pytest.mark.parametrize("override, expected", [
+    ("solver%tolerence=1", ["has no key tolerence", "did you mean tolerance?"]),
+    ("solvr%tolerance=1", ["there is no group &solvr", "did you mean solver?"]),
+    ("solver%tolerance=-1", ["&solver tolerance = -1", "above 0"]),
+    ("harmonics%method=hbd", ["&harmonics method = hbd", "'hbm'"]),
+    ("output%observe=3", ["&output observe = 3", "from 1 to 2"]),
+])
+def test_wrong_override_names_the_option(fw_run, override, expected):
+    message = fw_run.refused("--set", override, "case.nml")
+    for part in ["--set " + override, *expected]:
+        assert part in message, message
+
+
+@pytest.mark.parametrize("override, instead", [
+    ("case%analysis=time", "'frf' or 'point'"), ("solver%kind=kinsol", "'newton'"),
+    ("sweep%continuation=arclength", "'natural'"), ("sweep%stability=.true.", ".false."),
+    ("contact%law=dlft_velocity", "'dlft' or 'penalty'")])
+def test_what_is_not_available_yet(fw_run, override, instead):
+    message = fw_run.refused("--set", override, "case.nml")
+    assert override.split("=")[0] in message and instead in message
+
+
+def test_missing_namelist(fw_run):
+    message = fw_run.refused("none.nml", status=5)
+    assert "none.nml: cannot be read" in message
+
+
+def test_missing_model_file(with_model):
+    (with_model.directory / "model.h5").unlink()
+    message = with_model.refused(status=5)
+    assert "case.nml:3: &model file" in message and "model.h5" in message
+
+
+def test_truncated_model_file(with_model):
+    path = with_model.directory / "model.h5"
+    path.write_bytes(path.read_bytes()[:1000])
+    message = with_model.refused()
+    assert "case.nml:3: &model file: model.h5" in message and "truncated" in message
+
+
+@pytest.mark.parametrize("changes, expected", [
+    ({"mass": np.eye(3)}, ["model.h5", "stiffness"]),
+    ({"mass": np.ones(4)}, ["model.h5", "mass"]),
+    ({"stiffness": None}, ["model.h5", "stiffness"]),
+    ({"stiffness": np.array([[2.0, -1.0], [1.0, 2.0]])}, ["stiffness", "not symmetric", "(1,2) = -1"]),
+    ({"stiffness": np.full((2, 2), np.nan)}, ["/stiffness holds NaN at index (0, 0)", "finite"]),
+    ({"contact/mu": np.array([-0.3])}, ["mu(1) = -0.3", "at least 0"]),
+    ({"contact/mu": np.array([0.3, 0.3])}, ["model.h5", "mu"]),
+    ({"contact/side_1": np.array([[5, 0, 0]])}, ["dof 5", "n_dof = 2"]),
+    ({"load/cosine": np.array([np.inf, 0.0])}, ["/load/cosine holds Inf", "finite"]),
+])
+def test_wrong_model_file(with_model, changes, expected):
+    write_model(with_model.directory / "model.h5", **changes)
+    message = with_model.refused()
+    for part in ["case.nml:3: &model file", *expected][(1 if "contact/side_1" in changes else 0):]:
+        assert part in message, message
+
+
+def test_unwritable_output_is_refused_before_the_run(fw_run):
+    message = fw_run.refused("-o", "nowhere/x.h5", "case.nml", status=5)
+    assert "nowhere/x.h5" in message and "does not exist" in message and "-o" in message
+    message = fw_run.refused("-o", ".", "case.nml", status=5)
+    assert "is a directory" in message
+
+
+def test_existing_result_survives_a_refused_run(fw_run):
+    result = fw_run.directory / "case.h5"
+    assert fw_run("case.nml").returncode == 0
+    before = hashlib.sha256(result.read_bytes()).digest()
+    fw_run.refused("--set", "contact%mu=-1", "case.nml")
+    assert hashlib.sha256(result.read_bytes()).digest() == before
+    assert sorted(path.name for path in fw_run.directory.iterdir()) == ["case.h5", "case.nml"]

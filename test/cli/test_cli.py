@@ -1,0 +1,124 @@
+"""Options, exit statuses and what goes to which stream."""
+import os
+
+import pytest
+
+
+def test_version(fw_run):
+    done = fw_run("--version")
+    assert done.returncode == 0
+    assert done.stdout.startswith("fw_run ") and done.stdout.count(".") == 2
+
+
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_help_names_every_option_and_group(fw_run, option):
+    done = fw_run(option)
+    assert done.returncode == 0 and done.stderr == ""
+    for word in ["--set", "-o", "--check", "-q", "-v", "--version", "&contact", "Exit status"]:
+        assert word in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 88
+
+
+def test_no_argument(fw_run):
+    assert "fw_run --help" in fw_run.refused("--", status=2)
+
+
+def test_unknown_option_names_the_nearest(fw_run):
+    message = fw_run.refused("--chek", "case.nml", status=2)
+    assert "--chek" in message and "did you mean --check?" in message
+
+
+@pytest.mark.parametrize("arguments", [
+    ["-x", "case.nml"], ["case.nml", "other.nml"], ["case.nml", "-o"], ["case.nml", "--set"],
+    ["-qv", "case.nml"], ["--check=yes", "case.nml"], [""],
+])
+def test_wrong_usage(fw_run, arguments):
+    assert "fw_run --help" in fw_run.refused(*arguments, status=2)
+
+
+@pytest.mark.parametrize("override", [
+    "solver", "tolerance=1", "solver%tolerance", "solver%tolerance=", "=1", "%a=1"])
+def test_malformed_set(fw_run, override):
+    message = fw_run.refused("--set", override, "case.nml", status=2)
+    assert override in message and "group%key=value" in message
+
+
+def test_check_prints_what_reads_back(fw_run):
+    first = fw_run("--check", "case.nml")
+    assert first.returncode == 0 and first.stderr == ""
+    fw_run.write(first.stdout, "again.nml")
+    again = fw_run("--check", "again.nml")
+    assert again.returncode == 0
+    assert again.stdout == first.stdout
+    assert not list(fw_run.directory.glob("*.h5")), "--check runs nothing"
+
+
+def test_check_is_fortran(fw_run):
+    """The effective input is a namelist to other readers too."""
+    f90nml = pytest.importorskip("f90nml")
+    groups = f90nml.reads(fw_run("--check", "case.nml").stdout)
+    assert groups["harmonics"]["n_harmonics"] == 3
+    assert groups["solver"]["tolerance"] == 1e-8
+
+
+def test_set_changes_one_value_and_the_last_holds(fw_run):
+    done = fw_run("--check", "--set", "harmonics%n_harmonics=5", "--set=sweep%unit=Hz",
+                  "--set", "harmonics%n_harmonics=7", "--set", "case%title=a new title", "case.nml")
+    assert done.returncode == 0, done.stderr
+    assert "n_harmonics = 7 " in done.stdout
+    assert "unit = 'Hz'" in done.stdout
+    assert "title = 'a new title'" in done.stdout
+
+
+@pytest.mark.parametrize("arguments", [["-o", "x.h5"], ["-ox.h5"], ["-vo", "x.h5"],
+                                       ["--output=x.h5"]])
+def test_output_starts_at_the_current_directory(fw_run, arguments):
+    (fw_run.directory / "sub").mkdir()
+    (fw_run.directory / "case.nml").rename(fw_run.directory / "sub" / "case.nml")
+    done = fw_run("--check", *arguments, "sub/case.nml")
+    assert f"file = '{fw_run.directory}/x.h5'" in done.stdout, done.stderr
+    done = fw_run("--check", "sub/case.nml")
+    assert f"file = '{fw_run.directory}/sub/case.h5'" in done.stdout
+
+
+def test_double_dash_ends_the_options(fw_run):
+    (fw_run.directory / "case.nml").rename(fw_run.directory / "-q")
+    assert fw_run("--check", "--", "-q").returncode == 0
+
+
+def test_run_writes_result_and_summary(fw_run):
+    done = fw_run("case.nml")
+    assert done.returncode == 0, done.stderr
+    assert (fw_run.directory / "case.h5").exists()
+    assert done.stdout.strip(), "the summary goes to the standard output"
+    assert "point 3 of 3" in done.stderr and "\r" not in done.stderr
+
+
+def test_quiet_and_verbose(fw_run):
+    quiet = fw_run("-q", "case.nml")
+    assert quiet.returncode == 0 and quiet.stdout == quiet.stderr == ""
+    verbose = fw_run("-v", "case.nml")
+    assert verbose.returncode == 0
+    assert verbose.stderr.count("residual") == 3
+
+
+def test_bar_on_a_terminal(fw_run):
+    pty = pytest.importorskip("pty")
+    import subprocess
+
+    from conftest import PROGRAM
+    master, slave = pty.openpty()
+    done = subprocess.run([PROGRAM, "case.nml"], cwd=fw_run.directory, stdout=subprocess.PIPE,
+                          stderr=slave, timeout=60, check=False)
+    os.close(slave)
+    shown = os.read(master, 10000).decode()
+    os.close(master)
+    assert done.returncode == 0
+    assert "\r[" in shown and "3/3" in shown
+
+
+def test_status_of_a_run_that_does_not_converge(fw_run):
+    done = fw_run("--set", "solver%max_iterations=1", "--set", "solver%tolerance=1e-300",
+                  "--set", "solver%fallback=F", "case.nml")
+    assert done.returncode == 4, done.stderr
+    assert (fw_run.directory / "case.h5").exists(), "what was computed is saved"
