@@ -68,9 +68,11 @@ def with_model(fw_run):
     ("'test'", "'test", ["case.nml:1: &case title", "not closed"]),
     ("n_points = 3 /", "n_points = 3", ["case.nml:18: &sweep is not closed", "/"]),
     ("mu = 0.3", "mu 0.3", ["case.nml:11: &contact side_1 has 5 values", "if mu is a key, it lacks its ="]),
-    ("mu = 0.3", "mu = 0.3 law = 'dltf'", ["&contact law = 'dltf'", "'dlft'", "did you mean dlft?"]),
+    ("mu = 0.3", "mu = 0.3 law = 'dltf'",
+     ["&contact law = 'dltf'", "'dlft'", "did you mean dlft?"]),
     ("mu = 0.3", "mu = 0.3 law = 'penalty'", ["&contact tangential_stiffness is missing"]),
-    ("mu = 0.3", "mu = 0.3 tangential_stiffness = 1", ["tangential_stiffness belongs to law = 'penalty'"]),
+    ("mu = 0.3", "mu = 0.3 tangential_stiffness = 1",
+     ["tangential_stiffness belongs to law = 'penalty'"]),
     ("mu = 0.3", "mu = 0.3 0.4 0.5", ["&contact mu has 3 values", "must be 1"]),
     ("n_time = 64", "n_time = 64 adaptive = T", ["harmonics%adaptive", "not available", ".false."]),
 ])
@@ -89,8 +91,8 @@ def test_all_problems_at_once(fw_run):
 
 @pytest.mark.parametrize("group", ["&model", "&sweep"])
 def test_missing_group(fw_run, group):
-    fw_run.write("\n".join("&" + part for part in ["case /", "model n_dof=1 mass=1 stiffness=1 /",
-                           "sweep start=1 end=2 n_points=2 /"] if not ("&" + part).startswith(group)))
+    groups = ["&case /", "&model n_dof=1 mass=1 stiffness=1 /", "&sweep start=1 end=2 n_points=2 /"]
+    fw_run.write("\n".join(text for text in groups if not text.startswith(group)))
     assert f"case.nml: group {group} is missing" in fw_run.refused()
 
 
@@ -138,7 +140,8 @@ def test_truncated_model_file(with_model):
     ({"mass": np.eye(3)}, ["model.h5", "stiffness"]),
     ({"mass": np.ones(4)}, ["model.h5", "mass"]),
     ({"stiffness": None}, ["model.h5", "stiffness"]),
-    ({"stiffness": np.array([[2.0, -1.0], [1.0, 2.0]])}, ["stiffness", "not symmetric", "(1,2) = -1"]),
+    ({"stiffness": np.array([[2.0, -1.0], [1.0, 2.0]])},
+     ["stiffness", "not symmetric", "(1,2) = -1"]),
     ({"stiffness": np.full((2, 2), np.nan)}, ["/stiffness holds NaN at index (0, 0)", "finite"]),
     ({"contact/mu": np.array([-0.3])}, ["mu(1) = -0.3", "at least 0"]),
     ({"contact/mu": np.array([0.3, 0.3])}, ["model.h5", "mu"]),
