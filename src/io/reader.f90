@@ -12,7 +12,9 @@ module fw_reader
    use fw_namelist_data, only: namelist_type, value_type, entry_type, add_entry, value_count, &
                                stray_word, location
    use fw_records, only: record_list
-   use fw_text, only: string_type, lower_case, nearest_word, to_text, join
+   use fw_reader_text, only: near, shown, to_strings, words_text, element_text, dims_text, &
+                             real_list
+   use fw_text, only: string_type, lower_case, to_text, join
    use fw_text_list, only: append
    use fw_values, only: range_type, new_range, read_real, read_integer, read_logical, &
                         number_text, quoted_text
@@ -607,100 +609,5 @@ contains
       is_true = .false.
       if (present(flag)) is_true = flag
    end function is_true
-
-   !> `; did you mean ...?` where a word of the list is near.
-   function near(word, words) result(hint)
-      character(*), intent(in) :: word
-      type(string_type), intent(in) :: words(:)
-      character(:), allocatable :: hint
-
-      hint = nearest_word(lower_case(word), words)
-      if (len(hint) > 0) then
-         hint = '; did you mean '//hint//'?'
-      else if (size(words) <= 20) then
-         hint = '; known are '//join(words, ', ')
-      end if
-   end function near
-
-   pure function shown(value) result(text)
-      type(value_type), intent(in) :: value
-      character(:), allocatable :: text
-
-      text = value%text
-      if (value%quoted) text = quoted_text(value%text)
-   end function shown
-
-   pure function to_strings(words) result(strings)
-      character(*), intent(in) :: words(:)
-      type(string_type), allocatable :: strings(:)
-      integer :: i
-
-      allocate (strings(size(words)))
-      do i = 1, size(words)
-         strings(i)%text = trim(words(i))
-      end do
-   end function to_strings
-
-   pure function words_text(words) result(text)
-      character(*), intent(in) :: words(:)
-      character(:), allocatable :: text
-      integer :: i
-
-      text = quoted_text(trim(words(1)))
-      do i = 2, size(words)
-         text = text//trim(merge(' or', ',  ', i == size(words)))//' '//quoted_text(trim(words(i)))
-      end do
-   end function words_text
-
-   !> Subscripts of an element: `(2,1)`.
-   pure function element_text(element, dims) result(text)
-      integer, intent(in) :: element
-      integer, intent(in) :: dims(:)
-      character(:), allocatable :: text
-      integer :: i, rest
-
-      text = '('
-      rest = element - 1
-      do i = 1, size(dims)
-         if (i > 1) text = text//','
-         text = text//to_text(1 + mod(rest, dims(i)))
-         rest = rest/dims(i)
-      end do
-      text = text//')'
-   end function element_text
-
-   pure function dims_text(dims) result(text)
-      integer, intent(in) :: dims(:)
-      character(:), allocatable :: text
-      integer :: i
-
-      text = to_text(dims(1))
-      do i = 2, size(dims)
-         text = text//' x '//to_text(dims(i))
-      end do
-   end function dims_text
-
-   !> Numbers as namelist values; equal ones are written once.
-   function real_list(numbers, dims, repeats) result(text)
-      real(wp), intent(in) :: numbers(:)
-      integer, intent(in) :: dims(:)
-      logical, intent(in) :: repeats
-      character(:), allocatable :: text
-      integer :: i, per_line
-
-      text = ''
-      if (size(numbers) == 0) return
-      if (repeats .and. all(abs(numbers - numbers(1)) <= 0.0_wp)) then
-         text = number_text(numbers(1))
-         return
-      end if
-      per_line = merge(dims(1), 6, size(dims) > 1)
-      do i = 1, size(numbers)
-         text = text//number_text(numbers(i))
-         if (i == size(numbers)) exit
-         text = text//','//merge(new_line('a'), ' ', mod(i, per_line) == 0)
-         if (mod(i, per_line) == 0) text = text//repeat(' ', 6)
-      end do
-   end function real_list
 
 end module fw_reader
