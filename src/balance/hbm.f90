@@ -3,17 +3,20 @@
 !>   R(q) = Z_r q + f_springs(q) + B^T lambda(y) - F_r,
 !>
 !> with the prediction of the contact forces  y = F_r - Z_r q - f_springs + eps (q + gap)  (dlft)
-!> or  y = k (q + gap)  (penalty). Unknowns are (coordinate, coefficient), coordinates innermost.
+!> or  y = k (q + gap)  (penalty); dlft_velocity takes eps dq/dtau in the tangential directions.
+!> Unknowns are (coordinate, coefficient), coordinates innermost.
 module fw_hbm
    use fw_kinds, only: wp
    use fw_condensation, only: condensation_type
    use fw_condensation, only: new_condensation
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: spring_type
+   use fw_contact_data, only: law_dlft_velocity
    use fw_contact_data, only: law_penalty
    use fw_error, only: error_type
    use fw_forces, only: forces_type
    use fw_forces, only: new_forces
+   use fw_forces, only: pair_stuck
    use fw_fourier, only: fourier_type
    use fw_joint, only: joint_type
    use fw_lapack, only: zgemv
@@ -34,6 +37,8 @@ module fw_hbm
       type(springs_type) :: springs
       !> The contact law predicts from equilibrium (dlft) or from stiffness alone (penalty).
       logical :: rigid = .true.
+      !> Tangential prediction from velocities, without memory (dlft_velocity).
+      logical :: velocity_level = .false.
       !> Prediction stiffness: eps, or the penalty stiffness (n_pairs, 3) [force/length].
       real(wp), allocatable :: stiffness(:, :)
       !> Gap and wear depth (n_pairs) [length]; load of pairs without a normal dof (n_pairs).
@@ -118,6 +123,7 @@ contains
       self%structure = structure
       self%fourier = fourier
       self%rigid = contact%law /= law_penalty
+      self%velocity_level = contact%law == law_dlft_velocity
       m = structure%n_coordinates
       nc = fourier%n_coefficients
       nh = fourier%n_retained
@@ -137,6 +143,7 @@ contains
       else
          self%springs = new_springs([real(wp) ::], [integer ::], fourier)
       end if
+      self%contact%remembers = .not. self%velocity_level
       call set_stiffness(self, contact)
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       allocate (self%complex_in(m, nh), self%complex_out(m, nh), source=(0.0_wp, 0.0_wp))
@@ -239,6 +246,7 @@ contains
       if (self%contact%n_pairs > 0) then
          call predict(self, m, nc, x)
          call self%contact%evaluate(self%fourier)
+         if (self%velocity_level) call hold_stuck_means(self, m, nc, x)
       end if
       call collect(self, m, nc, r)
    end subroutine residual
@@ -304,14 +312,74 @@ contains
                      y(i, c, j) = y(i, c, j) + &
                                   self%stiffness(i, c)*r%coefficient(e)*q(r%coordinate(e), j)
                   end do
-                  if (self%rigid) y(i, c, j) = y(i, c, j) + self%balance(r%coordinate(r%first(row)), j)
                end do
             end do
          end do
+         if (self%velocity_level) call tangential_rates(self, y)
+         if (self%rigid) call add_balance(self, y)
          self%contact%offset = merge(self%stiffness(:, 3)*(self%gap + self%depth), &
                                      -self%normal_load, self%joint%row(3, :) > 0)
       end associate
    end subroutine predict
+
+   !> Replace predictions from displacements by predictions from velocities du/dtau.
+   subroutine tangential_rates(self, y)
+      type(hbm_system), intent(in) :: self
+      real(wp), intent(inout) :: y(:, :, :)
+      real(wp) :: cosine, n
+      integer :: i, c, h, k
+
+      do h = 1, self%fourier%n_retained
+         k = self%fourier%column(h)
+         n = real(self%fourier%harmonic(h), wp)
+         if (self%fourier%harmonic(h) == 0) then
+            y(:, 1:2, k) = 0.0_wp
+            cycle
+         end if
+         do c = 1, 2
+            do i = 1, size(y, 1)
+               cosine = y(i, c, k)
+               y(i, c, k) = n*y(i, c, k + 1)
+               y(i, c, k + 1) = -n*cosine
+            end do
+         end do
+      end do
+   end subroutine tangential_rates
+
+   !> What rigid pairs must transmit for equilibrium.
+   subroutine add_balance(self, y)
+      type(hbm_system), intent(in) :: self
+      real(wp), intent(inout) :: y(:, :, :)
+      integer :: i, c, j
+
+      do j = 1, size(y, 3)
+         do c = 1, 3
+            do i = 1, size(y, 1)
+               if (self%joint%row(c, i) == 0) cycle
+               y(i, c, j) = y(i, c, j) + self%balance(self%coordinate_of(c, i), j)
+            end do
+         end do
+      end do
+   end subroutine add_balance
+
+   !> Velocities say nothing of the mean position of a pair that sticks through the period: it
+   !> stays where it was assembled.
+   subroutine hold_stuck_means(self, m, nc, q)
+      class(hbm_system), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
+      integer :: i, c
+
+      if (.not. self%fourier%has_constant()) return
+      do i = 1, self%contact%n_pairs
+         if (self%contact%state(i) /= pair_stuck) cycle
+         do c = 1, 2
+            if (self%joint%row(c, i) == 0) cycle
+            self%contact%force(i, c, 1) = self%contact%force(i, c, 1) + &
+                                          self%stiffness(i, c)*q(self%coordinate_of(c, i), 1)
+         end do
+      end do
+   end subroutine hold_stuck_means
 
    !> r = -balance + B^T lambda.
    subroutine collect(self, m, nc, r)

@@ -40,6 +40,8 @@ contains
             do c = 1, 3
                if (self%joint%row(c, i) == 0 .or. self%contact%state(i) == pair_open) cycle
                j = self%coordinate_of(c, i)
+               ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
+               if (c < 3 .and. self%velocity_level) cycle
                pinned(j) = self%contact%state(i) == pair_stuck .or. &
                            (c == 3 .and. self%contact%always_closed(i))
                wanted(j) = self%contact%state(i) == pair_mixed
@@ -280,11 +282,35 @@ contains
                inputs(:, c) = inputs(:, c) + self%stiffness(pair, c)*r%coefficient(e)*vector(place, :nc)
             end do
             if (.not. self%rigid) cycle
+            if (c < 3 .and. self%velocity_level) then
+               call differentiate_inputs(self, self%contact%state(pair) == pair_stuck, inputs(:, c))
+            end if
             place = self%place(r%coordinate(r%first(row)))
             if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
          end do
       end associate
    end subroutine gather_inputs
+
+   !> Derivative by tau in place; the mean of a stuck pair stays, see hold_stuck_means.
+   subroutine differentiate_inputs(self, keep_mean, inputs)
+      type(hbm_system), intent(in) :: self
+      logical, intent(in) :: keep_mean
+      real(wp), intent(inout) :: inputs(:)
+      real(wp) :: cosine, n
+      integer :: h, k
+
+      do h = 1, self%fourier%n_retained
+         k = self%fourier%column(h)
+         n = real(self%fourier%harmonic(h), wp)
+         if (self%fourier%harmonic(h) == 0) then
+            if (.not. keep_mean) inputs(k) = 0.0_wp
+            cycle
+         end if
+         cosine = inputs(k)
+         inputs(k) = n*inputs(k + 1)
+         inputs(k + 1) = -n*cosine
+      end do
+   end subroutine differentiate_inputs
 
    !> Pairs may share coordinates (penalty), so that this stays in one thread.
    subroutine add_outputs(self)
@@ -399,8 +425,14 @@ contains
       integer, intent(in) :: h, pair, c_out, c_in
       complex(wp), intent(in) :: mean
       complex(wp), intent(inout) :: m(:, :)
-      integer :: e, f, p_out, p_in
+      integer :: e, f, p_out, p_in, n
+      complex(wp) :: factor
 
+      ! d/dtau is a factor i n of the complex coefficient uc - i us.
+      n = self%fourier%harmonic(h)
+      factor = one
+      if (self%velocity_level .and. c_in < 3) factor = cmplx(0.0_wp, n, wp)
+      if (n == 0 .and. self%contact%state(pair) == pair_stuck) factor = one
       associate (r => self%joint%relative, row => self%joint%row, na => self%n_active)
          do e = r%first(row(c_out, pair)), r%first(row(c_out, pair) + 1) - 1
             p_out = self%place(r%coordinate(e))
@@ -411,7 +443,7 @@ contains
                if (self%rigid) m(p_out, :na) = m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h)
                if (p_in > na) cycle
                m(p_out, p_in) = m(p_out, p_in) + r%coefficient(e)*r%coefficient(f)* &
-                                self%stiffness(pair, c_in)*mean
+                                self%stiffness(pair, c_in)*factor*mean
             end do
          end do
       end associate

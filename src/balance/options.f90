@@ -26,6 +26,10 @@ module fw_harmonics_options
       integer :: n_harmonics = 1
       !> Instants per period (0: chosen from the laws in use).
       integer :: n_time = 0
+      !> Instants of the equations of the least-squares variant (0: twice the unknowns).
+      integer :: n_collocation = 0
+      !> Highest harmonic that reaches the nonlinear springs of hdhb (0: no filter).
+      integer :: filter_harmonics = 0
       integer :: sampling = sampling_uniform
       integer :: parity = parity_auto
       !> Add harmonics only where the solution needs them.

@@ -15,7 +15,7 @@ module fw_correction
    implicit none (type, external)
    private
 
-   public :: march_turn_1d, march_turn_2d
+   public :: march_turn_1d, march_turn_2d, project_turn
 
 contains
 
@@ -80,5 +80,31 @@ contains
          end do
       end do
    end subroutine march_turn_2d
+
+   !> Pointwise projection onto the friction disc, without memory: the velocity-level law.
+   pure subroutine project_turn(n_pairs, n_time, first, last, mu, y, lambda, margin, pressure)
+      integer, intent(in) :: n_pairs, n_time, first, last
+      real(wp), intent(in) :: mu(n_pairs), y(n_pairs, 3, n_time)
+      !> As march_turn_1d.
+      real(wp), intent(inout) :: lambda(n_pairs, 3, n_time)
+      real(wp), intent(inout) :: margin(n_pairs), pressure(n_pairs)
+      integer :: i, k
+      real(wp) :: p, length, limit, scale
+
+      do k = 1, n_time
+         !$omp simd private(p, length, limit, scale)
+         do i = first, last
+            p = max(-y(i, 3, k), 0.0_wp)
+            limit = mu(i)*p
+            length = sqrt(y(i, 1, k)**2 + y(i, 2, k)**2)
+            scale = merge(1.0_wp, limit/max(length, tiny(1.0_wp)), length <= limit)
+            lambda(i, 1, k) = scale*y(i, 1, k)
+            lambda(i, 2, k) = scale*y(i, 2, k)
+            lambda(i, 3, k) = -p
+            margin(i) = min(margin(i), limit - length)
+            pressure(i) = min(pressure(i), p)
+         end do
+      end do
+   end subroutine project_turn
 
 end module fw_correction

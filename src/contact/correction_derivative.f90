@@ -18,13 +18,16 @@ module fw_correction_derivative
 contains
 
    !> March one pair through n_turns turns; the rows of the last turn are returned.
-   pure subroutine march_derivative(n_time, n_coef, n_turns, base, y, mu, present, x, rows, dx)
+   pure subroutine march_derivative(n_time, n_coef, n_turns, base, y, mu, present, remembers, x, &
+                                    rows, dx)
       integer, intent(in) :: n_time, n_coef, n_turns
       !> Base functions (n_coef, n_time) and predicted forces (3, n_time).
       real(wp), intent(in) :: base(n_coef, n_time), y(3, n_time)
       real(wp), intent(in) :: mu
       !> Which of t1, t2, n exist.
       logical, intent(in) :: present(3)
+      !> Whether the position is carried from instant to instant (false: velocity-level law).
+      logical, intent(in) :: remembers
       !> Corrected position at the start, then at the end of each turn.
       real(wp), intent(inout) :: x(2)
       !> d lambda_t / d inputs (n_coef, 3, tangential component, instant).
@@ -52,6 +55,9 @@ contains
                call follow(n_coef, base(:, k), present, rows(:, :, :, k), dx)
                x = y(1:2, k) - mu*p*d/length
             end if
+            if (remembers) cycle
+            x = 0.0_wp
+            dx = 0.0_wp
          end do
       end do
    end subroutine march_derivative

@@ -8,6 +8,7 @@ module fw_forces
    use fw_kinds, only: wp
    use fw_correction, only: march_turn_1d
    use fw_correction, only: march_turn_2d
+   use fw_correction, only: project_turn
    use fw_correction_derivative, only: march_derivative
    use fw_fourier, only: fourier_type
    use fw_lapack, only: dgemm
@@ -33,6 +34,8 @@ module fw_forces
       !> Which of t1, t2, n exist (3, n_pairs).
       logical, allocatable :: present(:, :)
       logical :: two_directions = .false.
+      !> Whether pairs remember their position (false: velocity-level law).
+      logical :: remembers = .true.
       !> Coefficients of predicted and contact forces (n_pairs, 3, n_coefficients).
       real(wp), allocatable :: prediction(:, :, :), force(:, :, :)
       !> The same at the instants (n_pairs, 3, n_time).
@@ -123,6 +126,12 @@ contains
       self%x(first:last, :) = self%x_start(first:last, :)
       self%margin(first:last) = huge(1.0_wp)
       self%pressure(first:last) = huge(1.0_wp)
+      if (.not. self%remembers) then
+         call project_turn(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
+                           self%force_time, self%margin, self%pressure)
+         self%turns(first:last) = 1
+         return
+      end if
       do turn = 1, max_turns
          start = self%x(first:last, :)
          if (self%two_directions) then
@@ -163,7 +172,7 @@ contains
          y_n = y(3, :)
          x = self%x_start(i, :)
          call march_derivative(fourier%n_time, nc, self%turns(i), fourier%synthesis, y, &
-                               self%mu(i), self%present(:, i), x, rows, dx)
+                               self%mu(i), self%present(:, i), self%remembers, x, rows, dx)
          call project(self%jacobian(:, :, i), fourier, rows, y_n, self%present(3, i))
       end do
       !$omp end do

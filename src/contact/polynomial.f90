@@ -11,6 +11,8 @@ module fw_polynomial
       integer :: n_springs = 0
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
+      !> Harmonics above this one are filtered from the elongations (LaBryer and Attar 2009).
+      integer :: highest_harmonic = huge(0)
       !> Coefficients of elongations and forces (n_springs, n_coefficients).
       real(wp), allocatable :: elongation(:, :), force(:, :)
       !> The same at the instants (n_springs, n_time).
@@ -49,6 +51,7 @@ contains
       integer :: i, k
 
       if (self%n_springs == 0) return
+      call low_pass(self, fourier, self%elongation)
       call fourier%to_time(self%n_springs, self%elongation, self%elongation_time)
       do k = 1, fourier%n_time
          do i = 1, self%n_springs
@@ -57,6 +60,19 @@ contains
       end do
       call fourier%to_coefficients(self%n_springs, self%force_time, self%force)
    end subroutine evaluate
+
+   !> Zero the coefficients above the highest harmonic.
+   pure subroutine low_pass(self, fourier, coefficients)
+      type(springs_type), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: coefficients(:, :)
+      integer :: h
+
+      do h = 1, fourier%n_retained
+         if (fourier%harmonic(h) <= self%highest_harmonic) cycle
+         coefficients(:, fourier%column(h):fourier%column(h) + 1) = 0.0_wp
+      end do
+   end subroutine low_pass
 
    !> Derivatives at the last evaluated elongations.
    subroutine linearize(self, fourier)
@@ -74,6 +90,11 @@ contains
                self%jacobian(:, j, i) = self%jacobian(:, j, i) + &
                                         (slope*fourier%analysis(j, k))*fourier%synthesis(:, k)
             end do
+         end do
+         ! Inputs are rows here: what is filtered has no derivative.
+         do j = 1, fourier%n_retained
+            if (fourier%harmonic(j) <= self%highest_harmonic) cycle
+            self%jacobian(fourier%column(j):fourier%column(j) + 1, :, i) = 0.0_wp
          end do
       end do
    end subroutine linearize

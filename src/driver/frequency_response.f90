@@ -25,7 +25,7 @@ contains
       type(result_writer), intent(inout) :: writer
       type(summary_type), intent(inout) :: summary
       type(error_type), allocatable, intent(out) :: error
-      type(hbm_system) :: system
+      type(hbm_system), target :: system
       type(point_solver) :: solver
       type(point_type) :: point
       integer :: k, n_points

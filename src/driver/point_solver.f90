@@ -7,7 +7,10 @@ module fw_point_solver
    use fw_error, only: error_type
    use fw_guess, only: free_guess
    use fw_guess, only: stuck_guess
+   use fw_harmonics_options, only: method_hdhb
    use fw_hbm, only: hbm_system
+   use fw_hdhb, only: hdhb_system
+   use fw_hdhb, only: new_hdhb
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
    use fw_point, only: point_type
@@ -28,6 +31,8 @@ module fw_point_solver
       real(wp) :: omega_last = -1.0_wp
       real(wp) :: omega_before = -1.0_wp
       integer :: n_converged = 0
+      !> Solve for values at the instants (hdhb) instead of coefficients.
+      logical :: in_time = .false.
    contains
       procedure :: start
       procedure :: solve
@@ -41,6 +46,7 @@ contains
       integer, intent(in) :: n
 
       self%newton%options = case%solver
+      self%in_time = case%harmonics%method == method_hdhb
       allocate (self%x(n), self%last(n), self%before(n), source=0.0_wp)
    end subroutine start
 
@@ -48,7 +54,7 @@ contains
    subroutine solve(self, case, system, omega, point, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(inout) :: system
+      type(hbm_system), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
@@ -75,7 +81,7 @@ contains
    !> Newton from the best guesses known; where all fail, first go half of the way.
    recursive subroutine approach(self, system, omega, depth, report, iterations, error)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout) :: system
+      type(hbm_system), intent(inout), target :: system
       real(wp), intent(in) :: omega
       integer, intent(in) :: depth
       type(solver_report), intent(out) :: report
@@ -102,7 +108,7 @@ contains
    !> Extrapolation along the sweep, the last solution, all stuck, all free.
    subroutine try_guesses(self, system, omega, report, iterations)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout) :: system
+      type(hbm_system), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
@@ -124,11 +130,32 @@ contains
          case (4)
             call free_guess(system, self%x)
          end select
-         call self%newton%solve(system, self%x, report)
+         call solve_balance(self, system, report)
          iterations = iterations + report%iterations
          if (report%converged .or. .not. self%newton%options%fallback) exit
       end do
    end subroutine try_guesses
+
+   !> From the guess in x, in the unknowns of the method.
+   subroutine solve_balance(self, system, report)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout), target :: system
+      type(solver_report), intent(out) :: report
+      type(hdhb_system) :: in_time
+      real(wp), allocatable :: values(:)
+      integer :: m
+
+      if (.not. self%in_time) then
+         call self%newton%solve(system, self%x, report)
+         return
+      end if
+      in_time = new_hdhb(system)
+      m = system%structure%n_coordinates
+      allocate (values(system%n))
+      call in_time%to_values(m, self%x, values)
+      call self%newton%solve(in_time, values, report)
+      call in_time%to_coefficients(m, values, self%x)
+   end subroutine solve_balance
 
    subroutine remember(self, omega)
       class(point_solver), intent(inout) :: self

@@ -11,6 +11,10 @@ module fw_problem
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
    use fw_fourier, only: fft_pays
+   use fw_harmonics_options, only: method_hbm
+   use fw_harmonics_options, only: method_hdhb
+   use fw_harmonics_options, only: method_tcm
+   use fw_harmonics_options, only: method_tcm_least_squares
    use fw_harmonics_options, only: parity_all
    use fw_harmonics_options, only: parity_odd
    use fw_hbm, only: hbm_system
@@ -54,6 +58,9 @@ contains
       if (allocated(error)) return
       call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
       system%reduced = case%solver%skips
+      if (case%harmonics%filter_harmonics > 0) then
+         system%springs%highest_harmonic = case%harmonics%filter_harmonics
+      end if
       if (fft_pays(fourier%n_coefficients, fourier%n_time)) then
          call system%fourier%prepare_fft(3*case%contact%n_pairs)
       end if
@@ -71,11 +78,18 @@ contains
 
       n_time = case%harmonics%n_time
       if (n_time == 0) n_time = automatic_n_time(case, joint)
-      odd_only = joint%half_wave_symmetric .and. modulo(n_time, 2) == 0
+      ! Only the projection keeps the symmetry of the instants; collocation at an odd number of
+      ! them does not.
+      odd_only = joint%half_wave_symmetric .and. modulo(n_time, 2) == 0 .and. &
+                 case%harmonics%method == method_hbm
       select case (case%harmonics%parity)
       case (parity_all)
          odd_only = .false.
       case (parity_odd)
+         if (case%harmonics%method /= method_hbm) then
+            call fatal_error(error, '&harmonics parity = ''odd'' needs method = ''hbm''', status_input)
+            return
+         end if
          if (.not. joint%half_wave_symmetric) then
             call fatal_error(error, '&harmonics parity = ''odd'': the response has even '// &
                              'harmonics, because of a static load, a normal dof or an even '// &
@@ -85,7 +99,24 @@ contains
          odd_only = .true.
       end select
       fourier = new_fourier(case%harmonics%n_harmonics, n_time, odd_only)
+      select case (case%harmonics%method)
+      case (method_tcm)
+         call fourier%collocate(fourier%n_coefficients)
+      case (method_tcm_least_squares)
+         call fourier%collocate(least_squares_points(case, fourier))
+      end select
    end subroutine choose_harmonics
+
+   !> Instants of the equations in the least-squares variant: twice the unknowns, where the user
+   !> leaves the choice.
+   pure integer function least_squares_points(case, fourier) result(n_points)
+      type(case_type), intent(in) :: case
+      type(fourier_type), intent(in) :: fourier
+
+      n_points = case%harmonics%n_collocation
+      if (n_points == 0) n_points = 2*fourier%n_coefficients
+      n_points = min(max(n_points, fourier%n_coefficients), fourier%n_time)
+   end function least_squares_points
 
    !> Instants per period where the input leaves the choice. Polynomials are sampled without any
    !> error from (power + 1) H + 1 instants on; for contact see the parameters above.
@@ -95,6 +126,8 @@ contains
       integer :: h
 
       h = case%harmonics%n_harmonics
+      n_time = 2*h + 1
+      if (case%harmonics%method == method_hdhb) return
       n_time = 2*h + 2
       if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
       if (case%contact%n_pairs > 0) then

@@ -36,8 +36,10 @@ contains
       integer :: least
 
       call reader%get_word('harmonics', 'method', options%method, method_words)
-      call reader%get('harmonics', 'n_harmonics', options%n_harmonics, least=0, most=10000)
+      call reader%get('harmonics', 'n_harmonics', options%n_harmonics, least=1, most=10000)
       call reader%get('harmonics', 'n_time', options%n_time, least=0)
+      call reader%get('harmonics', 'n_collocation', options%n_collocation, least=0)
+      call reader%get('harmonics', 'filter_harmonics', options%filter_harmonics, least=0)
       call reader%get_word('harmonics', 'sampling', options%sampling, sampling_words)
       call reader%get_word('harmonics', 'parity', options%parity, parity_words)
       call reader%get('harmonics', 'adaptive', options%adaptive)
@@ -88,6 +90,7 @@ contains
       call reader%get('solver', 'tolerance', options%tolerance, above=0.0_wp)
       call reader%get('solver', 'max_iterations', options%max_iterations, least=1)
       call reader%get('solver', 'fallback', options%fallback)
+      call reader%get('solver', 'skips', options%skips)
    end subroutine read_solver
 
    !> Group &pseudo_time.

@@ -9,6 +9,7 @@ module fw_fourier
    use fw_kinds, only: wp
    use fw_kinds, only: pi
    use fw_lapack, only: dgemm
+   use fw_linalg, only: lu_type
    use fw_fft, only: fft_type
    implicit none (type, external)
    private
@@ -36,6 +37,7 @@ module fw_fourier
       procedure :: differentiate
       procedure :: has_constant
       procedure :: prepare_fft
+      procedure :: collocate
    end type fourier_type
 
 contains
@@ -107,6 +109,28 @@ contains
       call self%fft%plan(n_rows, self%n_time)
    end subroutine prepare_fft
 
+   !> Replace the analysis by collocation: coefficients that fit the values at n_points of the
+   !> instants, exactly where n_points = n_coefficients, else in the sense of least squares.
+   subroutine collocate(self, n_points)
+      class(fourier_type), intent(inout) :: self
+      !> n_coefficients <= n_points <= n_time.
+      integer, intent(in) :: n_points
+      type(lu_type) :: normal
+      integer :: instant(n_points), j
+      logical :: singular
+
+      ! As even as the instants allow; distinct, because n_points <= n_time.
+      instant = [((j*self%n_time)/n_points + 1, j=0, n_points - 1)]
+      call normal%reserve(self%n_coefficients)
+      normal%matrix = matmul(self%synthesis(:, instant), transpose(self%synthesis(:, instant)))
+      call normal%factor(singular)
+      self%analysis = 0.0_wp
+      do j = 1, n_points
+         self%analysis(:, instant(j)) = self%synthesis(:, instant(j))
+         call normal%solve(self%analysis(:, instant(j)))
+      end do
+   end subroutine collocate
+
    !> Whether FFTW beats the matrix product for this many coefficients and instants.
    !> Measured by bench/transforms: the product runs at the speed of dgemm, the strided
    !> transform does not, so that it pays only for long transforms of many harmonics.
@@ -116,6 +140,15 @@ contains
       fft_pays = n_coefficients > 80 .and. n_time > 256
    end function fft_pays
 
+   !> Plans are made for one number of rows; others go through the matrix.
+   pure logical function fft_serves(self, n_rows)
+      type(fourier_type), intent(in) :: self
+      integer, intent(in) :: n_rows
+
+      fft_serves = .false.
+      if (self%use_fft) fft_serves = self%fft%n_rows == n_rows
+   end function fft_serves
+
    !> Values (n_rows, n_time) at the instants from coefficients (n_rows, n_coefficients).
    subroutine to_time(self, n_rows, coefficients, values)
       class(fourier_type), intent(inout) :: self
@@ -123,7 +156,7 @@ contains
       real(wp), intent(in) :: coefficients(n_rows, *)
       real(wp), intent(inout) :: values(n_rows, *)
 
-      if (self%use_fft) then
+      if (fft_serves(self, n_rows)) then
          call self%fft%synthesise(self%harmonic, self%column, coefficients, values)
       else
          call dgemm('N', 'N', n_rows, self%n_time, self%n_coefficients, 1.0_wp, coefficients, &
@@ -138,7 +171,7 @@ contains
       real(wp), intent(in) :: values(n_rows, *)
       real(wp), intent(inout) :: coefficients(n_rows, *)
 
-      if (self%use_fft) then
+      if (fft_serves(self, n_rows)) then
          call self%fft%analyse(self%harmonic, self%column, values, coefficients)
       else
          call dgemm('N', 'T', n_rows, self%n_coefficients, self%n_time, 1.0_wp, values, n_rows, &
