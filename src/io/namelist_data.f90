@@ -5,7 +5,7 @@ module fw_namelist_data
    private
 
    public :: namelist_type, group_type, entry_type, value_type, section_type
-   public :: add_entry, value_count, stray_word, location
+   public :: add_entry, value_count, stray_word, location, is_entry, last_entry, multiply_out
 
    !> One value, or `repeat` equal ones.
    type :: value_type
@@ -106,5 +106,39 @@ contains
          if (present(source)) place = source//':'//place
       end if
    end function location
+
+   !> Whether an assignment is to a key.
+   pure logical function is_entry(entry, group, key)
+      type(entry_type), intent(in) :: entry
+      character(*), intent(in) :: group, key
+
+      is_entry = .false.
+      if (entry%key == key) is_entry = entry%group == group
+   end function is_entry
+
+   !> The last assignment to a key, 0 for none.
+   pure integer function last_entry(input, group, key) result(i)
+      type(namelist_type), intent(in) :: input
+      character(*), intent(in) :: group, key
+
+      do i = input%n_entries, 1, -1
+         if (is_entry(input%entries(i), group, key)) return
+      end do
+      i = 0
+   end function last_entry
+
+   !> Values with their repeat counts written out.
+   pure subroutine multiply_out(values, repeated)
+      type(value_type), intent(in) :: values(:)
+      type(value_type), allocatable, intent(out) :: repeated(:)
+      integer :: i, n
+
+      allocate (repeated(sum(values%repeat)))
+      n = 0
+      do i = 1, size(values)
+         repeated(n + 1:n + values(i)%repeat) = values(i)
+         n = n + values(i)%repeat
+      end do
+   end subroutine multiply_out
 
 end module fw_namelist_data

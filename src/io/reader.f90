@@ -10,7 +10,8 @@ module fw_reader
    use fw_kinds, only: wp, i8
    use fw_namelist, only: parse_namelist, parse_override
    use fw_namelist_data, only: namelist_type, value_type, entry_type, add_entry, value_count, &
-                               stray_word, location
+                               stray_word, location, &
+                               is_entry, last_entry, multiply_out
    use fw_records, only: record_list
    use fw_reader_text, only: near, shown, to_strings, words_text, element_text, dims_text, &
                              real_list
@@ -570,38 +571,6 @@ contains
          range = new_range('an integer')
       end if
    end function integer_range
-
-   pure logical function is_entry(entry, group, key)
-      type(entry_type), intent(in) :: entry
-      character(*), intent(in) :: group, key
-
-      is_entry = .false.
-      if (entry%key == key) is_entry = entry%group == group
-   end function is_entry
-
-   !> The last assignment to a key, 0 for none.
-   pure integer function last_entry(input, group, key) result(i)
-      type(namelist_type), intent(in) :: input
-      character(*), intent(in) :: group, key
-
-      do i = input%n_entries, 1, -1
-         if (is_entry(input%entries(i), group, key)) return
-      end do
-      i = 0
-   end function last_entry
-
-   subroutine multiply_out(values, repeated)
-      type(value_type), intent(in) :: values(:)
-      type(value_type), allocatable, intent(out) :: repeated(:)
-      integer :: i, n
-
-      allocate (repeated(sum(values%repeat)))
-      n = 0
-      do i = 1, size(values)
-         repeated(n + 1:n + values(i)%repeat) = values(i)
-         n = n + values(i)%repeat
-      end do
-   end subroutine multiply_out
 
    pure logical function is_true(flag)
       logical, intent(in), optional :: flag
