@@ -1,5 +1,6 @@
 !> Small text helpers: numbers to text, lower case, the nearest word of a list.
 module fw_text
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -38,6 +39,8 @@ contains
       integer :: status
 
       write (buffer, '(g0.6)') number
+      text = trim(adjustl(buffer))
+      if (.not. ieee_is_finite(number)) return
       read (buffer, *, iostat=status) back
       if (status /= 0 .or. abs(back - number) > 0.0_wp) write (buffer, '(es24.16e3)') number
       text = trim(adjustl(buffer))

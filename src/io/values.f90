@@ -1,6 +1,10 @@
 !> Namelist values as numbers, the ranges they may lie in, and numbers as namelist text.
 module fw_values
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
+   use, intrinsic :: ieee_exceptions, only: ieee_set_flag
+   use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode
+   use, intrinsic :: ieee_exceptions, only: ieee_usual
    use fw_kinds, only: wp
    use fw_text, only: lower_case, to_text
    implicit none (type, external)
@@ -59,6 +63,7 @@ contains
       real(wp), intent(out) :: number
       logical, intent(out) :: ok
       character(:), allocatable :: lower
+      logical :: halting(size(ieee_usual))
       integer :: mark, status
 
       number = 0.0_wp
@@ -68,7 +73,13 @@ contains
       ok = is_decimal(lower(:merge(mark - 1, len(lower), mark > 0)))
       if (ok .and. mark > 0) ok = is_whole(lower(mark + 1:))
       if (.not. ok) return
+      ! A literal beyond the range raises overflow in the run-time library: a host program that
+      ! traps it must not end here, for it gets a message instead.
+      call ieee_get_halting_mode(ieee_usual, halting)
+      call ieee_set_halting_mode(ieee_usual, .false.)
       read (lower, *, iostat=status) number
+      call ieee_set_flag(ieee_usual, .false.)
+      call ieee_set_halting_mode(ieee_usual, halting)
       ok = status == 0 .and. ieee_is_finite(number)
    end subroutine read_real
 
