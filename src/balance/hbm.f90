@@ -23,13 +23,13 @@ module fw_hbm
    use fw_linalg, only: complex_lu_type
    use fw_polynomial, only: springs_type
    use fw_polynomial, only: new_springs
-   use fw_system, only: nonlinear_system
+   use fw_parameter_system, only: parameter_system
    implicit none (type, external)
    private
 
    public :: hbm_system, new_hbm, to_complex, to_real
 
-   type, extends(nonlinear_system) :: hbm_system
+   type, extends(parameter_system) :: hbm_system
       type(joint_type) :: joint
       type(condensation_type) :: structure
       type(fourier_type) :: fourier
@@ -55,7 +55,9 @@ module fw_hbm
       real(wp), allocatable :: active_out(:, :), pair_in(:, :), pair_out(:, :)
       type(complex_lu_type), allocatable :: preconditioner(:)
    contains
+      procedure :: set_parameter => set_frequency
       procedure :: set_frequency
+      procedure :: parameter_derivative
       procedure :: coordinate_of
       procedure :: residual
       procedure :: linearize
@@ -85,6 +87,12 @@ module fw_hbm
          real(wp), intent(in), contiguous :: r(:), solution(:)
          real(wp), intent(out), contiguous :: step(:)
       end subroutine expand
+
+      module subroutine parameter_derivative(self, x, dr)
+         class(hbm_system), intent(inout) :: self
+         real(wp), intent(in), contiguous :: x(:)
+         real(wp), intent(out), contiguous :: dr(:)
+      end subroutine parameter_derivative
 
       module subroutine apply(self, vector, product)
          class(hbm_system), intent(inout) :: self
@@ -203,12 +211,13 @@ contains
    end function coordinate_of
 
    !> Bring matrices and loads to a frequency.
-   subroutine set_frequency(self, omega, error)
+   subroutine set_frequency(self, parameter, error)
       class(hbm_system), intent(inout) :: self
-      real(wp), intent(in) :: omega
+      !> Angular frequency [rad/s].
+      real(wp), intent(in) :: parameter
       type(error_type), allocatable, intent(out) :: error
 
-      call self%structure%update(omega, error)
+      call self%structure%update(parameter, error)
       if (allocated(error)) return
       call to_real(self%fourier, self%structure%n_coordinates, self%structure%load, self%load)
       self%reference = load_norm(self)

@@ -156,6 +156,45 @@ contains
       step(self%used(:self%n_active), :) = solution
    end subroutine scatter
 
+   !> dR/d omega = (I - B^T G B)(Z' q - F') for rigid laws, Z' q - F' for penalty.
+   module procedure parameter_derivative
+      integer :: m
+
+      m = self%structure%n_coordinates
+      call to_complex(self%fourier, m, x, self%complex_in)
+      call self%structure%frequency_derivative(self%complex_in, self%complex_out)
+      call derivative_with_contact(self, m, self%fourier%n_coefficients, dr)
+   end procedure parameter_derivative
+
+   !> dr from the slopes of all coordinates in complex_out.
+   subroutine derivative_with_contact(self, m, nc, dr)
+      type(hbm_system), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(out) :: dr(m, nc)
+      integer :: i, c, j
+
+      call to_real(self%fourier, m, self%complex_out, dr)
+      if (.not. self%rigid) return
+      do i = 1, self%contact%n_pairs
+         if (self%contact%state(i) == pair_open) cycle
+         self%pair_in(:, i) = 0.0_wp
+         do c = 1, 3
+            if (self%joint%row(c, i) == 0) cycle
+            self%pair_in((c - 1)*nc + 1:c*nc, i) = -dr(self%coordinate_of(c, i), :)
+         end do
+         self%pair_out(:, i) = self%pair_in(:, i)
+         if (self%contact%state(i) == pair_mixed) then
+            call dgemv('T', 3*nc, 3*nc, 1.0_wp, self%contact%jacobian(1, 1, i), 3*nc, &
+                       self%pair_in(1, i), 1, 0.0_wp, self%pair_out(1, i), 1)
+         end if
+         do c = 1, 3
+            if (self%joint%row(c, i) == 0) cycle
+            j = self%coordinate_of(c, i)
+            dr(j, :) = dr(j, :) + self%pair_out((c - 1)*nc + 1:c*nc, i)
+         end do
+      end do
+   end subroutine derivative_with_contact
+
    module procedure apply
       integer :: h, k, na, nu, ld
 

@@ -6,13 +6,14 @@
 module fw_hdhb
    use fw_kinds, only: wp
    use fw_hbm, only: hbm_system
-   use fw_system, only: nonlinear_system
+   use fw_error, only: error_type
+   use fw_parameter_system, only: parameter_system
    implicit none (type, external)
    private
 
    public :: hdhb_system, new_hdhb
 
-   type, extends(nonlinear_system) :: hdhb_system
+   type, extends(parameter_system) :: hdhb_system
       !> The same balance in coefficients.
       type(hbm_system), pointer :: balance => null()
       !> Workspace (n).
@@ -20,6 +21,8 @@ module fw_hdhb
    contains
       procedure :: residual
       procedure :: linearize
+      procedure :: set_parameter
+      procedure :: parameter_derivative
       procedure :: reduce
       procedure :: expand
       procedure :: apply
@@ -77,6 +80,26 @@ contains
       call self%balance%residual(self%coefficients, self%product)
       call self%to_values(m, self%product, r)
    end subroutine residual
+
+   subroutine set_parameter(self, parameter, error)
+      class(hdhb_system), intent(inout) :: self
+      real(wp), intent(in) :: parameter
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%balance%set_parameter(parameter, error)
+   end subroutine set_parameter
+
+   subroutine parameter_derivative(self, x, dr)
+      class(hdhb_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: dr(:)
+      integer :: m
+
+      m = self%balance%structure%n_coordinates
+      call self%to_coefficients(m, x, self%coefficients)
+      call self%balance%parameter_derivative(self%coefficients, self%product)
+      call self%to_values(m, self%product, dr)
+   end subroutine parameter_derivative
 
    subroutine linearize(self, n_linear)
       class(hdhb_system), intent(inout) :: self

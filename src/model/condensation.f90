@@ -45,6 +45,7 @@ module fw_condensation
    contains
       procedure :: update
       procedure :: recover
+      procedure :: frequency_derivative
       procedure :: static_stiffness
    end type condensation_type
 
@@ -207,6 +208,53 @@ contains
          end associate
       end do
    end subroutine recover
+
+   !> d(Z_r q - F_r)/d omega at fixed q (n_coordinates, n_retained). With Z' = dZ/d omega of the
+   !> whole structure and xi recovered it is  Z'_qq q + Z'_qi xi - Z_qi D^-1 (Z'_iq q + D' xi).
+   subroutine frequency_derivative(self, q, derivative)
+      class(condensation_type), intent(in) :: self
+      !> Complex coordinates (n_coordinates, n_retained).
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp), intent(out) :: derivative(:, :)
+      complex(wp), allocatable :: coupling(:, :), slope(:, :), xi(:, :)
+      logical :: failed
+      integer :: h
+      real(wp) :: n, s
+
+      allocate (xi(self%basis%n_internal, 1))
+      do h = 1, size(self%harmonic)
+         n = real(self%harmonic(h), wp)
+         s = n*self%omega
+         associate (b => self%basis)
+            derivative(:, h) = n*matmul(cmplx(-2.0_wp*s*b%m_qq, b%c_qq, wp), q(:, h))
+            if (b%n_internal == 0) cycle
+            coupling = cmplx(b%k_qi - s**2*b%m_qi, s*b%c_qi, wp)
+            slope = n*cmplx(-2.0_wp*s*b%m_qi, b%c_qi, wp)
+            xi(:, 1) = harmonic_load(b%load_i, self%harmonic(h)) - matmul(q(:, h), coupling)
+            call solve_internal(b, s, xi, failed)
+            derivative(:, h) = derivative(:, h) + matmul(slope, xi(:, 1))
+            xi(:, 1) = matmul(q(:, h), slope) + n*internal_slope(b, s, xi(:, 1))
+            call solve_internal(b, s, xi, failed)
+            derivative(:, h) = derivative(:, h) - matmul(coupling, xi(:, 1))
+         end associate
+      end do
+   end subroutine frequency_derivative
+
+   !> dD/ds times a vector.
+   pure function internal_slope(basis, s, vector) result(product)
+      type(reduction_type), intent(in) :: basis
+      real(wp), intent(in) :: s
+      complex(wp), intent(in) :: vector(:)
+      complex(wp) :: product(size(vector))
+      complex(wp), parameter :: i_unit = (0.0_wp, 1.0_wp)
+
+      product = -2.0_wp*s*basis%m_i*vector
+      if (allocated(basis%c_ii)) then
+         product = product + i_unit*matmul(basis%c_ii, vector)
+      else
+         product = product + i_unit*basis%c_i*vector
+      end if
+   end function internal_slope
 
    !> Static stiffness of a coordinate, the scale of its penalty [force/length].
    pure real(wp) function static_stiffness(self, coordinate)

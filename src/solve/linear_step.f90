@@ -21,6 +21,8 @@ module fw_linear_step
       type(lu_type) :: lu
       type(gmres_type) :: gmres
       real(wp), allocatable :: rhs(:), solution(:)
+      !> Whether `lu` holds the factors of the last derivative.
+      logical :: factored = .false.
       !> Work done so far.
       integer :: factorizations = 0
       integer :: krylov_iterations = 0
@@ -29,11 +31,12 @@ module fw_linear_step
       real(wp) :: share_skipped = 0.0_wp
    contains
       procedure :: solve
+      procedure :: solve_again
    end type linear_step_type
 
 contains
 
-   !> step = -J^-1 r at the last point of the system.
+   !> step = -J^-1 r at the last point of the system, which is linearized.
    subroutine solve(self, system, r, tolerance, step, done)
       class(linear_step_type), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
@@ -46,27 +49,49 @@ contains
 
       call system%linearize(n)
       call reserve(self, n)
-      call system%reduce(r, self%rhs)
       done = .true.
-      self%solution = 0.0_wp
+      self%factored = .false.
       if (n > 0) then
          self%n_problems = self%n_problems + 1
          self%share_skipped = self%share_skipped + 1.0_wp - real(n, wp)/real(system%n, wp)
          if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_pays_up_to)) then
-            call solve_lu(self, system, n, done)
+            call factor(self, system, n, done)
          else
             call system%build_preconditioner()
-            call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
-            self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
-            ! A last resort that costs more, but only where GMRES has failed.
-            if (.not. done .and. self%kind /= linear_krylov) call solve_lu(self, system, n, done)
-            done = .true.
          end if
       end if
-      call system%expand(r, self%solution, step)
+      if (done) call self%solve_again(system, r, tolerance, step, done)
    end subroutine solve
 
-   subroutine solve_lu(self, system, n, done)
+   !> Another right-hand side with the derivative of the last `solve`.
+   subroutine solve_again(self, system, r, tolerance, step, done)
+      class(linear_step_type), intent(inout) :: self
+      class(nonlinear_system), intent(inout) :: system
+      real(wp), intent(in), contiguous :: r(:)
+      real(wp), intent(in) :: tolerance
+      real(wp), intent(out), contiguous :: step(:)
+      logical, intent(out) :: done
+      integer :: n
+
+      n = size(self%rhs)
+      done = .true.
+      call system%reduce(r, self%rhs)
+      self%solution = 0.0_wp
+      if (n > 0 .and. .not. self%factored) then
+         call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
+         self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+         ! A last resort that costs more, but only where GMRES has failed.
+         if (.not. done .and. self%kind /= linear_krylov) call factor(self, system, n, done)
+         done = .true.
+      end if
+      if (self%factored) then
+         self%solution = self%rhs
+         call self%lu%solve(self%solution)
+      end if
+      call system%expand(r, self%solution, step)
+   end subroutine solve_again
+
+   subroutine factor(self, system, n, done)
       type(linear_step_type), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
       integer, intent(in) :: n
@@ -78,10 +103,8 @@ contains
       call self%lu%factor(singular)
       self%factorizations = self%factorizations + 1
       done = .not. singular
-      if (singular) return
-      self%solution = self%rhs
-      call self%lu%solve(self%solution)
-   end subroutine solve_lu
+      self%factored = done
+   end subroutine factor
 
    subroutine reserve(self, n)
       type(linear_step_type), intent(inout) :: self
