@@ -1,0 +1,182 @@
+"""Run fw_run, read the times that it writes, and say on what they were measured."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import statistics
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ROOT", "Bench", "Run", "describe_machine"]
+
+ROOT = Path(__file__).resolve().parents[1]
+Floats = NDArray[np.float64]
+Groups = dict[str, dict[str, object]]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one run left.
+
+    Attributes
+    ----------
+    seconds : (n_points,)
+        Time spent on each point [s].
+    iterations : (n_points,)
+        Newton steps.
+    converged : (n_points,) bool
+    is_loose : (n_points,) bool
+        Points where every pair is open all the time: the blade has left its slot. The equations
+        allow it, an engine does not, and such points cost next to nothing.
+    coefficients : (n_points, 2H+1, n_observed)
+    elapsed : float
+        Time of the whole run without reading the input [s].
+    unknowns, unknowns_left : int
+        Unknowns, and their mean number in the linear problems.
+    """
+
+    seconds: Floats
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+    is_loose: NDArray[np.bool_]
+    coefficients: Floats
+    elapsed: float
+    unknowns: int
+    unknowns_left: int
+
+    @property
+    def usable(self) -> int:
+        """Number of points that converged to a joint that holds."""
+        return int((self.converged & ~self.is_loose).sum())
+
+
+class Bench:
+    """Runs cases in a folder of their own.
+
+    Parameters
+    ----------
+    program : Path
+        fw_run.
+    folder : Path
+        Where namelists and results go.
+    quick : bool
+        One short run of everything: to try the scripts, not to measure.
+    """
+
+    def __init__(self, program: Path, folder: Path, quick: bool = False) -> None:
+        self.program, self.folder, self.quick = program, folder, quick
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def run(self, groups: Groups, threads: int = 1) -> Run:
+        """Run a case once; points that do not converge are no error."""
+        namelist, result = self.folder / "case.nml", self.folder / "case.h5"
+        write_namelist(namelist, groups)
+        environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
+        done = subprocess.run([self.program, "-o", result, namelist], env=environment,
+                              capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 4):
+            raise RuntimeError(f"fw_run ended with {done.returncode}:\n{done.stderr}")
+        return read_run(result, done.stdout)
+
+    def repeat(self, groups: Groups, value: Callable[[Run], float], threads: int = 1,
+               most: int = 5, budget: float = 5.0) -> tuple[float, Run]:
+        """Median of a value over repeated runs, as many as fit into the budget [s]."""
+        values, start = [], time.perf_counter()
+        while True:
+            run = self.run(groups, threads)
+            values.append(value(run))
+            if self.quick or len(values) == most or time.perf_counter() - start > budget:
+                return statistics.median(values), run
+
+
+def read_run(path: Path, summary: str) -> Run:
+    """A result file and the summary that fw_run printed."""
+    with h5py.File(path, "r") as file:
+        omega = file["omega"][()]
+        loose = np.zeros(len(omega), dtype=bool)
+        if "contact/fraction" in file:
+            loose = file["contact/fraction"][:, :, 2].min(axis=1) > 1.0 - 1e-12
+        unknowns = int(re.search(r"^unknowns +(\d+)", summary, re.MULTILINE)[1])
+        skipped = re.search(r"stuck pairs, (\d+) %", summary)
+        share = int(skipped[1]) / 100.0 if skipped else 0.0
+        return Run(file["seconds"][()], file["iterations"][()],
+                   file["converged"][()].astype(bool), loose, file["coefficients"][()],
+                   float(file.attrs["elapsed"]), unknowns, round(unknowns * (1.0 - share)))
+
+
+def write_namelist(path: Path, groups: Groups) -> None:
+    """Write {group: {key: value}} as a namelist."""
+    lines = []
+    for group, keys in groups.items():
+        lines += [f"&{group}", *(f"   {key} = {literal(value)}" for key, value in keys.items()), "/"]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def literal(value: object) -> str:
+    """A value as a namelist takes it."""
+    if isinstance(value, bool):
+        return ".true." if value else ".false."
+    if isinstance(value, (str, Path)):
+        return f"'{value}'"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(literal(item) for item in value)
+    return repr(value)
+
+
+def describe_machine(build: Path) -> dict[str, str]:
+    """Processor, compiler, flags, commit and load, for the head of the report."""
+    cores = len(os.sched_getaffinity(0))
+    return {
+        "processor": f"{processor_name()}, {cores} core{'s' if cores > 1 else ''} usable",
+        "compiler": compiler_version(build),
+        "flags": build_flags(build),
+        "commit": commit(),
+        "date": date.today().isoformat(),
+        "load at the start": f"{os.getloadavg()[0]:.1f} (a quiet machine is near 0)",
+    }
+
+
+def processor_name() -> str:
+    """Model name as the system gives it."""
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        return platform.processor() or platform.machine()
+    found = re.search(r"^model name\s*:\s*(.+)$", text, re.MULTILINE)
+    return found[1].strip() if found else platform.machine()
+
+
+def compiler_version(build: Path) -> str:
+    """First line that the compiler of the build says about itself."""
+    cache = (build / "CMakeCache.txt").read_text(encoding="utf-8")
+    path = re.search(r"^CMAKE_Fortran_COMPILER:\w+=(.+)$", cache, re.MULTILINE)[1]
+    return subprocess.run([path, "--version"], capture_output=True, text=True,
+                          check=True).stdout.splitlines()[0]
+
+
+def build_flags(build: Path) -> str:
+    """Options that decide on speed, as the compiler got them."""
+    ninja = (build / "build.ninja").read_text(encoding="utf-8")
+    found = re.search(r"build [^\n]*newton[^\n]*\n(?:  [^\n]*\n)*?  FLAGS = ([^\n]*)", ninja)
+    words = found[1].split() if found else []
+    return " ".join(word for word in words if re.match(r"-(O|g$|m|f(openmp|fast))", word))
+
+
+def commit() -> str:
+    """Short hash, with a mark where the sources differ from it."""
+    def git(*arguments: str) -> str:
+        return subprocess.run(["git", "-C", ROOT, *arguments], capture_output=True, text=True,
+                              check=False).stdout.strip()
+
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", "src", "app")
+    return (git("rev-parse", "--short", "HEAD") or "unknown") + (" with changes" if changed else "")

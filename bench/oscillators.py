@@ -1,0 +1,160 @@
+"""Error against run time for oscillators whose exact periodic responses are known.
+
+The references (test/reference) were computed without harmonic balance: event by event, in closed
+form, or by shooting. The error is the relative L2 error of the first coordinate's Fourier
+coefficients up to the highest harmonic of the reference; harmonics that the solution does not
+carry count as zero.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+from measure import ROOT, Bench, Floats, Groups
+
+__all__ = ["HARMONICS", "INSTANTS", "Sample", "measure_oscillators"]
+
+HARMONICS = (1, 3, 7, 15, 31)
+INSTANTS = (64, 256, 1024)
+
+
+@dataclass(frozen=True)
+class Case:
+    """An oscillator with its reference coefficients (0, c1, s1, ...)."""
+
+    name: str
+    groups: Groups
+    reference: Floats
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One solution: error and time [s]; seconds is NaN where it did not converge."""
+
+    case: str
+    n_harmonics: int
+    n_time: int
+    error: float
+    seconds: float
+
+
+def measure_oscillators(bench: Bench) -> list[Sample]:
+    """Every case on the grid of harmonics and instants."""
+    samples = []
+    for case in load_cases():
+        for n_harmonics in HARMONICS[:2] if bench.quick else HARMONICS:
+            for n_time in INSTANTS:
+                if n_time < 2 * n_harmonics + 1:
+                    continue
+                groups = case.groups | {"harmonics": {"n_harmonics": n_harmonics,
+                                                      "n_time": n_time}}
+                seconds, run = bench.repeat(groups, lambda run: float(run.seconds[0]))
+                error = relative_error(run.coefficients[0, :, 0], case.reference)
+                samples.append(Sample(case.name, n_harmonics, n_time, error,
+                                      seconds if run.converged[0] else float("nan")))
+    return samples
+
+
+def relative_error(coefficients: Floats, reference: Floats) -> float:
+    """Relative L2 error over the harmonics of the reference."""
+    n = max(len(coefficients), len(reference))
+    difference = np.zeros(n)
+    difference[:len(coefficients)] = coefficients
+    difference[:len(reference)] -= reference
+    difference = difference[:len(reference)]
+    weights = np.full(len(reference), 0.5)
+    weights[0] = 1.0
+    return float(np.sqrt((weights * difference**2).sum() / (weights * reference**2).sum()))
+
+
+def load_cases() -> list[Case]:
+    """One or two cases of each kind, none of them near a fold."""
+    return [duffing(), coulomb("c0.1_N0.4_w0.9"), coulomb("ss_c0.05_N1.6_w0.7"),
+            jenkins("jenkins_F1.0_w1.2"), gap("gap_g0.5_F0.3_w1.15"),
+            two_dof("A_stickslip"), two_dof("E_separation")]
+
+
+def duffing() -> Case:
+    """Cubic spring, below the resonance."""
+    data = read("a_duffing")
+    point = next(p for p in data["points"] if p["omega"] == 0.8)
+    p = data["params"]
+    groups = single(p, p["F"], point["omega"])
+    groups["spring"] = {"n_springs": 1, "side_1": 1, "coefficient": p["alpha"], "power": 3}
+    return Case("Duffing", groups, reference(point))
+
+
+def coulomb(key: str) -> Case:
+    """Rigid friction under a constant normal load on a mass."""
+    item = read("b_coulomb")[key]
+    p = item["params"]
+    groups = single(p, p["F"], p["omega"])
+    groups["contact"] = {"n_pairs": 1, "law": "dlft", "side_1": [1, 0, 0], "mu": p["mu"],
+                         "normal_load": p["N0"]}
+    kind = "stick and slip" if key.startswith("ss") else "slip only"
+    return Case(f"Coulomb, {kind}", groups, reference(item))
+
+
+def jenkins(key: str) -> Case:
+    """Elastic dry friction."""
+    item = read("c_jenkins")[key]
+    p = item["params"]
+    groups = single(p, p["F"], p["omega"])
+    groups["contact"] = {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 0], "mu": 1.0,
+                         "normal_load": p["muN"], "tangential_stiffness": p["kt"]}
+    return Case("Jenkins", groups, reference(item))
+
+
+def gap(key: str) -> Case:
+    """Unilateral spring behind a gap; x > gap closes, hence the negative dof."""
+    item = read("e_gap")[key]
+    p = item["params"]
+    groups = single(p, p["F"], p["omega"])
+    groups["contact"] = {"n_pairs": 1, "law": "penalty", "side_1": [0, 0, -1], "gap": p["gap"],
+                         "normal_stiffness": p["kc"]}
+    return Case("gap", groups, reference(item))
+
+
+def two_dof(key: str) -> Case:
+    """Tangential and normal motion with stick, slip and separation."""
+    item = read("d_2dof")[key]
+    p = item["params"]
+    groups: Groups = {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": 2, "mass": flat(p["M"]), "stiffness": flat(p["K"]),
+                  "damping": flat(p["C"])},
+        "load": {"static": [0.0, p["P0"]], "cosine": [p["Ft"][0], p["Fn"][0]],
+                 "sine": [-p["Ft"][1], -p["Fn"][1]]},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, -2], "mu": p["mu"],
+                    "gap": p["gap"], "tangential_stiffness": p["kt"], "normal_stiffness": p["kn"]},
+        "sweep": {"start": p["omega"]}}
+    q = item["q1"]
+    return Case("two dofs, " + key.split("_")[1].replace("stickslip", "stick and slip"), groups,
+                reference(q))
+
+
+def single(p: dict[str, float], force: float, omega: float) -> Groups:
+    """Mass, damper and spring under a cosine force."""
+    return {"case": {"analysis": "point"},
+            "model": {"n_dof": 1, "mass": p["m"], "stiffness": p["k"], "damping": p["c"]},
+            "load": {"cosine": force}, "sweep": {"start": omega}}
+
+
+def read(name: str) -> dict:
+    """A file of references."""
+    return json.loads((ROOT / "test" / "reference" / f"oracle_{name}.json").read_text())
+
+
+def reference(item: dict) -> Floats:
+    """Coefficients in the order (0, c1, s1, ...)."""
+    c, s = (item["xc"], item["xs"]) if "xc" in item else (item["c"], item["s"])
+    mean = item["x0"] if "x0" in item else item["a0"]
+    return np.concatenate([[mean], np.column_stack([c, s]).ravel()])
+
+
+def flat(matrix: list[list[float]]) -> list[float]:
+    """Values of a symmetric matrix, in any order."""
+    return [float(value) for row in matrix for value in row]

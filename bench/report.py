@@ -1,0 +1,294 @@
+"""docs/benchmarks.md and its pictures from the measurements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from oscillators import HARMONICS, INSTANTS, Sample
+from sector import HARMONICS as SECTOR_HARMONICS
+from sector import LARGEST_LU, PAIRS, Crossing, PointTime, Sweep
+
+__all__ = ["Measurements", "write_report"]
+
+#: Time [s] that a sweep may take.
+TARGETS = {"48 pairs, H = 7": 5.0, "16 pairs, H = 3": 1.0}
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Everything that the report needs."""
+
+    machine: dict[str, str]
+    transforms: list[dict[str, str]]
+    oscillators: list[Sample]
+    crossing: list[Crossing]
+    points: list[PointTime]
+    threads: list[tuple[int, int, float]]
+    sweeps: list[Sweep]
+
+
+def write_report(folder: Path, data: Measurements) -> None:
+    """Write benchmarks.md and images/benchmark_*.png into a folder."""
+    images = folder / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    draw_points(images / "benchmark_points.png", data.points)
+    draw_errors(images / "benchmark_errors.png", data.oscillators)
+    draw_transforms(images / "benchmark_transforms.png", data.transforms)
+    draw_crossing(images / "benchmark_linear.png", data.crossing)
+    parts = [head(data.machine), sweeps_part(data.sweeps), points_part(data.points),
+             threads_part(data.threads), errors_part(data.oscillators),
+             crossing_part(data.crossing), transforms_part(data.transforms)]
+    (folder / "benchmarks.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def head(machine: dict[str, str]) -> str:
+    """Title and where it was measured."""
+    return "\n".join([
+        "# Benchmarks", "",
+        "Written by `make bench` (bench/run.py): do not edit. Times are medians of repeated runs, "
+        "in one thread unless it is said otherwise, without reading the input.", "",
+        *table(["", ""], machine.items())])
+
+
+def sweeps_part(sweeps: list[Sweep]) -> str:
+    """The sweeps that have a target."""
+    rows = []
+    for sweep in sweeps:
+        target = next(value for key, value in TARGETS.items() if sweep.title.startswith(key))
+        met = "met" if sweep.seconds < target else "missed"
+        rows.append((sweep.title, sweep.threads, len(sweep.run.seconds), sweep.run.usable,
+                     int(sweep.run.is_loose.sum()), int(sweep.run.iterations.sum()),
+                     f"{sweep.seconds:.2f}", f"< {target:g} s: {met}"))
+    return "\n".join([
+        "## Whole sweeps", "",
+        "Bladed-disk sector at 2500 rpm (`rotation_speed = 261.8`), tip force 0.5 N, modal damping "
+        "0.1 %, `n_time = 128`, 41 points between 1000 and 1015 Hz. A *loose* point converged to "
+        "a solution in which no pair touches at any instant; it satisfies the equations and means "
+        "nothing for a blade in its slot. A time with loose points is no measure of the program.",
+        "",
+        *table(["sweep", "threads", "points", "usable", "loose", "Newton steps", "time [s]",
+                "target"], rows)])
+
+
+def points_part(points: list[PointTime]) -> str:
+    """Time of a point against harmonics and pairs."""
+    rows = []
+    for pairs in PAIRS:
+        for n_harmonics in SECTOR_HARMONICS:
+            found = {p.linear: p for p in points
+                     if (p.pairs, p.n_harmonics) == (pairs, n_harmonics)}
+            if not found:
+                continue
+            krylov, lu = found["krylov"], found["lu"]
+            usable = f"{krylov.run.usable} of {len(krylov.run.seconds)}"
+            rows.append((pairs, n_harmonics, krylov.unknowns, krylov.run.unknowns_left, usable,
+                         milliseconds(krylov.seconds),
+                         "not run" if lu.run is None else milliseconds(lu.seconds)))
+    return "\n".join([
+        "## Time of a frequency point", "",
+        "The same sector, 8 points from 1008 down to 1003 Hz, around the peak, where the joint "
+        "slips. Unknowns are those of the system; stuck rows leave the linear problems, whose "
+        "mean size stands beside. Dense LU was not run for more than "
+        f"{LARGEST_LU} unknowns, where it takes minutes.", "",
+        *table(["pairs", "H", "unknowns", "in linear problems", "usable points",
+                "GMRES [ms/point]", "LU [ms/point]"], rows), "",
+        "![Time of a frequency point](images/benchmark_points.png)"])
+
+
+def threads_part(rows: list[tuple[int, int, float]]) -> str:
+    """One thread against two."""
+    one = {h: seconds for h, threads, seconds in rows if threads == 1}
+    lines = [(h, milliseconds(one[h]), milliseconds(seconds), f"{one[h] / seconds:.2f}")
+             for h, threads, seconds in rows if threads == 2]
+    return "\n".join([
+        "## Threads", "",
+        "48 pairs, the points of the section before.", "",
+        *table(["H", "1 thread [ms/point]", "2 threads [ms/point]", "speed-up"], lines)])
+
+
+def errors_part(samples: list[Sample]) -> str:
+    """Error against time of the oscillators."""
+    lines = ["## Error against run time", "",
+             "Relative L2 error of the Fourier coefficients of the first coordinate against "
+             "references that were computed without harmonic balance (test/reference), and the "
+             "time of the point from the first guess of a run. With rigid friction on a dof with "
+             "mass the law `dlft` converges slowly with H.", "",
+             "![Error against run time](images/benchmark_errors.png)"]
+    for case in dict.fromkeys(sample.case for sample in samples):
+        rows = []
+        for n_harmonics in HARMONICS:
+            found = {s.n_time: s for s in samples if (s.case, s.n_harmonics) == (case, n_harmonics)}
+            if found:
+                rows.append((n_harmonics, *(cell(found.get(n)) for n in INSTANTS)))
+        lines += ["", f"### {case[0].upper() + case[1:]}", "",
+                  *table(["H", *(f"n_time = {n}" for n in INSTANTS)], rows)]
+    return "\n".join(lines)
+
+
+def cell(sample: Sample | None) -> str:
+    """Error and time of a solution."""
+    if sample is None:
+        return "too few instants"
+    if math.isnan(sample.seconds):
+        return "not converged"
+    return f"{sample.error:.1e}, {1e3 * sample.seconds:.3g} ms"
+
+
+def crossing_part(rows: list[Crossing]) -> str:
+    """LU against GMRES."""
+    wins = [row.unknowns_left for row in rows if row.lu <= row.krylov]
+    losses = [row.unknowns_left for row in rows if row.lu > row.krylov]
+    text = "LU won nowhere." if not wins else f"LU won up to {max(wins)} unknowns"
+    if wins:
+        text += f"; GMRES won from {min(losses)} on." if losses else "; GMRES won nowhere."
+    lines = [(r.pairs, r.n_harmonics, r.unknowns_left, milliseconds(r.lu), milliseconds(r.krylov),
+              f"{r.lu / r.krylov:.2f}") for r in rows]
+    return "\n".join([
+        "## LU against GMRES", "",
+        "Time of a Newton step (with its share of residuals, condensation and recovery) at the "
+        "points of the sector near the peak, against the mean number of unknowns that were left "
+        f"in the linear problems. {text} This decides `lu_pays_up_to` in "
+        "src/solve/linear_step.f90.", "",
+        *table(["pairs", "H", "unknowns left", "LU [ms]", "GMRES [ms]", "ratio"], lines), "",
+        "![LU against GMRES](images/benchmark_linear.png)"])
+
+
+def transforms_part(rows: list[dict[str, str]]) -> str:
+    """Matrix products against FFTW."""
+    wrong = [row for row in rows if better(row) != row["chosen"]]
+    costly = [row for row in wrong if ratio(row) > 1.25 or ratio(row) < 0.8]
+    lines = [(row["n_harmonics"], row["n_time"], row["n_rows"], microseconds(row["matrix"]),
+              microseconds(row["fft"]), f"{ratio(row):.2f}", row["chosen"]) for row in rows]
+    worst = max((float(row["difference"]) for row in rows), default=0.0)
+    return "\n".join([
+        "## Matrix products against FFTW", "",
+        "Time of one transform to the instants and one back (bench/transforms.f90). Three rows "
+        "belong to a contact pair. The results of the two ways differ by "
+        f"{worst:.0e} at most (inputs between 0 and 1). `fft_pays` in src/math/fourier.f90 "
+        f"chooses the slower way in {len(costly)} of {len(rows)} sizes by more than a quarter.", "",
+        "![Matrix products against FFTW](images/benchmark_transforms.png)", "",
+        *table(["H", "n_time", "rows", "matrix [us]", "FFTW [us]", "matrix / FFTW", "chosen"],
+               lines)])
+
+
+def better(row: dict[str, str]) -> str:
+    """The faster way for a size."""
+    return "matrix" if float(row["matrix"]) <= float(row["fft"]) else "fft"
+
+
+def ratio(row: dict[str, str]) -> float:
+    """Time of the matrix product by that of FFTW."""
+    return float(row["matrix"]) / float(row["fft"])
+
+
+def draw_points(path: Path, points: list[PointTime]) -> None:
+    """Time of a point against harmonics."""
+    figure, axes = new_figure()
+    for pairs, colour in zip(PAIRS, ("#1f4e79", "#c0392b")):
+        for linear, style in (("krylov", "o-"), ("lu", "s--")):
+            found = [p for p in points if (p.pairs, p.linear) == (pairs, linear) and p.run]
+            axes.plot([p.n_harmonics for p in found], [1e3 * p.seconds for p in found], style,
+                      color=colour, label=f"{pairs} pairs, {'GMRES' if linear == 'krylov' else 'LU'}")
+    axes.set(xscale="log", yscale="log", xlabel="harmonics H", ylabel="time of a point [ms]")
+    axes.set_xticks(SECTOR_HARMONICS, [str(h) for h in SECTOR_HARMONICS], minor=False)
+    axes.minorticks_off()
+    finish(figure, axes, path)
+
+
+def draw_errors(path: Path, samples: list[Sample]) -> None:
+    """One panel for each oscillator."""
+    cases = list(dict.fromkeys(sample.case for sample in samples))
+    columns = 3
+    figure = Figure(figsize=(10.5, 3.1 * math.ceil(len(cases) / columns)), dpi=130,
+                    layout="constrained")
+    panels = figure.subplots(math.ceil(len(cases) / columns), columns, sharex=True, squeeze=False)
+    for axes, case in zip(panels.flat, cases):
+        for n_time, colour in zip(INSTANTS, ("#f58518", "#54a24b", "#1f4e79")):
+            found = [s for s in samples if (s.case, s.n_time) == (case, n_time)]
+            axes.plot([1e3 * s.seconds for s in found], [s.error for s in found], "o-",
+                      color=colour, markersize=4, label=f"n_time = {n_time}")
+            if n_time == INSTANTS[-1]:
+                for s in found:
+                    axes.annotate(f"{s.n_harmonics}", (1e3 * s.seconds, s.error), fontsize=8,
+                                  textcoords="offset points", xytext=(4, 3))
+        axes.set(xscale="log", yscale="log", title=case[0].upper() + case[1:])
+        axes.grid(alpha=0.3)
+    for axes in panels.flat[len(cases):]:
+        axes.set_axis_off()
+    for axes in panels[:, 0]:
+        axes.set_ylabel("relative error")
+    for axes in list(panels.flat)[max(0, len(cases) - columns):len(cases)]:
+        axes.tick_params(labelbottom=True)
+        axes.set_xlabel("time [ms]; labels: H")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="lower right", frameon=False)
+    figure.savefig(path)
+
+
+def draw_transforms(path: Path, rows: list[dict[str, str]]) -> None:
+    """Ratio of the times against the number of coefficients."""
+    figure, axes = new_figure()
+    colours = dict(zip(("3", "48", "144"), ("#f58518", "#54a24b", "#1f4e79")))
+    for rows_of, colour in colours.items():
+        for chosen, marker in (("matrix", "o"), ("fft", "^")):
+            found = [row for row in rows if (row["n_rows"], row["chosen"]) == (rows_of, chosen)]
+            axes.plot([2 * int(row["n_harmonics"]) + 1 for row in found],
+                      [ratio(row) for row in found], marker, color=colour, alpha=0.75,
+                      label=f"{rows_of} rows, {'FFTW' if chosen == 'fft' else chosen} chosen")
+    axes.axhline(1.0, color="0.4", linewidth=1.0)
+    axes.set(xscale="log", yscale="log", xlabel="coefficients 2H + 1",
+             ylabel="time of matrix products / time of FFTW")
+    finish(figure, axes, path)
+
+
+def draw_crossing(path: Path, rows: list[Crossing]) -> None:
+    """Time of a Newton step against the unknowns."""
+    figure, axes = new_figure()
+    for pairs, marker in ((8, "o"), (16, "s"), (48, "^")):
+        found = [row for row in rows if row.pairs == pairs]
+        if not found:
+            continue
+        x = [row.unknowns_left for row in found]
+        axes.plot(x, [1e3 * row.lu for row in found], marker + "--", color="#c0392b",
+                  label=f"LU, {pairs} pairs")
+        axes.plot(x, [1e3 * row.krylov for row in found], marker + "-", color="#1f4e79",
+                  label=f"GMRES, {pairs} pairs")
+    axes.set(xscale="log", yscale="log", xlabel="unknowns left in the linear problem",
+             ylabel="time of a Newton step [ms]")
+    finish(figure, axes, path)
+
+
+def new_figure() -> tuple[Figure, Axes]:
+    """A picture of one panel."""
+    figure = Figure(figsize=(6.6, 4.4), dpi=130, layout="constrained")
+    return figure, figure.subplots()
+
+
+def finish(figure: Figure, axes: Axes, path: Path) -> None:
+    """Grid, legend, file."""
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, fontsize=8)
+    figure.savefig(path)
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """Lines of a Markdown table."""
+    def line(cells: Iterable[object]) -> str:
+        return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+    return [line(header), line("---" for _ in header), *(line(row) for row in rows)]
+
+
+def milliseconds(seconds: float) -> str:
+    """Three digits are more than a time is worth."""
+    return f"{1e3 * seconds:.3g}"
+
+
+def microseconds(seconds: str) -> str:
+    """The same for a text in seconds."""
+    return f"{1e6 * float(seconds):.3g}"

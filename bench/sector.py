@@ -1,0 +1,147 @@
+"""Times on the bladed-disk sector: harmonics, pairs, linear solvers, threads, whole sweeps."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from measure import ROOT, Bench, Groups, Run
+
+__all__ = ["HARMONICS", "PAIRS", "Crossing", "PointTime", "Sweep", "measure_crossing",
+           "measure_points", "measure_sweeps", "measure_threads"]
+
+HARMONICS = (1, 3, 7, 17)
+PAIRS = (16, 48)
+#: Beyond this many unknowns a dense LU factorization takes minutes a sweep.
+LARGEST_LU = 1100
+#: The sweep around the peak goes down: upwards Newton loses the joint near the peak (see the
+#: whole sweeps), and points without contact would be measured.
+NEAR_PEAK = {"start": 1008.0, "end": 1003.0, "n_points": 8, "unit": "Hz"}
+WHOLE = {"start": 1000.0, "end": 1015.0, "n_points": 41, "unit": "Hz"}
+
+
+@dataclass(frozen=True)
+class PointTime:
+    """Time of a frequency point [s]; NaN where it was not measured."""
+
+    pairs: int
+    n_harmonics: int
+    linear: str
+    seconds: float
+    unknowns: int
+    run: Run | None
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep: time of the whole run [s] and how many points are usable."""
+
+    title: str
+    threads: int
+    seconds: float
+    run: Run
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Time of a Newton step with either linear solver [s] against the unknowns left."""
+
+    pairs: int
+    n_harmonics: int
+    unknowns_left: int
+    lu: float
+    krylov: float
+
+
+def case(pairs: int, n_harmonics: int, sweep: dict[str, object], linear: str = "auto",
+         file: Path | None = None) -> Groups:
+    """The sector at 2500 rpm under a tip force of 0.5 N."""
+    model = file or ROOT / "example" / "blade_sector" / f"sector_{pairs}.h5"
+    return {"case": {"title": f"sector, {pairs} pairs", "analysis": "frf"},
+            "model": {"source": "hdf5", "file": model, "rotation_speed": 261.8,
+                      "modal_damping": 1e-3},
+            "load": {"harmonic_scale": 0.5},
+            "harmonics": {"n_harmonics": n_harmonics, "n_time": 128},
+            "sweep": sweep,
+            "solver": {"linear": linear}}
+
+
+def measure_points(bench: Bench) -> list[PointTime]:
+    """Mean time of a point near the peak, with either linear solver."""
+    points = []
+    for pairs in PAIRS:
+        for n_harmonics in HARMONICS[:2] if bench.quick else HARMONICS:
+            for linear in ("krylov", "lu"):
+                unknowns = 3 * pairs * (2 * n_harmonics + 1)
+                if linear == "lu" and unknowns > LARGEST_LU:
+                    points.append(PointTime(pairs, n_harmonics, linear, float("nan"), unknowns,
+                                            None))
+                    continue
+                seconds, run = bench.repeat(case(pairs, n_harmonics, NEAR_PEAK, linear),
+                                            lambda run: float(run.seconds.mean()), most=3)
+                points.append(PointTime(pairs, n_harmonics, linear, seconds, run.unknowns, run))
+    return points
+
+
+def measure_threads(bench: Bench) -> list[tuple[int, int, float]]:
+    """Mean time of a point near the peak: (harmonics, threads, seconds), 48 pairs."""
+    usable = len(os.sched_getaffinity(0))
+    rows = []
+    for n_harmonics in (3,) if bench.quick else (3, 7, 17):
+        for threads in (1, 2):
+            if threads > usable:
+                continue
+            seconds, _ = bench.repeat(case(48, n_harmonics, NEAR_PEAK),
+                                      lambda run: float(run.seconds.mean()), threads, most=3)
+            rows.append((n_harmonics, threads, seconds))
+    return rows
+
+
+def measure_sweeps(bench: Bench) -> list[Sweep]:
+    """The two sweeps that have a target, up and down."""
+    down = WHOLE | {"start": WHOLE["end"], "end": WHOLE["start"]}
+    sweeps = []
+    for pairs, n_harmonics in ((48, 7), (16, 3)):
+        for direction, sweep in (("down", down), ("up", WHOLE)):
+            for threads in (1, min(2, len(os.sched_getaffinity(0)))):
+                seconds, run = bench.repeat(case(pairs, n_harmonics, sweep),
+                                            lambda run: run.elapsed, threads, most=3)
+                sweeps.append(Sweep(f"{pairs} pairs, H = {n_harmonics}, {direction}", threads,
+                                    seconds, run))
+    return sweeps
+
+
+def measure_crossing(bench: Bench) -> list[Crossing]:
+    """Time of a Newton step of growing size with LU and with GMRES."""
+    grid = {8: (1, 2, 3, 5, 7), 16: (1, 2, 3, 5), 48: (1,)}
+    rows = []
+    for pairs, harmonics in grid.items():
+        file = sector_file(pairs, bench.folder)
+        for n_harmonics in harmonics[:2] if bench.quick else harmonics:
+            times, left = {}, 0
+            for linear in ("lu", "krylov"):
+                times[linear], run = bench.repeat(case(pairs, n_harmonics, NEAR_PEAK, linear, file),
+                                                  step_seconds, most=5, budget=2.5)
+                left = run.unknowns_left
+            rows.append(Crossing(pairs, n_harmonics, left, times["lu"], times["krylov"]))
+    return sorted(rows, key=lambda row: row.unknowns_left)
+
+
+def step_seconds(run: Run) -> float:
+    """Time of a Newton step, with its share of everything else that a point needs."""
+    return float(run.seconds.sum() / max(1, run.iterations.sum()))
+
+
+def sector_file(pairs: int, folder: Path) -> Path:
+    """The model with so many pairs, generated where it is no example."""
+    example = ROOT / "example" / "blade_sector" / f"sector_{pairs}.h5"
+    if example.exists():
+        return example
+    path = folder / f"sector_{pairs}.h5"
+    if not path.exists():
+        subprocess.run([sys.executable, "-m", "fretwear.sector", "--pairs", str(pairs), "-q",
+                        "-o", path], check=True, env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
+    return path
