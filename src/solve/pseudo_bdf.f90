@@ -1,0 +1,300 @@
+!> Backward differentiation formulas of variable order (1 to 5) and step in pseudo-time, by CVODE
+!> (SUNDIALS; Cohen and Hindmarsh 1996) with SPGMR. Its matrix 1 + gamma P^-1 J is preconditioned
+!> by solutions with J + P/gamma: factors where the system is small, so that one or two Krylov
+!> iterations do, the system's own preconditioner where it is large.
+module fw_pseudo_bdf
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use, intrinsic :: iso_c_binding, only: c_associated
+   use, intrinsic :: iso_c_binding, only: c_double
+   use, intrinsic :: iso_c_binding, only: c_f_pointer
+   use, intrinsic :: iso_c_binding, only: c_funloc
+   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use, intrinsic :: iso_c_binding, only: c_long
+   use, intrinsic :: iso_c_binding, only: c_null_funptr
+   use, intrinsic :: iso_c_binding, only: c_null_ptr
+   use, intrinsic :: iso_c_binding, only: c_ptr
+   use fcvode_mod, only: cv_bdf
+   use fcvode_mod, only: cv_one_step
+   use fcvode_mod, only: fcvode
+   use fcvode_mod, only: fcvodecreate
+   use fcvode_mod, only: fcvodefree
+   use fcvode_mod, only: fcvodegetcurrentstep
+   use fcvode_mod, only: fcvodegetlastorder
+   use fcvode_mod, only: fcvodegetnumerrtestfails
+   use fcvode_mod, only: fcvodegetnumnonlinsolvconvfails
+   use fcvode_mod, only: fcvodegetnumnonlinsolviters
+   use fcvode_mod, only: fcvodeinit
+   use fcvode_mod, only: fcvodeseterrhandlerfn
+   use fcvode_mod, only: fcvodesetinitstep
+   use fcvode_mod, only: fcvodesetjactimes
+   use fcvode_mod, only: fcvodesetlinearsolver
+   use fcvode_mod, only: fcvodesetmaxord
+   use fcvode_mod, only: fcvodesetpreconditioner
+   use fcvode_mod, only: fcvodesetstablimdet
+   use fcvode_mod, only: fcvodesetstoptime
+   use fcvode_mod, only: fcvodesetuserdata
+   use fcvode_mod, only: fcvodesstolerances
+   use fsundials_linearsolver_mod, only: fsunlinsolfree
+   use fsundials_linearsolver_mod, only: sun_prec_left
+   use fsundials_linearsolver_mod, only: sunlinearsolver
+   use fsundials_matrix_mod, only: sunmatrix
+   use fsundials_nvector_mod, only: n_vector
+   use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr
+   use fw_kinds, only: wp
+   use fw_pseudo_linear, only: shifted_linear
+   use fw_pseudo_scheme, only: pseudo_scheme
+   use fw_pseudo_system, only: pseudo_system
+   use fw_sundials, only: callback_fatal
+   use fw_sundials, only: callback_ok
+   use fw_sundials, only: callback_smaller
+   use fw_sundials, only: close_context
+   use fw_sundials, only: ignore_message
+   use fw_sundials, only: open_context
+   use fw_sundials, only: release
+   use fw_sundials, only: values
+   use fw_sundials, only: wrap
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: bdf_scheme
+
+   !> What the callbacks need: C pointers cannot point to a polymorphic object itself.
+   type :: bdf_state
+      class(pseudo_system), pointer :: system => null()
+      type(shifted_linear) :: linear
+      !> Shift behind the preconditioner.
+      real(wp) :: gamma = 0.0_wp
+      !> The point evaluated last without a shift and whether the system is linearized there.
+      real(wp), allocatable :: seen(:), work(:)
+      logical :: linearized = .false.
+   end type bdf_state
+
+   type, extends(pseudo_scheme) :: bdf_scheme
+      !> Error of a step, relative to the unknowns.
+      real(wp) :: accuracy = 1.0e-3_wp
+      integer :: max_order = 5
+      !> Order of the last step.
+      integer :: order = 0
+      !> Where positive, the integration ends exactly there.
+      real(wp) :: stop_time = 0.0_wp
+      type(bdf_state), pointer :: state => null()
+      type(c_ptr) :: context = c_null_ptr
+      type(c_ptr) :: memory = c_null_ptr
+      type(n_vector), pointer :: x => null()
+      type(sunlinearsolver), pointer :: spgmr => null()
+   contains
+      procedure :: start
+      procedure :: advance
+      procedure :: finish
+   end type bdf_scheme
+
+   integer(c_int), parameter :: krylov_length = 30
+   !> First step, relative to the scale of pseudo-time.
+   real(wp), parameter :: first_step = 1.0e-3_wp
+
+contains
+
+   subroutine start(self, system, x, done)
+      class(bdf_scheme), intent(inout) :: self
+      class(pseudo_system), intent(inout), target :: system
+      real(wp), intent(inout), contiguous, target :: x(:)
+      logical, intent(out) :: done
+
+      allocate (self%state)
+      self%state%system => system
+      self%state%linear%kind = self%solver%linear
+      self%state%seen = x
+      allocate (self%state%work(size(x)))
+      self%step = self%options%step
+      if (self%step <= 0.0_wp) self%step = first_step*self%scales%time
+      call open_context(self%context, done)
+      if (.not. done) return
+      self%x => wrap(x, self%context)
+      self%memory = fcvodecreate(cv_bdf, self%context)
+      done = associated(self%x) .and. c_associated(self%memory)
+      if (.not. done) return
+      self%spgmr => fsunlinsol_spgmr(self%x, sun_prec_left, krylov_length, self%context)
+      done = associated(self%spgmr)
+      if (done) call configure(self, done)
+   end subroutine start
+
+   subroutine configure(self, done)
+      class(bdf_scheme), intent(inout) :: self
+      logical, intent(out) :: done
+      type(sunmatrix), pointer :: no_matrix
+      integer(c_int) :: status(11)
+
+      nullify (no_matrix)
+      status = 0
+      associate (memory => self%memory)
+         status(1) = fcvodeseterrhandlerfn(memory, c_funloc(ignore_message), c_null_ptr)
+         status(2) = fcvodeinit(memory, c_funloc(evaluate), 0.0_c_double, self%x)
+         status(3) = fcvodesetuserdata(memory, c_loc(self%state))
+         status(4) = fcvodesstolerances(memory, self%accuracy, self%accuracy*self%scales%unknown)
+         status(5) = fcvodesetlinearsolver(memory, self%spgmr, no_matrix)
+         status(6) = fcvodesetjactimes(memory, c_null_funptr, c_funloc(multiply))
+         status(7) = fcvodesetpreconditioner(memory, c_funloc(set_up), c_funloc(precondition))
+         status(8) = fcvodesetmaxord(memory, int(self%max_order, c_int))
+         ! From order 3 on the formulas are unstable near the imaginary axis: watch for it.
+         status(9) = fcvodesetstablimdet(memory, 1_c_int)
+         status(10) = fcvodesetinitstep(memory, self%step)
+         if (self%stop_time > 0.0_wp) status(11) = fcvodesetstoptime(memory, self%stop_time)
+      end associate
+      done = all(status == 0)
+   end subroutine configure
+
+   subroutine advance(self, system, x, done)
+      class(bdf_scheme), intent(inout) :: self
+      class(pseudo_system), intent(inout), target :: system
+      real(wp), intent(inout), contiguous, target :: x(:)
+      logical, intent(out) :: done
+      real(c_double) :: reached(1), far
+      integer(c_int) :: status
+
+      ! Newton's method may have used the system meanwhile.
+      self%state%linearized = .false.
+      self%state%seen = huge(1.0_wp)
+      far = self%time + max(1.0e3_wp*self%step, self%scales%time)
+      status = fcvode(self%memory, far, self%x, reached, cv_one_step)
+      done = status >= 0
+      if (done) then
+         self%time = reached(1)
+         self%accepted = self%accepted + 1
+         call count_work(self)
+      else
+         self%message = 'BDF: CVODE gave up with status '//to_text(int(status))
+      end if
+      call system%residual(x, self%r)
+   end subroutine advance
+
+   subroutine count_work(self)
+      class(bdf_scheme), intent(inout) :: self
+      integer(c_long) :: errors(1), failures(1), iterations(1)
+      integer(c_int) :: order(1), status(5)
+      real(c_double) :: next(1)
+
+      status(1) = fcvodegetnumerrtestfails(self%memory, errors)
+      status(2) = fcvodegetnumnonlinsolvconvfails(self%memory, failures)
+      status(3) = fcvodegetnumnonlinsolviters(self%memory, iterations)
+      status(4) = fcvodegetlastorder(self%memory, order)
+      status(5) = fcvodegetcurrentstep(self%memory, next)
+      if (any(status /= 0)) return
+      self%rejected = int(errors(1) + failures(1))
+      self%linear_solves = int(iterations(1))
+      self%order = int(order(1))
+      self%step = next(1)
+   end subroutine count_work
+
+   subroutine finish(self)
+      class(bdf_scheme), intent(inout) :: self
+      integer(c_int) :: status
+
+      if (c_associated(self%memory)) call fcvodefree(self%memory)
+      self%memory = c_null_ptr
+      if (associated(self%spgmr)) status = fsunlinsolfree(self%spgmr)
+      nullify (self%spgmr)
+      call release(self%x)
+      call close_context(self%context)
+      if (associated(self%state)) deallocate (self%state)
+   end subroutine finish
+
+   !> Callback: rate of the flow.
+   integer(c_int) function evaluate(time, x, rate, data) bind(c) result(status)
+      real(c_double), value :: time
+      type(n_vector), intent(inout) :: x, rate
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: x_values(:), rate_values(:)
+
+      associate (time => time)
+      end associate
+      call c_f_pointer(data, state)
+      x_values => values(x, state%system%n)
+      rate_values => values(rate, state%system%n)
+      call state%system%rate(x_values, rate_values)
+      state%seen = x_values
+      state%linearized = .false.
+      status = callback_ok
+      if (.not. ieee_is_finite(norm2(rate_values))) status = callback_smaller
+   end function evaluate
+
+   !> Callback: -P^-1 J times vector.
+   integer(c_int) function multiply(vector, product, time, x, rate, data, work) bind(c) result(status)
+      type(n_vector), intent(inout) :: vector, product, x, rate, work
+      real(c_double), value :: time
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: v(:), p(:), x_values(:)
+      integer :: n_linear
+
+      associate (time => time, rate => rate, work => work)
+      end associate
+      call c_f_pointer(data, state)
+      x_values => values(x, state%system%n)
+      v => values(vector, state%system%n)
+      p => values(product, state%system%n)
+      if (any(abs(x_values - state%seen) > 0.0_wp)) then
+         call state%system%residual(x_values, state%work)
+         state%seen = x_values
+         state%linearized = .false.
+      end if
+      if (.not. state%linearized) call state%system%linearize(n_linear)
+      state%linearized = .true.
+      call state%system%apply(v, p)
+      p = -p
+      call state%system%flow_solve(p)
+      status = callback_ok
+   end function multiply
+
+   !> Callback: preconditioner for 1 + gamma P^-1 J.
+   integer(c_int) function set_up(time, x, rate, as_before, renewed, gamma, data) bind(c) &
+      result(status)
+      real(c_double), value :: time, gamma
+      type(n_vector), intent(inout) :: x, rate
+      integer(c_int), value :: as_before
+      integer(c_int), intent(inout) :: renewed
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: x_values(:)
+      logical :: done
+
+      associate (time => time, rate => rate, as_before => as_before)
+      end associate
+      call c_f_pointer(data, state)
+      x_values => values(x, state%system%n)
+      state%gamma = gamma
+      call state%system%set_shift(gamma, x_values)
+      call state%linear%prepare(state%system, x_values, state%work, done)
+      call state%system%clear_shift()
+      ! What the system knows of x belongs to the shift.
+      state%seen = huge(1.0_wp)
+      state%linearized = .false.
+      renewed = 1
+      status = merge(callback_ok, callback_smaller, done)
+   end function set_up
+
+   !> Callback: (1 + gamma P^-1 J)^-1 right = (J + P/gamma)^-1 P right/gamma, about.
+   integer(c_int) function precondition(time, x, rate, right, solution, gamma, accuracy, side, data) &
+      bind(c) result(status)
+      real(c_double), value :: time, gamma, accuracy
+      type(n_vector), intent(inout) :: x, rate, right, solution
+      integer(c_int), value :: side
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: z(:)
+
+      associate (time => time, gamma => gamma, accuracy => accuracy, x => x, rate => rate, &
+                 side => side)
+      end associate
+      call c_f_pointer(data, state)
+      z => values(solution, state%system%n)
+      call state%system%flow_product(values(right, state%system%n), z)
+      z = z/state%gamma
+      call state%linear%precondition(state%system, z)
+      status = callback_ok
+      if (.not. ieee_is_finite(norm2(z))) status = callback_fatal
+   end function precondition
+
+end module fw_pseudo_bdf

@@ -1,0 +1,114 @@
+!> Explicit multistage scheme in pseudo-time (Jameson, Schmidt, Turkel 1981; Jameson 1985): from
+!> stage to stage  x_k = x_0 + a_k h dx/dt(x_(k-1)),  with two vectors of storage. Stable where the
+!> eigenvalues of P^-1 J have positive real parts, and then only for steps of some Courant number;
+!> each unknown may have its own step.
+module fw_pseudo_runge_kutta
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use fw_kinds, only: wp
+   use fw_pseudo_scheme, only: pseudo_scheme
+   use fw_pseudo_system, only: pseudo_system
+   implicit none (type, external)
+   private
+
+   public :: runge_kutta_scheme
+
+   !> Coefficients of the stages. Four: order 4 for linear systems; five: order 2, with damping.
+   real(wp), parameter :: four_stages(4) = [0.25_wp, 1.0_wp/3.0_wp, 0.5_wp, 1.0_wp]
+   real(wp), parameter :: five_stages(5) = [0.25_wp, 1.0_wp/6.0_wp, 0.375_wp, 0.5_wp, 1.0_wp]
+
+   type, extends(pseudo_scheme) :: runge_kutta_scheme
+      !> 4 or 5.
+      integer :: n_stages = 5
+      real(wp) :: cfl = 0.8_wp
+      !> Steps (n), the start of a step (n), its rate (n).
+      real(wp), allocatable :: steps(:), x_old(:), rate(:)
+   contains
+      procedure :: start
+      procedure :: advance
+   end type runge_kutta_scheme
+
+   !> Steps after which the steps are computed anew: the stiffness of contact follows its state.
+   integer, parameter :: refresh = 20
+   !> Growth of the residual in one step that shows instability; a transient stays far below.
+   real(wp), parameter :: unstable = 10.0_wp
+   real(wp), parameter :: smallest_cfl = 1.0e-3_wp
+
+contains
+
+   subroutine start(self, system, x, done)
+      class(runge_kutta_scheme), intent(inout) :: self
+      class(pseudo_system), intent(inout), target :: system
+      real(wp), intent(inout), contiguous, target :: x(:)
+      logical, intent(out) :: done
+
+      self%cfl = self%options%cfl
+      self%x_old = x
+      allocate (self%steps(size(x)), self%rate(size(x)))
+      done = size(x) == system%n
+   end subroutine start
+
+   subroutine advance(self, system, x, done)
+      class(runge_kutta_scheme), intent(inout) :: self
+      class(pseudo_system), intent(inout), target :: system
+      real(wp), intent(inout), contiguous, target :: x(:)
+      logical, intent(out) :: done
+      real(wp) :: before, after
+
+      self%x_old = x
+      before = norm2(self%r)
+      if (modulo(self%accepted, refresh) == 0) call choose_steps(self, system, x)
+      do
+         call take_step(self, system, x)
+         after = norm2(self%r)
+         done = ieee_is_finite(after) .and. after <= unstable*before
+         if (done) exit
+         self%rejected = self%rejected + 1
+         x = self%x_old
+         call system%residual(x, self%r)
+         self%cfl = 0.5_wp*self%cfl
+         if (self%cfl < smallest_cfl .or. &
+             self%accepted + self%rejected >= self%options%max_steps) then
+            self%message = 'Runge-Kutta: the residual explodes at every Courant number'
+            return
+         end if
+         call choose_steps(self, system, x)
+      end do
+      self%accepted = self%accepted + 1
+      self%time = self%time + self%step
+   end subroutine advance
+
+   !> An explicit step given by the user is the longest one.
+   subroutine choose_steps(self, system, x)
+      class(runge_kutta_scheme), intent(inout) :: self
+      class(pseudo_system), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+
+      call system%local_steps(x, self%cfl, self%steps)
+      if (self%options%step > 0.0_wp) then
+         self%steps = min(self%steps, self%options%step*self%cfl/self%options%cfl)
+      end if
+      self%step = minval(self%steps)
+   end subroutine choose_steps
+
+   !> The residual at x is known; that at the end is left in self%r.
+   subroutine take_step(self, system, x)
+      class(runge_kutta_scheme), intent(inout) :: self
+      class(pseudo_system), intent(inout) :: system
+      real(wp), intent(inout), contiguous :: x(:)
+      real(wp) :: coefficient
+      integer :: stage
+
+      do stage = 1, self%n_stages
+         if (self%n_stages == size(four_stages)) then
+            coefficient = four_stages(stage)
+         else
+            coefficient = five_stages(stage)
+         end if
+         self%rate = self%r
+         call system%flow_solve(self%rate)
+         x = self%x_old - coefficient*self%steps*self%rate
+         call system%residual(x, self%r)
+      end do
+   end subroutine take_step
+
+end module fw_pseudo_runge_kutta
