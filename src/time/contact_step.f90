@@ -1,0 +1,251 @@
+!> The contact problem of one step: forces lambda of the rows with
+!>
+!>   s = s_free - W lambda,
+!>   normal      lambda_n <= 0, s_n >= 0, lambda_n s_n = 0          (Signorini),
+!>   tangential  |lambda_t| <= mu |lambda_n|, and lambda_t = mu |lambda_n| s_t/|s_t| in slip (Coulomb),
+!>   springs     lambda = coefficient s**power.
+!>
+!> s measures from where the pair would stay closed and stuck. W is the Delassus operator, with
+!> the compliance of the penalty law on its diagonal: an elastic pair is a rigid one behind its
+!> springs. Semismooth Newton on the projections (Alart and Curnier 1991); where it cycles,
+!> projected Gauss-Seidel sweeps (Jean 1999).
+module fw_contact_step
+   use fw_kinds, only: wp
+   use fw_linalg, only: lu_type
+   use fw_time_structure, only: time_structure
+   implicit none (type, external)
+   private
+
+   public :: contact_problem, new_contact_problem
+   public :: state_open, state_stick, state_slip
+
+   integer, parameter :: state_open = 0, state_stick = 1, state_slip = 2
+
+   integer, parameter :: max_newton = 20, max_sweeps = 400
+   !> On the projections, relative to the largest force; where Newton's method stagnates at the
+   !> round-off of the smallest steps, the looser one will do.
+   real(wp), parameter :: tolerance = 1.0e-10_wp, loose_tolerance = 1.0e-7_wp
+
+   type :: contact_problem
+      !> Forces of the rows (n_rows), kept as the first guess of the next step.
+      real(wp), allocatable :: force(:)
+      !> Where the pair would stay without force (n_rows).
+      real(wp), allocatable :: free(:)
+      !> Whether the gap of the pair is closed, so that it may bear (n_pairs).
+      logical, allocatable :: closed(:)
+      !> state_open, state_stick or state_slip (n_pairs).
+      integer, allocatable :: state(:)
+      !> Largest force seen, the scale of the tolerance.
+      real(wp) :: scale = 0.0_wp
+      ! Workspace.
+      real(wp), allocatable :: rate(:), mismatch(:), relative(:), slope(:, :, :)
+      type(lu_type) :: lu
+   contains
+      procedure :: solve
+   end type contact_problem
+
+contains
+
+   pure function new_contact_problem(structure) result(self)
+      type(time_structure), intent(in) :: structure
+      type(contact_problem) :: self
+      integer :: n
+
+      n = structure%n_rows
+      allocate (self%force(n), self%free(n), self%rate(n), self%mismatch(n), self%relative(n), &
+                source=0.0_wp)
+      allocate (self%closed(structure%n_pairs), source=.true.)
+      allocate (self%state(structure%n_pairs), source=state_stick)
+      allocate (self%slope(3, 3, structure%n_pairs), source=0.0_wp)
+      call self%lu%reserve(n)
+   end function new_contact_problem
+
+   !> Solve for the forces with the operator w (n_rows, n_rows); `done` is false where neither
+   !> method converged.
+   subroutine solve(self, structure, w, done)
+      class(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: w(:, :)
+      logical, intent(out) :: done
+      integer :: iteration
+      logical :: singular
+
+      done = .true.
+      if (structure%n_rows == 0) return
+      call set_rates(self, structure, w)
+      do iteration = 1, max_newton
+         call evaluate(self, structure, w)
+         done = maxval(abs(self%mismatch)) <= tolerance*self%scale
+         if (done) return
+         call newton_step(self, structure, w, singular)
+         if (singular) exit
+      end do
+      call evaluate(self, structure, w)
+      done = maxval(abs(self%mismatch)) <= loose_tolerance*self%scale .and. .not. singular
+      if (.not. done) call sweep(self, structure, w, done)
+   end subroutine solve
+
+   !> Projection parameters: the inverse of the pair's own compliance, one for both tangential
+   !> directions.
+   pure subroutine set_rates(self, structure, w)
+      type(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: w(:, :)
+      real(wp) :: mean
+      integer :: i, r
+
+      do r = 1, structure%n_rows
+         self%rate(r) = 1.0_wp/w(r, r)
+      end do
+      do i = 1, structure%n_pairs
+         if (any(structure%row(1:2, i) == 0)) cycle
+         mean = 2.0_wp/(w(structure%row(1, i), structure%row(1, i)) + &
+                        w(structure%row(2, i), structure%row(2, i)))
+         self%rate(structure%row(1:2, i)) = mean
+      end do
+   end subroutine set_rates
+
+   !> s, the mismatch lambda - projection(lambda + rate s), states and slopes of the projection.
+   subroutine evaluate(self, structure, w)
+      type(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: w(:, :)
+      integer :: i, r
+
+      self%scale = max(self%scale, maxval(abs(self%force)))
+      self%relative = self%free
+      do r = 1, structure%n_rows
+         self%relative = self%relative - w(:, r)*self%force(r)
+      end do
+      do i = 1, structure%n_pairs
+         call project_pair(self, structure, i)
+      end do
+      do i = 1, structure%n_springs
+         r = structure%n_rows - structure%n_springs + i
+         self%mismatch(r) = self%force(r) - &
+                            structure%coefficient(i)*self%relative(r)**structure%power(i)
+      end do
+   end subroutine evaluate
+
+   !> One pair: mismatch, state, and slope = d projection / d y with y = lambda + rate s.
+   pure subroutine project_pair(self, structure, i)
+      type(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      integer, intent(in) :: i
+      real(wp) :: y(3), e(2), p, length, limit
+      integer :: c, r
+
+      y = 0.0_wp
+      do c = 1, 3
+         r = structure%row(c, i)
+         if (r > 0) y(c) = self%force(r) + self%rate(r)*self%relative(r)
+      end do
+      if (structure%row(3, i) == 0) y(3) = -structure%normal_load(i)
+      p = merge(max(-y(3), 0.0_wp), 0.0_wp, self%closed(i))
+      length = norm2(y(1:2))
+      limit = structure%mu(i)*p
+      associate (slope => self%slope(:, :, i))
+         slope = 0.0_wp
+         if (p <= 0.0_wp) then
+            self%state(i) = state_open
+            y = 0.0_wp
+         else
+            if (structure%row(3, i) > 0) slope(3, 3) = 1.0_wp
+            if (length <= limit) then
+               self%state(i) = state_stick
+               slope(1, 1) = 1.0_wp
+               slope(2, 2) = 1.0_wp
+            else
+               self%state(i) = state_slip
+               e = y(1:2)/length
+               y(1:2) = limit*e
+               slope(1:2, 1) = -limit/length*e*e(1)
+               slope(1:2, 2) = -limit/length*e*e(2)
+               slope(1, 1) = slope(1, 1) + limit/length
+               slope(2, 2) = slope(2, 2) + limit/length
+               if (structure%row(3, i) > 0) slope(1:2, 3) = -structure%mu(i)*e
+            end if
+         end if
+         do c = 1, 3
+            r = structure%row(c, i)
+            if (r > 0) self%mismatch(r) = self%force(r) - y(c)
+         end do
+      end associate
+   end subroutine project_pair
+
+   !> force <- force - J^-1 mismatch, J = 1 - slope (1 - rate W).
+   subroutine newton_step(self, structure, w, singular)
+      type(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: w(:, :)
+      logical, intent(out) :: singular
+      real(wp) :: tangent
+      integer :: i, c, d, r, q
+
+      associate (jacobian => self%lu%matrix)
+         jacobian = 0.0_wp
+         do r = 1, structure%n_rows
+            jacobian(r, r) = 1.0_wp
+         end do
+         do i = 1, structure%n_pairs
+            do c = 1, 3
+               r = structure%row(c, i)
+               if (r == 0) cycle
+               do d = 1, 3
+                  q = structure%row(d, i)
+                  if (q == 0 .or. abs(self%slope(c, d, i)) <= 0.0_wp) cycle
+                  jacobian(r, q) = jacobian(r, q) - self%slope(c, d, i)
+                  jacobian(r, :) = jacobian(r, :) + self%slope(c, d, i)*self%rate(q)*w(q, :)
+               end do
+            end do
+         end do
+         do i = 1, structure%n_springs
+            r = structure%n_rows - structure%n_springs + i
+            tangent = structure%coefficient(i)*real(structure%power(i), wp)* &
+                      self%relative(r)**(structure%power(i) - 1)
+            jacobian(r, :) = jacobian(r, :) + tangent*w(r, :)
+         end do
+      end associate
+      call self%lu%factor(singular)
+      if (singular) return
+      call self%lu%solve(self%mismatch)
+      self%force = self%force - self%mismatch
+   end subroutine newton_step
+
+   !> Projected Gauss-Seidel: each pair in turn takes its projection, springs a Newton step.
+   subroutine sweep(self, structure, w, done)
+      type(contact_problem), intent(inout) :: self
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: w(:, :)
+      logical, intent(out) :: done
+      real(wp) :: change, tangent
+      integer :: i, c, r, k
+
+      self%force = merge(self%force, 0.0_wp, abs(self%force) <= huge(1.0_wp))
+      do k = 1, max_sweeps
+         call evaluate(self, structure, w)
+         done = maxval(abs(self%mismatch)) <= tolerance*self%scale
+         if (done) return
+         do i = 1, structure%n_pairs
+            call project_pair(self, structure, i)
+            do c = 1, 3
+               r = structure%row(c, i)
+               if (r == 0) cycle
+               change = -self%mismatch(r)
+               self%force(r) = self%force(r) + change
+               self%relative = self%relative - w(:, r)*change
+            end do
+         end do
+         do i = 1, structure%n_springs
+            r = structure%n_rows - structure%n_springs + i
+            tangent = structure%coefficient(i)*real(structure%power(i), wp)* &
+                      self%relative(r)**(structure%power(i) - 1)
+            change = -(self%force(r) - structure%coefficient(i)* &
+                       self%relative(r)**structure%power(i))/(1.0_wp + tangent*w(r, r))
+            self%force(r) = self%force(r) + change
+            self%relative = self%relative - w(:, r)*change
+         end do
+      end do
+   end subroutine sweep
+
+end module fw_contact_step

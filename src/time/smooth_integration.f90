@@ -1,0 +1,240 @@
+!> Integration over a period without contact, springs only, by CVODE (Hindmarsh et al. 2005):
+!> Adams-Moulton formulas of variable order and step to tolerances near round-off, values at
+!> uniform instants from its dense output. For structures with a regular mass whose highest
+!> frequency is not far above that of the load; others go through fw_time_stepper.
+module fw_smooth_integration
+   use, intrinsic :: iso_c_binding, only: c_associated
+   use, intrinsic :: iso_c_binding, only: c_double
+   use, intrinsic :: iso_c_binding, only: c_f_pointer
+   use, intrinsic :: iso_c_binding, only: c_funloc
+   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use, intrinsic :: iso_c_binding, only: c_long
+   use, intrinsic :: iso_c_binding, only: c_null_ptr
+   use, intrinsic :: iso_c_binding, only: c_ptr
+   use fcvode_mod, only: cv_adams
+   use fcvode_mod, only: cv_normal
+   use fcvode_mod, only: fcvode
+   use fcvode_mod, only: fcvodecreate
+   use fcvode_mod, only: fcvodefree
+   use fcvode_mod, only: fcvodeinit
+   use fcvode_mod, only: fcvodesetlinearsolver
+   use fcvode_mod, only: fcvodesetmaxnumsteps
+   use fcvode_mod, only: fcvodesetstoptime
+   use fcvode_mod, only: fcvodesetuserdata
+   use fcvode_mod, only: fcvodesstolerances
+   use fnvector_serial_mod, only: fn_vmake_serial
+   use fsundials_context_mod, only: fsuncontext_create
+   use fsundials_context_mod, only: fsuncontext_free
+   use fsundials_linearsolver_mod, only: fsunlinsolfree
+   use fsundials_linearsolver_mod, only: sunlinearsolver
+   use fsundials_matrix_mod, only: fsunmatdestroy
+   use fsundials_matrix_mod, only: sunmatrix
+   use fsundials_nvector_mod, only: fn_vdestroy
+   use fsundials_nvector_mod, only: fn_vgetarraypointer
+   use fsundials_nvector_mod, only: n_vector
+   use fsunlinsol_dense_mod, only: fsunlinsol_dense
+   use fsunmatrix_dense_mod, only: fsundensematrix
+   use fw_kinds, only: i8
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   use fw_linalg, only: lu_type
+   use fw_period_record, only: new_period_record
+   use fw_period_record, only: period_record
+   use fw_periodic_state, only: period_map
+   use fw_time_structure, only: time_structure
+   implicit none (type, external)
+   private
+
+   public :: smooth_integration, new_smooth_integration, is_smooth
+
+   !> Relative tolerance, and absolute tolerance as a share of the largest entry of the state.
+   real(wp), parameter :: relative_tolerance = 1.0e-12_wp, absolute_share = 1.0e-13_wp
+   !> Highest frequency over that of the load up to which the steps of the Adams formulas, which
+   !> it bounds, are not too many.
+   real(wp), parameter :: moderate_ratio = 200.0_wp
+   integer(c_long), parameter :: max_steps = 1000000_c_long
+
+   !> x'' = acceleration (x, v) + load - springs, all divided by the mass.
+   type :: acceleration_type
+      integer :: n = 0
+      real(wp) :: omega = 0.0_wp
+      !> M^-1 of stiffness and damping (n, n), loads (n, 3) and rows of springs (n, n_springs).
+      real(wp), allocatable :: stiffness(:, :), damping(:, :), load(:, :), springs(:, :)
+      real(wp), allocatable :: rows(:, :), coefficient(:)
+      integer, allocatable :: power(:)
+   end type acceleration_type
+
+   type, extends(period_map) :: smooth_integration
+      type(acceleration_type) :: acceleration
+      !> Observed quantities (n_observed, n_dof).
+      real(wp), allocatable :: observe(:, :)
+      type(period_record) :: record
+   contains
+      procedure :: integrate
+   end type smooth_integration
+
+contains
+
+   !> Whether a structure is for this module.
+   logical function is_smooth(structure, omega)
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: omega
+      type(acceleration_type) :: acceleration
+
+      is_smooth = structure%n_pairs == 0 .and. .not. allocated(structure%massive)
+      if (.not. is_smooth) return
+      call divide_by_mass(structure, omega, acceleration)
+      is_smooth = sqrt(maxval(sum(abs(acceleration%stiffness), dim=2))) <= moderate_ratio*omega
+   end function is_smooth
+
+   !> Prepare; samples are taken at n_samples uniform instants of the period.
+   subroutine new_smooth_integration(structure, observe, omega, n_samples, self)
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: observe(:, :)
+      real(wp), intent(in) :: omega
+      integer, intent(in) :: n_samples
+      type(smooth_integration), intent(out) :: self
+      integer :: i, n
+
+      n = structure%n_dof
+      call divide_by_mass(structure, omega, self%acceleration)
+      self%observe = observe
+      self%record = new_period_record(size(observe, 1), 0, n_samples)
+      allocate (self%weight(2*n))
+      do i = 1, n
+         self%weight(i) = sqrt(abs(structure%stiffness(i, i)) + omega**2*structure%mass(i, i))
+         self%weight(n + i) = sqrt(structure%mass(i, i))
+      end do
+   end subroutine new_smooth_integration
+
+   subroutine divide_by_mass(structure, omega, acceleration)
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: omega
+      type(acceleration_type), intent(out) :: acceleration
+      type(lu_type) :: mass
+      logical :: singular
+
+      acceleration%n = structure%n_dof
+      acceleration%omega = omega
+      call mass%reserve(structure%n_dof)
+      mass%matrix = structure%mass
+      call mass%factor(singular)
+      acceleration%stiffness = structure%stiffness
+      acceleration%damping = structure%damping
+      acceleration%load = structure%load
+      acceleration%rows = structure%rows
+      acceleration%springs = structure%rows
+      acceleration%coefficient = structure%coefficient
+      acceleration%power = structure%power
+      call solve_columns(mass, acceleration%stiffness)
+      call solve_columns(mass, acceleration%damping)
+      call solve_columns(mass, acceleration%load)
+      call solve_columns(mass, acceleration%springs)
+   end subroutine divide_by_mass
+
+   subroutine solve_columns(lu, columns)
+      type(lu_type), intent(in) :: lu
+      real(wp), intent(inout), contiguous :: columns(:, :)
+      integer :: j
+
+      do j = 1, size(columns, 2)
+         call lu%solve(columns(:, j))
+      end do
+   end subroutine solve_columns
+
+   !> Right-hand side for CVODE.
+   integer(c_int) function evaluate(t, y_vector, slope_vector, user_data) bind(c) result(status)
+      real(c_double), value :: t
+      type(n_vector) :: y_vector, slope_vector
+      type(c_ptr), value :: user_data
+      type(acceleration_type), pointer :: a
+      real(c_double), pointer :: y(:), slope(:)
+      integer :: i, n
+
+      call c_f_pointer(user_data, a)
+      y => fn_vgetarraypointer(y_vector)
+      slope => fn_vgetarraypointer(slope_vector)
+      n = a%n
+      slope(:n) = y(n + 1:2*n)
+      slope(n + 1:2*n) = a%load(:, 1) + cos(a%omega*t)*a%load(:, 2) + sin(a%omega*t)*a%load(:, 3)
+      do i = 1, n
+         slope(n + 1:2*n) = slope(n + 1:2*n) - y(i)*a%stiffness(:, i) - y(n + i)*a%damping(:, i)
+      end do
+      do i = 1, size(a%coefficient)
+         slope(n + 1:2*n) = slope(n + 1:2*n) - a%springs(:, i)*a%coefficient(i)* &
+                            dot_product(a%rows(:, i), y(:n))**a%power(i)
+      end do
+      status = 0
+   end function evaluate
+
+   !> One period from a state (displacements, velocities); see period_map.
+   subroutine integrate(self, start, finish, range, done)
+      class(smooth_integration), intent(inout) :: self
+      real(wp), intent(in), contiguous :: start(:)
+      real(wp), intent(out), contiguous :: finish(:)
+      real(wp), intent(out) :: range
+      logical, intent(out) :: done
+      type(acceleration_type), target :: acceleration
+      type(n_vector), pointer :: y_vector
+      type(sunmatrix), pointer :: matrix
+      type(sunlinearsolver), pointer :: solver
+      type(c_ptr) :: context, memory
+      real(c_double), allocatable, target :: y(:)
+      integer(c_int) :: status
+
+      acceleration = self%acceleration
+      y = start
+      finish = start
+      range = 0.0_wp
+      done = fsuncontext_create(c_null_ptr, context) == 0
+      if (.not. done) return
+      y_vector => fn_vmake_serial(int(size(y), i8), y, context)
+      matrix => fsundensematrix(int(size(y), i8), int(size(y), i8), context)
+      solver => fsunlinsol_dense(y_vector, matrix, context)
+      memory = fcvodecreate(cv_adams, context)
+      done = c_associated(memory)
+      if (done) then
+         done = fcvodeinit(memory, c_funloc(evaluate), 0.0_wp, y_vector) == 0
+         status = fcvodesstolerances(memory, relative_tolerance, &
+                                     absolute_share*max(maxval(abs(start)), tiny(1.0_wp)**0.5_wp))
+         status = fcvodesetuserdata(memory, c_loc(acceleration))
+         status = fcvodesetlinearsolver(memory, solver, matrix)
+         status = fcvodesetmaxnumsteps(memory, max_steps)
+         if (done) call march(self, memory, y_vector, start, y, range, done)
+         call fcvodefree(memory)
+      end if
+      finish = y
+      status = fsunlinsolfree(solver)
+      call fsunmatdestroy(matrix)
+      call fn_vdestroy(y_vector)
+      status = fsuncontext_free(context)
+   end subroutine integrate
+
+   !> From sample to sample, through the period.
+   subroutine march(self, memory, y_vector, start, y, range, done)
+      class(smooth_integration), intent(inout) :: self
+      type(c_ptr), intent(inout) :: memory
+      type(n_vector), intent(inout) :: y_vector
+      real(wp), intent(in) :: start(:)
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(out) :: range
+      logical, intent(out) :: done
+      real(c_double) :: reached(1)
+      real(wp) :: instant, period
+      integer :: k, n
+
+      n = self%acceleration%n
+      period = 2.0_wp*pi/self%acceleration%omega
+      range = 0.0_wp
+      done = fcvodesetstoptime(memory, period) == 0
+      do k = 1, self%record%n_steps
+         self%record%observed(:, k) = matmul(self%observe, y(:n))
+         instant = period*real(k, wp)/real(self%record%n_steps, wp)
+         done = fcvode(memory, instant, y_vector, reached, cv_normal) >= 0
+         if (.not. done) return
+         range = max(range, norm2(self%weight*(y - start)))
+      end do
+   end subroutine march
+
+end module fw_smooth_integration

@@ -1,0 +1,220 @@
+!> A structure with contact pairs and springs, prepared for integration in time:
+!>
+!>   M u'' + C u' + K u + B^T lambda = f_0 + f_c cos(omega t) + f_s sin(omega t)
+!>
+!> Rows of B are the relative displacements u(side_1) - u(side_2) of the components in use, pair by
+!> pair, then of the springs. The mass may be singular: its massless directions are separated by
+!> an orthogonal projection and follow the others without inertia.
+module fw_time_structure
+   use fw_kinds, only: wp
+   use fw_contact_data, only: contact_type
+   use fw_contact_data, only: law_penalty
+   use fw_contact_data, only: spring_type
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_failure
+   use fw_lapack, only: dgemm
+   use fw_lapack, only: dsyevd
+   use fw_model, only: model_type
+   implicit none (type, external)
+   private
+
+   public :: time_structure, new_time_structure
+
+   !> Share of the largest eigenvalue of the scaled mass below which a direction is massless.
+   real(wp), parameter :: massless_tolerance = 1.0e-12_wp
+   !> Part of a row of B that must lie in the massless directions to count.
+   real(wp), parameter :: massless_part = 1.0e-9_wp
+
+   type :: time_structure
+      integer :: n_dof = 0
+      integer :: n_pairs = 0
+      integer :: n_springs = 0
+      !> Rows of B: components of pairs, then springs.
+      integer :: n_rows = 0
+      real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :)
+      !> Static, cosine and sine loads in columns (n_dof, 3) [force].
+      real(wp), allocatable :: load(:, :)
+      !> B transposed (n_dof, n_rows), entries 0 and +-1.
+      real(wp), allocatable :: rows(:, :)
+      !> Row of each component of each pair, 0 where it is absent (3, n_pairs).
+      integer, allocatable :: row(:, :)
+      !> Whether a row moves without inertia (n_rows).
+      logical, allocatable :: massless(:)
+      !> 1/stiffness of the penalty law, 0 for rigid contact (n_rows) [length/force].
+      real(wp), allocatable :: compliance(:)
+      logical :: rigid = .true.
+      !> Friction coefficient, gap with wear [length], constant normal force [force] (n_pairs).
+      real(wp), allocatable :: mu(:), gap(:), normal_load(:)
+      !> Springs: force coefficient * e**power (n_springs).
+      real(wp), allocatable :: coefficient(:)
+      integer, allocatable :: power(:)
+      !> Projection on the directions with mass (n_dof, n_dof); not allocated where all have mass.
+      real(wp), allocatable :: massive(:, :)
+   contains
+      procedure :: project
+   end type time_structure
+
+contains
+
+   !> Prepare a model; `present` marks the components of the pairs that are in use (3, n_pairs).
+   subroutine new_time_structure(model, contact, springs, present, self, error)
+      type(model_type), intent(in) :: model
+      type(contact_type), intent(in) :: contact
+      type(spring_type), intent(in) :: springs
+      logical, intent(in) :: present(:, :)
+      type(time_structure), intent(out) :: self
+      !> status_failure where the eigenvalues of the mass cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+
+      self%n_dof = model%n_dof
+      self%n_pairs = contact%n_pairs
+      self%n_springs = springs%n_springs
+      self%mass = model%mass
+      self%damping = model%damping
+      self%stiffness = model%stiffness
+      self%load = reshape([model%load_static, model%load_cosine, model%load_sine], [model%n_dof, 3])
+      self%rigid = contact%law /= law_penalty
+      call take_pairs(contact, present, self)
+      call take_springs(springs, self)
+      call find_massless(self, error)
+   end subroutine new_time_structure
+
+   !> Components that an elastic law gives no stiffness transmit nothing and are left out.
+   subroutine take_pairs(contact, present, self)
+      type(contact_type), intent(in) :: contact
+      logical, intent(in) :: present(:, :)
+      type(time_structure), intent(inout) :: self
+      real(wp) :: stiffness
+      integer :: i, c
+
+      allocate (self%row(3, contact%n_pairs), source=0)
+      allocate (self%compliance(3*contact%n_pairs), source=0.0_wp)
+      allocate (self%rows(self%n_dof, 3*contact%n_pairs + self%n_springs), source=0.0_wp)
+      allocate (self%mu(0), self%gap(0), self%normal_load(0))
+      if (contact%n_pairs == 0) return
+      self%mu = contact%mu
+      self%gap = contact%gap
+      self%normal_load = merge(contact%normal_load, 0.0_wp, &
+                               contact%side_1(3, :) == 0 .and. contact%side_2(3, :) == 0)
+      do i = 1, contact%n_pairs
+         do c = 1, 3
+            if (.not. present(c, i)) cycle
+            if (.not. self%rigid) then
+               stiffness = contact%tangential_stiffness(i)
+               if (c == 3) stiffness = contact%normal_stiffness(i)
+               if (stiffness <= 0.0_wp) cycle
+               self%compliance(self%n_rows + 1) = 1.0_wp/stiffness
+            end if
+            self%n_rows = self%n_rows + 1
+            self%row(c, i) = self%n_rows
+            call add_side(self, contact%side_1(c, i), 1.0_wp)
+            call add_side(self, contact%side_2(c, i), -1.0_wp)
+         end do
+      end do
+   end subroutine take_pairs
+
+   subroutine take_springs(springs, self)
+      type(spring_type), intent(in) :: springs
+      type(time_structure), intent(inout) :: self
+      integer :: i
+
+      allocate (self%coefficient(0), self%power(0))
+      self%compliance = [self%compliance(:self%n_rows), (0.0_wp, i=1, springs%n_springs)]
+      do i = 1, springs%n_springs
+         self%n_rows = self%n_rows + 1
+         call add_side(self, springs%side_1(i), 1.0_wp)
+         call add_side(self, springs%side_2(i), -1.0_wp)
+      end do
+      self%rows = self%rows(:, :self%n_rows)
+      if (springs%n_springs == 0) return
+      self%coefficient = springs%coefficient
+      self%power = springs%power
+   end subroutine take_springs
+
+   pure subroutine add_side(self, side, sign)
+      type(time_structure), intent(inout) :: self
+      integer, intent(in) :: side
+      real(wp), intent(in) :: sign
+
+      if (side == 0) return
+      self%rows(abs(side), self%n_rows) = self%rows(abs(side), self%n_rows) + &
+                                          sign*real(merge(1, -1, side > 0), wp)
+   end subroutine add_side
+
+   !> Split the dofs by the eigenvectors of the mass scaled to a unit diagonal, so that mixed
+   !> units do not decide what counts as massless.
+   subroutine find_massless(self, error)
+      type(time_structure), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: vectors(:, :), values(:), null_space(:, :), scale(:), work(:)
+      integer, allocatable :: iwork(:)
+      integer :: n, n_null, info, i
+
+      n = self%n_dof
+      allocate (self%massless(self%n_rows), source=.false.)
+      allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
+      scale = [(merge(1.0_wp/sqrt(self%mass(i, i)), 1.0_wp, self%mass(i, i) > 0.0_wp), i=1, n)]
+      vectors = self%mass
+      do i = 1, n
+         vectors(:, i) = scale(:)*vectors(:, i)*scale(i)
+      end do
+      call dsyevd('V', 'U', n, vectors, n, values, work, size(work), iwork, size(iwork), info)
+      if (info /= 0) then
+         call fatal_error(error, 'the eigenvalues of the mass matrix could not be computed; '// &
+                          'check its values', status_failure)
+         return
+      end if
+      n_null = count(values <= massless_tolerance*max(values(n), 0.0_wp))
+      if (n_null == 0) return
+      null_space = vectors(:, :n_null)
+      do i = 1, n
+         null_space(i, :) = scale(i)*null_space(i, :)
+      end do
+      call orthonormalize(null_space)
+      allocate (self%massive(n, n), source=0.0_wp)
+      do i = 1, n
+         self%massive(i, i) = 1.0_wp
+      end do
+      call dgemm('N', 'T', n, n, n_null, -1.0_wp, null_space, n, null_space, n, 1.0_wp, &
+                 self%massive, n)
+      do i = 1, self%n_rows
+         self%massless(i) = norm2(matmul(self%rows(:, i), null_space)) > &
+                            massless_part*norm2(self%rows(:, i))
+      end do
+   end subroutine find_massless
+
+   !> Gram-Schmidt, twice, in place.
+   pure subroutine orthonormalize(columns)
+      real(wp), intent(inout) :: columns(:, :)
+      integer :: i, j, pass
+
+      do i = 1, size(columns, 2)
+         do pass = 1, 2
+            do j = 1, i - 1
+               columns(:, i) = columns(:, i) - &
+                               dot_product(columns(:, j), columns(:, i))*columns(:, j)
+            end do
+            columns(:, i) = columns(:, i)/norm2(columns(:, i))
+         end do
+      end do
+   end subroutine orthonormalize
+
+   !> Part of a vector in the directions with mass (n_dof).
+   pure subroutine project(self, vector, part)
+      class(time_structure), intent(in) :: self
+      real(wp), intent(in) :: vector(self%n_dof)
+      real(wp), intent(out) :: part(self%n_dof)
+      integer :: j
+
+      if (.not. allocated(self%massive)) then
+         part = vector
+         return
+      end if
+      part = 0.0_wp
+      do j = 1, self%n_dof
+         part = part + vector(j)*self%massive(:, j)
+      end do
+   end subroutine project
+
+end module fw_time_structure

@@ -1,0 +1,120 @@
+!> Periodic response by integration in time, with the method that the structure needs: the
+!> reference for harmonic balance on the same model, contact laws and loads.
+module fw_time_solution
+   use fw_kinds, only: wp
+   use fw_error, only: error_type
+   use fw_period_record, only: averaged_coefficients
+   use fw_period_record, only: largest_sample
+   use fw_period_record, only: period_record
+   use fw_period_record, only: sampled_coefficients
+   use fw_periodic_state, only: find_periodic_state
+   use fw_periodic_state, only: periodic_report
+   use fw_point, only: point_type
+   use fw_smooth_integration, only: is_smooth
+   use fw_smooth_integration, only: new_smooth_integration
+   use fw_smooth_integration, only: smooth_integration
+   use fw_time_options, only: time_options
+   use fw_time_stepper, only: new_time_stepper
+   use fw_time_stepper, only: time_stepper
+   use fw_time_structure, only: time_structure
+   implicit none (type, external)
+   private
+
+   public :: integrate_in_time, time_state
+
+   !> Where the integration starts, at t = 0.
+   type :: time_state
+      !> Displacement and velocity (n_dof).
+      real(wp), allocatable :: displacement(:), velocity(:)
+      !> Corrected tangential position of the pairs [length] (2, n_pairs).
+      real(wp), allocatable :: corrected(:, :)
+   end type time_state
+
+contains
+
+   !> Integrate to the periodic state and fill a point: coefficients up to n_harmonics, amplitudes,
+   !> contact forces, shares and work; `iterations` are the periods, `residual` the change from
+   !> one period to the next.
+   subroutine integrate_in_time(structure, observe, omega, options, tolerance, state, n_harmonics, &
+                                point, error)
+      type(time_structure), intent(in) :: structure
+      !> Observed quantities (n_observed, n_dof).
+      real(wp), intent(in) :: observe(:, :)
+      real(wp), intent(in) :: omega
+      type(time_options), intent(in) :: options
+      !> On the relative change from one period to the next.
+      real(wp), intent(in) :: tolerance
+      type(time_state), intent(in) :: state
+      !> At most half of the steps.
+      integer, intent(in) :: n_harmonics
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(periodic_report) :: report
+      type(smooth_integration) :: smooth
+      type(time_stepper) :: stepper
+      real(wp), allocatable :: vector(:)
+
+      if (is_smooth(structure, omega)) then
+         call new_smooth_integration(structure, observe, omega, options%steps_per_period, smooth)
+         vector = [state%displacement, state%velocity]
+         call find_periodic_state(smooth, options%n_periods, tolerance, vector, report)
+         call fill_point(smooth%record, n_harmonics, point)
+      else
+         call new_time_stepper(structure, observe, omega, options%steps_per_period, stepper, error)
+         if (allocated(error)) return
+         vector = stepper%pack_state(state%displacement, state%velocity, &
+                                     row_memory(structure, state%corrected))
+         call find_periodic_state(stepper, options%n_periods, tolerance, vector, report)
+         call fill_point(stepper%record, n_harmonics, point)
+         report%converged = report%converged .and. stepper%record%n_failed == 0
+      end if
+      point%omega = omega
+      point%iterations = report%n_periods
+      point%residual = report%change
+      point%converged = report%converged
+   end subroutine integrate_in_time
+
+   !> Corrected positions by rows (n_rows).
+   pure function row_memory(structure, corrected) result(memory)
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: corrected(:, :)
+      real(wp) :: memory(structure%n_rows)
+      integer :: i, c
+
+      memory = 0.0_wp
+      do i = 1, structure%n_pairs
+         do c = 1, 2
+            if (structure%row(c, i) > 0) memory(structure%row(c, i)) = corrected(c, i)
+         end do
+      end do
+   end function row_memory
+
+   subroutine fill_point(record, n_harmonics, point)
+      type(period_record), intent(in) :: record
+      integer, intent(in) :: n_harmonics
+      type(point_type), intent(inout) :: point
+      integer :: c, i, n_observed, n_pairs
+
+      n_observed = size(record%observed, 1)
+      n_pairs = size(record%work)
+      allocate (point%coefficients(2*n_harmonics + 1, n_observed), point%amplitude(n_observed))
+      point%history = transpose(record%observed + record%observed_mean)
+      do i = 1, n_observed
+         point%coefficients(:, i) = sampled_coefficients(record%observed(i, :), n_harmonics) + &
+                                    averaged_coefficients(record%observed_mean(i, :), n_harmonics)
+         point%amplitude(i) = largest_sample(point%history(:, i))
+      end do
+      if (n_pairs == 0) return
+      allocate (point%force(3, n_pairs, 2*n_harmonics + 1))
+      do i = 1, n_pairs
+         do c = 1, 3
+            point%force(c, i, :) = averaged_coefficients(record%force(c, i, :), n_harmonics)
+         end do
+      end do
+      point%fraction = record%share
+      point%dissipation = record%work
+      point%force_history = record%force
+      point%slip_history = record%slip
+   end subroutine fill_point
+
+end module fw_time_solution

@@ -1,0 +1,181 @@
+!> The step of fw_time_stepper: contact problem, changes of state, update and record.
+submodule(fw_time_stepper) fw_time_step
+   use fw_contact_step, only: state_stick
+   implicit none (type, external)
+
+contains
+
+   !> Solve a step from the present state without taking it. It is refused, unless it is the
+   !> smallest, where a pair changes its state or its contact problem is not solved.
+   module subroutine try_step(self, level, instant, accepted)
+      class(time_stepper), intent(inout) :: self
+      integer, intent(in) :: level
+      real(wp), intent(in) :: instant
+      logical, intent(out) :: accepted
+      logical :: done
+
+      associate (s => self%structure, step => self%step(level))
+         call mean_load(self, instant, step%duration, self%load)
+         call step%free_increment(s, self%displacement, self%velocity, self%load, self%increment)
+         call take_rows(s, self%displacement, self%row_position)
+         call take_rows(s, self%velocity, self%row_velocity)
+         call take_rows(s, self%increment, self%row_increment)
+         call set_references(self, step%h)
+         self%contact%force = self%last_force
+         call self%contact%solve(s, step%delassus, done)
+         call step%add_forces(s, self%contact%force, self%increment)
+         call take_rows(s, self%increment, self%row_increment)
+      end associate
+      accepted = .true.
+      if (level < self%n_levels) accepted = done .and. .not. any_change(self)
+      if (accepted .and. .not. done) self%record%n_failed = self%record%n_failed + 1
+   end subroutine try_step
+
+   !> Mean of the loads at both ends of a step, to which the prewarped step belongs.
+   pure subroutine mean_load(self, instant, duration, load)
+      class(time_stepper), intent(in) :: self
+      real(wp), intent(in) :: instant, duration
+      real(wp), intent(out) :: load(:)
+      real(wp) :: middle, share
+
+      share = cos(0.5_wp*self%omega*duration)
+      middle = 2.0_wp*pi*instant + 0.5_wp*self%omega*duration
+      load = self%structure%load(:, 1) + share*cos(middle)*self%structure%load(:, 2) + &
+             share*sin(middle)*self%structure%load(:, 3)
+   end subroutine mean_load
+
+   !> B x of a vector of dofs.
+   subroutine take_rows(structure, vector, rows)
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: vector(:)
+      real(wp), intent(out) :: rows(:)
+
+      if (structure%n_rows == 0) return
+      call dgemv('T', structure%n_dof, structure%n_rows, 1.0_wp, structure%rows, &
+                 structure%n_dof, vector, 1, 0.0_wp, rows, 1)
+   end subroutine take_rows
+
+   !> Measure the rows from where pairs stay closed and stuck: v+ = 0 means d = h v/4 ...
+   !> in positions, the gap closes or the corrected position is kept.
+   subroutine set_references(self, h)
+      class(time_stepper), intent(inout) :: self
+      real(wp), intent(in) :: h
+      integer :: i, c, r
+
+      associate (s => self%structure, free => self%contact%free)
+         do i = 1, s%n_pairs
+            self%contact%closed(i) = .true.
+            do c = 1, 3
+               r = s%row(c, i)
+               if (r == 0) cycle
+               if (.not. in_positions(s, r)) then
+                  free(r) = self%row_increment(r) - 0.25_wp*h*self%row_velocity(r)
+                  if (c == 3) self%contact%closed(i) = self%row_position(r) + s%gap(i) <= 0.0_wp
+               else if (c == 3) then
+                  free(r) = self%row_increment(r) + (self%row_position(r) + s%gap(i))
+               else
+                  free(r) = self%row_increment(r) + (self%row_position(r) - self%memory(r))
+               end if
+            end do
+         end do
+         do r = s%n_rows - s%n_springs + 1, s%n_rows
+            free(r) = self%row_increment(r) + self%row_position(r)
+         end do
+      end associate
+   end subroutine set_references
+
+   !> Whether the contact of a row is written in positions: massless or elastic.
+   elemental logical function in_positions(structure, row)
+      type(time_structure), intent(in) :: structure
+      integer, intent(in) :: row
+
+      in_positions = structure%massless(row) .or. structure%compliance(row) > 0.0_wp
+   end function in_positions
+
+   !> Whether a pair ends the step in another state than it started, or crosses its gap.
+   pure logical function any_change(self)
+      class(time_stepper), intent(in) :: self
+      integer :: i, c, r
+      real(wp) :: turn
+
+      any_change = .false.
+      associate (s => self%structure)
+         do i = 1, s%n_pairs
+            if (self%contact%state(i) /= self%last_state(i) .and. self%last_state(i) >= 0) then
+               any_change = .true.
+            else if (self%contact%state(i) == state_slip) then
+               turn = 0.0_wp
+               do c = 1, 2
+                  r = s%row(c, i)
+                  if (r > 0) turn = turn + self%contact%force(r)*self%last_force(r)
+               end do
+               any_change = turn < 0.0_wp
+            else if (.not. self%contact%closed(i)) then
+               r = s%row(3, i)
+               any_change = self%row_position(r) + 2.0_wp*self%row_increment(r) + s%gap(i) < 0.0_wp
+            end if
+            if (any_change) return
+         end do
+      end associate
+   end function any_change
+
+   !> Take the step that was tried last, and record it in a sample of the period.
+   module subroutine accept_step(self, level, sample)
+      class(time_stepper), intent(inout) :: self
+      integer, intent(in) :: level, sample
+      real(wp) :: share
+
+      share = self%step(level)%duration/self%step(0)%duration
+      associate (s => self%structure)
+         self%mean = self%displacement + self%increment
+         if (s%n_pairs > 0) call record_contact(self, share, sample)
+         call s%project(self%increment, self%part)
+         if (allocated(s%massive)) then
+            call s%project(self%mean, self%load)
+            self%record%observed_mean(:, sample) = self%record%observed_mean(:, sample) + &
+               share*matmul(self%observe, self%mean - self%load)
+         end if
+         self%velocity = 4.0_wp/self%step(level)%h*self%part - self%velocity
+         ! u+ = u + 2 d with mass, u + d without.
+         self%displacement = self%displacement + self%increment + self%part
+      end associate
+      self%last_force = self%contact%force
+      self%last_state = self%contact%state
+      self%record%n_taken = self%record%n_taken + 1
+   end subroutine accept_step
+
+   !> Means of forces and displacements, shares of the states, work; corrected positions move.
+   subroutine record_contact(self, share, sample)
+      class(time_stepper), intent(inout) :: self
+      real(wp), intent(in) :: share
+      integer, intent(in) :: sample
+      real(wp) :: period_share, step_length
+      integer :: i, c, r, place
+
+      period_share = share/real(self%record%n_steps, wp)
+      associate (s => self%structure, record => self%record, contact => self%contact)
+         do i = 1, s%n_pairs
+            do c = 1, 3
+               r = s%row(c, i)
+               if (r == 0) cycle
+               record%force(c, i, sample) = record%force(c, i, sample) + share*contact%force(r)
+               record%slip(c, i, sample) = record%slip(c, i, sample) + &
+                                           share*(self%row_position(r) + self%row_increment(r))
+               step_length = 2.0_wp*self%row_increment(r)
+               if (in_positions(s, r)) then
+                  step_length = 0.0_wp
+                  if (c < 3 .and. contact%state(i) /= state_stick) then
+                     step_length = contact%relative(r)
+                     self%memory(r) = self%memory(r) + step_length
+                  end if
+               end if
+               record%work(i) = record%work(i) + contact%force(r)*step_length
+            end do
+            if (s%row(3, i) == 0) record%force(3, i, sample) = -s%normal_load(i)
+            place = merge(3, contact%state(i), contact%state(i) == state_open)
+            record%share(place, i) = record%share(place, i) + period_share
+         end do
+      end associate
+   end subroutine record_contact
+
+end submodule fw_time_step
