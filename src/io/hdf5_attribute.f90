@@ -127,14 +127,17 @@ contains
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name, value
       type(error_type), allocatable, intent(out) :: error
+      type(string_type) :: strings(1)
       integer(hid_t) :: id, type_id
       integer :: status, ignored
 
+      ! Not by a structure constructor, whose text gfortran 12 does not free.
+      strings(1)%text = value
       type_id = new_string_type()
       call new_attribute(file, object, name, type_id, id, error)
       call h5tclose_f(type_id, ignored)
       if (allocated(error)) return
-      call put_strings(id, .true., [string_type(value)], status)
+      call put_strings(id, .true., strings, status)
       call h5aclose_f(id, ignored)
       if (status < 0) call attribute_failure(file, object, name, 'cannot be written', error)
    end subroutine write_attribute_text

@@ -59,8 +59,11 @@ contains
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name, text
       type(error_type), allocatable, intent(out) :: error
+      type(string_type) :: strings(1)
 
-      call write_strings(file, name, [integer ::], [string_type(text)], error)
+      ! Not by a structure constructor, whose text gfortran 12 does not free.
+      strings(1)%text = text
+      call write_strings(file, name, [integer ::], strings, error)
    end subroutine write_text_0
 
    subroutine write_text_1(file, name, texts, error)

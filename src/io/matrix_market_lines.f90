@@ -4,6 +4,10 @@
 module fw_matrix_market_lines
    use, intrinsic :: iso_fortran_env, only: iostat_end
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
+   use, intrinsic :: ieee_exceptions, only: ieee_overflow
+   use, intrinsic :: ieee_exceptions, only: ieee_set_flag
+   use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -235,10 +239,17 @@ contains
       character(*), intent(in) :: word
       real(wp), intent(out) :: number
       integer, intent(out) :: status
+      logical :: halting
 
       number = 0.0_wp
       status = verify(word, '+-.0123456789eEdD')
-      if (status == 0) read (word, *, iostat=status) number
+      if (status /= 0) return
+      ! '1e999' is an error in the file, even where the program traps overflows of its own.
+      call ieee_get_halting_mode(ieee_overflow, halting)
+      call ieee_set_halting_mode(ieee_overflow, .false.)
+      read (word, *, iostat=status) number
+      call ieee_set_flag(ieee_overflow, .false.)
+      call ieee_set_halting_mode(ieee_overflow, halting)
       if (status == 0 .and. .not. ieee_is_finite(number)) status = 1
    end subroutine to_real
 

@@ -199,6 +199,7 @@ contains
       type(hdf5_file), intent(in) :: file
       real(wp), allocatable, intent(in) :: history(:, :)
       type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: row(:, :)
       logical :: created
 
       created = self%list(d_observed)%is_created()
@@ -211,7 +212,8 @@ contains
                             [size(history, 2), size(history, 1)], error)
          if (allocated(error)) return
       end if
-      call self%list(d_observed)%append(file, transpose(history), error)
+      row = transpose(history)
+      call self%list(d_observed)%append(file, row, error)
    end subroutine append_observed
 
    !> Rows of (3, n_pairs, n_time).
