@@ -45,6 +45,8 @@ module fw_hbm
       real(wp), allocatable :: gap(:), depth(:), normal_load(:)
       !> F - Z q - f_springs, and the loads (n_coordinates, n_coefficients).
       real(wp), allocatable :: balance(:, :), load(:, :)
+      !> Share of the vibratory load that acts; below 1 only on the way to a first solution.
+      real(wp) :: load_share = 1.0_wp
       !> Workspace (n_coordinates, n_retained).
       complex(wp), allocatable :: complex_in(:, :), complex_out(:, :)
       ! The remaining linear problem, see fw_hbm_linear.
@@ -221,6 +223,11 @@ contains
       if (allocated(error)) return
       call to_real(self%fourier, self%structure%n_coordinates, self%structure%load, self%load)
       self%reference = load_norm(self)
+      if (self%fourier%has_constant()) then
+         self%load(:, 2:) = self%load_share*self%load(:, 2:)
+      else
+         self%load = self%load_share*self%load
+      end if
    end subroutine set_frequency
 
    !> The norm to which residuals are compared: that of the vibratory load. A large static load

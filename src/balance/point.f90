@@ -14,6 +14,8 @@ module fw_point
       !> Largest magnitude over the period (n_observed).
       real(wp), allocatable :: amplitude(:)
       logical :: converged = .false.
+      !> The branch turns here.
+      logical :: fold = .false.
       integer :: iterations = 0
       !> norm(R)/norm(F) at the end.
       real(wp) :: residual = 0.0_wp

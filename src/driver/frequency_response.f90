@@ -3,6 +3,7 @@ module fw_frequency_response
    use fw_kinds, only: wp
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
+   use fw_branch, only: run_branch
    use fw_error, only: error_type
    use fw_hbm, only: hbm_system
    use fw_observer, only: observer_type
@@ -10,6 +11,7 @@ module fw_frequency_response
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
    use fw_result, only: result_writer
+   use fw_solver_options, only: continuation_arclength
    use fw_summary, only: summary_type
    implicit none (type, external)
    private
@@ -21,9 +23,9 @@ contains
    !> Solve every point, in the order given; each is written as soon as it is known.
    subroutine run_frequency_response(case, observer, writer, summary, error)
       type(case_type), intent(in) :: case
-      class(observer_type), intent(inout) :: observer
-      type(result_writer), intent(inout) :: writer
-      type(summary_type), intent(inout) :: summary
+      class(observer_type), intent(inout), target :: observer
+      type(result_writer), intent(inout), target :: writer
+      type(summary_type), intent(inout), target :: summary
       type(error_type), allocatable, intent(out) :: error
       type(hbm_system), target :: system
       type(point_solver) :: solver
@@ -33,6 +35,13 @@ contains
       call build_system(case, system, error)
       if (allocated(error)) return
       call solver%start(case, system%n)
+      if (case%analysis == analysis_frf .and. case%sweep%continuation == continuation_arclength) then
+         call observer%on_start(case%title, 0)
+         call run_branch(case, system, solver, observer, writer, summary, error)
+         call observer%on_end()
+         call summary%describe_work(system, solver%newton%linear)
+         return
+      end if
       n_points = 1
       if (case%analysis == analysis_frf) n_points = case%sweep%n_points
       call observer%on_start(case%title, n_points)

@@ -1,4 +1,5 @@
-!> One solution point: warm start, other guesses, intermediate frequencies, then what is reported.
+!> One solution point: warm start, other guesses, intermediate frequencies or loads, then what is
+!> reported.
 module fw_point_solver
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
@@ -23,6 +24,8 @@ module fw_point_solver
 
    !> Halvings of a frequency step that fails.
    integer, parameter :: max_halvings = 6
+   !> First and smallest step of the load on the way to a first solution.
+   real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
    type :: point_solver
       type(newton_solver) :: newton
@@ -62,7 +65,7 @@ contains
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
-      call approach(self, system, omega, 0, report, point%iterations, error)
+      call reach(self, system, omega, report, point%iterations, error)
       if (allocated(error)) return
       point%omega = omega
       point%converged = report%converged
@@ -78,7 +81,80 @@ contains
       point%seconds = real(clock_end - clock, wp)/real(rate, wp)
    end subroutine solve
 
-   !> Newton from the best guesses known; where all fail, first go half of the way.
+   !> Newton from the best guesses known. Where all fail: from the last point on the sweep by
+   !> halves, or to the first point by raising the load; and at last from the solution without
+   !> contact, which may lie on another branch.
+   subroutine reach(self, system, omega, report, iterations, error)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout), target :: system
+      real(wp), intent(in) :: omega
+      type(solver_report), intent(out) :: report
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: closest(:)
+
+      call approach(self, system, omega, 0, report, iterations, error)
+      if (allocated(error)) return
+      if (report%converged .or. .not. self%newton%options%fallback) return
+      if (self%n_converged == 0) then
+         call raise_load(self, system, omega, report, iterations, error)
+         if (allocated(error) .or. report%converged) return
+      end if
+      closest = self%x
+      call free_guess(system, self%x)
+      call solve_balance(self, system, report)
+      iterations = iterations + report%iterations
+      if (report%converged) then
+         call remember(self, omega)
+      else
+         self%x = closest
+      end if
+   end subroutine reach
+
+   !> From the static position to the full vibratory load, by steps that adapt.
+   subroutine raise_load(self, system, omega, report, iterations, error)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout), target :: system
+      real(wp), intent(in) :: omega
+      type(solver_report), intent(out) :: report
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: reached(:)
+      real(wp) :: share, step
+
+      share = 0.0_wp
+      step = first_load_step
+      system%load_share = 0.0_wp
+      call system%set_frequency(omega, error)
+      if (allocated(error)) return
+      call stuck_guess(system, self%x)
+      reached = self%x
+      do
+         system%load_share = min(1.0_wp, share + step)
+         call system%set_frequency(omega, error)
+         if (allocated(error)) exit
+         call solve_balance(self, system, report)
+         iterations = iterations + report%iterations
+         if (report%converged) then
+            reached = self%x
+            share = system%load_share
+            if (share >= 1.0_wp) exit
+            step = 1.5_wp*step
+         else
+            self%x = reached
+            step = 0.5_wp*step
+            if (step < smallest_load_step) exit
+         end if
+      end do
+      system%load_share = 1.0_wp
+      if (report%converged) then
+         call remember(self, omega)
+      else if (.not. allocated(error)) then
+         call system%set_frequency(omega, error)
+      end if
+   end subroutine raise_load
+
+   !> Newton from the guesses; where they fail, first go half of the way from the last point.
    recursive subroutine approach(self, system, omega, depth, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(hbm_system), intent(inout), target :: system
@@ -105,7 +181,7 @@ contains
       if (report%converged) call remember(self, omega)
    end subroutine approach
 
-   !> Extrapolation along the sweep, the last solution, all stuck, all free.
+   !> Extrapolation along the sweep, the last solution, all stuck.
    subroutine try_guesses(self, system, omega, report, iterations)
       class(point_solver), intent(inout) :: self
       type(hbm_system), intent(inout), target :: system
@@ -118,7 +194,7 @@ contains
       first = 3
       if (self%n_converged > 0) first = 2
       if (self%n_converged > 1) first = 1
-      do guess = first, 4
+      do guess = first, 3
          select case (guess)
          case (1)
             step = (omega - self%omega_last)/(self%omega_last - self%omega_before)
@@ -127,8 +203,6 @@ contains
             self%x = self%last
          case (3)
             call stuck_guess(system, self%x)
-         case (4)
-            call free_guess(system, self%x)
          end select
          call solve_balance(self, system, report)
          iterations = iterations + report%iterations

@@ -21,12 +21,15 @@ module fw_summary
       integer :: n_points = 0
       integer :: n_converged = 0
       integer :: iterations = 0
+      !> The run ended before it had covered what was asked for.
+      logical :: incomplete = .false.
       type(string_type), allocatable :: name(:)
       !> Largest amplitude of each observed quantity among converged points, and where [rad/s].
       real(wp), allocatable :: peak(:), peak_omega(:)
       type(string_type), allocatable :: work(:)
    contains
       procedure :: add
+      procedure :: mark_incomplete
       procedure :: describe_work
       procedure :: lines
    end type summary_type
@@ -58,6 +61,12 @@ contains
          self%peak_omega(i) = point%omega
       end do
    end subroutine add
+
+   subroutine mark_incomplete(self)
+      class(summary_type), intent(inout) :: self
+
+      self%incomplete = .true.
+   end subroutine mark_incomplete
 
    !> What the linear solver did, and what the case did not need.
    subroutine describe_work(self, system, linear)

@@ -7,7 +7,7 @@ module fw_available
                                    method_tcm_least_squares, method_hdhb, sampling_words, &
                                    sampling_uniform
    use fw_solver_options, only: solver_words, solver_newton, continuation_words, &
-                                continuation_natural
+                                continuation_natural, continuation_arclength
    implicit none (type, external)
    private
 
@@ -27,7 +27,7 @@ contains
       call check('harmonics%sampling', sampling_words, case%harmonics%sampling, [sampling_uniform])
       call check('solver%kind', solver_words, case%solver%kind, [solver_newton])
       call check('sweep%continuation', continuation_words, case%sweep%continuation, &
-                 [continuation_natural])
+                 [continuation_natural, continuation_arclength])
       call check_off('harmonics%adaptive', case%harmonics%adaptive)
       call check_off('sweep%stability', case%sweep%stability)
 

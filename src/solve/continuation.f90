@@ -1,0 +1,302 @@
+!> Pseudo-arclength continuation of R(x, p) = 0 (Keller 1977) with analytic dR/dp: predictor along
+!> the tangent, Newton corrector orthogonal to it, adaptive step, folds located on the way.
+!>
+!> Lengths are measured with x over its own scale and p over the length of its interval, so that
+!> a step means the same in every system of units.
+module fw_continuation
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use fw_kinds, only: wp
+   use fw_error, only: error_type
+   use fw_linear_step, only: linear_step_type
+   use fw_newton, only: solver_report
+   use fw_parameter_system, only: parameter_system
+   use fw_solver_options, only: solver_options
+   implicit none (type, external)
+   private
+
+   public :: arclength_type, branch_observer
+
+   !> Receives the points of a branch in order.
+   type, abstract :: branch_observer
+   contains
+      procedure(take_point), deferred :: take
+   end type branch_observer
+
+   abstract interface
+      !> A converged point; `fold` marks the points where p turns.
+      subroutine take_point(self, x, p, report, fold, error)
+         import :: branch_observer, wp, solver_report, error_type
+         class(branch_observer), intent(inout) :: self
+         real(wp), intent(in), contiguous :: x(:)
+         real(wp), intent(in) :: p
+         type(solver_report), intent(in) :: report
+         logical, intent(in) :: fold
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine take_point
+   end interface
+
+   !> A point of the branch with its unit tangent.
+   type :: branch_point
+      real(wp), allocatable :: x(:), t(:)
+      real(wp) :: p = 0.0_wp
+      real(wp) :: t_p = 0.0_wp
+   end type branch_point
+
+   type :: arclength_type
+      type(solver_options) :: options
+      type(linear_step_type) :: linear
+      !> The interval of p: from start to finish.
+      real(wp) :: start = 0.0_wp
+      real(wp) :: finish = 1.0_wp
+      !> First step as a share of the interval.
+      real(wp) :: step = 0.01_wp
+      integer :: max_points = 1000
+      !> Scales of x (at least; it follows the branch) and p in lengths.
+      real(wp) :: x_scale = 0.0_wp
+      real(wp) :: p_scale = 1.0_wp
+      !> Why the branch ended.
+      character(:), allocatable :: ending
+      !> Whether it ended at a bound of the interval.
+      logical :: complete = .false.
+   contains
+      procedure :: trace
+   end type arclength_type
+
+   !> Corrector iterations: more than the last is a failure; the others steer the step.
+   integer, parameter :: max_corrections = 14, quick = 3, slow = 7
+   !> Steps between these multiples of the first one.
+   real(wp), parameter :: largest_growth = 2.0_wp, smallest_share = 1.0e-5_wp
+   !> Iterative linear solutions: the tangent needs more digits than a Newton step.
+   real(wp), parameter :: forcing = 1.0e-6_wp
+   !> A fold is located when p changes by less than this part of itself.
+   real(wp), parameter :: fold_tolerance = 1.0e-10_wp
+   integer, parameter :: max_fold_steps = 40
+
+contains
+
+   !> Follow the branch from a converged x at p = start until finish, in either direction of p.
+   subroutine trace(self, system, x, observer, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      class(branch_observer), intent(inout) :: observer
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: here, next
+      type(solver_report) :: report
+      real(wp) :: ds
+      integer :: k
+      logical :: done
+
+      call begin(self, system, x, here, error)
+      ds = self%step
+      do k = 2, self%max_points
+         if (allocated(error)) return
+         call advance(self, system, here, ds, next, report, done, error)
+         if (allocated(error)) return
+         if (.not. done) then
+            self%ending = 'the corrector failed at the smallest step'
+            return
+         end if
+         if (here%t_p*next%t_p < 0.0_wp) call report_fold(self, system, here, next, ds, observer, error)
+         if (allocated(error)) return
+         if ((next%p - self%start)*(next%p - self%finish) > 0.0_wp) then
+            call land(self, system, here, next, observer, error)
+            return
+         end if
+         call observer%take(next%x, next%p, report, .false., error)
+         if (allocated(error)) return
+         if (report%iterations <= quick) ds = min(1.4_wp*ds, largest_growth*self%step)
+         if (report%iterations >= slow) ds = 0.6_wp*ds
+         here = next
+      end do
+      self%ending = 'max_points was reached'
+   end subroutine trace
+
+   !> The first point and its tangent, towards finish.
+   subroutine begin(self, system, x, here, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      type(branch_point), intent(out) :: here
+      type(error_type), allocatable, intent(out) :: error
+      logical :: done
+
+      self%linear%kind = self%options%linear
+      self%p_scale = max(abs(self%finish - self%start), tiny(1.0_wp))
+      here%x = x
+      here%p = self%start
+      self%x_scale = max(self%x_scale, norm2(x), tiny(1.0_wp))
+      allocate (here%t(size(x)), source=0.0_wp)
+      here%t_p = sign(1.0_wp, self%finish - self%start)
+      call system%set_parameter(here%p, error)
+      if (allocated(error)) return
+      call find_tangent(self, system, here, here, done)
+   end subroutine begin
+
+   !> Unit tangent (dx/dp, 1) at a point, in the direction of another one's.
+   subroutine find_tangent(self, system, previous, point, done)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: previous
+      type(branch_point), intent(inout) :: point
+      logical, intent(out) :: done
+      real(wp), allocatable :: r(:), slope(:), t(:)
+      real(wp) :: length, direction
+
+      allocate (r(system%n), slope(system%n), t(system%n))
+      call system%residual(point%x, r)
+      call self%linear%prepare(system, done)
+      if (.not. done) return
+      call system%parameter_derivative(point%x, slope)
+      call self%linear%solve_prepared(system, slope, forcing, t, done)
+      if (.not. done) return
+      length = sqrt(inner(self, t, 1.0_wp, t, 1.0_wp))
+      direction = sign(1.0_wp, inner(self, t, 1.0_wp, previous%t, previous%t_p))
+      point%t = direction*t/length
+      point%t_p = direction/length
+   end subroutine find_tangent
+
+   pure real(wp) function inner(self, x1, p1, x2, p2)
+      class(arclength_type), intent(in) :: self
+      real(wp), intent(in) :: x1(:), p1, x2(:), p2
+
+      inner = dot_product(x1, x2)/self%x_scale**2 + p1*p2/self%p_scale**2
+   end function inner
+
+   !> Take a step, halving it until the corrector converges.
+   subroutine advance(self, system, here, ds, next, report, done, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here
+      real(wp), intent(inout) :: ds
+      type(branch_point), intent(out) :: next
+      type(solver_report), intent(out) :: report
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+
+      self%x_scale = max(self%x_scale, norm2(here%x))
+      do
+         call correct(self, system, here, ds, next, report, error)
+         if (allocated(error)) return
+         done = report%converged
+         if (done) return
+         ds = 0.5_wp*ds
+         if (ds < smallest_share*self%step) return
+      end do
+   end subroutine advance
+
+   !> Newton's method on R = 0 with the distance along the tangent fixed to ds.
+   subroutine correct(self, system, here, ds, next, report, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here
+      real(wp), intent(in) :: ds
+      type(branch_point), intent(out) :: next
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: r(:), step(:), slope(:), dx_dp(:)
+      real(wp) :: dp, before
+      logical :: done
+
+      allocate (r(system%n), step(system%n), slope(system%n), dx_dp(system%n))
+      next%x = here%x + ds*here%t
+      next%p = here%p + ds*here%t_p
+      before = huge(1.0_wp)
+      do
+         call system%set_parameter(next%p, error)
+         if (allocated(error)) return
+         call system%residual(next%x, r)
+         report%residual = norm2(r)/system%reference
+         report%converged = report%residual <= self%options%tolerance
+         if (report%converged .or. report%iterations == max_corrections) exit
+         if (.not. ieee_is_finite(report%residual)) exit
+         if (report%residual > 1.0e3_wp*before) exit
+         before = report%residual
+         call self%linear%solve(system, r, forcing, step, done)
+         if (.not. done) exit
+         call system%parameter_derivative(next%x, slope)
+         call self%linear%solve_prepared(system, slope, forcing, dx_dp, done)
+         report%iterations = report%iterations + 1
+         dp = -inner(self, here%t, here%t_p, step, 0.0_wp)/inner(self, here%t, here%t_p, dx_dp, 1.0_wp)
+         next%x = next%x + step + dp*dx_dp
+         next%p = next%p + dp
+      end do
+      if (report%converged) then
+         call find_tangent(self, system, here, next, done)
+         report%converged = done
+      end if
+   end subroutine correct
+
+   !> Between two points whose tangents differ in the sign of dp/ds lies a fold: regula falsi
+   !> (Illinois) on that sign.
+   subroutine report_fold(self, system, here, next, ds, observer, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here, next
+      real(wp), intent(in) :: ds
+      class(branch_observer), intent(inout) :: observer
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: middle
+      type(solver_report) :: report
+      real(wp) :: low, high, at_low, at_high, s, p_before
+      integer :: k
+
+      low = 0.0_wp
+      high = ds
+      at_low = here%t_p
+      at_high = next%t_p
+      p_before = huge(1.0_wp)
+      do k = 1, max_fold_steps
+         s = (low*at_high - high*at_low)/(at_high - at_low)
+         call correct(self, system, here, s, middle, report, error)
+         if (allocated(error)) return
+         if (.not. report%converged) return
+         if (abs(middle%p - p_before) <= fold_tolerance*abs(middle%p)) exit
+         p_before = middle%p
+         if (middle%t_p*at_low > 0.0_wp) then
+            low = s
+            at_low = middle%t_p
+            at_high = 0.5_wp*at_high
+         else
+            high = s
+            at_high = middle%t_p
+            at_low = 0.5_wp*at_low
+         end if
+      end do
+      call observer%take(middle%x, middle%p, report, .true., error)
+   end subroutine report_fold
+
+   !> The branch leaves the interval: its last point lies exactly on the bound.
+   subroutine land(self, system, here, next, observer, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here, next
+      class(branch_observer), intent(inout) :: observer
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp), allocatable :: x(:), r(:), step(:)
+      real(wp) :: bound, share
+      logical :: done
+
+      bound = merge(self%start, self%finish, (next%p - self%start)*(self%finish - self%start) < 0.0_wp)
+      share = (bound - here%p)/(next%p - here%p)
+      x = here%x + share*(next%x - here%x)
+      allocate (r(system%n), step(system%n))
+      call system%set_parameter(bound, error)
+      if (allocated(error)) return
+      do
+         call system%residual(x, r)
+         report%residual = norm2(r)/system%reference
+         report%converged = report%residual <= self%options%tolerance
+         if (report%converged .or. report%iterations == max_corrections) exit
+         call self%linear%solve(system, r, forcing, step, done)
+         if (.not. done) exit
+         x = x + step
+         report%iterations = report%iterations + 1
+      end do
+      self%ending = 'the branch left the interval of frequencies'
+      self%complete = report%converged
+      call observer%take(x, bound, report, .false., error)
+   end subroutine land
+
+end module fw_continuation
