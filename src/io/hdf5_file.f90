@@ -8,7 +8,6 @@ module fw_hdf5_file
    use fw_error, only: fatal_error
    use fw_error, only: status_input
    use fw_error, only: status_io
-   use fw_text, only: to_text
    use hdf5, only: hid_t
    use hdf5, only: hsize_t
    use hdf5, only: h5open_f

@@ -7,9 +7,11 @@ module fw_model_file
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
+   use fw_hdf5, only: dataset_failure
    use fw_hdf5, only: hdf5_file
    use fw_hdf5, only: has_attribute
    use fw_hdf5, only: read_attribute
+   use fw_hdf5, only: read_dataset
    use fw_kinds, only: wp
    use fw_model_file_parts, only: read_dofs
    use fw_model_file_parts, only: read_matrix
@@ -183,8 +185,6 @@ contains
 
    !> Turn signed dof numbers into rows of the observation matrix.
    subroutine read_observed_dofs(file, model, error)
-      use fw_hdf5, only: read_dataset
-      use fw_hdf5, only: dataset_failure
       type(hdf5_file), intent(in) :: file
       type(file_model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
