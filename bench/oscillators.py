@@ -15,7 +15,7 @@ import numpy as np
 
 from measure import ROOT, Bench, Floats, Groups
 
-__all__ = ["HARMONICS", "INSTANTS", "Sample", "measure_oscillators"]
+__all__ = ["HARMONICS", "INSTANTS", "Sample", "measure_oscillators", "two_dof"]
 
 HARMONICS = (1, 3, 7, 15, 31)
 INSTANTS = (64, 256, 1024)
@@ -72,9 +72,10 @@ def relative_error(coefficients: Floats, reference: Floats) -> float:
 
 def load_cases() -> list[Case]:
     """One or two cases of each kind, none of them near a fold."""
-    return [duffing(), coulomb("c0.1_N0.4_w0.9"), coulomb("ss_c0.05_N1.6_w0.7"),
-            jenkins("jenkins_F1.0_w1.2"), gap("gap_g0.5_F0.3_w1.15"),
-            two_dof("A_stickslip"), two_dof("E_separation")]
+    return [duffing(), jenkins("jenkins_F1.0_w1.2"), gap("gap_g0.0_F0.3_w1.35"),
+            two_dof("A_stickslip"), two_dof("E_separation"),
+            coulomb("c0.1_N0.4_w0.9", "dlft"), coulomb("c0.1_N0.4_w0.9", "dlft_velocity"),
+            coulomb("ss_c0.1_N1.2_w0.4", "dlft"), coulomb("ss_c0.1_N1.2_w0.4", "dlft_velocity")]
 
 
 def duffing() -> Case:
@@ -87,15 +88,15 @@ def duffing() -> Case:
     return Case("Duffing", groups, reference(point))
 
 
-def coulomb(key: str) -> Case:
+def coulomb(key: str, law: str) -> Case:
     """Rigid friction under a constant normal load on a mass."""
     item = read("b_coulomb")[key]
     p = item["params"]
     groups = single(p, p["F"], p["omega"])
-    groups["contact"] = {"n_pairs": 1, "law": "dlft", "side_1": [1, 0, 0], "mu": p["mu"],
+    groups["contact"] = {"n_pairs": 1, "law": law, "side_1": [1, 0, 0], "mu": p["mu"],
                          "normal_load": p["N0"]}
     kind = "stick and slip" if key.startswith("ss") else "slip only"
-    return Case(f"Coulomb, {kind}", groups, reference(item))
+    return Case(f"Coulomb, {kind}, {law}", groups, reference(item))
 
 
 def jenkins(key: str) -> Case:

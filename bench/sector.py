@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from measure import ROOT, Bench, Groups, Run
+from oscillators import two_dof
 
 __all__ = ["HARMONICS", "PAIRS", "Crossing", "PointTime", "Sweep", "measure_crossing",
            "measure_points", "measure_sweeps", "measure_threads"]
@@ -17,9 +18,10 @@ HARMONICS = (1, 3, 7, 17)
 PAIRS = (16, 48)
 #: Beyond this many unknowns a dense LU factorization takes minutes a sweep.
 LARGEST_LU = 1100
-#: The sweep around the peak goes down: upwards Newton loses the joint near the peak (see the
-#: whole sweeps), and points without contact would be measured.
-NEAR_PEAK = {"start": 1008.0, "end": 1003.0, "n_points": 8, "unit": "Hz"}
+#: Around the peak [Hz], at 4400 rpm: half of the pairs slip, and every point is usable.
+PEAKS = {8: 1017.6, 16: 1022.7, 48: 1017.8}
+HALF_WIDTH, N_NEAR = 2.0, 9
+SLOW, FAST = 261.8, 460.8
 WHOLE = {"start": 1000.0, "end": 1015.0, "n_points": 41, "unit": "Hz"}
 
 
@@ -49,19 +51,25 @@ class Sweep:
 class Crossing:
     """Time of a Newton step with either linear solver [s] against the unknowns left."""
 
-    pairs: int
+    case: str
     n_harmonics: int
     unknowns_left: int
     lu: float
     krylov: float
 
 
+def near_peak(pairs: int) -> dict[str, object]:
+    """A short sweep through the peak."""
+    return {"start": PEAKS[pairs] - HALF_WIDTH, "end": PEAKS[pairs] + HALF_WIDTH,
+            "n_points": N_NEAR, "unit": "Hz"}
+
+
 def case(pairs: int, n_harmonics: int, sweep: dict[str, object], linear: str = "auto",
-         file: Path | None = None) -> Groups:
-    """The sector at 2500 rpm under a tip force of 0.5 N."""
+         file: Path | None = None, speed: float = FAST) -> Groups:
+    """The sector under a tip force of 0.5 N."""
     model = file or ROOT / "example" / "blade_sector" / f"sector_{pairs}.h5"
     return {"case": {"title": f"sector, {pairs} pairs", "analysis": "frf"},
-            "model": {"source": "hdf5", "file": model, "rotation_speed": 261.8,
+            "model": {"source": "hdf5", "file": model, "rotation_speed": speed,
                       "modal_damping": 1e-3},
             "load": {"harmonic_scale": 0.5},
             "harmonics": {"n_harmonics": n_harmonics, "n_time": 128},
@@ -80,7 +88,7 @@ def measure_points(bench: Bench) -> list[PointTime]:
                     points.append(PointTime(pairs, n_harmonics, linear, float("nan"), unknowns,
                                             None))
                     continue
-                seconds, run = bench.repeat(case(pairs, n_harmonics, NEAR_PEAK, linear),
+                seconds, run = bench.repeat(case(pairs, n_harmonics, near_peak(pairs), linear),
                                             lambda run: float(run.seconds.mean()), most=3)
                 points.append(PointTime(pairs, n_harmonics, linear, seconds, run.unknowns, run))
     return points
@@ -94,7 +102,7 @@ def measure_threads(bench: Bench) -> list[tuple[int, int, float]]:
         for threads in (1, 2):
             if threads > usable:
                 continue
-            seconds, _ = bench.repeat(case(48, n_harmonics, NEAR_PEAK),
+            seconds, _ = bench.repeat(case(48, n_harmonics, near_peak(48)),
                                       lambda run: float(run.seconds.mean()), threads, most=3)
             rows.append((n_harmonics, threads, seconds))
     return rows
@@ -107,7 +115,7 @@ def measure_sweeps(bench: Bench) -> list[Sweep]:
     for pairs, n_harmonics in ((48, 7), (16, 3)):
         for direction, sweep in (("down", down), ("up", WHOLE)):
             for threads in (1, min(2, len(os.sched_getaffinity(0)))):
-                seconds, run = bench.repeat(case(pairs, n_harmonics, sweep),
+                seconds, run = bench.repeat(case(pairs, n_harmonics, sweep, speed=SLOW),
                                             lambda run: run.elapsed, threads, most=3)
                 sweeps.append(Sweep(f"{pairs} pairs, H = {n_harmonics}, {direction}", threads,
                                     seconds, run))
@@ -116,18 +124,28 @@ def measure_sweeps(bench: Bench) -> list[Sweep]:
 
 def measure_crossing(bench: Bench) -> list[Crossing]:
     """Time of a Newton step of growing size with LU and with GMRES."""
-    grid = {8: (1, 2, 3, 5, 7), 16: (1, 2, 3, 5), 48: (1,)}
+    grid = {8: (1, 2, 3, 5, 7), 16: (1, 2, 3, 5, 7), 48: (1, 3)}
     rows = []
     for pairs, harmonics in grid.items():
         file = sector_file(pairs, bench.folder)
         for n_harmonics in harmonics[:2] if bench.quick else harmonics:
-            times, left = {}, 0
-            for linear in ("lu", "krylov"):
-                times[linear], run = bench.repeat(case(pairs, n_harmonics, NEAR_PEAK, linear, file),
-                                                  step_seconds, most=5, budget=2.5)
-                left = run.unknowns_left
-            rows.append(Crossing(pairs, n_harmonics, left, times["lu"], times["krylov"]))
+            groups = case(pairs, n_harmonics, near_peak(pairs), file=file)
+            rows.append(cross(bench, f"sector, {pairs} pairs", n_harmonics, groups))
+    small = two_dof("A_stickslip").groups
+    for n_harmonics in (1, 31) if bench.quick else (1, 3, 7, 15, 31):
+        groups = small | {"harmonics": {"n_harmonics": n_harmonics, "n_time": 128}}
+        rows.append(cross(bench, "two dofs", n_harmonics, groups))
     return sorted(rows, key=lambda row: row.unknowns_left)
+
+
+def cross(bench: Bench, name: str, n_harmonics: int, groups: Groups) -> Crossing:
+    """One case with both linear solvers."""
+    times, left = {}, 0
+    for linear in ("lu", "krylov"):
+        times[linear], run = bench.repeat(groups | {"solver": {"linear": linear}}, step_seconds,
+                                          budget=2.5)
+        left = run.unknowns_left
+    return Crossing(name, n_harmonics, left, times["lu"], times["krylov"])
 
 
 def step_seconds(run: Run) -> float:
