@@ -5,7 +5,7 @@ module fw_lapack
    private
 
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd, dgecon
-   public :: dlange
+   public :: dlange, dgeev
 
    interface
       subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
@@ -104,6 +104,16 @@ module fw_lapack
          integer, intent(inout) :: iwork(*)
          integer, intent(out) :: info
       end subroutine dgecon
+
+      subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
+         import :: wp
+         character, intent(in) :: jobvl, jobvr
+         integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+         real(wp), intent(inout) :: a(lda, *), vl(ldvl, *), vr(ldvr, *)
+         real(wp), intent(out) :: wr(*), wi(*)
+         real(wp), intent(inout) :: work(*)
+         integer, intent(out) :: info
+      end subroutine dgeev
 
       function dlange(norm, m, n, a, lda, work) result(value)
          import :: wp

@@ -1,0 +1,289 @@
+!> Derivative of the nonlinear forces at a periodic solution, as an operator between the Fourier
+!> coefficients 0..H' of a perturbation: force(output row) = block * displacement(input row).
+!>
+!> Springs and unilateral contact act at an instant, so that the block is the multiplication by
+!> the slope s(tau). That of a spring is a polynomial in tau, integrated without error. That of a
+!> contact jumps between 0 and k: its coefficients come from the instants where the gap closes
+!> and opens, found on the polynomial itself, so that the sampling leaves no error either.
+!>
+!> Friction remembers. Its block is the derivative of the periodic response (the march through
+!> the period with its memory). It says how the force follows a perturbation of the same period,
+!> so that it is exact where a multiplier passes 1, and a quasi-linear approximation elsewhere.
+module fw_stability_tangent
+   use fw_forces, only: forces_type
+   use fw_forces, only: new_forces
+   use fw_forces, only: pair_open
+   use fw_forces, only: pair_stuck
+   use fw_fourier, only: coefficient_count
+   use fw_fourier, only: fourier_type
+   use fw_fourier, only: new_fourier
+   use fw_hbm, only: hbm_system
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: tangent_type, new_tangent
+
+   type :: tangent_type
+      !> Harmonics of the perturbation, H', and its real coefficients per row.
+      integer :: n_harmonics = 0
+      integer :: n_coefficients = 0
+      integer :: n_terms = 0
+      !> Rows of the joint (n_terms).
+      integer, allocatable :: output(:), input(:)
+      !> (output coefficient, input coefficient, term) [force/length].
+      real(wp), allocatable :: block(:, :, :)
+   end type tangent_type
+
+   !> Instants of the march per harmonic: with fewer, the sampling of the switches shows.
+   integer, parameter :: instants_friction = 32
+   !> Points per harmonic between which a gap is taken to change its sign once at most.
+   integer, parameter :: points_per_harmonic = 32
+
+contains
+
+   !> The derivative at the solution x of a system (penalty law and springs).
+   subroutine new_tangent(system, x, n_harmonics, self)
+      class(hbm_system), intent(in) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      !> H', at least the highest harmonic of the solution.
+      integer, intent(in) :: n_harmonics
+      type(tangent_type), intent(out) :: self
+      real(wp), allocatable :: rows(:, :)
+      integer :: i, n_terms
+
+      self%n_harmonics = n_harmonics
+      self%n_coefficients = coefficient_count(n_harmonics)
+      n_terms = system%springs%n_springs
+      do i = 1, system%contact%n_pairs
+         n_terms = n_terms + count(system%joint%row(:, i) > 0)**2
+      end do
+      allocate (self%output(n_terms), self%input(n_terms))
+      allocate (self%block(self%n_coefficients, self%n_coefficients, n_terms))
+      call relative_displacements(system, system%structure%n_coordinates, x, n_harmonics, rows)
+      call add_springs(system, rows, self)
+      call add_gaps(system, rows, self)
+      call add_friction(system, rows, self)
+   end subroutine new_tangent
+
+   !> Coefficients 0..H' of the relative displacement of every row (2H'+1, n_rows).
+   pure subroutine relative_displacements(system, m, q, n_harmonics, rows)
+      class(hbm_system), intent(in) :: system
+      integer, intent(in) :: m, n_harmonics
+      real(wp), intent(in) :: q(m, *)
+      real(wp), allocatable, intent(out) :: rows(:, :)
+      integer :: row, e, h, n, column
+
+      associate (r => system%joint%relative, f => system%fourier)
+         allocate (rows(coefficient_count(n_harmonics), r%n_rows), source=0.0_wp)
+         do row = 1, r%n_rows
+            do e = r%first(row), r%first(row + 1) - 1
+               do h = 1, f%n_retained
+                  n = f%harmonic(h)
+                  column = f%column(h)
+                  associate (weight => r%coefficient(e), j => r%coordinate(e))
+                     if (n == 0) then
+                        rows(1, row) = rows(1, row) + weight*q(j, column)
+                     else
+                        rows(2*n:2*n + 1, row) = rows(2*n:2*n + 1, row) + &
+                                                 weight*q(j, column:column + 1)
+                     end if
+                  end associate
+               end do
+            end do
+         end do
+      end associate
+   end subroutine relative_displacements
+
+   pure subroutine add_springs(system, rows, self)
+      class(hbm_system), intent(in) :: system
+      real(wp), intent(in) :: rows(:, :)
+      type(tangent_type), intent(inout) :: self
+      type(fourier_type) :: fourier
+      real(wp), allocatable :: slope(:)
+      integer :: i, row, power
+
+      do i = 1, system%springs%n_springs
+         row = system%joint%spring_row(i)
+         power = system%springs%power(i)
+         ! Exact: the slope has power - 1 times the harmonics, the block adds two times H'.
+         fourier = new_fourier(self%n_harmonics, max(4, power + 1)*self%n_harmonics + 2)
+         slope = matmul(rows(:, row), fourier%synthesis)
+         slope = system%springs%coefficient(i)*real(power, wp)*slope**(power - 1)
+         call add_multiplication(fourier, slope, row, self)
+      end do
+   end subroutine add_springs
+
+   !> Pairs that bear without friction.
+   pure subroutine add_gaps(system, rows, self)
+      class(hbm_system), intent(in) :: system
+      real(wp), intent(in) :: rows(:, :)
+      type(tangent_type), intent(inout) :: self
+      type(fourier_type) :: fourier, wide
+      real(wp), allocatable :: gap(:), slope(:)
+      integer :: i, row
+
+      fourier = new_fourier(self%n_harmonics, 4*self%n_harmonics + 2)
+      wide = new_fourier(2*self%n_harmonics, 4*self%n_harmonics + 2)
+      do i = 1, system%contact%n_pairs
+         row = system%joint%row(3, i)
+         if (row == 0 .or. has_friction(system, i)) cycle
+         gap = rows(:, row)
+         gap(1) = gap(1) + system%gap(i) + system%depth(i)
+         ! Harmonics above 2 H' of the slope couple nothing.
+         slope = matmul(closed_share(gap, 2*self%n_harmonics), wide%synthesis)
+         slope = system%stiffness(i, 3)*slope
+         call add_multiplication(fourier, slope, row, self)
+      end do
+   end subroutine add_gaps
+
+   pure logical function has_friction(system, pair)
+      class(hbm_system), intent(in) :: system
+      integer, intent(in) :: pair
+
+      has_friction = system%contact%mu(pair) > 0.0_wp .and. any(system%joint%row(1:2, pair) > 0)
+   end function has_friction
+
+   !> The operator of a product with slope(tau), projected: a term from a row to itself.
+   pure subroutine add_multiplication(fourier, slope, row, self)
+      type(fourier_type), intent(in) :: fourier
+      !> At the instants (n_time).
+      real(wp), intent(in) :: slope(:)
+      integer, intent(in) :: row
+      type(tangent_type), intent(inout) :: self
+      real(wp) :: weighted(fourier%n_time, fourier%n_coefficients)
+      integer :: k
+
+      do k = 1, fourier%n_time
+         weighted(k, :) = slope(k)*fourier%synthesis(:, k)
+      end do
+      self%n_terms = self%n_terms + 1
+      self%output(self%n_terms) = row
+      self%input(self%n_terms) = row
+      self%block(:, :, self%n_terms) = matmul(fourier%analysis, weighted)
+   end subroutine add_multiplication
+
+   !> Coefficients 0..n_harmonics of the function that is 1 where the gap is negative, else 0.
+   pure function closed_share(gap, n_harmonics) result(share)
+      !> Coefficients of the gap.
+      real(wp), intent(in) :: gap(:)
+      integer, intent(in) :: n_harmonics
+      real(wp) :: share(coefficient_count(n_harmonics))
+      real(wp) :: before, after, tau, sign, spacing
+      integer :: k, m, n_points
+
+      n_points = points_per_harmonic*max(1, size(gap)/2)
+      spacing = 2.0_wp*pi/real(n_points, wp)
+      share = 0.0_wp
+      after = value_at(gap, 0.0_wp)
+      if (after < 0.0_wp) share(1) = 1.0_wp
+      do k = 1, n_points
+         before = after
+         after = value_at(gap, modulo(k, n_points)*spacing)
+         if ((before < 0.0_wp) .eqv. (after < 0.0_wp)) cycle
+         tau = crossing(gap, (k - 1)*spacing, k*spacing, before < 0.0_wp)
+         ! The primitive of the base functions counts where contact ends, less where it begins.
+         sign = merge(1.0_wp, -1.0_wp, before < 0.0_wp)
+         share(1) = share(1) + sign*tau/(2.0_wp*pi)
+         do m = 1, n_harmonics
+            share(2*m) = share(2*m) + sign*sin(m*tau)/(m*pi)
+            share(2*m + 1) = share(2*m + 1) - sign*cos(m*tau)/(m*pi)
+         end do
+      end do
+   end function closed_share
+
+   !> Where the gap changes its sign, by bisection.
+   pure real(wp) function crossing(gap, from, to, negative) result(middle)
+      real(wp), intent(in) :: gap(:), from, to
+      !> Whether the gap is negative at the lower end.
+      logical, intent(in) :: negative
+      ! Leaves 2**-50 of a spacing below 0.2, the round-off of tau.
+      integer, parameter :: n_halvings = 50
+      real(wp) :: low, high
+      integer :: i
+
+      low = from
+      high = to
+      do i = 1, n_halvings
+         middle = 0.5_wp*(low + high)
+         if ((value_at(gap, middle) < 0.0_wp) .eqv. negative) then
+            low = middle
+         else
+            high = middle
+         end if
+      end do
+   end function crossing
+
+   pure real(wp) function value_at(coefficients, tau) result(value)
+      real(wp), intent(in) :: coefficients(:), tau
+      integer :: n
+
+      value = coefficients(1)
+      do n = 1, size(coefficients)/2
+         value = value + coefficients(2*n)*cos(n*tau) + coefficients(2*n + 1)*sin(n*tau)
+      end do
+   end function value_at
+
+   !> Pairs with friction, from the derivative of their march.
+   subroutine add_friction(system, rows, self)
+      class(hbm_system), intent(in) :: system
+      real(wp), intent(in) :: rows(:, :)
+      type(tangent_type), intent(inout) :: self
+      type(fourier_type) :: fourier
+      type(forces_type) :: forces
+      logical :: rubs(system%contact%n_pairs)
+      integer :: i, c
+
+      rubs = [(has_friction(system, i), i=1, size(rubs))]
+      if (.not. any(rubs)) return
+      fourier = new_fourier(self%n_harmonics, max(system%fourier%n_time, &
+                                                  instants_friction*self%n_harmonics))
+      forces = new_forces(system%contact%mu, system%joint%row > 0, fourier)
+      forces%x_start = system%contact%x_start
+      forces%offset = merge(system%stiffness(:, 3)*(system%gap + system%depth), &
+                            -system%normal_load, system%joint%row(3, :) > 0)
+      do i = 1, size(rubs)
+         do c = 1, 3
+            if (system%joint%row(c, i) == 0) cycle
+            forces%prediction(i, c, :) = system%stiffness(i, c)*rows(:, system%joint%row(c, i))
+         end do
+      end do
+      call forces%evaluate(fourier)
+      call forces%linearize(fourier)
+      do i = 1, size(rubs)
+         if (rubs(i) .and. forces%state(i) /= pair_open) call add_pair(system, forces, i, self)
+      end do
+   end subroutine add_friction
+
+   !> All couples of components of a pair; a stuck one is a spring in each direction.
+   pure subroutine add_pair(system, forces, pair, self)
+      class(hbm_system), intent(in) :: system
+      type(forces_type), intent(in) :: forces
+      integer, intent(in) :: pair
+      type(tangent_type), intent(inout) :: self
+      integer :: c, d, j, nc
+
+      nc = self%n_coefficients
+      do d = 1, 3
+         do c = 1, 3
+            if (system%joint%row(c, pair) == 0 .or. system%joint%row(d, pair) == 0) cycle
+            self%n_terms = self%n_terms + 1
+            self%output(self%n_terms) = system%joint%row(c, pair)
+            self%input(self%n_terms) = system%joint%row(d, pair)
+            associate (block => self%block(:, :, self%n_terms))
+               block = 0.0_wp
+               if (forces%state(pair) /= pair_stuck) then
+                  block = transpose(forces%jacobian((d - 1)*nc + 1:d*nc, (c - 1)*nc + 1:c*nc, pair))
+               else if (c == d) then
+                  do j = 1, nc
+                     block(j, j) = 1.0_wp
+                  end do
+               end if
+               block = system%stiffness(pair, d)*block
+            end associate
+         end do
+      end do
+   end subroutine add_pair
+
+end module fw_stability_tangent
