@@ -18,6 +18,7 @@ module fw_smooth_integration
    use fcvode_mod, only: fcvodecreate
    use fcvode_mod, only: fcvodefree
    use fcvode_mod, only: fcvodeinit
+   use fcvode_mod, only: fcvodeseterrfile
    use fcvode_mod, only: fcvodesetlinearsolver
    use fcvode_mod, only: fcvodesetmaxnumsteps
    use fcvode_mod, only: fcvodesetstoptime
@@ -48,18 +49,19 @@ module fw_smooth_integration
 
    public :: smooth_integration, new_smooth_integration, is_smooth
 
-   !> Relative tolerance, and absolute tolerance as a share of the largest entry of the state.
+   !> Relative tolerance, and absolute tolerance as a share of the largest entry of the state or
+   !> of the displacement that the load would give the mass alone.
    real(wp), parameter :: relative_tolerance = 1.0e-12_wp, absolute_share = 1.0e-13_wp
    !> Highest frequency over that of the load up to which the steps of the Adams formulas, which
    !> it bounds, are not too many.
    real(wp), parameter :: moderate_ratio = 200.0_wp
    integer(c_long), parameter :: max_steps = 1000000_c_long
 
-   !> x'' = acceleration (x, v) + load - springs, all divided by the mass.
+   !> In tau = omega t, with w = dx/dtau: dw/dtau = load - stiffness x - damping w - springs, all
+   !> divided by the mass and omega**2, so that both halves of the state have one unit.
    type :: acceleration_type
       integer :: n = 0
-      real(wp) :: omega = 0.0_wp
-      !> M^-1 of stiffness and damping (n, n), loads (n, 3) and rows of springs (n, n_springs).
+      !> Stiffness and damping (n, n), loads (n, 3) and rows of springs (n, n_springs).
       real(wp), allocatable :: stiffness(:, :), damping(:, :), load(:, :), springs(:, :)
       real(wp), allocatable :: rows(:, :), coefficient(:)
       integer, allocatable :: power(:)
@@ -67,6 +69,7 @@ module fw_smooth_integration
 
    type, extends(period_map) :: smooth_integration
       type(acceleration_type) :: acceleration
+      real(wp) :: omega = 0.0_wp
       !> Observed quantities (n_observed, n_dof).
       real(wp), allocatable :: observe(:, :)
       type(period_record) :: record
@@ -85,7 +88,7 @@ contains
       is_smooth = structure%n_pairs == 0 .and. .not. allocated(structure%massive)
       if (.not. is_smooth) return
       call divide_by_mass(structure, omega, acceleration)
-      is_smooth = sqrt(maxval(sum(abs(acceleration%stiffness), dim=2))) <= moderate_ratio*omega
+      is_smooth = sqrt(maxval(sum(abs(acceleration%stiffness), dim=2))) <= moderate_ratio
    end function is_smooth
 
    !> Prepare; samples are taken at n_samples uniform instants of the period.
@@ -99,6 +102,7 @@ contains
 
       n = structure%n_dof
       call divide_by_mass(structure, omega, self%acceleration)
+      self%omega = omega
       self%observe = observe
       self%record = new_period_record(size(observe, 1), 0, n_samples)
       allocate (self%weight(2*n))
@@ -116,7 +120,6 @@ contains
       logical :: singular
 
       acceleration%n = structure%n_dof
-      acceleration%omega = omega
       call mass%reserve(structure%n_dof)
       mass%matrix = structure%mass
       call mass%factor(singular)
@@ -131,6 +134,10 @@ contains
       call solve_columns(mass, acceleration%damping)
       call solve_columns(mass, acceleration%load)
       call solve_columns(mass, acceleration%springs)
+      acceleration%stiffness = acceleration%stiffness/omega**2
+      acceleration%damping = acceleration%damping/omega
+      acceleration%load = acceleration%load/omega**2
+      acceleration%springs = acceleration%springs/omega**2
    end subroutine divide_by_mass
 
    subroutine solve_columns(lu, columns)
@@ -157,7 +164,7 @@ contains
       slope => fn_vgetarraypointer(slope_vector)
       n = a%n
       slope(:n) = y(n + 1:2*n)
-      slope(n + 1:2*n) = a%load(:, 1) + cos(a%omega*t)*a%load(:, 2) + sin(a%omega*t)*a%load(:, 3)
+      slope(n + 1:2*n) = a%load(:, 1) + cos(t)*a%load(:, 2) + sin(t)*a%load(:, 3)
       do i = 1, n
          slope(n + 1:2*n) = slope(n + 1:2*n) - y(i)*a%stiffness(:, i) - y(n + i)*a%damping(:, i)
       end do
@@ -182,9 +189,11 @@ contains
       type(c_ptr) :: context, memory
       real(c_double), allocatable, target :: y(:)
       integer(c_int) :: status
+      integer :: n
 
       acceleration = self%acceleration
-      y = start
+      n = acceleration%n
+      y = [start(:n), start(n + 1:)/self%omega]
       finish = start
       range = 0.0_wp
       done = fsuncontext_create(c_null_ptr, context) == 0
@@ -196,15 +205,17 @@ contains
       done = c_associated(memory)
       if (done) then
          done = fcvodeinit(memory, c_funloc(evaluate), 0.0_wp, y_vector) == 0
-         status = fcvodesstolerances(memory, relative_tolerance, &
-                                     absolute_share*max(maxval(abs(start)), tiny(1.0_wp)**0.5_wp))
+         status = fcvodesstolerances(memory, relative_tolerance, absolute_share*max( &
+                                     maxval(abs(y)), maxval(abs(acceleration%load)), tiny(1.0_wp)))
+         ! A failure is reported to the caller, not on the terminal.
+         status = fcvodeseterrfile(memory, c_null_ptr)
          status = fcvodesetuserdata(memory, c_loc(acceleration))
          status = fcvodesetlinearsolver(memory, solver, matrix)
          status = fcvodesetmaxnumsteps(memory, max_steps)
          if (done) call march(self, memory, y_vector, start, y, range, done)
          call fcvodefree(memory)
       end if
-      finish = y
+      finish = [y(:n), self%omega*y(n + 1:)]
       status = fsunlinsolfree(solver)
       call fsunmatdestroy(matrix)
       call fn_vdestroy(y_vector)
@@ -221,19 +232,18 @@ contains
       real(wp), intent(out) :: range
       logical, intent(out) :: done
       real(c_double) :: reached(1)
-      real(wp) :: instant, period
+      real(wp) :: instant
       integer :: k, n
 
       n = self%acceleration%n
-      period = 2.0_wp*pi/self%acceleration%omega
       range = 0.0_wp
-      done = fcvodesetstoptime(memory, period) == 0
+      done = fcvodesetstoptime(memory, 2.0_wp*pi) == 0
       do k = 1, self%record%n_steps
          self%record%observed(:, k) = matmul(self%observe, y(:n))
-         instant = period*real(k, wp)/real(self%record%n_steps, wp)
+         instant = 2.0_wp*pi*real(k, wp)/real(self%record%n_steps, wp)
          done = fcvode(memory, instant, y_vector, reached, cv_normal) >= 0
          if (.not. done) return
-         range = max(range, norm2(self%weight*(y - start)))
+         range = max(range, norm2(self%weight*([y(:n), self%omega*y(n + 1:)] - start)))
       end do
    end subroutine march
 

@@ -149,7 +149,7 @@ contains
       class(time_stepper), intent(inout) :: self
       real(wp), intent(in) :: share
       integer, intent(in) :: sample
-      real(wp) :: period_share, step_length
+      real(wp) :: period_share, step_length, force
       integer :: i, c, r, place
 
       period_share = share/real(self%record%n_steps, wp)
@@ -162,14 +162,17 @@ contains
                record%slip(c, i, sample) = record%slip(c, i, sample) + &
                                            share*(self%row_position(r) + self%row_increment(r))
                step_length = 2.0_wp*self%row_increment(r)
+               force = contact%force(r)
                if (in_positions(s, r)) then
                   step_length = 0.0_wp
                   if (c < 3 .and. contact%state(i) /= state_stick) then
                      step_length = contact%relative(r)
                      self%memory(r) = self%memory(r) + step_length
+                     ! From the middle of the last step to that of this one.
+                     force = 0.5_wp*(force + self%last_force(r))
                   end if
                end if
-               record%work(i) = record%work(i) + contact%force(r)*step_length
+               record%work(i) = record%work(i) + force*step_length
             end do
             if (s%row(3, i) == 0) record%force(3, i, sample) = -s%normal_load(i)
             place = merge(3, contact%state(i), contact%state(i) == state_open)

@@ -1,0 +1,218 @@
+!> Analysis 'time': the periodic response by integration in time at the frequencies of a sweep,
+!> the reference for harmonic balance.
+!>
+!> The integration starts from the harmonic balance solution of the case, or from its first guess
+!> where that does not converge: this saves periods and picks the branch. What is written is the
+!> last period as integrated; it is `converged` only where it repeats by itself.
+module fw_time_response
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_kinds, only: wp
+   use fw_case, only: analysis_frf
+   use fw_case, only: case_type
+   use fw_contact_data, only: law_dlft_velocity
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_guess, only: stuck_guess
+   use fw_harmonics_options, only: method_hbm
+   use fw_hbm, only: hbm_system
+   use fw_observer, only: observer_type
+   use fw_point, only: point_type
+   use fw_point_solver, only: point_solver
+   use fw_problem, only: build_system
+   use fw_recovery, only: recover_point
+   use fw_result, only: result_writer
+   use fw_summary, only: summary_type
+   use fw_text, only: to_text
+   use fw_time_solution, only: integrate_in_time
+   use fw_time_solution, only: time_state
+   use fw_time_structure, only: new_time_structure
+   use fw_time_structure, only: time_structure
+   implicit none (type, external)
+   private
+
+   public :: run_time_response
+
+   !> Tightest relative change from period to period that is asked for: changes of state that move
+   !> by one of the smallest steps keep it from vanishing.
+   real(wp), parameter :: tightest_change = 1.0e-8_wp
+
+contains
+
+   !> Integrate at every frequency of the sweep, in the order given; each point is written as soon
+   !> as it is known.
+   subroutine run_time_response(case, observer, writer, summary, error)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+      type(result_writer), intent(inout) :: writer
+      type(summary_type), intent(inout) :: summary
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: start_case
+      type(hbm_system) :: system
+      type(point_solver) :: solver
+      type(time_structure) :: structure
+      type(point_type) :: point
+      integer :: k, n_points
+
+      call check_steps(case, error)
+      if (allocated(error)) return
+      n_points = 1
+      if (case%sweep%end > 0.0_wp) n_points = case%sweep%n_points
+      start_case = case_of_start(case, n_points)
+      call build_system(start_case, system, error)
+      if (allocated(error)) return
+      call solver%start(start_case, system%n)
+      call new_time_structure(case%model, case%contact, case%springs, system%joint%row > 0, &
+                              structure, error)
+      if (allocated(error)) return
+      call observer%on_start(case%title, n_points)
+      do k = 1, n_points
+         call solve_point(case, start_case, system, solver, structure, &
+                          frequency(start_case, k, n_points), observer, point, error)
+         if (allocated(error)) exit
+         call writer%add_point(point, error)
+         if (allocated(error)) exit
+         call summary%add(point)
+         call observer%on_point(k, n_points, point)
+      end do
+      call observer%on_end()
+   end subroutine run_time_response
+
+   !> The coefficients of the result need instants.
+   subroutine check_steps(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: fewest = 16
+      integer :: least
+
+      least = max(fewest, 4*case%harmonics%n_harmonics)
+      if (case%time%steps_per_period >= least) return
+      call fatal_error(error, '&time steps_per_period = '//to_text(case%time%steps_per_period)// &
+                       ': must be at least max('//to_text(fewest)//', 4*n_harmonics) = '// &
+                       to_text(least), status_input)
+   end subroutine check_steps
+
+   !> The case of which the harmonic balance solution gives the initial state: all dofs are
+   !> observed.
+   function case_of_start(case, n_points) result(start)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: n_points
+      type(case_type) :: start
+      integer :: i
+
+      start = case
+      start%analysis = analysis_frf
+      start%harmonics%method = method_hbm
+      start%output%contact = .false.
+      start%output%histories = .false.
+      if (n_points == 1) start%sweep%end = case%sweep%start
+      deallocate (start%model%observe_matrix)
+      allocate (start%model%observe_matrix(case%model%n_dof, case%model%n_dof), source=0.0_wp)
+      do i = 1, case%model%n_dof
+         start%model%observe_matrix(i, i) = 1.0_wp
+      end do
+   end function case_of_start
+
+   !> Evenly spaced from start to end, both exact.
+   pure real(wp) function frequency(case, k, n_points) result(omega)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: k, n_points
+      real(wp) :: share
+
+      omega = case%sweep%start
+      if (n_points == 1) return
+      share = real(k - 1, wp)/real(n_points - 1, wp)
+      omega = (1.0_wp - share)*case%sweep%start + share*case%sweep%end
+   end function frequency
+
+   !> Initial state, integration, time spent.
+   subroutine solve_point(case, start_case, system, solver, structure, omega, observer, point, error)
+      type(case_type), intent(in) :: case, start_case
+      type(hbm_system), intent(inout), target :: system
+      type(point_solver), intent(inout) :: solver
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: omega
+      class(observer_type), intent(inout) :: observer
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(time_state) :: state
+      integer(int64) :: clock, clock_end, rate
+
+      call system_clock(clock, rate)
+      call initial_state(start_case, system, solver, structure, omega, observer, state, error)
+      if (allocated(error)) return
+      call integrate_in_time(structure, case%model%observe_matrix, omega, case%time, &
+                             max(case%solver%tolerance, tightest_change), state, &
+                             case%harmonics%n_harmonics, point, error)
+      if (allocated(error)) return
+      if (.not. case%output%histories) then
+         deallocate (point%history)
+         if (allocated(point%force_history)) deallocate (point%force_history, point%slip_history)
+      end if
+      if (.not. case%output%contact .and. allocated(point%force)) then
+         deallocate (point%force, point%fraction, point%dissipation)
+      end if
+      call system_clock(clock_end)
+      point%seconds = real(clock_end - clock, wp)/real(rate, wp)
+   end subroutine solve_point
+
+   !> Displacements and velocities at t = 0 of the harmonic balance solution, and where its pairs
+   !> stick.
+   subroutine initial_state(case, system, solver, structure, omega, observer, state, error)
+      type(case_type), intent(in) :: case
+      type(hbm_system), intent(inout), target :: system
+      type(point_solver), intent(inout) :: solver
+      type(time_structure), intent(in) :: structure
+      real(wp), intent(in) :: omega
+      class(observer_type), intent(inout) :: observer
+      type(time_state), intent(out) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: balance
+      integer :: h
+
+      call solver%solve(case, system, omega, balance, error)
+      if (allocated(error)) return
+      if (.not. balance%converged) then
+         call observer%on_message('harmonic balance did not converge: the integration in time '// &
+                                  'starts from the stuck response')
+         call stuck_guess(system, solver%x)
+         deallocate (balance%coefficients, balance%amplitude)
+         call recover_point(system, solver%x, case%harmonics%n_harmonics, .false., balance)
+      end if
+      associate (c => balance%coefficients)
+         state%displacement = c(1, :)
+         allocate (state%velocity(size(c, 2)), source=0.0_wp)
+         do h = 1, case%harmonics%n_harmonics
+            state%displacement = state%displacement + c(2*h, :)
+            state%velocity = state%velocity + real(h, wp)*omega*c(2*h + 1, :)
+         end do
+      end associate
+      call take_corrected(case, system, structure, balance%converged, state)
+   end subroutine initial_state
+
+   !> Corrected positions: those of the march where there is one, the displacements themselves
+   !> where the law is written in velocities, the unstrained assembly otherwise.
+   subroutine take_corrected(case, system, structure, converged, state)
+      type(case_type), intent(in) :: case
+      type(hbm_system), intent(in) :: system
+      type(time_structure), intent(in) :: structure
+      logical, intent(in) :: converged
+      type(time_state), intent(inout) :: state
+      integer :: i, c, r
+
+      allocate (state%corrected(2, structure%n_pairs), source=0.0_wp)
+      if (.not. converged) return
+      do i = 1, structure%n_pairs
+         do c = 1, 2
+            r = structure%row(c, i)
+            if (r == 0) cycle
+            if (case%contact%law == law_dlft_velocity) then
+               state%corrected(c, i) = dot_product(structure%rows(:, r), state%displacement)
+            else if (system%stiffness(i, c) > 0.0_wp) then
+               state%corrected(c, i) = system%contact%x(i, c)/system%stiffness(i, c)
+            end if
+         end do
+      end do
+   end subroutine take_corrected
+
+end module fw_time_response
