@@ -49,7 +49,7 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Time of a Newton step with either linear solver [s] against the unknowns left."""
+    """Time of a point with either linear solver [s] against the unknowns left."""
 
     case: str
     n_harmonics: int
@@ -123,7 +123,7 @@ def measure_sweeps(bench: Bench) -> list[Sweep]:
 
 
 def measure_crossing(bench: Bench) -> list[Crossing]:
-    """Time of a Newton step of growing size with LU and with GMRES."""
+    """Time of a point of growing size with LU and with GMRES."""
     grid = {8: (1, 2, 3, 5, 7), 16: (1, 2, 3, 5, 7), 48: (1, 3)}
     rows = []
     for pairs, harmonics in grid.items():
@@ -142,15 +142,10 @@ def cross(bench: Bench, name: str, n_harmonics: int, groups: Groups) -> Crossing
     """One case with both linear solvers."""
     times, left = {}, 0
     for linear in ("lu", "krylov"):
-        times[linear], run = bench.repeat(groups | {"solver": {"linear": linear}}, step_seconds,
-                                          budget=2.5)
+        times[linear], run = bench.repeat(groups | {"solver": {"linear": linear}},
+                                          lambda run: float(run.seconds.mean()), budget=2.5)
         left = run.unknowns_left
     return Crossing(name, n_harmonics, left, times["lu"], times["krylov"])
-
-
-def step_seconds(run: Run) -> float:
-    """Time of a Newton step, with its share of everything else that a point needs."""
-    return float(run.seconds.sum() / max(1, run.iterations.sum()))
 
 
 def sector_file(pairs: int, folder: Path) -> Path:
