@@ -1,0 +1,118 @@
+"""Every example runs and gives the number that its README promises."""
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLE = ROOT / "example"
+FW_RUN = os.environ.get("FW_RUN", str(ROOT / "build" / "release" / "fw_run"))
+
+# Namelist: (dataset, rows, column, number, relative tolerance). `rows` is a frequency [rad/s], or
+# None for the largest value of the sweep. Numbers of oscillators are exact solutions (see the
+# READMEs), tolerances what the harmonics or instants of the example leave; those of the sector are
+# the program's own, to the digits that other processors and thread counts reproduce.
+NUMBERS = {
+    "duffing/duffing.nml": [("amplitude", 1.43, 0, 1.719445704, 5e-7)],
+    "coulomb/coulomb.nml": [("amplitude", 0.9, 0, 4.127829467, 1e-2),
+                            ("amplitude", 0.9, 0, 4.0902, 2e-5)],
+    "jenkins/jenkins.nml": [("amplitude", 1.0, 0, 9.468233129, 1e-6),
+                            ("contact/dissipation", 1.0, 0, 17.936466258, 5e-6),
+                            ("amplitude", None, 0, 9.784333, 1e-6)],
+    "gap/gap.nml": [("amplitude", 1.15, 0, 1.332770444, 5e-6)],
+    "separation/separation.nml": [("amplitude", 0.9, 0, 2.240312606, 5e-6),
+                                  ("contact/dissipation", 0.9, 0, 2.830244154, 2e-5)],
+    "blade_sector/frf.nml": [("amplitude", None, 0, 0.8830621, 1e-6)],
+    "blade_sector/frf_stuck.nml": [("amplitude", None, 0, 1.6722078, 1e-6)],
+    "blade_sector/frf_48.nml": [("amplitude", None, 0, 0.9286232, 1e-6)],
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Result file of a namelist, computed once."""
+    folder, done = tmp_path_factory.mktemp("examples"), {}
+
+    def run(name):
+        if name not in done:
+            path = folder / (Path(name).stem + ".h5")
+            process = subprocess.run(
+                [FW_RUN, "-q", "-o", str(path), str(EXAMPLE / name)],
+                capture_output=True, text=True, check=False, timeout=120)
+            assert process.returncode == 0, process.stderr
+            done[name] = path
+        return done[name]
+
+    return run
+
+
+def test_every_example_is_listed():
+    found = {str(path.relative_to(EXAMPLE)) for path in EXAMPLE.rglob("*.nml")}
+    assert found == set(NUMBERS)
+    assert all((EXAMPLE / name).with_name("README.md").exists() for name in found)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_number(results, name):
+    with h5py.File(results(name), "r") as file:
+        assert file["converged"][()].all()
+        omega = file["omega"][()]
+        for dataset, at, column, number, tolerance in NUMBERS[name]:
+            values = file[dataset][:, column]
+            k = np.argmax(values) if at is None else np.argmin(np.abs(omega - at))
+            assert at is None or omega[k] == pytest.approx(at, rel=1e-12)
+            assert values[k] == pytest.approx(number, rel=tolerance)
+
+
+def test_gap_is_closed_for_the_share_of_the_exact_orbit(results):
+    with h5py.File(results("gap/gap.nml"), "r") as file:
+        # Two switches, each off by at most one of 1024 instants.
+        assert file["contact/fraction"][-1, 0, 0] == pytest.approx(0.2226257, abs=2.0 / 1024)
+
+
+def test_friction_lowers_the_peak_of_the_sector(results):
+    """Half of the pairs slip, friction takes energy, and the peak comes earlier and lower."""
+    with h5py.File(results("blade_sector/frf.nml"), "r") as friction, \
+            h5py.File(results("blade_sector/frf_stuck.nml"), "r") as stuck:
+        at, linear = (int(np.argmax(file["amplitude"][:, 0])) for file in (friction, stuck))
+        assert friction["omega"][at] < stuck["omega"][linear]
+        assert friction["amplitude"][at, 0] < 0.6 * stuck["amplitude"][linear, 0]
+        assert np.count_nonzero(friction["contact/fraction"][at, :, 1]) == 8
+        assert friction["contact/dissipation"][at].sum() > 0.0
+        assert np.all(stuck["contact/fraction"][:, :, 0] == 1.0)
+        assert np.abs(stuck["contact/dissipation"][()]).max() == 0.0
+
+
+def test_result_file_of_the_sector_with_48_pairs(results):
+    """Shapes and attributes of the contract."""
+    n_points, n_coefficients, n_observed, n_pairs = 41, 15, 4, 48
+    shapes = {
+        "omega": (), "converged": (), "iterations": (), "residual": (), "seconds": (),
+        "coefficients": (n_coefficients, n_observed), "amplitude": (n_observed,),
+        "contact/force": (n_coefficients, n_pairs, 3), "contact/fraction": (n_pairs, 3),
+        "contact/dissipation": (n_pairs,)}
+    with h5py.File(results("blade_sector/frf_48.nml"), "r") as file:
+        def text(name):
+            value = file.attrs[name]
+            return value.decode() if isinstance(value, bytes) else str(value)
+
+        for name, shape in shapes.items():
+            assert file[name].shape == (n_points, *shape), name
+            assert np.all(np.isfinite(file[name][()])), name
+        assert text("format") == "fretwear-result"
+        assert file.attrs["format_version"] == 1
+        assert text("status") == "complete"
+        assert text("fretwear_version")
+        assert "n_harmonics" in text("namelist")
+        assert file.attrs["elapsed"] > 0.0
+        names = [name.decode() for name in file["observed/name"][()]]
+        assert names == ["tip", "tip_x", "tip_y", "tip_z"]
+        assert file["converged"][()].all()
+        assert file["omega"][[0, -1]] == pytest.approx(2.0 * np.pi * np.array([1013.0, 1025.0]))
+        # Every pair is in some state at every instant.
+        assert file["contact/fraction"][()].sum(axis=2) == pytest.approx(1.0, abs=1e-12)

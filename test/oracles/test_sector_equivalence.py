@@ -1,0 +1,118 @@
+"""The blade sector with 16 pairs: the same answer however it is computed."""
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+import slow_balance as slow
+from oracle_runs import ROOT, run_case
+
+MODEL = ROOT / "example" / "blade_sector" / "sector_16.h5"
+SPEED = 460.8
+# The solver stops at 1e-12 of the load; the resonance amplifies that a hundredfold.
+SAME = 1e-9
+# The damping of modes whose stiffness is round-off is the root of that; measured: 1.2e-8.
+STUCK = 1e-7
+# The penalty is formed anew by another route, 1e-3 off, which the forces feel; measured: 2.6e-5.
+LAW = 1e-4
+
+
+def sector(n_points=13, threads=1, contact=None, harmonics=None, output=None, **solver):
+    """Resonance of the sector where half of the pairs slip."""
+    return {
+        "case": {"analysis": "frf", "threads": threads},
+        "model": {"source": "hdf5", "file": str(MODEL), "modal_damping": 1e-3,
+                  "rotation_speed": SPEED},
+        "contact": contact or {"mu": 0.5},
+        "load": {"harmonic_scale": 0.5},
+        "harmonics": {"n_harmonics": 3, "n_time": 128, **(harmonics or {})},
+        "sweep": {"start": 1020.0, "end": 1026.0, "n_points": n_points, "unit": "Hz"},
+        "solver": {"tolerance": 1e-12, **solver},
+        "output": output or {"observe": "tip"},
+    }
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """The defaults."""
+    result = run_case(tmp_path_factory.mktemp("sector"), sector())
+    assert result.converged.all()
+    return result
+
+
+@pytest.mark.parametrize("groups", [
+    pytest.param(sector(threads=2), id="two threads"),
+    pytest.param(sector(linear="lu"), id="lu"),
+    pytest.param(sector(linear="krylov"), id="krylov"),
+    pytest.param(sector(skips=False), id="no skips"),
+    pytest.param(sector(harmonics={"parity": "all"}), id="all harmonics"),
+    pytest.param(sector(contact={"mu": 0.5, "memory": "assembly"}), id="memory spelt out"),
+])
+def test_same_answer(tmp_path, reference, groups):
+    result = run_case(tmp_path, groups)
+    for name in ("coefficients", "force"):
+        expected, found = getattr(reference, name), getattr(result, name)
+        assert np.abs(found - expected).max() < SAME * np.abs(expected).max()
+    assert np.abs(result.fraction - reference.fraction).max() < 0.5 / 128
+
+
+def test_sweep_direction_does_not_matter(tmp_path, reference):
+    groups = sector()
+    groups["sweep"].update(start=1026.0, end=1020.0)
+    downwards = run_case(tmp_path, groups)
+    difference = downwards.coefficients[::-1] - reference.coefficients
+    assert np.abs(difference).max() < SAME * np.abs(reference.coefficients).max()
+
+
+def structure():
+    """Matrices, loads and contact rows of the model file at the rotation speed, in NumPy."""
+    with h5py.File(MODEL, "r") as file:
+        mass = file["mass"][()]
+        stiffness = file["stiffness"][()] + SPEED**2 * file["stiffness_rotation"][()]
+        static = file["load/static"][()] + SPEED**2 * file["load/static_rotation"][()]
+        cosine, tip = 0.5 * file["load/cosine"][()], file["observe/matrix"][0]
+        sides = file["contact/side_1"][()], file["contact/side_2"][()]
+    # Modes of the structure with its contact open; those without stiffness are not damped.
+    root = np.linalg.inv(np.linalg.cholesky(mass))
+    values, vectors = np.linalg.eigh(root @ stiffness @ root.T)
+    modes = mass @ root.T @ vectors
+    damping = 2e-3 * modes * np.sqrt(np.maximum(values, 0.0)) @ modes.T
+    rows = np.vstack([slow.pair_rows(a, b, len(mass)) for a, b in zip(*sides, strict=True)])
+    return (mass, damping, stiffness), static, cosine, tip, rows
+
+
+def test_stuck_sector_is_linear_algebra(tmp_path):
+    """An interference and much friction hold every pair: the bonded structure, solved directly."""
+    result = run_case(tmp_path, sector(contact={"mu": 100.0, "gap": -0.01}))
+    (mass, damping, stiffness), _, cosine, tip, rows = structure()
+    free = np.flatnonzero(~np.any(rows != 0.0, axis=0))
+    for omega, computed in zip(result.omega, result.coefficients[:, :, 0], strict=True):
+        dynamic = (stiffness - omega**2 * mass + 1j * omega * damping)[np.ix_(free, free)]
+        expected = tip[free] @ np.linalg.solve(dynamic, cosine[free])
+        assert abs(computed[1] - 1j * computed[2] - expected) < STUCK * abs(expected)
+        # The interference is static: no other harmonic moves.
+        assert np.abs(computed[3:]).max() < 1e-10
+
+
+def test_sector_obeys_equilibrium_and_contact_law(tmp_path):
+    """The equations with friction at the peak, formed anew from the result file."""
+    (mass, damping, stiffness), static, cosine, _, rows = structure()
+    groups = sector(output={"observe": list(range(1, len(mass) + 1)), "histories": True})
+    groups["case"]["analysis"] = "point"
+    groups["sweep"] = {"start": 1022.7, "unit": "Hz"}
+    result = run_case(tmp_path, groups)
+    u, force = result.coefficients[0], result.force[0].reshape(7, -1)
+    load = np.zeros_like(u)
+    load[0], load[1] = static, cosine
+    # Relative to the load, of which the centrifugal part is by far the largest.
+    defect = slow.equilibrium((mass, damping, stiffness), result.omega[0], u, force @ rows, load)
+    assert defect < 1e-9
+    penalty = slow.automatic_penalty(stiffness, rows)
+    relative = u @ rows.T
+    slipping = 0
+    for pair in range(16):
+        own = slice(3 * pair, 3 * pair + 3)
+        defect = slow.law_defect(force[:, own], relative[:, own], 0.0, 0.5, penalty[own], 128, True)
+        assert defect < LAW, pair
+        slipping += result.fraction[0, pair, 1] > 0.0
+    assert slipping == 8
