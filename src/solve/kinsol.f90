@@ -19,7 +19,6 @@ module fw_kinsol
    use fkinsol_mod, only: fkinseterrhandlerfn
    use fkinsol_mod, only: fkinsetfuncnormtol
    use fkinsol_mod, only: fkinsetjactimesvecfn
-   use fkinsol_mod, only: fkinsetlinearsolver
    use fkinsol_mod, only: fkinsetmaxnewtonstep
    use fkinsol_mod, only: fkinsetmaxsetupcalls
    use fkinsol_mod, only: fkinsetnummaxiters
@@ -31,7 +30,6 @@ module fw_kinsol
    use fsundials_linearsolver_mod, only: fsunlinsolfree
    use fsundials_linearsolver_mod, only: sun_prec_right
    use fsundials_linearsolver_mod, only: sunlinearsolver
-   use fsundials_matrix_mod, only: sunmatrix
    use fsundials_nvector_mod, only: n_vector
    use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr
    use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmrsetmaxrestarts
@@ -91,6 +89,16 @@ module fw_kinsol
    real(wp), parameter :: shortest_step = 1.0e-10_wp
    !> Longest step, times the size of the unknowns; generous, since that is a guess.
    real(wp), parameter :: longest_step = 1.0e4_wp
+
+   !> The Fortran interface of this function cannot say that there is no matrix: it takes an
+   !> object where C takes a null pointer. This is the function behind that interface.
+   interface
+      integer(c_int) function set_linear_solver(memory, solver, matrix) &
+         bind(c, name='_wrap_FKINSetLinearSolver')
+         import :: c_int, c_ptr
+         type(c_ptr), value :: memory, solver, matrix
+      end function set_linear_solver
+   end interface
 
 contains
 
@@ -181,7 +189,8 @@ contains
       objects%x => wrap(x, objects%context)
       objects%x_scale => wrap(x_scale, objects%context)
       objects%r_scale => wrap(r_scale, objects%context)
-      done = associated(objects%x) .and. associated(objects%x_scale) .and. associated(objects%r_scale)
+      done = associated(objects%x) .and. associated(objects%x_scale) .and. &
+             associated(objects%r_scale)
       if (.not. done) return
       objects%memory = fkincreate(objects%context)
       objects%linear => fsunlinsol_spgmr(objects%x, sun_prec_right, krylov_length, objects%context)
@@ -193,17 +202,15 @@ contains
       type(kinsol_objects), intent(inout) :: objects
       type(kinsol_state), intent(inout), target :: state
       logical, intent(out) :: done
-      type(sunmatrix), pointer :: no_matrix
       real(wp) :: root_n
       integer(c_int) :: status(11)
 
-      nullify (no_matrix)
       root_n = sqrt(real(state%system%n, wp))
       associate (memory => objects%memory)
          status(1) = fkinseterrhandlerfn(memory, c_funloc(ignore_message), c_null_ptr)
          status(2) = fkininit(memory, c_funloc(evaluate), objects%x)
          status(3) = fkinsetuserdata(memory, c_loc(state))
-         status(4) = fkinsetlinearsolver(memory, objects%linear, no_matrix)
+         status(4) = set_linear_solver(memory, c_loc(objects%linear), c_null_ptr)
          status(5) = fkinsetjactimesvecfn(memory, c_funloc(multiply))
          status(6) = fkinsetpreconditioner(memory, c_funloc(set_up), c_funloc(precondition))
          status(7) = fkinsetnummaxiters(memory, int(self%options%max_iterations, c_long))
@@ -264,7 +271,7 @@ contains
    end subroutine linearize_at
 
    !> Callback: residual.
-   integer(c_int) function evaluate(x, r, data) bind(c) result(status)
+   integer(c_int) function evaluate(x, r, data) bind(c, name='') result(status)
       type(n_vector), intent(inout) :: x, r
       type(c_ptr), value :: data
       type(kinsol_state), pointer :: state
@@ -280,7 +287,7 @@ contains
    end function evaluate
 
    !> Callback: Jacobian times vector.
-   integer(c_int) function multiply(vector, product, x, new_x, data) bind(c) result(status)
+   integer(c_int) function multiply(vector, product, x, new_x, data) bind(c, name='') result(status)
       type(n_vector), intent(inout) :: vector, product, x
       integer(c_int), intent(inout) :: new_x
       type(c_ptr), value :: data
@@ -300,7 +307,7 @@ contains
    end function multiply
 
    !> Callback: build the preconditioner.
-   integer(c_int) function set_up(x, x_scale, r, r_scale, data) bind(c) result(status)
+   integer(c_int) function set_up(x, x_scale, r, r_scale, data) bind(c, name='') result(status)
       type(n_vector), intent(inout) :: x, x_scale, r, r_scale
       type(c_ptr), value :: data
       type(kinsol_state), pointer :: state
@@ -317,7 +324,8 @@ contains
    end function set_up
 
    !> Callback: apply the preconditioner.
-   integer(c_int) function precondition(x, x_scale, r, r_scale, vector, data) bind(c) result(status)
+   integer(c_int) function precondition(x, x_scale, r, r_scale, vector, data) bind(c, name='') &
+      result(status)
       type(n_vector), intent(inout) :: x, x_scale, r, r_scale, vector
       type(c_ptr), value :: data
       type(kinsol_state), pointer :: state

@@ -28,17 +28,15 @@ module fw_pseudo_bdf
    use fcvode_mod, only: fcvodeseterrhandlerfn
    use fcvode_mod, only: fcvodesetinitstep
    use fcvode_mod, only: fcvodesetjactimes
-   use fcvode_mod, only: fcvodesetlinearsolver
    use fcvode_mod, only: fcvodesetmaxord
    use fcvode_mod, only: fcvodesetpreconditioner
    use fcvode_mod, only: fcvodesetstablimdet
    use fcvode_mod, only: fcvodesetstoptime
    use fcvode_mod, only: fcvodesetuserdata
-   use fcvode_mod, only: fcvodesstolerances
+   use fcvode_mod, only: fcvodewftolerances
    use fsundials_linearsolver_mod, only: fsunlinsolfree
    use fsundials_linearsolver_mod, only: sun_prec_left
    use fsundials_linearsolver_mod, only: sunlinearsolver
-   use fsundials_matrix_mod, only: sunmatrix
    use fsundials_nvector_mod, only: n_vector
    use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr
    use fw_kinds, only: wp
@@ -69,12 +67,18 @@ module fw_pseudo_bdf
       !> The point evaluated last without a shift and whether the system is linearized there.
       real(wp), allocatable :: seen(:), work(:)
       logical :: linearized = .false.
+      !> Accuracy of a step now, and the size of the unknowns that it is relative to.
+      real(wp) :: accuracy = 0.0_wp
+      real(wp) :: unknown = 1.0_wp
    end type bdf_state
 
    type, extends(pseudo_scheme) :: bdf_scheme
-      !> Error of a step, relative to the unknowns.
+      !> Error of a step, relative to the unknowns, at the start; it falls with the residual, as
+      !> CVODE leaves unknowns where they are once they are that accurate.
       real(wp) :: accuracy = 1.0e-3_wp
       integer :: max_order = 5
+      !> Norm of the residual at the start.
+      real(wp) :: first = 1.0_wp
       !> Order of the last step.
       integer :: order = 0
       !> Where positive, the integration ends exactly there.
@@ -93,6 +97,18 @@ module fw_pseudo_bdf
    integer(c_int), parameter :: krylov_length = 30
    !> First step, relative to the scale of pseudo-time.
    real(wp), parameter :: first_step = 1.0e-3_wp
+   !> Share of the fall of the residual that the accuracy follows, and the end of it.
+   real(wp), parameter :: following = 100.0_wp, finest = 1.0e-9_wp
+
+   !> The Fortran interface of this function cannot say that there is no matrix: it takes an
+   !> object where C takes a null pointer. This is the function behind that interface.
+   interface
+      integer(c_int) function set_linear_solver(memory, solver, matrix) &
+         bind(c, name='_wrap_FCVodeSetLinearSolver')
+         import :: c_int, c_ptr
+         type(c_ptr), value :: memory, solver, matrix
+      end function set_linear_solver
+   end interface
 
 contains
 
@@ -103,10 +119,13 @@ contains
       logical, intent(out) :: done
 
       allocate (self%state)
+      self%first = norm2(self%r)
       self%state%system => system
       self%state%linear%kind = self%solver%linear
       self%state%seen = x
       allocate (self%state%work(size(x)))
+      self%state%accuracy = self%accuracy
+      self%state%unknown = self%scales%unknown
       self%step = self%options%step
       if (self%step <= 0.0_wp) self%step = first_step*self%scales%time
       call open_context(self%context, done)
@@ -123,17 +142,15 @@ contains
    subroutine configure(self, done)
       class(bdf_scheme), intent(inout) :: self
       logical, intent(out) :: done
-      type(sunmatrix), pointer :: no_matrix
       integer(c_int) :: status(11)
 
-      nullify (no_matrix)
       status = 0
       associate (memory => self%memory)
          status(1) = fcvodeseterrhandlerfn(memory, c_funloc(ignore_message), c_null_ptr)
          status(2) = fcvodeinit(memory, c_funloc(evaluate), 0.0_c_double, self%x)
          status(3) = fcvodesetuserdata(memory, c_loc(self%state))
-         status(4) = fcvodesstolerances(memory, self%accuracy, self%accuracy*self%scales%unknown)
-         status(5) = fcvodesetlinearsolver(memory, self%spgmr, no_matrix)
+         status(4) = fcvodewftolerances(memory, c_funloc(weigh))
+         status(5) = set_linear_solver(memory, c_loc(self%spgmr), c_null_ptr)
          status(6) = fcvodesetjactimes(memory, c_null_funptr, c_funloc(multiply))
          status(7) = fcvodesetpreconditioner(memory, c_funloc(set_up), c_funloc(precondition))
          status(8) = fcvodesetmaxord(memory, int(self%max_order, c_int))
@@ -156,6 +173,7 @@ contains
       ! Newton's method may have used the system meanwhile.
       self%state%linearized = .false.
       self%state%seen = huge(1.0_wp)
+      call tighten(self)
       far = self%time + max(1.0e3_wp*self%step, self%scales%time)
       status = fcvode(self%memory, far, self%x, reached, cv_one_step)
       done = status >= 0
@@ -168,6 +186,15 @@ contains
       end if
       call system%residual(x, self%r)
    end subroutine advance
+
+   !> The accuracy before a step; it never gets worse again.
+   subroutine tighten(self)
+      class(bdf_scheme), intent(inout) :: self
+      real(wp) :: share
+
+      share = max(finest, following*norm2(self%r)/max(self%first, tiny(1.0_wp)))
+      self%state%accuracy = min(self%state%accuracy, share*self%accuracy)
+   end subroutine tighten
 
    subroutine count_work(self)
       class(bdf_scheme), intent(inout) :: self
@@ -200,8 +227,21 @@ contains
       if (associated(self%state)) deallocate (self%state)
    end subroutine finish
 
+   !> Callback: weights of errors.
+   integer(c_int) function weigh(x, weight, data) bind(c, name='') result(status)
+      type(n_vector), intent(inout) :: x, weight
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: w(:)
+
+      call c_f_pointer(data, state)
+      w => values(weight, state%system%n)
+      w = 1.0_wp/(state%accuracy*(state%unknown + abs(values(x, state%system%n))))
+      status = callback_ok
+   end function weigh
+
    !> Callback: rate of the flow.
-   integer(c_int) function evaluate(time, x, rate, data) bind(c) result(status)
+   integer(c_int) function evaluate(time, x, rate, data) bind(c, name='') result(status)
       real(c_double), value :: time
       type(n_vector), intent(inout) :: x, rate
       type(c_ptr), value :: data
@@ -221,7 +261,8 @@ contains
    end function evaluate
 
    !> Callback: -P^-1 J times vector.
-   integer(c_int) function multiply(vector, product, time, x, rate, data, work) bind(c) result(status)
+   integer(c_int) function multiply(vector, product, time, x, rate, data, work) &
+      bind(c, name='') result(status)
       type(n_vector), intent(inout) :: vector, product, x, rate, work
       real(c_double), value :: time
       type(c_ptr), value :: data
@@ -249,7 +290,7 @@ contains
    end function multiply
 
    !> Callback: preconditioner for 1 + gamma P^-1 J.
-   integer(c_int) function set_up(time, x, rate, as_before, renewed, gamma, data) bind(c) &
+   integer(c_int) function set_up(time, x, rate, as_before, renewed, gamma, data) bind(c, name='') &
       result(status)
       real(c_double), value :: time, gamma
       type(n_vector), intent(inout) :: x, rate
@@ -276,8 +317,9 @@ contains
    end function set_up
 
    !> Callback: (1 + gamma P^-1 J)^-1 right = (J + P/gamma)^-1 P right/gamma, about.
-   integer(c_int) function precondition(time, x, rate, right, solution, gamma, accuracy, side, data) &
-      bind(c) result(status)
+   integer(c_int) function precondition(time, x, rate, right, solution, gamma, accuracy, &
+                                        side, data) &
+      bind(c, name='') result(status)
       real(c_double), value :: time, gamma, accuracy
       type(n_vector), intent(inout) :: x, rate, right, solution
       integer(c_int), value :: side

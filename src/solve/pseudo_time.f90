@@ -197,8 +197,8 @@ contains
       done = norm <= self%options%tolerance
       if (done) return
       if (.not. norm <= runaway*max(1.0_wp, progress%first)) then
-         report%message = 'the flow runs away from its start: it has no stable steady state there, '// &
-                          'or the steps are too long for the scheme'
+         report%message = 'the flow runs away from its start: it has no stable steady state '// &
+                          'there, or the steps are too long for the scheme'
          done = .true.
          return
       end if

@@ -73,7 +73,7 @@ contains
    end function values
 
    !> Error handler: messages of SUNDIALS go nowhere, since failures are outcomes here.
-   subroutine ignore_message(code, module_name, function_name, text, data) bind(c)
+   subroutine ignore_message(code, module_name, function_name, text, data) bind(c, name='')
       integer(c_int), value :: code
       type(c_ptr), value :: module_name, function_name, text, data
 

@@ -8,7 +8,7 @@ module small_systems
    private
 
    public :: dense_system, circle_system, linear_system, arctan_system, corner_system
-   public :: rootless_system, spring_system, broken_system
+   public :: rootless_system, spring_system, broken_system, hump_system
 
    !> A system given by its residual and its whole derivative. P is diagonal.
    type, abstract, extends(pseudo_system) :: dense_system
@@ -75,6 +75,14 @@ module small_systems
       procedure :: value => arctan_value
       procedure :: derivative => arctan_derivative
    end type arctan_system
+
+   !> x/(1 + x^2) = 0: beyond the hump at |x| = 1 Newton's direction leads away from the root, the
+   !> flow does not.
+   type, extends(dense_system) :: hump_system
+   contains
+      procedure :: value => hump_value
+      procedure :: derivative => hump_derivative
+   end type hump_system
 
    !> A chain with stops, x_i - 0.4 (neighbours) + 10 max(x_i - 1, 0) = load: a corner in each.
    type, extends(dense_system) :: corner_system
@@ -288,6 +296,28 @@ contains
          matrix(i, i) = 1.0_wp/(1.0_wp + x(i)**2)
       end do
    end subroutine arctan_derivative
+
+   subroutine hump_value(self, x, r)
+      class(hump_system), intent(in) :: self
+      real(wp), intent(in) :: x(:)
+      real(wp), intent(out) :: r(:)
+
+      associate (self => self)
+      end associate
+      r = x/(1.0_wp + x**2)
+   end subroutine hump_value
+
+   subroutine hump_derivative(self, x, matrix)
+      class(hump_system), intent(in) :: self
+      real(wp), intent(in) :: x(:)
+      real(wp), intent(out) :: matrix(:, :)
+      integer :: i
+
+      matrix = 0.0_wp
+      do i = 1, self%n
+         matrix(i, i) = (1.0_wp - x(i)**2)/(1.0_wp + x(i)**2)**2
+      end do
+   end subroutine hump_derivative
 
    subroutine corner_value(self, x, r)
       class(corner_system), intent(in) :: self
