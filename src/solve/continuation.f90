@@ -1,6 +1,10 @@
 !> Pseudo-arclength continuation of R(x, p) = 0 (Keller 1977) with analytic dR/dp: predictor along
 !> the tangent, Newton corrector orthogonal to it, adaptive step, folds located on the way.
 !>
+!> Contact makes R piecewise smooth, and at a kink the branch may turn by more than a right angle:
+!> then no point lies ahead on the tangent, and Newton's method cycles between the two pieces. The
+!> tangent of the piece beyond the kink is taken, in the direction that stays in that piece.
+!>
 !> Lengths are measured with x over its own scale and p over the length of its interval, so that
 !> a step means the same in every system of units.
 module fw_continuation
@@ -64,6 +68,11 @@ module fw_continuation
 
    !> Corrector iterations: more than the last is a failure; the others steer the step.
    integer, parameter :: max_corrections = 14, quick = 3, slow = 7
+   !> Corrections without a smaller residual that end an attempt: a cycle.
+   integer, parameter :: patience = 4
+   !> A turn at a kink is tried when the step has shrunk to this multiple of the first one; the
+   !> residual must be smaller by this factor on the side that the branch takes.
+   real(wp), parameter :: turn_below = 0.1_wp, turn_contrast = 0.3_wp
    !> Steps between these multiples of the first one.
    real(wp), parameter :: largest_growth = 2.0_wp, smallest_share = 1.0e-5_wp
    !> Iterative linear solutions: the tangent needs more digits than a Newton step.
@@ -167,7 +176,7 @@ contains
    subroutine advance(self, system, here, ds, next, report, done, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
-      type(branch_point), intent(in) :: here
+      type(branch_point), intent(inout) :: here
       real(wp), intent(inout) :: ds
       type(branch_point), intent(out) :: next
       type(solver_report), intent(out) :: report
@@ -180,10 +189,55 @@ contains
          if (allocated(error)) return
          done = report%converged
          if (done) return
+         if (ds < turn_below*self%step) call turn_at_kink(self, system, ds, here, error)
+         if (allocated(error)) return
          ds = 0.5_wp*ds
          if (ds < smallest_share*self%step) return
       end do
    end subroutine advance
+
+   !> Give `here` the tangent of the piece just beyond it, if the branch goes on in that piece.
+   subroutine turn_at_kink(self, system, ds, here, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      real(wp), intent(in) :: ds
+      type(branch_point), intent(inout) :: here
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: beyond
+      real(wp) :: ahead, behind
+      logical :: done
+
+      beyond = here
+      beyond%x = here%x + ds*here%t
+      beyond%p = here%p + ds*here%t_p
+      call system%set_parameter(beyond%p, error)
+      if (allocated(error)) return
+      call find_tangent(self, system, here, beyond, done)
+      if (.not. done) return
+      call distance_from_branch(system, here, beyond, ds, ahead, error)
+      if (allocated(error)) return
+      call distance_from_branch(system, here, beyond, -ds, behind, error)
+      if (allocated(error)) return
+      if (min(ahead, behind) > turn_contrast*max(ahead, behind)) return
+      here%t = sign(1.0_wp, behind - ahead)*beyond%t
+      here%t_p = sign(1.0_wp, behind - ahead)*beyond%t_p
+   end subroutine turn_at_kink
+
+   !> Residual at a distance s from a point along the tangent of another.
+   subroutine distance_from_branch(system, here, beyond, s, residual, error)
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here, beyond
+      real(wp), intent(in) :: s
+      real(wp), intent(out) :: residual
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: r(system%n)
+
+      residual = huge(1.0_wp)
+      call system%set_parameter(here%p + s*beyond%t_p, error)
+      if (allocated(error)) return
+      call system%residual(here%x + s*beyond%t, r)
+      residual = norm2(r)
+   end subroutine distance_from_branch
 
    !> Newton's method on R = 0 with the distance along the tangent fixed to ds.
    subroutine correct(self, system, here, ds, next, report, error)
@@ -195,13 +249,15 @@ contains
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: r(:), step(:), slope(:), dx_dp(:)
-      real(wp) :: dp, before
+      real(wp) :: dp, best
       logical :: done
+      integer :: stalled
 
       allocate (r(system%n), step(system%n), slope(system%n), dx_dp(system%n))
       next%x = here%x + ds*here%t
       next%p = here%p + ds*here%t_p
-      before = huge(1.0_wp)
+      best = huge(1.0_wp)
+      stalled = 0
       do
          call system%set_parameter(next%p, error)
          if (allocated(error)) return
@@ -210,8 +266,10 @@ contains
          report%converged = report%residual <= self%options%tolerance
          if (report%converged .or. report%iterations == max_corrections) exit
          if (.not. ieee_is_finite(report%residual)) exit
-         if (report%residual > 1.0e3_wp*before) exit
-         before = report%residual
+         stalled = stalled + 1
+         if (report%residual < 0.9_wp*best) stalled = 0
+         best = min(best, report%residual)
+         if (stalled >= patience .or. report%residual > 1.0e3_wp*best) exit
          call self%linear%solve(system, r, forcing, step, done)
          if (.not. done) exit
          call system%parameter_derivative(next%x, slope)
