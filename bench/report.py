@@ -9,6 +9,7 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from oscillators import HARMONICS, INSTANTS, Sample
 from sector import HARMONICS as SECTOR_HARMONICS
@@ -219,6 +220,7 @@ def draw_errors(path: Path, samples: list[Sample]) -> None:
                     axes.annotate(f"{s.n_harmonics}", (1e3 * s.seconds, s.error), fontsize=8,
                                   textcoords="offset points", xytext=(4, 3))
         axes.set(xscale="log", yscale="log")
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_title(case[0].upper() + case[1:], fontsize=10)
         axes.grid(alpha=0.3)
     for axes in panels.flat[len(cases):]:
