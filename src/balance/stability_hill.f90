@@ -27,7 +27,7 @@ module fw_hill
    !> Mean harmonics are compared to this one instead of zero. A negative multiplier has two copies
    !> with means of exactly +-1/2; off centre, one of them is nearer. No symmetry makes another
    !> value a tie.
-   real(wp), parameter :: centre = 0.0618_wp
+   real(wp), parameter :: centre = 0.05_wp
 
 contains
 
@@ -42,7 +42,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: stiffness(:, :), state(:, :), mean(:)
       complex(wp), allocatable :: values(:)
-      integer :: j, best, n_dynamic
+      integer :: n_dynamic
 
       n_dynamic = basis%n_massive + basis%n_damped
       call assemble_stiffness(basis, tangent, omega, stiffness)
@@ -52,12 +52,31 @@ contains
       call solve_eigen(tangent%n_coefficients, n_dynamic, state, values, mean, error)
       if (allocated(error)) return
       allocate (exponents(2*basis%n_massive + basis%n_damped))
-      do j = 1, size(exponents)
-         best = minloc(abs(mean - centre), dim=1)
-         exponents(j) = values(best)
-         mean(best) = huge(1.0_wp)
-      end do
+      call choose_copies(values, mean, exponents)
    end subroutine hill_exponents
+
+   !> One copy of each family: its mean harmonic lies within 1/2 of the centre. Families too damped
+   !> for these harmonics (a relaxation much faster than they are) may appear there several times:
+   !> the least damped ones count. Should some be missing, the next to the centre serve.
+   pure subroutine choose_copies(values, mean, exponents)
+      complex(wp), intent(in) :: values(:)
+      real(wp), intent(in) :: mean(:)
+      complex(wp), intent(out) :: exponents(:)
+      logical :: left(size(values)), central(size(values))
+      integer :: j, best
+
+      left = .true.
+      central = abs(mean - centre) < 0.5_wp
+      do j = 1, size(exponents)
+         if (any(left .and. central)) then
+            best = maxloc(real(values, wp), dim=1, mask=left .and. central)
+         else
+            best = minloc(abs(mean - centre), dim=1, mask=left)
+         end if
+         exponents(j) = values(best)
+         left(best) = .false.
+      end do
+   end subroutine choose_copies
 
    !> K + S + C D + M D^2, coefficients innermost (n_coefficients*n, n_coefficients*n).
    pure subroutine assemble_stiffness(basis, tangent, omega, matrix)
