@@ -1,4 +1,4 @@
-!> Backward differentiation formulas of variable order (1 to 5) and step in pseudo-time, by CVODE
+!> Backward differentiation formulas of variable order and step in pseudo-time, by CVODE
 !> (SUNDIALS; Cohen and Hindmarsh 1996) with SPGMR. Its matrix 1 + gamma P^-1 J is preconditioned
 !> by solutions with J + P/gamma: factors where the system is small, so that one or two Krylov
 !> iterations do, the system's own preconditioner where it is large.
@@ -75,8 +75,12 @@ module fw_pseudo_bdf
    type, extends(pseudo_scheme) :: bdf_scheme
       !> Error of a step, relative to the unknowns, at the start; it falls with the residual, as
       !> CVODE leaves unknowns where they are once they are that accurate.
-      real(wp) :: accuracy = 1.0e-3_wp
-      integer :: max_order = 5
+      real(wp) :: accuracy = 3.0e-2_wp
+      !> Highest order, 1 to 5. Formulas above order 2 are not A-stable (Dahlquist 1963): on flows
+      !> with eigenvalues near the imaginary axis, as the rotated one of lightly damped structures,
+      !> they are held to short steps. On a Duffing oscillator with 5 harmonics 82 of 84 starts
+      !> arrived with order 2, some 30 with order 5.
+      integer :: max_order = 2
       !> Norm of the residual at the start.
       real(wp) :: first = 1.0_wp
       !> Order of the last step.
@@ -154,7 +158,7 @@ contains
          status(6) = fcvodesetjactimes(memory, c_null_funptr, c_funloc(multiply))
          status(7) = fcvodesetpreconditioner(memory, c_funloc(set_up), c_funloc(precondition))
          status(8) = fcvodesetmaxord(memory, int(self%max_order, c_int))
-         ! From order 3 on the formulas are unstable near the imaginary axis: watch for it.
+         ! Where order 3 and more are allowed, watch for their instability.
          status(9) = fcvodesetstablimdet(memory, 1_c_int)
          status(10) = fcvodesetinitstep(memory, self%step)
          if (self%stop_time > 0.0_wp) status(11) = fcvodesetstoptime(memory, self%stop_time)

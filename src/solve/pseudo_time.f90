@@ -44,6 +44,8 @@ module fw_pseudo_time
       type(pseudo_time_options) :: pseudo
       !> Try Newton's method on the way; without it the flow itself must reach the tolerance.
       logical :: end_with_newton = .true.
+      !> Highest order of the scheme 'bdf', 1 to 5; 0: that scheme's own choice.
+      integer :: bdf_max_order = 0
       type(newton_solver) :: newton
       !> The best point and where Newton's method is tried (n).
       real(wp), allocatable :: best_x(:), trial(:)
@@ -105,6 +107,10 @@ contains
       self%best_x = x
       self%trial = x
       call new_scheme(scheme, self%options, self%pseudo)
+      select type (scheme)
+      type is (bdf_scheme)
+         if (self%bdf_max_order > 0) scheme%max_order = self%bdf_max_order
+      end select
       call begin(self, system, x, scheme, progress, report, done)
       do while (.not. done)
          if (scheme%accepted + scheme%rejected >= self%pseudo%max_steps) then
@@ -120,6 +126,12 @@ contains
          call judge(self, system, x, scheme, progress, report, done)
       end do
       call scheme%finish()
+      call system%clear_shift()
+      if (self%end_with_newton .and. len(report%message) > 0 .and. scheme%accepted > 0) then
+         ! A last resort: the flow has not arrived, but may have come near.
+         x = self%best_x
+         call try_newton(self, system, x, progress, report, done)
+      end if
       call conclude(self, system, x, scheme, progress, report)
    end subroutine solve
 
