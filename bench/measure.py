@@ -77,11 +77,16 @@ class Bench:
         self.program, self.folder, self.quick = program, folder, quick
         folder.mkdir(parents=True, exist_ok=True)
 
-    def run(self, groups: Groups, threads: int = 1) -> Run:
-        """Run a case once; points that do not converge are no error."""
+    def run(self, groups: Groups, threads: int = 1, wait: str | None = None) -> Run:
+        """Run a case once; points that do not converge are no error.
+
+        `wait` is OMP_WAIT_POLICY: whether idle threads spin ("active") or sleep ("passive").
+        """
         namelist, result = self.folder / "case.nml", self.folder / "case.h5"
         write_namelist(namelist, groups)
         environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
+        if wait:
+            environment["OMP_WAIT_POLICY"] = wait
         done = subprocess.run([self.program, "-o", result, namelist], env=environment,
                               capture_output=True, text=True, check=False)
         if done.returncode not in (0, 4):
@@ -89,11 +94,11 @@ class Bench:
         return read_run(result, done.stdout)
 
     def repeat(self, groups: Groups, value: Callable[[Run], float], threads: int = 1,
-               most: int = 5, budget: float = 5.0) -> tuple[float, Run]:
+               most: int = 5, budget: float = 5.0, wait: str | None = None) -> tuple[float, Run]:
         """Median of a value over repeated runs, as many as fit into the budget [s]."""
         values, start = [], time.perf_counter()
         while True:
-            run = self.run(groups, threads)
+            run = self.run(groups, threads, wait)
             values.append(value(run))
             if self.quick or len(values) == most or time.perf_counter() - start > budget:
                 return statistics.median(values), run

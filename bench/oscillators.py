@@ -51,7 +51,7 @@ def measure_oscillators(bench: Bench) -> list[Sample]:
                     continue
                 groups = case.groups | {"harmonics": {"n_harmonics": n_harmonics,
                                                       "n_time": n_time}}
-                seconds, run = bench.repeat(groups, lambda run: float(run.seconds[0]))
+                seconds, run = bench.repeat(groups, lambda run: float(run.seconds[0]), most=3)
                 error = relative_error(run.coefficients[0, :, 0], case.reference)
                 samples.append(Sample(case.name, n_harmonics, n_time, error,
                                       seconds if run.converged[0] else float("nan")))

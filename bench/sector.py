@@ -11,8 +11,8 @@ from pathlib import Path
 from measure import ROOT, Bench, Groups, Run
 from oscillators import two_dof
 
-__all__ = ["HARMONICS", "PAIRS", "Crossing", "PointTime", "Sweep", "measure_crossing",
-           "measure_points", "measure_sweeps", "measure_threads"]
+__all__ = ["HARMONICS", "PAIRS", "Crossing", "PointTime", "Sweep", "ThreadTimes",
+           "measure_crossing", "measure_points", "measure_sweeps", "measure_threads"]
 
 HARMONICS = (1, 3, 7, 17)
 PAIRS = (16, 48)
@@ -45,6 +45,16 @@ class Sweep:
     threads: int
     seconds: float
     run: Run
+
+
+@dataclass(frozen=True)
+class ThreadTimes:
+    """Time of a point [s] with one thread, with two, and with two that sleep while they wait."""
+
+    n_harmonics: int
+    one: float
+    two: float
+    two_passive: float
 
 
 @dataclass(frozen=True)
@@ -94,29 +104,29 @@ def measure_points(bench: Bench) -> list[PointTime]:
     return points
 
 
-def measure_threads(bench: Bench) -> list[tuple[int, int, float]]:
-    """Mean time of a point near the peak: (harmonics, threads, seconds), 48 pairs."""
-    usable = len(os.sched_getaffinity(0))
+def measure_threads(bench: Bench) -> list[ThreadTimes]:
+    """Mean time of a point near the peak with one and two threads, 48 pairs."""
+    if len(os.sched_getaffinity(0)) < 2:
+        return []
     rows = []
     for n_harmonics in (3,) if bench.quick else (3, 7, 17):
-        for threads in (1, 2):
-            if threads > usable:
-                continue
-            seconds, _ = bench.repeat(case(48, n_harmonics, near_peak(48)),
-                                      lambda run: float(run.seconds.mean()), threads, most=3)
-            rows.append((n_harmonics, threads, seconds))
+        groups = case(48, n_harmonics, near_peak(48))
+        times = [bench.repeat(groups, lambda run: float(run.seconds.mean()), threads, 3, 4.0, wait)[0]
+                 for threads, wait in ((1, None), (2, None), (2, "passive"))]
+        rows.append(ThreadTimes(n_harmonics, *times))
     return rows
 
 
 def measure_sweeps(bench: Bench) -> list[Sweep]:
-    """The two sweeps that have a target, up and down."""
+    """The two sweeps that have a target, up and down; two threads sleep while they wait."""
     down = WHOLE | {"start": WHOLE["end"], "end": WHOLE["start"]}
     sweeps = []
     for pairs, n_harmonics in ((48, 7), (16, 3)):
         for direction, sweep in (("down", down), ("up", WHOLE)):
             for threads in (1, min(2, len(os.sched_getaffinity(0)))):
                 seconds, run = bench.repeat(case(pairs, n_harmonics, sweep, speed=SLOW),
-                                            lambda run: run.elapsed, threads, most=3)
+                                            lambda run: run.elapsed, threads, most=3,
+                                            wait="passive" if threads > 1 else None)
                 sweeps.append(Sweep(f"{pairs} pairs, H = {n_harmonics}, {direction}", threads,
                                     seconds, run))
     return sweeps
