@@ -164,22 +164,26 @@ contains
    end subroutine new_hbm
 
    !> eps of the order of the local static stiffness, one for both tangential directions (the
-   !> friction law is isotropic) and one for the normal.
+   !> friction law is isotropic) and one for the normal. Directions that nothing moves do not
+   !> count, whether they are left out or not.
    subroutine set_stiffness(self, contact)
       type(hbm_system), intent(inout) :: self
       type(contact_type), intent(in) :: contact
       real(wp) :: stiffness(3)
-      integer :: i, c, n_tangential
+      logical :: counts(2)
+      integer :: i, c
 
       allocate (self%stiffness(contact%n_pairs, 3), source=0.0_wp)
       do i = 1, contact%n_pairs
          if (self%rigid) then
             stiffness = 0.0_wp
             do c = 1, 3
-               if (self%joint%row(c, i) > 0) stiffness(c) = local_stiffness(self, self%coordinate_of(c, i))
+               if (self%joint%row(c, i) == 0) cycle
+               stiffness(c) = local_stiffness(self, self%coordinate_of(c, i))
             end do
-            n_tangential = count(self%joint%row(1:2, i) > 0)
-            stiffness(1:2) = sum(stiffness(1:2))/real(max(1, n_tangential), wp)
+            counts = self%joint%row(1:2, i) > 0 .and. .not. self%joint%idle(1:2, i)
+            if (.not. any(counts)) counts = self%joint%row(1:2, i) > 0
+            stiffness(1:2) = sum(stiffness(1:2), mask=counts)/real(max(1, count(counts)), wp)
             self%stiffness(i, :) = contact%penalty_scale*stiffness
          else
             if (any(self%joint%row(1:2, i) > 0)) self%stiffness(i, 1:2) = contact%tangential_stiffness(i)

@@ -134,6 +134,7 @@ contains
          self%complex_out(:self%n_used, h) = self%complex_out(self%used(:self%n_used), h)
       end do
       call outputs_to_real(self)
+      if (self%springs%n_springs > 0) call spring_product(self, m, self%balance, spread_out=.true.)
       call contact_product(self, m, self%balance, spread_out=.true.)
       rhs = rhs - self%active_out(:self%n_active, :)
    end subroutine reduce_shaped
@@ -209,7 +210,7 @@ contains
       end do
       !$omp end parallel do
       call outputs_to_real(self)
-      if (self%springs%n_springs > 0) call spring_product(self, na, vector)
+      if (self%springs%n_springs > 0) call spring_product(self, na, vector, spread_out=.false.)
       if (self%contact%n_pairs > 0) call contact_product(self, na, vector, spread_out=.false.)
       do k = 1, self%fourier%n_coefficients
          product((k - 1)*na + 1:k*na) = self%active_out(:na, k)
@@ -246,10 +247,12 @@ contains
    end subroutine outputs_to_real
 
    !> active_out = active_out + derivative of the springs times vector.
-   subroutine spring_product(self, na, vector)
+   subroutine spring_product(self, n_rows, vector, spread_out)
       type(hbm_system), intent(inout) :: self
-      integer, intent(in) :: na
-      real(wp), intent(in) :: vector(na, *)
+      integer, intent(in) :: n_rows
+      real(wp), intent(in) :: vector(n_rows, *)
+      !> The vector holds all coordinates, not just the active ones.
+      logical, intent(in) :: spread_out
       integer :: i, e, k, nc, place
 
       nc = self%fourier%n_coefficients
@@ -258,8 +261,8 @@ contains
             ! The spring's own workspaces are free between evaluations.
             s%elongation(i, :) = 0.0_wp
             do e = r%first(row(i)), r%first(row(i) + 1) - 1
-               place = self%place(r%coordinate(e))
-               if (place == 0 .or. place > na) cycle
+               place = merge(r%coordinate(e), self%place(r%coordinate(e)), spread_out)
+               if (place == 0 .or. place > n_rows) cycle
                s%elongation(i, :) = s%elongation(i, :) + r%coefficient(e)*vector(place, :nc)
             end do
             do k = 1, nc

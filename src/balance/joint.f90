@@ -5,6 +5,7 @@ module fw_joint
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: spring_type
    use fw_contact_data, only: law_penalty
+   use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -23,7 +24,8 @@ module fw_joint
       integer, allocatable :: row(:, :)
       !> Row of each spring (n_springs).
       integer, allocatable :: spring_row(:)
-      !> Components given but dropped, because nothing ever moves them.
+      !> Components that nothing ever moves (3, n_pairs), and how many of them were dropped.
+      logical, allocatable :: idle(:, :)
       integer :: n_idle = 0
       !> Whether the solution has odd harmonics only (u(t + T/2) = -u(t)).
       logical :: half_wave_symmetric = .false.
@@ -44,15 +46,16 @@ contains
       integer :: i, c, n_rows
 
       call find_moving_dofs(model, contact, springs, moving)
-      if (.not. skip_idle) moving(1:) = .true.
       allocate (self%row(3, contact%n_pairs), source=0)
+      allocate (self%idle(3, contact%n_pairs), source=.false.)
       allocate (side_1(0), side_2(0))
       n_rows = 0
       do i = 1, contact%n_pairs
          do c = 1, 3
             if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
-            if (.not. (moving(abs(contact%side_1(c, i))) .or. &
-                       moving(abs(contact%side_2(c, i))))) then
+            self%idle(c, i) = .not. (moving(abs(contact%side_1(c, i))) .or. &
+                                     moving(abs(contact%side_2(c, i))))
+            if (self%idle(c, i) .and. skip_idle) then
                self%n_idle = self%n_idle + 1
                cycle
             end if
@@ -117,8 +120,8 @@ contains
 
    end subroutine find_moving_dofs
 
-   !> Half-wave symmetry is exact where nothing static acts, normal loads are constant and
-   !> springs are odd.
+   !> Half-wave symmetry is exact where nothing static acts, normal loads are constant, springs
+   !> are odd, and no pair carries a static force over from an earlier point of the sweep.
    pure logical function symmetric(model, contact, springs, joint)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
@@ -126,7 +129,8 @@ contains
       type(joint_type), intent(in) :: joint
 
       symmetric = all(abs(model%load_static) <= 0.0_wp)
-      if (contact%n_pairs > 0) symmetric = symmetric .and. all(joint%row(3, :) == 0)
+      if (contact%n_pairs > 0) symmetric = symmetric .and. &
+         all(joint%row(3, :) == 0) .and. contact%memory /= memory_carried
       if (springs%n_springs > 0) symmetric = symmetric .and. all(modulo(springs%power, 2) == 1)
    end function symmetric
 

@@ -106,21 +106,34 @@ contains
       end do
       !$omp end parallel do
       call fourier%to_coefficients(3*self%n_pairs, self%force_time, self%force)
-      where (self%margin >= 0.0_wp .and. self%pressure > 0.0_wp)
-         self%state = pair_stuck
-      else where (maxval(-self%force_time(:, 3, :), dim=2) <= 0.0_wp)
-         self%state = pair_open
-      else where
-         self%state = pair_mixed
-      end where
+      call classify(self)
    end subroutine evaluate
+
+   !> State of every pair over the whole march.
+   pure subroutine classify(self)
+      class(forces_type), intent(inout) :: self
+      integer :: i, k
+
+      do i = 1, self%n_pairs
+         if (self%margin(i) >= 0.0_wp .and. self%pressure(i) > 0.0_wp) then
+            self%state(i) = pair_stuck
+            cycle
+         end if
+         self%state(i) = pair_open
+         if (self%pressure(i) > 0.0_wp) self%state(i) = pair_mixed
+         do k = 1, size(self%force_time, 3)
+            if (self%state(i) == pair_mixed) exit
+            if (self%force_time(i, 3, k) < 0.0_wp) self%state(i) = pair_mixed
+         end do
+      end do
+   end subroutine classify
 
    !> March pairs first..last until their state repeats after a period.
    subroutine march(self, n_time, first, last)
       class(forces_type), intent(inout) :: self
       integer, intent(in) :: n_time, first, last
       integer :: turn, i
-      real(wp) :: start(first:last, 2), scale
+      real(wp) :: start(block_size, 2), scale
       logical :: periodic
 
       self%x(first:last, :) = self%x_start(first:last, :)
@@ -133,7 +146,7 @@ contains
          return
       end if
       do turn = 1, max_turns
-         start = self%x(first:last, :)
+         start(:last - first + 1, :) = self%x(first:last, :)
          if (self%two_directions) then
             call march_turn_2d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
                                self%x, self%force_time, self%margin, self%pressure)
@@ -144,7 +157,7 @@ contains
          periodic = .true.
          do i = first, last
             scale = abs(self%x(i, 1)) + abs(self%x(i, 2))
-            if (any(abs(self%x(i, :) - start(i, :)) > periodic_tolerance*scale)) periodic = .false.
+            if (any(abs(self%x(i, :) - start(i - first + 1, :)) > periodic_tolerance*scale)) periodic = .false.
          end do
          if (periodic) exit
       end do
@@ -218,6 +231,7 @@ contains
       real(wp), intent(out) :: share(:, :)
       integer :: i, k, n_time
       real(wp) :: tangential, limit
+      logical :: sticks
       ! A slipping force lies on the cone to round-off.
       real(wp), parameter :: on_cone = 1.0_wp - 1.0e-12_wp
 
@@ -229,7 +243,10 @@ contains
             tangential = norm2(self%force_time(i, 1:2, k))
             if (self%force_time(i, 3, k) >= 0.0_wp) then
                share(3, i) = share(3, i) + 1.0_wp
-            else if (tangential < on_cone*limit .or. self%margin(i) >= 0.0_wp) then
+               cycle
+            end if
+            sticks = tangential < on_cone*limit .or. self%margin(i) >= 0.0_wp
+            if (sticks) then
                share(1, i) = share(1, i) + 1.0_wp
             else
                share(2, i) = share(2, i) + 1.0_wp

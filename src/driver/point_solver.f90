@@ -175,10 +175,9 @@ contains
       if (.not. self%newton%options%fallback) return
       call approach(self, system, 0.5_wp*(self%omega_last + omega), depth + 1, report, iterations, error)
       if (allocated(error)) return
-      call system%set_frequency(omega, error)
-      if (allocated(error) .or. .not. report%converged) return
-      call try_guesses(self, system, omega, report, iterations)
-      if (report%converged) call remember(self, omega)
+      if (report%converged) call approach(self, system, omega, depth + 1, report, iterations, error)
+      if (allocated(error)) return
+      if (.not. report%converged) call system%set_frequency(omega, error)
    end subroutine approach
 
    !> Extrapolation along the sweep, the last solution, all stuck.

@@ -61,7 +61,7 @@ contains
       if (case%harmonics%filter_harmonics > 0) then
          system%springs%highest_harmonic = case%harmonics%filter_harmonics
       end if
-      if (fft_pays(fourier%n_coefficients, fourier%n_time)) then
+      if (case%contact%n_pairs > 0 .and. fft_pays(fourier%n_coefficients, fourier%n_time)) then
          call system%fourier%prepare_fft(3*case%contact%n_pairs)
       end if
    end subroutine build_system

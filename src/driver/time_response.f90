@@ -126,7 +126,8 @@ contains
    end function frequency
 
    !> Initial state, integration, time spent.
-   subroutine solve_point(case, start_case, system, solver, structure, omega, observer, point, error)
+   subroutine solve_point(case, start_case, system, solver, structure, omega, observer, point, &
+                          error)
       type(case_type), intent(in) :: case, start_case
       type(hbm_system), intent(inout), target :: system
       type(point_solver), intent(inout) :: solver

@@ -31,7 +31,8 @@ module fw_linear_step
       real(wp) :: share_skipped = 0.0_wp
    contains
       procedure :: solve
-      procedure :: solve_again
+      procedure :: prepare
+      procedure :: solve_prepared
    end type linear_step_type
 
 contains
@@ -44,6 +45,16 @@ contains
       !> Relative residual asked of an iterative solution.
       real(wp), intent(in) :: tolerance
       real(wp), intent(out), contiguous :: step(:)
+      logical, intent(out) :: done
+
+      call self%prepare(system, done)
+      if (done) call self%solve_prepared(system, r, tolerance, step, done)
+   end subroutine solve
+
+   !> Linearize the system at its last point, and factor or build the preconditioner.
+   subroutine prepare(self, system, done)
+      class(linear_step_type), intent(inout) :: self
+      class(nonlinear_system), intent(inout) :: system
       logical, intent(out) :: done
       integer :: n
 
@@ -60,11 +71,10 @@ contains
             call system%build_preconditioner()
          end if
       end if
-      if (done) call self%solve_again(system, r, tolerance, step, done)
-   end subroutine solve
+   end subroutine prepare
 
-   !> Another right-hand side with the derivative of the last `solve`.
-   subroutine solve_again(self, system, r, tolerance, step, done)
+   !> step = -J^-1 r with the derivative that was prepared.
+   subroutine solve_prepared(self, system, r, tolerance, step, done)
       class(linear_step_type), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
       real(wp), intent(in), contiguous :: r(:)
@@ -82,14 +92,16 @@ contains
          self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
          ! A last resort that costs more, but only where GMRES has failed.
          if (.not. done .and. self%kind /= linear_krylov) call factor(self, system, n, done)
-         done = .true.
+         ! Where LU is not wanted, Newton's method judges what GMRES has reached.
+         if (self%kind == linear_krylov) done = .true.
+         if (.not. done) return
       end if
       if (self%factored) then
          self%solution = self%rhs
          call self%lu%solve(self%solution)
       end if
       call system%expand(r, self%solution, step)
-   end subroutine solve_again
+   end subroutine solve_prepared
 
    subroutine factor(self, system, n, done)
       type(linear_step_type), intent(inout) :: self

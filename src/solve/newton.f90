@@ -36,7 +36,7 @@ module fw_newton
 
 contains
 
-   !> Solve from the guess in x; the best point found is left there.
+   !> Solve from the guess in x; the last point is left there.
    subroutine solve(self, system, x, report)
       class(newton_solver), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
