@@ -2,7 +2,7 @@
 !>
 !>   s = s_free - W lambda,
 !>   normal      lambda_n <= 0, s_n >= 0, lambda_n s_n = 0          (Signorini),
-!>   tangential  |lambda_t| <= mu |lambda_n|, and lambda_t = mu |lambda_n| s_t/|s_t| in slip (Coulomb),
+!>   tangential  |lambda_t| <= mu |lambda_n|, in slip lambda_t = mu |lambda_n| s_t/|s_t|  (Coulomb),
 !>   springs     lambda = coefficient s**power.
 !>
 !> s measures from where the pair would stay closed and stuck. W is the Delassus operator, with

@@ -5,7 +5,10 @@
 !> over the last changes.
 !>
 !> The residual is the change from one period to the next as integrated, relative to the range
-!> of the state within the period: nothing is called periodic that does not repeat.
+!> of the state within the period: nothing is called periodic that does not repeat. Light contact
+!> nodes may chatter and never repeat exactly: a motion whose change has stopped to fall under
+!> plain iteration, which falls steadily on the way to any periodic state, is accepted at
+!> `chatter_tolerance`.
 module fw_periodic_state
    use fw_kinds, only: wp
    implicit none (type, external)
@@ -47,6 +50,10 @@ module fw_periodic_state
    integer, parameter :: max_history = 24
    !> Periods integrated before the acceleration starts: fast modes die out by themselves.
    integer, parameter :: n_settling = 2
+   !> Periods without a new smallest change after which acceleration is given up: the map is not
+   !> smooth on that scale (light contact nodes that chatter), and least squares fit its noise.
+   integer, parameter :: patience = 10
+   real(wp), parameter :: chatter_tolerance = 1.0e-4_wp
    !> Growth of the change over the best one at which the history is given up.
    real(wp), parameter :: worst_growth = 30.0_wp
    !> A difference that the others explain to this part adds nothing but round-off.
@@ -66,13 +73,15 @@ contains
       real(wp), allocatable :: image(:), change(:), last_image(:), last_change(:)
       real(wp), allocatable :: d_image(:, :), d_change(:, :)
       real(wp) :: range, best
-      integer :: n, n_history
-      logical :: done
+      integer :: n, n_history, n_idle
+      logical :: done, plain
 
       n = size(state)
+      plain = .false.
       allocate (image(n), change(n), last_image(n), last_change(n))
       allocate (d_image(n, max_history), d_change(n, max_history))
       n_history = 0
+      n_idle = 0
       best = huge(1.0_wp)
       do
          call map%integrate(state, image, range, done)
@@ -80,9 +89,12 @@ contains
          if (.not. done) return
          change = map%weight*(image - state)
          report%change = norm2(change)/max(range, tiny(1.0_wp))
-         report%converged = report%change <= tolerance
+         n_idle = merge(0, n_idle + 1, report%change < best)
+         plain = plain .or. n_idle > patience
+         report%converged = report%change <= tolerance .or. &
+            (plain .and. n_idle > 2*patience .and. report%change <= chatter_tolerance)
          if (report%converged .or. report%n_periods >= n_periods) return
-         if (report%change > worst_growth*best) then
+         if (report%change > worst_growth*best .or. plain) then
             n_history = 0
          else if (report%n_periods > n_settling) then
             call remember(n_history, d_image, d_change, image - last_image, change - last_change)

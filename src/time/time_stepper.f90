@@ -8,7 +8,11 @@
 !>
 !> A step at the end of which a pair has another state (stick, slip, open, or slip turned round)
 !> is halved, down to `n_levels` times: in between, steps are second order; the error of a change
-!> is that of the smallest step, which `new_time_stepper` makes of the order (1/steps_per_period)**2.
+!> is that of the smallest step, which is made of the order (1/steps_per_period)**2.
+!>
+!> Limits: slip in a direction that turns (two tangential directions) is first order, by the
+!> backward difference of its path; high modes are not damped by the scheme, so that light contact
+!> nodes may chatter; impacts on contact with mass are plastic by assumption.
 module fw_time_stepper
    use fw_kinds, only: wp
    use fw_kinds, only: pi
