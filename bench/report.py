@@ -95,9 +95,9 @@ def points_part(points: list[PointTime]) -> str:
     return "\n".join([
         "## Time of a frequency point", "",
         "The sector at 4400 rpm (`rotation_speed = 460.8`), else the same: 9 points within 2 Hz of "
-        "the peak, where half of the pairs slip. Unknowns are those of the system; stuck rows leave the linear problems, whose "
+        "the peak, where the joint slips. Unknowns are those of the system; stuck rows leave the linear problems, whose "
         "mean size stands beside. Dense LU was not run for more than "
-        f"{LARGEST_LU} unknowns, where it takes minutes.", "",
+        f"{LARGEST_LU} unknowns: its time grows with their cube.", "",
         *table(["pairs", "H", "unknowns", "in linear problems", "usable points",
                 "GMRES [ms/point]", "LU [ms/point]"], rows), "",
         "![Time of a frequency point](images/benchmark_points.png)"])

@@ -16,9 +16,9 @@ __all__ = ["HARMONICS", "PAIRS", "Crossing", "PointTime", "Sweep", "ThreadTimes"
 
 HARMONICS = (1, 3, 7, 17)
 PAIRS = (16, 48)
-#: Beyond this many unknowns a dense LU factorization takes minutes a sweep.
+#: Dense LU is left out beyond this many unknowns, to keep the whole measurement short.
 LARGEST_LU = 1100
-#: Around the peak [Hz], at 4400 rpm: half of the pairs slip, and every point is usable.
+#: Peaks [Hz] at 4400 rpm, where the joint slips and every point is usable.
 PEAKS = {8: 1017.6, 16: 1022.7, 48: 1017.8}
 HALF_WIDTH, N_NEAR = 2.0, 9
 SLOW, FAST = 261.8, 460.8
