@@ -4,16 +4,18 @@
 !> Perturbations live in all dofs of the model and in all harmonics, whatever harmonics and
 !> coordinates the solution was computed in: an odd solution may well lose its symmetry.
 !>
-!> What the multipliers mean depends on the law:
-!> * nonlinear springs, contact with a gap but without friction: those of the structure;
-!> * friction of the penalty law: the force depends on where the pair slipped before. Hill's
-!>   perturbation p(t) exp(lambda t) is given the force that p alone would find, which takes the
-!>   pair's memory as periodic. That is exact at lambda = 0, so that a multiplier passes 1 at the
-!>   folds, as it should. Elsewhere it is an approximation that misses most of the damping by
-!>   friction: on an oscillator with one slipping pair the modulus came out as 0.92 where the memory
-!>   makes it 0.03. A result above 1 off the real axis is no proof then. The memory of a pair that
-!>   sticks through the period would add a multiplier of exactly 1; it is left out;
-!> * rigid contact (dlft, dlft_velocity) has no derivative in time: refused.
+!> * Nonlinear springs, contact with a gap and pairs that stick throughout act at an instant:
+!>   Hill's method (fw_hill), with the accuracy of the solution.
+!> * Friction that slips depends on the past. Hill's method with the derivative of the periodic
+!>   response would take the memory of a pair as periodic: right where a multiplier passes 1, blind
+!>   to the damping by friction elsewhere (on an oscillator with one slipping pair the modulus came
+!>   out as 0.92 where it is 0.03). There the perturbation is marched through the period, positions
+!>   of the pairs included (fw_stability_march); so are models too large for Hill's eigenproblem.
+!>   The error is that of 1024 or more steps a period: measured 1e-5 for springs, 2e-3 where
+!>   friction switches between the steps.
+!> * A pair that sticks throughout could rest anywhere within its cone, a multiplier of exactly 1
+!>   that is left out.
+!> * Rigid contact (dlft, dlft_velocity) has no derivative in time: refused.
 module fw_stability
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -26,17 +28,23 @@ module fw_stability
    use fw_model, only: model_type
    use fw_stability_basis, only: new_perturbation_basis
    use fw_stability_basis, only: perturbation_basis
+   use fw_stability_history, only: history_type
+   use fw_stability_history, only: new_history
+   use fw_stability_march, only: marched_multipliers
    use fw_stability_tangent, only: new_tangent
    use fw_stability_tangent, only: tangent_type
    use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: floquet_multipliers, is_stable, largest_hill_order
+   public :: floquet_multipliers, is_stable, most_dofs
 
-   !> Order of the eigenproblem that is refused beyond: the time grows with its cube (measured on
-   !> two cores: 1000 takes 2 s, 2000 takes 20 s).
-   integer, parameter :: largest_hill_order = 2000
+   !> Order of Hill's eigenproblem beyond which the march is faster by far: the time grows with
+   !> the cube of the order (measured on two cores: 0.6 s at 1000, 10 s or more at 2000; the march
+   !> of 60 dofs takes 0.2 s).
+   integer, parameter :: largest_hill_order = 1000
+   !> Dofs above which the march takes minutes too.
+   integer, parameter :: most_dofs = 400
    !> Harmonics of the perturbation where the solution has fewer and the order stays below this.
    integer, parameter :: fewest_harmonics = 12, comfortable_order = 500
    !> A modulus above 1 by less than this is round-off or truncation of Hill's problem: undamped
@@ -59,19 +67,25 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(perturbation_basis) :: basis
       type(tangent_type) :: tangent
+      type(history_type) :: history
       complex(wp), allocatable :: exponents(:)
-      integer :: n_harmonics
+      integer :: i, n_harmonics
 
-      call check_system(system, error)
+      call check_system(system, model%n_dof, error)
       if (allocated(error)) return
       call new_perturbation_basis(model, system%joint%relative, basis, error)
       if (allocated(error)) return
-      call choose_harmonics(system, basis, n_harmonics, error)
-      if (allocated(error)) return
-      call new_tangent(system, x, n_harmonics, tangent)
-      call hill_exponents(basis, tangent, system%structure%omega, exponents, error)
-      if (allocated(error)) return
-      multipliers = exp(exponents*(2.0_wp*pi/system%structure%omega))
+      call new_history(system, x, history)
+      n_harmonics = chosen_harmonics(system, basis)
+      if (n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%contact%n_pairs)])) then
+         call marched_multipliers(system, basis, history, multipliers, error)
+         if (allocated(error)) return
+      else
+         call new_tangent(system, x, history%forces%state, n_harmonics, tangent)
+         call hill_exponents(basis, tangent, system%structure%omega, exponents, error)
+         if (allocated(error)) return
+         multipliers = exp(exponents*(2.0_wp*pi/system%structure%omega))
+      end if
       call pair_conjugates(multipliers)
       call sort_descending(multipliers)
    end subroutine floquet_multipliers
@@ -83,8 +97,9 @@ contains
       is_stable = all(abs(multipliers) <= 1.0_wp + round_off)
    end function is_stable
 
-   subroutine check_system(system, error)
+   subroutine check_system(system, n_dof, error)
       class(hbm_system), intent(in) :: system
+      integer, intent(in) :: n_dof
       type(error_type), allocatable, intent(out) :: error
 
       if (system%rigid .and. system%contact%n_pairs > 0) then
@@ -94,26 +109,25 @@ contains
          call fatal_error(error, '&sweep stability: '//to_text(system%joint%n_idle)// &
                           ' components of contact pairs that nothing moves were left out, but '// &
                           'perturbations move them; keep them in the system', status_input)
+      else if (n_dof > most_dofs) then
+         call fatal_error(error, '&sweep stability is offered for up to '//to_text(most_dofs)// &
+                          ' dofs, the model has '//to_text(n_dof)//'; reduce it or switch '// &
+                          'stability off', status_input)
       end if
    end subroutine check_system
 
-   !> Those of the solution, and more where the eigenproblem stays small.
-   subroutine choose_harmonics(system, basis, n_harmonics, error)
+   !> Harmonics for Hill's method: those of the solution, and more where the eigenproblem stays
+   !> small; 0 where it would be too large.
+   pure integer function chosen_harmonics(system, basis) result(n_harmonics)
       class(hbm_system), intent(in) :: system
       type(perturbation_basis), intent(in) :: basis
-      integer, intent(out) :: n_harmonics
-      type(error_type), allocatable, intent(out) :: error
       integer :: width
 
       width = max(1, 2*basis%n_massive + basis%n_damped)
       n_harmonics = max(maxval(system%fourier%harmonic), &
                         min(fewest_harmonics, (comfortable_order/width - 1)/2))
-      if (width*coefficient_count(n_harmonics) <= largest_hill_order) return
-      call fatal_error(error, '&sweep stability: Hill''s eigenproblem has the order '// &
-                       to_text(width*coefficient_count(n_harmonics))//' here, more than '// &
-                       to_text(largest_hill_order)//'; take fewer dofs or harmonics, or switch '// &
-                       'stability off', status_input)
-   end subroutine choose_harmonics
+      if (width*coefficient_count(n_harmonics) > largest_hill_order) n_harmonics = 0
+   end function chosen_harmonics
 
    !> Multipliers are real or come in conjugate pairs. The copies of the exponents that were chosen
    !> need not be conjugate (a negative multiplier comes from one exponent off the axis), so that

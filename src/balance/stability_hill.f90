@@ -98,8 +98,8 @@ contains
             end do
             call add_derivative(basis%damping(i, j)*omega, row, column, tangent%n_harmonics, matrix)
             do term = 1, tangent%n_terms
-               weight = basis%direction(i, tangent%output(term))* &
-                        basis%direction(j, tangent%input(term))
+               weight = basis%direction(i, tangent%row(term))* &
+                        basis%direction(j, tangent%row(term))
                if (abs(weight) <= 0.0_wp) cycle
                do k = 1, nc
                   matrix(row + 1:row + nc, column + k) = matrix(row + 1:row + nc, column + k) + &

@@ -8,23 +8,21 @@
 !>   slip   df = mu p/|d| (I - e e^T)(dy - dx) - mu e dy_n,  dx = dy - df
 !>   open   df = 0,                                          dx = dy.
 !>
-!> Time steps follow Newmark's rule of constant mean acceleration (error h**2, no numerical damping),
-!> with backward Euler for massless damped directions: there the mean rule would ring.
+!> Time steps follow Newmark's rule of constant mean acceleration (error h**2, no numerical
+!> damping), with backward Euler for massless damped directions: there the mean rule would ring.
 module fw_stability_march
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_failure
    use fw_error, only: status_input
-   use fw_forces, only: forces_type
    use fw_hbm, only: hbm_system
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dgeev
-   use fw_lapack, only: dgemm
    use fw_lapack, only: dgetrs
    use fw_linalg, only: lu_type
    use fw_stability_basis, only: perturbation_basis
-   use fw_stability_tangent, only: history_type
+   use fw_stability_history, only: history_type
    implicit none (type, external)
    private
 
@@ -39,9 +37,10 @@ module fw_stability_march
       real(wp), allocatable :: x(:, :)
       !> Constant part of the matrix of a step (n, n).
       real(wp), allocatable :: fixed(:, :)
-      !> Force by predicted force, and by position, at the present instant (row, row).
-      real(wp), allocatable :: by_y(:, :), by_x(:, :)
-      !> The same at the instant before, to see whether the factors still hold.
+      !> Derivatives of the forces at the present instant, see history_type.
+      real(wp), allocatable :: by_u(:, :), by_x(:, :)
+      logical, allocatable :: keeps(:)
+      !> by_u of the factors in lu.
       real(wp), allocatable :: factored(:, :)
       type(lu_type) :: lu
    end type march_type
@@ -61,12 +60,13 @@ contains
       integer, allocatable :: memory(:)
       integer :: k
 
-      memory = pack(history%memory_row, history%memory_row > 0)
+      memory = pack([(k, k=1, size(history%remembers))], history%remembers)
       call start(system, basis, history, memory, march, error)
       if (allocated(error)) return
       do k = 1, history%n_time
-         call set_laws(history, modulo(k, history%n_time) + 1, march)
-         call advance(basis, march, error)
+         call history%derivatives(modulo(k, history%n_time) + 1, march%by_u, march%by_x, &
+                                  march%keeps)
+         call advance(basis, history, march, error)
          if (allocated(error)) return
       end do
       associate (nd => basis%n_massive + basis%n_damped)
@@ -95,7 +95,8 @@ contains
       n_columns = nd + nb + size(memory)
       self%step = 2.0_wp*pi/(system%structure%omega*history%n_time)
       allocate (self%y(n, n_columns), self%v(nb, n_columns), self%a(nb, n_columns), source=0.0_wp)
-      allocate (self%x(nr, n_columns), self%by_y(nr, nr), self%by_x(nr, nr), source=0.0_wp)
+      allocate (self%x(nr, n_columns), self%by_u(nr, nr), self%by_x(nr, nr), source=0.0_wp)
+      allocate (self%keeps(nr))
       do j = 1, nd
          self%y(j, j) = 1.0_wp
       end do
@@ -113,7 +114,7 @@ contains
       do j = nb + 1, nd
          self%fixed(j, j) = self%fixed(j, j) + 1.0_wp/self%step
       end do
-      call set_laws(history, 1, self)
+      call history%derivatives(1, self%by_u, self%by_x, self%keeps)
       call settle(basis, history, self, error)
    end subroutine start
 
@@ -124,21 +125,21 @@ contains
       type(history_type), intent(in) :: history
       type(march_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: stiffness(:, :), force(:, :), by_y(:, :), static(:, :)
-      integer :: nb, nd, n_static, info, i, row
+      real(wp), allocatable :: stiffness(:, :), force(:, :), by_u(:, :), static(:, :)
+      integer :: nb, nd, n_static, info, row
       logical :: singular
 
       nb = basis%n_massive
       nd = nb + basis%n_damped
       n_static = basis%n - nd
-      by_y = self%by_y
-      do i = 1, size(history%memory_row)
-         row = history%memory_row(i)
-         if (row == 0) cycle
-         by_y(row, :) = 0.0_wp
-         by_y(row, row) = history%stiffness(row)
+      by_u = self%by_u
+      do row = 1, size(history%remembers)
+         if (.not. history%remembers(row)) cycle
+         by_u(row, :) = 0.0_wp
+         by_u(row, row) = history%stiffness(row)
       end do
-      stiffness = basis%stiffness + matmul(basis%direction, matmul(by_y, transpose(basis%direction)))
+      stiffness = basis%stiffness + &
+                  matmul(basis%direction, matmul(by_u, transpose(basis%direction)))
       force = matmul(stiffness(:, :nd), self%y(:nd, :)) - matmul(basis%direction, self%x)
       if (n_static > 0) then
          call self%lu%reserve(n_static)
@@ -153,6 +154,7 @@ contains
                      static, n_static, info)
          self%y(nd + 1:, :) = static
          force = force + matmul(stiffness(:, nd + 1:), static)
+         ! The storage never shrinks, and its leading dimension must be that of the steps.
          deallocate (self%lu%matrix, self%lu%pivot)
       end if
       self%a = -force(:nb, :) - matmul(basis%damping(:nb, :nb), self%v)
@@ -165,22 +167,14 @@ contains
                        'neither stiffness nor contact; hold it or give it mass', status_input)
    end subroutine refuse_loose
 
-   !> Derivatives of all forces at an instant.
-   pure subroutine set_laws(history, instant, self)
-      type(history_type), intent(in) :: history
-      integer, intent(in) :: instant
-      type(march_type), intent(inout) :: self
-
-      call history%derivatives(instant, self%by_y, self%by_x)
-   end subroutine set_laws
-
-   !> One step to the instant whose laws are set.
-   subroutine advance(basis, self, error)
+   !> One step to the instant whose derivatives are at hand.
+   subroutine advance(basis, history, self, error)
       type(perturbation_basis), intent(in) :: basis
+      type(history_type), intent(in) :: history
       type(march_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: rhs(:, :), rows(:, :)
-      integer :: nb, nd, info
+      real(wp), allocatable :: rhs(:, :), rows(:, :), force(:, :)
+      integer :: nb, nd, info, row
       logical :: singular
 
       nb = basis%n_massive
@@ -202,6 +196,58 @@ contains
       end associate
       self%y = rhs
       rows = matmul(transpose(basis%direction), self%y)
+      force = matmul(self%by_u, rows) + matmul(self%by_x, self%x)
+      do row = 1, size(rows, 1)
+         if (.not. history%remembers(row) .or. self%keeps(row)) cycle
+         self%x(row, :) = history%stiffness(row)*rows(row, :) - force(row, :)
+      end do
    end subroutine advance
+
+   !> Factor the matrix of a step where the laws differ from those of the factors at hand.
+   subroutine factor(basis, self, singular)
+      type(perturbation_basis), intent(in) :: basis
+      type(march_type), intent(inout) :: self
+      logical, intent(out) :: singular
+
+      singular = .false.
+      if (allocated(self%factored)) then
+         if (all(abs(self%by_u - self%factored) <= 0.0_wp)) return
+      end if
+      self%factored = self%by_u
+      call self%lu%reserve(basis%n)
+      self%lu%matrix = self%fixed + matmul(basis%direction, &
+                                           matmul(self%by_u, transpose(basis%direction)))
+      call self%lu%factor(singular)
+   end subroutine factor
+
+   !> The n_wanted eigenvalues of largest modulus.
+   subroutine largest_eigenvalues(n_wanted, matrix, values, error)
+      integer, intent(in) :: n_wanted
+      real(wp), contiguous, intent(inout) :: matrix(:, :)
+      complex(wp), allocatable, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: re(:), im(:), work(:)
+      complex(wp), allocatable :: all_values(:)
+      logical, allocatable :: left(:)
+      real(wp) :: unused(1, 1)
+      integer :: n, info, j, best
+
+      n = size(matrix, 1)
+      allocate (re(n), im(n), work(max(1, 8*n)), values(n_wanted))
+      call dgeev('N', 'N', n, matrix, max(1, n), re, im, unused, 1, unused, 1, work, size(work), &
+                 info)
+      if (info /= 0) then
+         call fatal_error(error, '&sweep stability: the eigenvalues of the monodromy matrix '// &
+                          'did not converge', status_failure)
+         return
+      end if
+      all_values = cmplx(re, im, wp)
+      allocate (left(n), source=.true.)
+      do j = 1, n_wanted
+         best = maxloc(abs(all_values), dim=1, mask=left)
+         values(j) = all_values(best)
+         left(best) = .false.
+      end do
+   end subroutine largest_eigenvalues
 
 end module fw_stability_march

@@ -1,18 +1,13 @@
 !> Derivative of the nonlinear forces at a periodic solution, as an operator between the Fourier
-!> coefficients 0..H' of a perturbation: force(output row) = block * displacement(input row).
+!> coefficients 0..H' of a perturbation, one term a row of the joint: force = block * displacement.
 !>
 !> Springs and unilateral contact act at an instant, so that the block is the multiplication by
 !> the slope s(tau). That of a spring is a polynomial in tau, integrated without error. That of a
 !> contact jumps between 0 and k: its coefficients come from the instants where the gap closes
 !> and opens, found on the polynomial itself, so that the sampling leaves no error either.
 !>
-!> Friction remembers. Its block is the derivative of the periodic response (the march through
-!> the period with its memory). It says how the force follows a perturbation of the same period,
-!> so that it is exact where a multiplier passes 1, and a quasi-linear approximation elsewhere.
+!> Friction that slips depends on the past and has no place here: see fw_stability_march.
 module fw_stability_tangent
-   use fw_forces, only: forces_type
-   use fw_forces, only: new_forces
-   use fw_forces, only: pair_open
    use fw_forces, only: pair_stuck
    use fw_fourier, only: coefficient_count
    use fw_fourier, only: fourier_type
@@ -23,7 +18,7 @@ module fw_stability_tangent
    implicit none (type, external)
    private
 
-   public :: tangent_type, new_tangent
+   public :: tangent_type, new_tangent, relative_displacements
 
    type :: tangent_type
       !> Harmonics of the perturbation, H', and its real coefficients per row.
@@ -31,22 +26,22 @@ module fw_stability_tangent
       integer :: n_coefficients = 0
       integer :: n_terms = 0
       !> Rows of the joint (n_terms).
-      integer, allocatable :: output(:), input(:)
+      integer, allocatable :: row(:)
       !> (output coefficient, input coefficient, term) [force/length].
       real(wp), allocatable :: block(:, :, :)
    end type tangent_type
 
-   !> Instants of the march per harmonic: with fewer, the sampling of the switches shows.
-   integer, parameter :: instants_friction = 32
    !> Points per harmonic between which a gap is taken to change its sign once at most.
    integer, parameter :: points_per_harmonic = 32
 
 contains
 
    !> The derivative at the solution x of a system (penalty law and springs).
-   subroutine new_tangent(system, x, n_harmonics, self)
+   subroutine new_tangent(system, x, state, n_harmonics, self)
       class(hbm_system), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
+      !> What the pairs do (n_pairs); those with friction are stuck or open.
+      integer, intent(in) :: state(:)
       !> H', at least the highest harmonic of the solution.
       integer, intent(in) :: n_harmonics
       type(tangent_type), intent(out) :: self
@@ -57,14 +52,14 @@ contains
       self%n_coefficients = coefficient_count(n_harmonics)
       n_terms = system%springs%n_springs
       do i = 1, system%contact%n_pairs
-         n_terms = n_terms + count(system%joint%row(:, i) > 0)**2
+         n_terms = n_terms + count(system%joint%row(:, i) > 0)
       end do
-      allocate (self%output(n_terms), self%input(n_terms))
+      allocate (self%row(n_terms))
       allocate (self%block(self%n_coefficients, self%n_coefficients, n_terms))
       call relative_displacements(system, system%structure%n_coordinates, x, n_harmonics, rows)
       call add_springs(system, rows, self)
       call add_gaps(system, rows, self)
-      call add_friction(system, rows, self)
+      call add_stuck(system, state, self)
    end subroutine new_tangent
 
    !> Coefficients 0..H' of the relative displacement of every row (2H'+1, n_rows).
@@ -159,8 +154,7 @@ contains
          weighted(k, :) = slope(k)*fourier%synthesis(:, k)
       end do
       self%n_terms = self%n_terms + 1
-      self%output(self%n_terms) = row
-      self%input(self%n_terms) = row
+      self%row(self%n_terms) = row
       self%block(:, :, self%n_terms) = matmul(fourier%analysis, weighted)
    end subroutine add_multiplication
 
@@ -225,65 +219,25 @@ contains
       end do
    end function value_at
 
-   !> Pairs with friction, from the derivative of their march.
-   subroutine add_friction(system, rows, self)
+   !> Pairs that stick through the period are springs in every direction.
+   pure subroutine add_stuck(system, state, self)
       class(hbm_system), intent(in) :: system
-      real(wp), intent(in) :: rows(:, :)
+      integer, intent(in) :: state(:)
       type(tangent_type), intent(inout) :: self
-      type(fourier_type) :: fourier
-      type(forces_type) :: forces
-      logical :: rubs(system%contact%n_pairs)
-      integer :: i, c
+      integer :: i, c, j
 
-      rubs = [(has_friction(system, i), i=1, size(rubs))]
-      if (.not. any(rubs)) return
-      fourier = new_fourier(self%n_harmonics, max(system%fourier%n_time, &
-                                                  instants_friction*self%n_harmonics))
-      forces = new_forces(system%contact%mu, system%joint%row > 0, fourier)
-      forces%x_start = system%contact%x_start
-      forces%offset = merge(system%stiffness(:, 3)*(system%gap + system%depth), &
-                            -system%normal_load, system%joint%row(3, :) > 0)
-      do i = 1, size(rubs)
+      do i = 1, system%contact%n_pairs
+         if (.not. has_friction(system, i) .or. state(i) /= pair_stuck) cycle
          do c = 1, 3
             if (system%joint%row(c, i) == 0) cycle
-            forces%prediction(i, c, :) = system%stiffness(i, c)*rows(:, system%joint%row(c, i))
-         end do
-      end do
-      call forces%evaluate(fourier)
-      call forces%linearize(fourier)
-      do i = 1, size(rubs)
-         if (rubs(i) .and. forces%state(i) /= pair_open) call add_pair(system, forces, i, self)
-      end do
-   end subroutine add_friction
-
-   !> All couples of components of a pair; a stuck one is a spring in each direction.
-   pure subroutine add_pair(system, forces, pair, self)
-      class(hbm_system), intent(in) :: system
-      type(forces_type), intent(in) :: forces
-      integer, intent(in) :: pair
-      type(tangent_type), intent(inout) :: self
-      integer :: c, d, j, nc
-
-      nc = self%n_coefficients
-      do d = 1, 3
-         do c = 1, 3
-            if (system%joint%row(c, pair) == 0 .or. system%joint%row(d, pair) == 0) cycle
             self%n_terms = self%n_terms + 1
-            self%output(self%n_terms) = system%joint%row(c, pair)
-            self%input(self%n_terms) = system%joint%row(d, pair)
-            associate (block => self%block(:, :, self%n_terms))
-               block = 0.0_wp
-               if (forces%state(pair) /= pair_stuck) then
-                  block = transpose(forces%jacobian((d - 1)*nc + 1:d*nc, (c - 1)*nc + 1:c*nc, pair))
-               else if (c == d) then
-                  do j = 1, nc
-                     block(j, j) = 1.0_wp
-                  end do
-               end if
-               block = system%stiffness(pair, d)*block
-            end associate
+            self%row(self%n_terms) = system%joint%row(c, i)
+            self%block(:, :, self%n_terms) = 0.0_wp
+            do j = 1, self%n_coefficients
+               self%block(j, j, self%n_terms) = system%stiffness(i, c)
+            end do
          end do
       end do
-   end subroutine add_pair
+   end subroutine add_stuck
 
 end module fw_stability_tangent

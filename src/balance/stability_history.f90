@@ -1,0 +1,178 @@
+!> The nonlinear forces along one period of a solution, and their derivatives at each instant: what
+!> the march of a perturbation needs. Rows are those of the joint.
+module fw_stability_history
+   use fw_forces, only: forces_type
+   use fw_forces, only: new_forces
+   use fw_forces, only: pair_mixed
+   use fw_fourier, only: fourier_type
+   use fw_fourier, only: new_fourier
+   use fw_hbm, only: hbm_system
+   use fw_kinds, only: wp
+   use fw_stability_tangent, only: relative_displacements
+   implicit none (type, external)
+   private
+
+   public :: history_type, new_history
+
+   !> Steps per period at least: the error of Newmark's rule is (w step)**2/12 of the phase.
+   integer, parameter :: fewest_steps = 1024
+   integer, parameter :: steps_per_harmonic = 32
+
+   type :: history_type
+      integer :: n_time = 0
+      !> Row of each component, 0 where there is none (3, n_pairs), and of each spring.
+      integer, allocatable :: row(:, :), spring_row(:)
+      !> Prediction stiffness of each row, 0 of springs (n_rows) [force/length].
+      real(wp), allocatable :: stiffness(:)
+      !> Tangential rows of pairs that slip, which remember their position (n_rows).
+      logical, allocatable :: remembers(:)
+      !> Pairs along the period.
+      type(forces_type) :: forces
+      !> Slopes of the springs (n_springs, n_time).
+      real(wp), allocatable :: slope(:, :)
+   contains
+      procedure :: rubs
+      procedure :: derivatives
+   end type history_type
+
+contains
+
+   !> Follow the solution x of a system through a period.
+   subroutine new_history(system, x, self)
+      class(hbm_system), intent(in) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      type(history_type), intent(out) :: self
+      type(fourier_type) :: fourier
+      real(wp), allocatable :: rows(:, :), elongation(:)
+      integer :: i, c, h
+
+      h = maxval(system%fourier%harmonic)
+      self%n_time = max(fewest_steps, system%fourier%n_time, steps_per_harmonic*h)
+      fourier = new_fourier(h, self%n_time)
+      call relative_displacements(system, system%structure%n_coordinates, x, h, rows)
+      self%row = system%joint%row
+      self%spring_row = system%joint%spring_row
+      allocate (self%stiffness(size(rows, 2)), source=0.0_wp)
+      allocate (self%remembers(size(rows, 2)), source=.false.)
+      self%forces = new_forces(system%contact%mu, self%row > 0, fourier)
+      do i = 1, system%contact%n_pairs
+         do c = 1, 3
+            if (self%row(c, i) == 0) cycle
+            self%stiffness(self%row(c, i)) = system%stiffness(i, c)
+            self%forces%prediction(i, c, :) = system%stiffness(i, c)*rows(:, self%row(c, i))
+         end do
+      end do
+      self%forces%x_start = system%contact%x_start
+      self%forces%offset = merge(system%stiffness(:, 3)*(system%gap + system%depth), &
+                                 -system%normal_load, self%row(3, :) > 0)
+      call self%forces%evaluate(fourier)
+      call find_memory(self)
+      allocate (self%slope(system%springs%n_springs, self%n_time))
+      do i = 1, system%springs%n_springs
+         elongation = matmul(rows(:, self%spring_row(i)), fourier%synthesis)
+         self%slope(i, :) = system%springs%coefficient(i)*real(system%springs%power(i), wp)* &
+                            elongation**(system%springs%power(i) - 1)
+      end do
+   end subroutine new_history
+
+   !> Positions that slip or open pairs set anew. That of a pair that sticks throughout stays
+   !> where it was put: a multiplier of exactly 1, which says nothing and is left out.
+   pure subroutine find_memory(self)
+      class(history_type), intent(inout) :: self
+      integer :: i, c
+
+      do i = 1, size(self%row, 2)
+         if (.not. self%rubs(i)) cycle
+         do c = 1, 2
+            if (self%row(c, i) > 0) self%remembers(self%row(c, i)) = .true.
+         end do
+      end do
+   end subroutine find_memory
+
+   !> Whether a pair slips or opens at some time, with friction: its force depends on the past.
+   pure logical function rubs(self, pair)
+      class(history_type), intent(in) :: self
+      integer, intent(in) :: pair
+
+      rubs = self%forces%mu(pair) > 0.0_wp .and. any(self%row(1:2, pair) > 0) .and. &
+             self%forces%state(pair) == pair_mixed
+   end function rubs
+
+   !> d force = by_u d u_r + by_x d x at an instant, and which rows keep their position there.
+   pure subroutine derivatives(self, k, by_u, by_x, keeps)
+      class(history_type), intent(in) :: self
+      integer, intent(in) :: k
+      !> (output row, input row) [force/length] and [1].
+      real(wp), intent(out) :: by_u(:, :), by_x(:, :)
+      logical, intent(out) :: keeps(:)
+      real(wp) :: d(2), p, length
+      integer :: i, before
+
+      by_u = 0.0_wp
+      by_x = 0.0_wp
+      keeps = .false.
+      do i = 1, size(self%spring_row)
+         by_u(self%spring_row(i), self%spring_row(i)) = self%slope(i, k)
+      end do
+      before = modulo(k - 2, self%n_time) + 1
+      do i = 1, size(self%row, 2)
+         p = -self%forces%prediction_time(i, 3, k)
+         if (p <= 0.0_wp) cycle
+         ! Whatever the state of a pair, its position is y - lambda.
+         d = self%forces%prediction_time(i, 1:2, k) - &
+             (self%forces%prediction_time(i, 1:2, before) - self%forces%force_time(i, 1:2, before))
+         length = norm2(d)
+         if (length > self%forces%mu(i)*p) then
+            call slip(self, i, self%forces%mu(i)*p/length, d/length, by_u, by_x)
+         else if (self%forces%mu(i) > 0.0_wp) then
+            call stick(self, i, by_u, by_x, keeps)
+         end if
+         if (self%row(3, i) > 0) then
+            by_u(self%row(3, i), self%row(3, i)) = self%stiffness(self%row(3, i))
+         end if
+      end do
+   end subroutine derivatives
+
+   pure subroutine stick(self, pair, by_u, by_x, keeps)
+      class(history_type), intent(in) :: self
+      integer, intent(in) :: pair
+      real(wp), intent(inout) :: by_u(:, :), by_x(:, :)
+      logical, intent(inout) :: keeps(:)
+      integer :: c, row
+
+      do c = 1, 2
+         row = self%row(c, pair)
+         if (row == 0) cycle
+         by_u(row, row) = self%stiffness(row)
+         by_x(row, row) = -1.0_wp
+         keeps(row) = .true.
+      end do
+   end subroutine stick
+
+   !> The force turns with the slip direction e and grows with the pressure.
+   pure subroutine slip(self, pair, share, e, by_u, by_x)
+      class(history_type), intent(in) :: self
+      integer, intent(in) :: pair
+      !> mu p/|d|.
+      real(wp), intent(in) :: share, e(2)
+      real(wp), intent(inout) :: by_u(:, :), by_x(:, :)
+      real(wp) :: turn
+      integer :: c, b, row, column, normal
+
+      normal = self%row(3, pair)
+      do c = 1, 2
+         row = self%row(c, pair)
+         if (row == 0) cycle
+         do b = 1, 2
+            column = self%row(b, pair)
+            ! With one direction there is nothing to turn.
+            if (any(self%row(1:2, pair) == 0)) cycle
+            turn = share*(merge(1.0_wp, 0.0_wp, b == c) - e(c)*e(b))
+            by_u(row, column) = turn*self%stiffness(column)
+            by_x(row, column) = -turn
+         end do
+         if (normal > 0) by_u(row, normal) = -self%forces%mu(pair)*e(c)*self%stiffness(normal)
+      end do
+   end subroutine slip
+
+end module fw_stability_history
