@@ -11,8 +11,8 @@
 !>   to the damping by friction elsewhere (on an oscillator with one slipping pair the modulus came
 !>   out as 0.92 where it is 0.03). There the perturbation is marched through the period, positions
 !>   of the pairs included (fw_stability_march); so are models too large for Hill's eigenproblem.
-!>   The error is that of 1024 or more steps a period: measured 1e-5 for springs, 2e-3 where
-!>   friction switches between the steps.
+!>   The error is that of 1024 or more steps a period: measured 1e-5 to 1e-4 for springs,
+!>   up to 3e-3 where friction switches between the steps.
 !> * A pair that sticks throughout could rest anywhere within its cone, a multiplier of exactly 1
 !>   that is left out.
 !> * Rigid contact (dlft, dlft_velocity) has no derivative in time: refused.
