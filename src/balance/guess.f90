@@ -6,10 +6,11 @@ module fw_guess
    use fw_hbm, only: to_complex
    use fw_hbm, only: to_real
    use fw_linalg, only: complex_lu_type
+   use fw_linalg, only: is_positive_definite
    implicit none (type, external)
    private
 
-   public :: stuck_guess, free_guess
+   public :: stuck_guess, free_guess, held_without_contact
 
    !> Rounds of opening pairs under tension; each opens at least one pair or is the last.
    integer, parameter :: max_rounds = 20
@@ -42,6 +43,16 @@ contains
       closed = .false.
       call linear_solution(system, closed, x, tension)
    end subroutine free_guess
+
+   !> Whether the structure holds a static load without its contact. (Without a static harmonic
+   !> there is no static position to lose.)
+   logical function held_without_contact(system) result(held)
+      type(hbm_system), intent(in) :: system
+
+      held = .true.
+      if (.not. system%fourier%has_constant()) return
+      held = is_positive_definite(real(system%structure%stiffness(:, :, 1), wp))
+   end function held_without_contact
 
    !> Solve with closed pairs stuck; tension is their mean normal force (positive: it pulls).
    subroutine linear_solution(system, closed, x, tension)

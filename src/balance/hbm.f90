@@ -280,7 +280,7 @@ contains
       complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
       call to_complex(self%fourier, m, q, self%complex_in)
-      !$omp parallel do default(none) shared(self, m) private(h) if(m > 40)
+      !$omp parallel do default(none) shared(self, m) private(h) if(m > 80)
       do h = 1, self%fourier%n_retained
          call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, &
                     self%complex_in(1, h), 1, zero, self%complex_out(1, h), 1)

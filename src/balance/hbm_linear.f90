@@ -15,7 +15,7 @@ submodule(fw_hbm) fw_hbm_linear
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
    !> Coordinates above which the harmonics of a product are worth a thread each.
-   integer, parameter :: threads_pay_from = 40
+   integer, parameter :: threads_pay_from = 80
 
 contains
 
@@ -288,7 +288,7 @@ contains
 
       n = 3*self%fourier%n_coefficients
       !$omp parallel do default(none) shared(self, n_rows, vector, spread_out, n) private(i) &
-      !$omp schedule(static) if(self%contact%n_pairs > 8)
+      !$omp schedule(static) if(n_rows > threads_pay_from)
       do i = 1, self%contact%n_pairs
          if (self%contact%state(i) == pair_open) cycle
          call gather_inputs(self, i, n_rows, vector, spread_out, self%pair_in(:, i))
@@ -382,7 +382,8 @@ contains
       integer :: h
       logical :: singular
 
-      !$omp parallel do default(none) shared(self) private(h, singular) schedule(dynamic)
+      !$omp parallel do default(none) shared(self) private(h, singular) schedule(dynamic) &
+      !$omp if(self%n_active > threads_pay_from)
       do h = 1, self%fourier%n_retained
          call self%preconditioner(h)%reserve(self%n_active)
          associate (m => self%preconditioner(h)%matrix, na => self%n_active)

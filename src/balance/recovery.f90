@@ -11,7 +11,7 @@ module fw_recovery
    implicit none (type, external)
    private
 
-   public :: recover_point, recover_histories, largest_magnitude
+   public :: recover_point, recover_histories, largest_magnitude, carry_solution
 
 contains
 
@@ -44,6 +44,28 @@ contains
       point%amplitude = [(largest_magnitude(point%coefficients(:, i)), i=1, n_observed)]
       if (with_contact .and. system%contact%n_pairs > 0) call recover_contact(system, x, n_harmonics, point)
    end subroutine recover_point
+
+   !> Carry a solution between the condensed and the whole system of a case: the relative
+   !> coordinates are the first of both; internal modes that only the target keeps start at zero.
+   pure subroutine carry_solution(source, x, target, y)
+      type(hbm_system), intent(in) :: source, target
+      real(wp), intent(in) :: x(:)
+      real(wp), intent(out) :: y(:)
+      integer :: i, j, k, m_source, m_target, n_relative
+
+      m_source = source%structure%n_coordinates
+      m_target = target%structure%n_coordinates
+      n_relative = source%joint%relative%n_coordinates
+      y = 0.0_wp
+      do k = 0, source%fourier%n_coefficients - 1
+         y(k*m_target + 1:k*m_target + n_relative) = x(k*m_source + 1:k*m_source + n_relative)
+         do i = 1, size(source%structure%basis%kept)
+            j = findloc(target%structure%basis%kept, source%structure%basis%kept(i), dim=1)
+            if (j == 0) cycle
+            y(k*m_target + n_relative + j) = x(k*m_source + n_relative + i)
+         end do
+      end do
+   end subroutine carry_solution
 
    !> Forces, shares of stick, slip and open, and friction energy per cycle.
    subroutine recover_contact(system, x, n_harmonics, point)

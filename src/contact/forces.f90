@@ -22,10 +22,13 @@ module fw_forces
    integer, parameter :: pair_stuck = 1, pair_open = 2, pair_mixed = 3
    !> Pairs marched together: one cache line, and a whole number of vector registers.
    integer, parameter :: block_size = 8
+   !> Pairs above which threads pay; with fewer, a parallel region costs more than its work.
+   integer, parameter :: threads_pay_from = 24
    !> Turns after which a march that is not periodic is given up; a random sample needed 4.
    integer, parameter :: max_turns = 100
-   !> A march is periodic when x repeats to this part of the largest force of the pair.
-   real(wp), parameter :: periodic_tolerance = 1.0e-14_wp
+   !> A march is periodic when x repeats to this part of the largest predicted force of the pair:
+   !> far below the tolerance of any balance, far above round-off.
+   real(wp), parameter :: periodic_tolerance = 1.0e-12_wp
 
    type :: forces_type
       integer :: n_pairs = 0
@@ -42,6 +45,8 @@ module fw_forces
       real(wp), allocatable :: prediction_time(:, :, :), force_time(:, :, :)
       !> Constant part of the predicted normal force: preload, or stiffness times gap (n_pairs).
       real(wp), allocatable :: offset(:)
+      !> Bound of the predicted tangential forces (n_pairs).
+      real(wp), allocatable :: scale(:)
       !> Corrected position [force] where the march starts, and after its last turn (n_pairs, 2).
       real(wp), allocatable :: x_start(:, :), x(:, :)
       !> Smallest mu p - |d|, smallest p and turns needed (n_pairs).
@@ -56,6 +61,7 @@ module fw_forces
       procedure :: evaluate
       procedure :: linearize
       procedure :: always_closed
+      procedure :: all_open
       procedure :: fractions
    end type forces_type
 
@@ -81,7 +87,7 @@ contains
       allocate (self%prediction(n, 3, nc), self%force(n, 3, nc), source=0.0_wp)
       allocate (self%prediction_time(n, 3, nt), self%force_time(n, 3, nt), source=0.0_wp)
       allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
-      allocate (self%margin(n), self%pressure(n), self%offset(n), source=0.0_wp)
+      allocate (self%margin(n), self%pressure(n), self%offset(n), self%scale(n), source=0.0_wp)
       allocate (self%turns(n), source=0)
       allocate (self%state(n), source=pair_stuck)
    end function new_forces
@@ -97,9 +103,13 @@ contains
       do k = 1, fourier%n_time
          self%prediction_time(:, 3, k) = self%prediction_time(:, 3, k) + self%offset
       end do
+      self%scale = 0.0_wp
+      do k = 1, fourier%n_coefficients
+         self%scale = self%scale + abs(self%prediction(:, 1, k)) + abs(self%prediction(:, 2, k))
+      end do
       n_blocks = (self%n_pairs + block_size - 1)/block_size
       !$omp parallel do default(none) shared(self, n_blocks, fourier) private(first, block) &
-      !$omp schedule(static) if(n_blocks > 2)
+      !$omp schedule(static) if(self%n_pairs > threads_pay_from)
       do block = 1, n_blocks
          first = (block - 1)*block_size + 1
          call march(self, fourier%n_time, first, min(first + block_size - 1, self%n_pairs))
@@ -134,7 +144,6 @@ contains
       integer, intent(in) :: n_time, first, last
       integer :: turn, i
       real(wp) :: start(block_size, 2), scale
-      logical :: periodic
 
       self%x(first:last, :) = self%x_start(first:last, :)
       self%margin(first:last) = huge(1.0_wp)
@@ -145,6 +154,7 @@ contains
          self%turns(first:last) = 1
          return
       end if
+      self%turns(first:last) = 0
       do turn = 1, max_turns
          start(:last - first + 1, :) = self%x(first:last, :)
          if (self%two_directions) then
@@ -154,14 +164,14 @@ contains
             call march_turn_1d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
                                self%x, self%force_time, self%margin, self%pressure)
          end if
-         periodic = .true.
          do i = first, last
-            scale = abs(self%x(i, 1)) + abs(self%x(i, 2))
-            if (any(abs(self%x(i, :) - start(i - first + 1, :)) > periodic_tolerance*scale)) periodic = .false.
+            scale = self%scale(i)
+            if (self%turns(i) == 0 .and. all(abs(self%x(i, :) - start(i - first + 1, :)) <= &
+                                             periodic_tolerance*scale)) self%turns(i) = turn
          end do
-         if (periodic) exit
+         if (all(self%turns(first:last) > 0)) exit
       end do
-      self%turns(first:last) = min(turn, max_turns)
+      where (self%turns(first:last) == 0) self%turns(first:last) = max_turns
    end subroutine march
 
    !> Derivatives of all mixed pairs at the last evaluated prediction.
@@ -175,7 +185,8 @@ contains
       if (.not. any(self%state == pair_mixed)) return
       nc = fourier%n_coefficients
       if (.not. allocated(self%jacobian)) allocate (self%jacobian(3*nc, 3*nc, self%n_pairs))
-      !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i)
+      !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i) &
+      !$omp if(self%n_pairs > threads_pay_from)
       allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
       allocate (y_n(fourier%n_time))
       !$omp do schedule(dynamic)
@@ -224,6 +235,13 @@ contains
 
       always_closed = self%pressure(pair) > 0.0_wp
    end function always_closed
+
+   !> Whether no pair bears at any instant.
+   pure logical function all_open(self)
+      class(forces_type), intent(in) :: self
+
+      all_open = all(self%state == pair_open)
+   end function all_open
 
    !> Share of the period that each pair spends in stick, slip and open (3, n_pairs).
    pure subroutine fractions(self, share)

@@ -83,7 +83,7 @@ contains
       else
          call branch%trace(system, solver%x, recorder, error)
       end if
-      call merge_work(branch%linear, solver%newton%linear)
+      call merge_work(branch%linear, solver%method%newton%linear)
       if (allocated(error)) return
       call observer%on_message('branch: '//branch%ending)
       if (.not. branch%complete) call summary%mark_incomplete()

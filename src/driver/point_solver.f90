@@ -8,15 +8,14 @@ module fw_point_solver
    use fw_error, only: error_type
    use fw_guess, only: free_guess
    use fw_guess, only: stuck_guess
-   use fw_harmonics_options, only: method_hdhb
    use fw_hbm, only: hbm_system
-   use fw_hdhb, only: hdhb_system
-   use fw_hdhb, only: new_hdhb
-   use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
    use fw_point, only: point_type
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
+   use fw_solution, only: solution_method
+   use fw_solver_options, only: pseudo_time_options
+   use fw_solver_options, only: solver_pseudo_time
    implicit none (type, external)
    private
 
@@ -28,14 +27,14 @@ module fw_point_solver
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
    type :: point_solver
-      type(newton_solver) :: newton
+      type(solution_method) :: method
       !> The present solution, and the last two converged ones with their frequencies.
       real(wp), allocatable :: x(:), last(:), before(:)
       real(wp) :: omega_last = -1.0_wp
       real(wp) :: omega_before = -1.0_wp
       integer :: n_converged = 0
-      !> Solve for values at the instants (hdhb) instead of coefficients.
-      logical :: in_time = .false.
+      !> Points that the pseudo-time fallback has saved.
+      integer :: n_by_flow = 0
    contains
       procedure :: start
       procedure :: solve
@@ -48,8 +47,7 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: n
 
-      self%newton%options = case%solver
-      self%in_time = case%harmonics%method == method_hdhb
+      call self%method%start(case)
       allocate (self%x(n), self%last(n), self%before(n), source=0.0_wp)
    end subroutine start
 
@@ -65,7 +63,7 @@ contains
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
-      call reach(self, system, omega, report, point%iterations, error)
+      call reach(self, case, system, omega, report, point%iterations, error)
       if (allocated(error)) return
       point%omega = omega
       point%converged = report%converged
@@ -82,34 +80,82 @@ contains
    end subroutine solve
 
    !> Newton from the best guesses known. Where all fail: from the last point on the sweep by
-   !> halves, or to the first point by raising the load; and at last from the solution without
-   !> contact, which may lie on another branch.
-   subroutine reach(self, system, omega, report, iterations, error)
+   !> halves, or to the first point by raising the load; then by pseudo-time; and at last from the
+   !> solution without contact, which may lie on another branch.
+   subroutine reach(self, case, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
       type(hbm_system), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: closest(:)
 
+      if (case%solver%kind == solver_pseudo_time) then
+         call by_flow(self, case, case%pseudo_time, system, omega, report, iterations, error)
+         return
+      end if
       call approach(self, system, omega, 0, report, iterations, error)
       if (allocated(error)) return
-      if (report%converged .or. .not. self%newton%options%fallback) return
+      if (report%converged .or. .not. case%solver%fallback) return
       if (self%n_converged == 0) then
          call raise_load(self, system, omega, report, iterations, error)
          if (allocated(error) .or. report%converged) return
       end if
+      call by_flow(self, case, pseudo_time_options(), system, omega, report, iterations, error)
+      if (allocated(error)) return
+      if (report%converged) then
+         self%n_by_flow = self%n_by_flow + 1
+         return
+      end if
+      call from_free_guess(self, system, omega, report, iterations)
+   end subroutine reach
+
+   !> The last resort; what was reached before it stays where this fails too.
+   subroutine from_free_guess(self, system, omega, report, iterations)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout), target :: system
+      real(wp), intent(in) :: omega
+      type(solver_report), intent(inout) :: report
+      integer, intent(inout) :: iterations
+      type(solver_report) :: last_report
+      real(wp), allocatable :: closest(:)
+
       closest = self%x
       call free_guess(system, self%x)
-      call solve_balance(self, system, report)
-      iterations = iterations + report%iterations
-      if (report%converged) then
+      call self%method%solve(system, self%x, last_report)
+      iterations = iterations + last_report%iterations
+      if (last_report%converged) then
+         report = last_report
          call remember(self, omega)
       else
          self%x = closest
       end if
-   end subroutine reach
+   end subroutine from_free_guess
+
+   !> Integrate in pseudo-time from the last solution, or from the stuck guess.
+   subroutine by_flow(self, case, pseudo, system, omega, report, iterations, error)
+      class(point_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(pseudo_time_options), intent(in) :: pseudo
+      type(hbm_system), intent(inout), target :: system
+      real(wp), intent(in) :: omega
+      type(solver_report), intent(out) :: report
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+
+      call system%set_frequency(omega, error)
+      if (allocated(error)) return
+      if (self%n_converged > 0) then
+         self%x = self%last
+      else
+         call stuck_guess(system, self%x)
+      end if
+      call self%method%solve_by_flow(case, pseudo, system, self%x, report, error)
+      if (allocated(error)) return
+      iterations = iterations + report%iterations
+      if (report%converged) call remember(self, omega)
+   end subroutine by_flow
 
    !> From the static position to the full vibratory load, by steps that adapt.
    subroutine raise_load(self, system, omega, report, iterations, error)
@@ -133,7 +179,7 @@ contains
          system%load_share = min(1.0_wp, share + step)
          call system%set_frequency(omega, error)
          if (allocated(error)) exit
-         call solve_balance(self, system, report)
+         call self%method%solve(system, self%x, report)
          iterations = iterations + report%iterations
          if (report%converged) then
             reached = self%x
@@ -172,7 +218,7 @@ contains
          return
       end if
       if (depth == max_halvings .or. self%n_converged == 0) return
-      if (.not. self%newton%options%fallback) return
+      if (.not. self%method%newton%options%fallback) return
       call approach(self, system, 0.5_wp*(self%omega_last + omega), depth + 1, report, iterations, error)
       if (allocated(error)) return
       if (report%converged) call approach(self, system, omega, depth + 1, report, iterations, error)
@@ -203,32 +249,11 @@ contains
          case (3)
             call stuck_guess(system, self%x)
          end select
-         call solve_balance(self, system, report)
+         call self%method%solve(system, self%x, report)
          iterations = iterations + report%iterations
-         if (report%converged .or. .not. self%newton%options%fallback) exit
+         if (report%converged .or. .not. self%method%newton%options%fallback) exit
       end do
    end subroutine try_guesses
-
-   !> From the guess in x, in the unknowns of the method.
-   subroutine solve_balance(self, system, report)
-      class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
-      type(solver_report), intent(out) :: report
-      type(hdhb_system) :: in_time
-      real(wp), allocatable :: values(:)
-      integer :: m
-
-      if (.not. self%in_time) then
-         call self%newton%solve(system, self%x, report)
-         return
-      end if
-      in_time = new_hdhb(system)
-      m = system%structure%n_coordinates
-      allocate (values(system%n))
-      call in_time%to_values(m, self%x, values)
-      call self%newton%solve(in_time, values, report)
-      call in_time%to_coefficients(m, values, self%x)
-   end subroutine solve_balance
 
    subroutine remember(self, omega)
       class(point_solver), intent(inout) :: self

@@ -35,10 +35,12 @@ module fw_problem
 contains
 
    !> Build the system of a case at the first frequency of its sweep.
-   subroutine build_system(case, system, error)
+   subroutine build_system(case, system, error, keep_all)
       type(case_type), intent(in) :: case
       type(hbm_system), intent(out) :: system
       type(error_type), allocatable, intent(out) :: error
+      !> Condense nothing (pseudo-time flows live on the whole structure).
+      logical, intent(in), optional :: keep_all
       type(joint_type) :: joint
       type(fourier_type) :: fourier
       type(condensation_type) :: structure
@@ -52,7 +54,7 @@ contains
       if (case%analysis == analysis_frf) then
          range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
       end if
-      call new_condensation(case%model, joint%relative, fourier%harmonic, range, structure, error)
+      call new_condensation(case%model, joint%relative, fourier%harmonic, range, structure, error, keep_all)
       if (allocated(error)) return
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
@@ -61,7 +63,7 @@ contains
       if (case%harmonics%filter_harmonics > 0) then
          system%springs%highest_harmonic = case%harmonics%filter_harmonics
       end if
-      if (case%contact%n_pairs > 0 .and. fft_pays(fourier%n_coefficients, fourier%n_time)) then
+      if (case%contact%n_pairs > 0 .and. fft_pays(fourier%n_coefficients)) then
          call system%fourier%prepare_fft(3*case%contact%n_pairs)
       end if
    end subroutine build_system

@@ -3,6 +3,7 @@ module fw_run
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_available, only: check_available
+   use fw_case, only: analysis_time
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_error, only: status_not_converged
@@ -14,6 +15,7 @@ module fw_run
    use fw_summary, only: summary_type
    use fw_summary, only: new_summary
    use fw_threads, only: thread_scope
+   use fw_time_response, only: run_time_response
    implicit none (type, external)
    private
 
@@ -42,7 +44,11 @@ contains
       if (allocated(error)) return
       call threads%enter(case%threads)
       summary = new_summary(case)
-      call run_frequency_response(case, observer, writer, summary, error)
+      if (case%analysis == analysis_time) then
+         call run_time_response(case, observer, writer, summary, error)
+      else
+         call run_frequency_response(case, observer, writer, summary, error)
+      end if
       call threads%leave()
       call system_clock(clock_end)
       elapsed = real(clock_end - clock, wp)/real(rate, wp)

@@ -31,6 +31,7 @@ module fw_summary
       procedure :: add
       procedure :: mark_incomplete
       procedure :: describe_work
+      procedure :: note_fallback
       procedure :: lines
    end type summary_type
 
@@ -95,6 +96,14 @@ contains
          self%work = [self%work, line('skipped', 'every linear problem: the joint stays stuck')]
       end if
    end subroutine describe_work
+
+   !> Points that only the pseudo-time fallback has solved.
+   subroutine note_fallback(self, n_points)
+      class(summary_type), intent(inout) :: self
+      integer, intent(in) :: n_points
+
+      self%work = [self%work, line('fallback', 'pseudo-time served '//to_text(n_points)//' points')]
+   end subroutine note_fallback
 
    !> The table (seconds: elapsed time).
    function lines(self, seconds) result(table)

@@ -1,12 +1,13 @@
 !> What this version can run. The one place to change when a method arrives.
 module fw_available
-   use fw_case, only: case_type, analysis_words, analysis_frf, analysis_point
+   use fw_case, only: case_type, analysis_words, analysis_frf, analysis_point, analysis_time
    use fw_contact_data, only: law_words, law_dlft, law_dlft_velocity, law_penalty
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_words, method_hbm, method_tcm, &
                                    method_tcm_least_squares, method_hdhb, sampling_words, &
                                    sampling_uniform
-   use fw_solver_options, only: solver_words, solver_newton, continuation_words, &
+   use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
+                                 solver_pseudo_time, continuation_words, &
                                 continuation_natural, continuation_arclength
    implicit none (type, external)
    private
@@ -20,12 +21,14 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
-      call check('case%analysis', analysis_words, case%analysis, [analysis_frf, analysis_point])
+      call check('case%analysis', analysis_words, case%analysis, &
+                 [analysis_frf, analysis_point, analysis_time])
       call check('contact%law', law_words, case%contact%law, [law_dlft, law_dlft_velocity, law_penalty])
       call check('harmonics%method', method_words, case%harmonics%method, &
                  [method_hbm, method_tcm, method_tcm_least_squares, method_hdhb])
       call check('harmonics%sampling', sampling_words, case%harmonics%sampling, [sampling_uniform])
-      call check('solver%kind', solver_words, case%solver%kind, [solver_newton])
+      call check('solver%kind', solver_words, case%solver%kind, &
+                 [solver_newton, solver_powell, solver_kinsol, solver_pseudo_time])
       call check('sweep%continuation', continuation_words, case%sweep%continuation, &
                  [continuation_natural, continuation_arclength])
       call check_off('harmonics%adaptive', case%harmonics%adaptive)

@@ -131,13 +131,13 @@ contains
       end do
    end subroutine collocate
 
-   !> Whether FFTW beats the matrix product for this many coefficients and instants.
-   !> Measured by bench/transforms: the product runs at the speed of dgemm, the strided
-   !> transform does not, so that it pays only for long transforms of many harmonics.
-   pure logical function fft_pays(n_coefficients, n_time)
-      integer, intent(in) :: n_coefficients, n_time
+   !> Whether FFTW beats the matrix product for this many coefficients, whatever the instants: the
+   !> product runs at the speed of dgemm, the strided transform does not. Measured by
+   !> bench/transforms.f90.
+   pure logical function fft_pays(n_coefficients)
+      integer, intent(in) :: n_coefficients
 
-      fft_pays = n_coefficients > 80 .and. n_time > 256
+      fft_pays = n_coefficients > 64
    end function fft_pays
 
    !> Plans are made for one number of rows; others go through the matrix.

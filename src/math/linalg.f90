@@ -6,11 +6,12 @@ module fw_linalg
    use fw_lapack, only: dgetrs
    use fw_lapack, only: zgetrf
    use fw_lapack, only: zgetrs
+   use fw_lapack, only: dsyevd
    use fw_lapack, only: dsygvd
    implicit none (type, external)
    private
 
-   public :: lu_type, complex_lu_type, solve_symmetric_eigen
+   public :: lu_type, complex_lu_type, solve_symmetric_eigen, is_positive_definite
 
    !> LU factors of a real matrix. The storage only grows, so that refactoring does not allocate.
    type :: lu_type
@@ -127,5 +128,27 @@ contains
                   iwork, size(iwork), info)
       done = info == 0
    end subroutine solve_symmetric_eigen
+
+   !> Whether a symmetric matrix is positive definite, beyond the round-off of its eigenvalues,
+   !> after its rows and columns are scaled to a unit diagonal.
+   logical function is_positive_definite(a) result(positive)
+      real(wp), intent(in) :: a(:, :)
+      real(wp), parameter :: round_off = 1.0e-10_wp
+      real(wp), allocatable :: scaled(:, :), values(:), work(:)
+      integer, allocatable :: iwork(:)
+      integer :: i, j, n, info
+
+      n = size(a, 1)
+      positive = all([(a(i, i) > 0.0_wp, i=1, n)])
+      if (.not. positive .or. n == 0) return
+      allocate (scaled(n, n), values(n), work(2*n + 1), iwork(1))
+      do j = 1, n
+         do i = 1, n
+            scaled(i, j) = a(i, j)/sqrt(a(i, i)*a(j, j))
+         end do
+      end do
+      call dsyevd('N', 'U', n, scaled, n, values, work, size(work), iwork, 1, info)
+      positive = info == 0 .and. values(1) > round_off
+   end function is_positive_definite
 
 end module fw_linalg

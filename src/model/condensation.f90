@@ -52,7 +52,7 @@ module fw_condensation
 contains
 
    !> Prepare the condensation of a model to its relative coordinates.
-   subroutine new_condensation(model, relative, harmonic, omega_range, self, error)
+   subroutine new_condensation(model, relative, harmonic, omega_range, self, error, keep_all)
       type(model_type), intent(in) :: model
       type(relative_type), intent(in) :: relative
       !> Harmonics in use.
@@ -61,8 +61,10 @@ contains
       real(wp), intent(in) :: omega_range(2)
       type(condensation_type), intent(out) :: self
       type(error_type), allocatable, intent(out) :: error
+      !> Condense nothing: every internal mode becomes a coordinate.
+      logical, intent(in), optional :: keep_all
 
-      call new_reduction(model, relative, harmonic, omega_range, self%basis, error)
+      call new_reduction(model, relative, harmonic, omega_range, self%basis, error, keep_all)
       if (allocated(error)) return
       self%n_coordinates = self%basis%n_coordinates
       self%harmonic = harmonic
@@ -81,7 +83,7 @@ contains
       if (omega >= self%omega .and. omega <= self%omega) return
       n_failed = 0
       !$omp parallel do default(none) shared(self, omega) private(h) reduction(+:n_failed) &
-      !$omp schedule(dynamic)
+      !$omp schedule(dynamic) if(self%n_coordinates > 80)
       do h = 1, size(self%harmonic)
          call condense(self, h, omega, n_failed)
       end do

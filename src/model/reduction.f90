@@ -17,8 +17,8 @@ module fw_reduction
    type :: reduction_type
       integer :: n_coordinates = 0
       integer :: n_internal = 0
-      !> Internal modes kept as coordinates, behind the relative ones.
-      integer :: n_kept = 0
+      !> Internal modes kept as coordinates, behind the relative ones: their numbers.
+      integer, allocatable :: kept(:)
       !> Blocks of the coordinates (n_coordinates, n_coordinates).
       real(wp), allocatable :: k_qq(:, :), m_qq(:, :), c_qq(:, :)
       !> Coupling blocks (n_coordinates, n_internal).
@@ -44,7 +44,7 @@ module fw_reduction
 contains
 
    !> Build the basis; errors where the structure has a part that nothing holds.
-   subroutine new_reduction(model, relative, harmonic, omega_range, self, error)
+   subroutine new_reduction(model, relative, harmonic, omega_range, self, error, keep_all)
       type(model_type), intent(in) :: model
       type(relative_type), intent(in) :: relative
       integer, intent(in) :: harmonic(:)
@@ -52,20 +52,25 @@ contains
       real(wp), intent(in) :: omega_range(2)
       type(reduction_type), intent(out) :: self
       type(error_type), allocatable, intent(out) :: error
+      !> Condense nothing: every internal mode becomes a coordinate.
+      logical, intent(in), optional :: keep_all
       real(wp), allocatable :: t_q(:, :), t_i(:, :)
       logical, allocatable :: keep(:)
+      integer :: j
 
       call split_basis(relative, t_q, t_i)
       call internal_modes(model, t_q, t_i, self, error)
       if (allocated(error)) return
       call transform(model, t_q, t_i, self)
+      call check_free_modes(self, error)
+      if (allocated(error)) return
       keep = undamped_resonances(self, harmonic, omega_range)
+      if (present(keep_all)) keep = keep .or. keep_all
       if (any(keep)) then
          call move_to_coordinates(keep, t_q, t_i, self)
          call transform(model, t_q, t_i, self)
       end if
-      self%n_kept = count(keep)
-      call check_free_modes(self, error)
+      self%kept = pack([(j, j=1, size(keep))], keep)
    end subroutine new_reduction
 
    !> u = t_q q + t_i eta of the relative coordinates, before any mode.

@@ -14,7 +14,7 @@ module fw_linear_step
    public :: linear_step_type
 
    !> Unknowns up to which LU is the faster; measured by bench/run.py (docs/benchmarks.md).
-   integer, parameter :: lu_pays_up_to = 200
+   integer, parameter :: lu_pays_up_to = 60
 
    type :: linear_step_type
       integer :: kind = linear_auto

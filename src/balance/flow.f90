@@ -1,0 +1,272 @@
+!> Pseudo-time flows of the harmonic balance, P dU/dt = -R(U), on the whole structure:
+!>
+!>   rotated         P_n = 2 i n omega M,  P_0 = omega^2 M
+!>   identity        P = omega^2 m, the same for every coordinate (the paper's flow, with m the
+!>                   mean mass to give it the unit of a stiffness)
+!>   preconditioned  P_n = Z_n + the prediction stiffness of the pairs: the closed linear joint
+!>
+!> The rotated flow damps every harmonic below and above every resonance: the eigenvalues of its
+!> linear part have the real part c/2m. The identity flow grows wherever n omega passes a natural
+!> frequency.
+!>
+!> A step of implicit Euler solves the same problem with artificial damping, Z + P/h and
+!> F + P U_old/h, the contact laws included: stuck pairs stay as they are.
+module fw_flow
+   use fw_kinds, only: wp
+   use fw_hbm, only: hbm_system
+   use fw_hbm, only: to_complex
+   use fw_hbm, only: to_real
+   use fw_lapack, only: zgemm
+   use fw_linalg, only: complex_lu_type
+   use fw_pseudo_system, only: pseudo_system
+   use fw_solver_options, only: flow_identity
+   use fw_solver_options, only: flow_preconditioned
+   implicit none (type, external)
+   private
+
+   public :: flow_system, new_flow
+
+   type, extends(pseudo_system) :: flow_system
+      !> The balance, nothing condensed, at its frequency.
+      type(hbm_system), pointer :: balance => null()
+      !> P of each harmonic (n_coordinates, n_coordinates, n_retained), and its factors.
+      complex(wp), allocatable :: p(:, :, :)
+      type(complex_lu_type), allocatable :: factors(:)
+      !> Stiffness and load without a shift.
+      complex(wp), allocatable :: stiffness(:, :, :)
+      real(wp), allocatable :: load(:, :)
+      !> Workspace (n_coordinates, n_retained), (n_coordinates, n_coefficients).
+      complex(wp), allocatable :: input(:, :), output(:, :)
+      real(wp), allocatable :: product(:, :)
+   contains
+      procedure :: residual
+      procedure :: linearize
+      procedure :: reduce
+      procedure :: expand
+      procedure :: apply
+      procedure :: build_preconditioner
+      procedure :: precondition
+      procedure :: assemble
+      procedure :: flow_product
+      procedure :: flow_solve
+      procedure :: set_shift
+      procedure :: clear_shift
+   end type flow_system
+
+   !> Massless directions get this share of their stiffness as mass, so that P is regular.
+   real(wp), parameter :: massless_share = 1.0e-4_wp
+
+contains
+
+   !> The flow of a balance at its present frequency; to be made anew when that changes.
+   subroutine new_flow(balance, flow, self)
+      type(hbm_system), intent(inout), target :: balance
+      !> flow_rotated, flow_identity or flow_preconditioned.
+      integer, intent(in) :: flow
+      type(flow_system), intent(out) :: self
+      integer :: h, m, nh
+
+      m = balance%structure%n_coordinates
+      nh = balance%fourier%n_retained
+      self%balance => balance
+      self%n = balance%n
+      self%reference = balance%reference
+      self%stiffness = balance%structure%stiffness
+      self%load = balance%load
+      allocate (self%p(m, m, nh), self%factors(nh))
+      allocate (self%input(m, nh), self%output(m, nh), self%product(m, size(self%load, 2)))
+      do h = 1, nh
+         call fill_flow(balance, flow, h, self%p(:, :, h))
+         call factor_flow(self, h)
+      end do
+   end subroutine new_flow
+
+   !> P of one harmonic.
+   subroutine fill_flow(balance, flow, h, p)
+      type(hbm_system), intent(in) :: balance
+      integer, intent(in) :: flow, h
+      complex(wp), intent(out) :: p(:, :)
+      real(wp) :: omega, mean_mass
+      integer :: i, n
+
+      omega = balance%structure%omega
+      n = balance%fourier%harmonic(h)
+      associate (b => balance%structure%basis)
+         select case (flow)
+         case (flow_identity)
+            mean_mass = sum([(abs(b%m_qq(i, i)), i=1, size(p, 1))])/real(size(p, 1), wp)
+            p = (0.0_wp, 0.0_wp)
+            do i = 1, size(p, 1)
+               p(i, i) = omega**2*mean_mass
+            end do
+         case (flow_preconditioned)
+            p = balance%structure%stiffness(:, :, h)
+            call add_closed_joint(balance, p)
+         case default
+            p = omega**2*b%m_qq
+            if (n > 0) p = cmplx(0.0_wp, 2.0_wp*n, wp)*p
+         end select
+      end associate
+   end subroutine fill_flow
+
+   !> Prediction stiffness of every component of every pair.
+   subroutine add_closed_joint(balance, p)
+      type(hbm_system), intent(in) :: balance
+      complex(wp), intent(inout) :: p(:, :)
+      integer :: i, c, e, f, row
+
+      associate (r => balance%joint%relative)
+         do i = 1, balance%contact%n_pairs
+            do c = 1, 3
+               row = balance%joint%row(c, i)
+               if (row == 0) cycle
+               do e = r%first(row), r%first(row + 1) - 1
+                  do f = r%first(row), r%first(row + 1) - 1
+                     p(r%coordinate(e), r%coordinate(f)) = p(r%coordinate(e), r%coordinate(f)) + &
+                        r%coefficient(e)*r%coefficient(f)*balance%stiffness(i, c)
+                  end do
+               end do
+            end do
+         end do
+      end associate
+   end subroutine add_closed_joint
+
+   !> Factors of P for the explicit schemes, massless directions made regular.
+   subroutine factor_flow(self, h)
+      type(flow_system), intent(inout) :: self
+      integer, intent(in) :: h
+      logical :: singular
+      real(wp) :: smallest
+      integer :: i, m
+
+      m = size(self%p, 1)
+      call self%factors(h)%reserve(m)
+      self%factors(h)%matrix = self%p(:, :, h)
+      call self%factors(h)%factor(singular)
+      smallest = minval([(abs(self%factors(h)%matrix(i, i)), i=1, m)])
+      if (.not. singular .and. smallest > 1.0e-12_wp*maxval(abs(self%p(:, :, h)))) return
+      do i = 1, m
+         self%p(i, i, h) = self%p(i, i, h) + massless_share*abs(self%stiffness(i, i, h))
+      end do
+      self%factors(h)%matrix = self%p(:, :, h)
+      call self%factors(h)%factor(singular)
+   end subroutine factor_flow
+
+   subroutine flow_product(self, vector, product)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: vector(:)
+      real(wp), intent(out), contiguous :: product(:)
+
+      call multiply(self, size(self%p, 1), vector, product)
+   end subroutine flow_product
+
+   subroutine multiply(self, m, vector, product)
+      class(flow_system), intent(inout) :: self
+      integer, intent(in) :: m
+      real(wp), intent(in) :: vector(m, *)
+      real(wp), intent(inout) :: product(m, *)
+      complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+      integer :: h
+
+      call to_complex(self%balance%fourier, m, vector, self%input)
+      do h = 1, size(self%p, 3)
+         call zgemm('N', 'N', m, 1, m, one, self%p(1, 1, h), m, self%input(1, h), m, zero, &
+                    self%output(1, h), m)
+      end do
+      call to_real(self%balance%fourier, m, self%output, product)
+   end subroutine multiply
+
+   subroutine flow_solve(self, vector)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: vector(:)
+      integer :: h, m
+
+      m = size(self%p, 1)
+      call to_complex(self%balance%fourier, m, vector, self%input)
+      do h = 1, size(self%p, 3)
+         call self%factors(h)%solve(1, self%input(:, h:h))
+      end do
+      call to_real(self%balance%fourier, m, self%input, vector)
+   end subroutine flow_solve
+
+   subroutine set_shift(self, h, x_old)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(in) :: h
+      real(wp), intent(in), contiguous :: x_old(:)
+
+      self%balance%structure%stiffness = self%stiffness + self%p/h
+      call multiply(self, size(self%p, 1), x_old, self%product)
+      self%balance%load = self%load + self%product/h
+   end subroutine set_shift
+
+   subroutine clear_shift(self)
+      class(flow_system), intent(inout) :: self
+
+      self%balance%structure%stiffness = self%stiffness
+      self%balance%load = self%load
+   end subroutine clear_shift
+
+   ! The system of the balance, shifted or not.
+
+   subroutine residual(self, x, r)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: r(:)
+
+      self%balance%reduced = self%reduced
+      call self%balance%residual(x, r)
+   end subroutine residual
+
+   subroutine linearize(self, n_linear)
+      class(flow_system), intent(inout) :: self
+      integer, intent(out) :: n_linear
+
+      self%balance%reduced = self%reduced
+      call self%balance%linearize(n_linear)
+   end subroutine linearize
+
+   subroutine reduce(self, r, rhs)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: r(:)
+      real(wp), intent(out), contiguous :: rhs(:)
+
+      call self%balance%reduce(r, rhs)
+   end subroutine reduce
+
+   subroutine expand(self, r, solution, step)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: r(:), solution(:)
+      real(wp), intent(out), contiguous :: step(:)
+
+      call self%balance%expand(r, solution, step)
+   end subroutine expand
+
+   subroutine apply(self, vector, product)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: vector(:)
+      real(wp), intent(out), contiguous :: product(:)
+
+      call self%balance%apply(vector, product)
+   end subroutine apply
+
+   subroutine build_preconditioner(self)
+      class(flow_system), intent(inout) :: self
+
+      call self%balance%build_preconditioner()
+   end subroutine build_preconditioner
+
+   subroutine precondition(self, vector)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: vector(:)
+
+      call self%balance%precondition(vector)
+   end subroutine precondition
+
+   subroutine assemble(self, matrix)
+      class(flow_system), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: matrix(:, :)
+
+      call self%balance%assemble(matrix)
+   end subroutine assemble
+
+end module fw_flow

@@ -1,0 +1,152 @@
+!> Solve a balance with the solver that the case asks for, in the unknowns of its method.
+module fw_solution
+   use fw_kinds, only: wp
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_flow, only: flow_system
+   use fw_flow, only: new_flow
+   use fw_guess, only: held_without_contact
+   use fw_harmonics_options, only: method_hdhb
+   use fw_hbm, only: hbm_system
+   use fw_hdhb, only: hdhb_system
+   use fw_hdhb, only: new_hdhb
+   use fw_kinsol, only: kinsol_solver
+   use fw_newton, only: newton_solver
+   use fw_newton, only: solver_report
+   use fw_parameter_system, only: parameter_system
+   use fw_powell, only: powell_solver
+   use fw_problem, only: build_system
+   use fw_pseudo_time, only: pseudo_report
+   use fw_pseudo_time, only: pseudo_time_solver
+   use fw_recovery, only: carry_solution
+   use fw_solver_options, only: pseudo_time_options
+   use fw_solver_options, only: solver_kinsol
+   use fw_solver_options, only: solver_powell
+   use fw_solver_options, only: solver_pseudo_time
+   implicit none (type, external)
+   private
+
+   public :: solution_method
+
+   type :: solution_method
+      type(newton_solver) :: newton
+      type(powell_solver) :: powell
+      type(kinsol_solver) :: kinsol
+      !> 'pseudo_time' was asked for; otherwise it is the last resort of the others.
+      integer :: kind = 0
+      !> Unknowns are values at the instants (hdhb).
+      logical :: in_time = .false.
+      !> The balance with nothing condensed, made when a flow is first needed.
+      type(hbm_system), allocatable :: whole
+      !> Why the last pseudo-time solution failed.
+      character(:), allocatable :: message
+   contains
+      procedure :: start
+      procedure :: solve
+      procedure :: solve_by_flow
+   end type solution_method
+
+contains
+
+   subroutine start(self, case)
+      class(solution_method), intent(inout) :: self
+      type(case_type), intent(in) :: case
+
+      self%kind = case%solver%kind
+      self%newton%options = case%solver
+      self%powell%options = case%solver
+      self%kinsol%options = case%solver
+      self%in_time = case%harmonics%method == method_hdhb
+   end subroutine start
+
+   !> From the guess in the coefficients x. A solution with every pair open, of a structure that
+   !> its contact alone holds, is no equilibrium that lasts: it does not count.
+   subroutine solve(self, system, x, report)
+      class(solution_method), intent(inout) :: self
+      type(hbm_system), intent(inout), target :: system
+      real(wp), intent(inout), contiguous :: x(:)
+      type(solver_report), intent(out) :: report
+      type(hdhb_system) :: in_time
+      real(wp), allocatable :: values(:)
+      integer :: m
+
+      if (self%in_time) then
+         in_time = new_hdhb(system)
+         m = system%structure%n_coordinates
+         allocate (values(system%n))
+         call in_time%to_values(m, x, values)
+         call solve_system(self, in_time, values, report)
+         call in_time%to_coefficients(m, values, x)
+      else
+         call solve_system(self, system, x, report)
+      end if
+      if (report%converged) report%converged = held(system)
+   end subroutine solve
+
+   !> Whether something holds the structure at the last evaluated point.
+   logical function held(system)
+      type(hbm_system), intent(in) :: system
+
+      held = .true.
+      if (system%contact%n_pairs == 0) return
+      if (.not. system%contact%all_open()) return
+      held = held_without_contact(system)
+   end function held
+
+   subroutine solve_system(self, system, x, report)
+      class(solution_method), intent(inout) :: self
+      class(parameter_system), intent(inout), target :: system
+      real(wp), intent(inout), contiguous :: x(:)
+      type(solver_report), intent(out) :: report
+
+      select case (self%kind)
+      case (solver_powell)
+         call self%powell%solve(system, x, report)
+      case (solver_kinsol)
+         call self%kinsol%solve(system, x, report)
+      case default
+         call self%newton%solve(system, x, report)
+      end select
+   end subroutine solve_system
+
+   !> Integrate in pseudo-time on the whole structure, at the frequency and from the guess of the
+   !> condensed one.
+   subroutine solve_by_flow(self, case, pseudo, system, x, report, error)
+      class(solution_method), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(pseudo_time_options), intent(in) :: pseudo
+      type(hbm_system), intent(inout) :: system
+      real(wp), intent(inout), contiguous :: x(:)
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      type(pseudo_time_solver) :: solver
+      type(pseudo_report) :: outcome
+      type(flow_system) :: flow
+      real(wp), allocatable :: whole_x(:)
+
+      if (.not. allocated(self%whole)) then
+         allocate (self%whole)
+         call build_system(case, self%whole, error, keep_all=.true.)
+         if (allocated(error)) return
+      end if
+      call self%whole%set_frequency(system%structure%omega, error)
+      if (allocated(error)) return
+      ! One and the same law: prediction stiffness, memory and reference of the condensed system.
+      self%whole%stiffness = system%stiffness
+      self%whole%contact%x_start = system%contact%x_start
+      self%whole%reference = system%reference
+      allocate (whole_x(self%whole%n))
+      call carry_solution(system, x, self%whole, whole_x)
+      call new_flow(self%whole, pseudo%flow, flow)
+      flow%reduced = system%reduced
+      solver%options = case%solver
+      solver%pseudo = pseudo
+      call solver%solve(flow, whole_x, outcome)
+      call flow%clear_shift()
+      report = outcome%solver_report
+      if (.not. outcome%converged) self%message = outcome%message
+      call carry_solution(self%whole, whole_x, system, x)
+      if (report%converged) report%converged = held(self%whole)
+   end subroutine solve_by_flow
+
+end module fw_solution
