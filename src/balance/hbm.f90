@@ -119,7 +119,8 @@ module fw_hbm
 
 contains
 
-   !> Build the system of a joint; call set_frequency before the first residual.
+   !> Build the system of a joint. The structure must stand at a frequency already (its stiffness
+   !> sets eps); call set_frequency before the first residual.
    subroutine new_hbm(joint, structure, fourier, contact, springs, self)
       type(joint_type), intent(in) :: joint
       type(condensation_type), intent(in) :: structure
@@ -261,6 +262,7 @@ contains
 
       m = self%structure%n_coordinates
       nc = self%fourier%n_coefficients
+      if (m == 0) return
       call multiply_stiffness(self, m, nc, x)
       if (self%springs%n_springs > 0) call add_springs(self, m, nc, x)
       if (self%contact%n_pairs > 0) then

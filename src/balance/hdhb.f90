@@ -42,6 +42,7 @@ contains
 
       self%balance => balance
       self%n = balance%n
+      self%reduced = balance%reduced
       allocate (self%coefficients(self%n), self%product(self%n), source=0.0_wp)
    end function new_hdhb
 
@@ -105,6 +106,7 @@ contains
       class(hdhb_system), intent(inout) :: self
       integer, intent(out) :: n_linear
 
+      self%balance%reduced = self%reduced
       call self%balance%linearize(n_linear)
    end subroutine linearize
 

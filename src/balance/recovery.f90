@@ -15,7 +15,8 @@ module fw_recovery
 
 contains
 
-   !> Fill a point from the solution x; with_contact adds forces, states and dissipation.
+   !> Fill a point from the solution x, where the system was evaluated last; with_contact adds
+   !> forces, states and dissipation.
    subroutine recover_point(system, x, n_harmonics, with_contact, point)
       type(hbm_system), intent(inout) :: system
       real(wp), intent(in), contiguous :: x(:)
@@ -67,19 +68,17 @@ contains
       end do
    end subroutine carry_solution
 
-   !> Forces, shares of stick, slip and open, and friction energy per cycle.
+   !> Forces, shares of stick, slip and open, and friction energy per cycle, at the point where the
+   !> system was evaluated last.
    subroutine recover_contact(system, x, n_harmonics, point)
       type(hbm_system), intent(inout) :: system
       real(wp), intent(in), contiguous :: x(:)
       integer, intent(in) :: n_harmonics
       type(point_type), intent(inout) :: point
       type(fourier_type) :: all_harmonics
-      real(wp), allocatable :: force(:, :, :), r(:)
+      real(wp), allocatable :: force(:, :, :)
       integer :: n_pairs, i, c
 
-      allocate (r(size(x)))
-      ! The contact forces of this very point, not of the last trial of the solver.
-      call system%residual(x, r)
       n_pairs = system%contact%n_pairs
       all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
       allocate (force(n_pairs, 3, all_harmonics%n_coefficients))
@@ -170,7 +169,7 @@ contains
    pure real(wp) function largest_magnitude(coefficients) result(largest)
       real(wp), intent(in) :: coefficients(:)
       integer, parameter :: points_per_wave = 16, newton_steps = 4
-      real(wp) :: value, slope, curvature, tau, spacing, step
+      real(wp) :: value, slope, curvature, tau, spacing, step, on_grid
       integer :: k, i, n_grid, n_harmonics
       real(wp), allocatable :: grid(:)
 
@@ -183,11 +182,12 @@ contains
       end do
       grid(0) = grid(n_grid)
       grid(n_grid + 1) = grid(1)
-      largest = maxval(abs(grid))
+      on_grid = maxval(abs(grid))
+      largest = on_grid
       do k = 1, n_grid
          if (abs(grid(k)) < max(abs(grid(k - 1)), abs(grid(k + 1)))) cycle
          ! A peak between grid points exceeds the grid by at most (H spacing)^2/8 of the largest.
-         if (abs(grid(k)) < 0.97_wp*maxval(abs(grid))) cycle
+         if (abs(grid(k)) < 0.97_wp*on_grid) cycle
          tau = k*spacing
          do i = 1, newton_steps
             call evaluate(coefficients, tau, value, slope, curvature)

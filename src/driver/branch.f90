@@ -23,6 +23,9 @@ module fw_branch
 
    public :: run_branch
 
+   !> First step where n_points leaves the choice: this part of the interval.
+   integer, parameter :: default_steps = 100
+
    !> Turns branch points into results.
    type, extends(branch_observer) :: branch_recorder
       type(case_type), pointer :: case => null()
@@ -33,6 +36,7 @@ module fw_branch
       type(summary_type), pointer :: summary => null()
       integer :: n_points = 0
       integer(int64) :: clock = 0
+      real(wp), allocatable :: r(:)
    contains
       procedure :: take
    end type branch_recorder
@@ -56,6 +60,7 @@ contains
 
       call solver%solve(case, system, case%sweep%start, point, error)
       if (allocated(error)) return
+      allocate (recorder%r(system%n))
       recorder%case => case
       recorder%system => system
       recorder%observer => observer
@@ -73,7 +78,8 @@ contains
       branch%finish = case%sweep%end
       branch%max_points = case%sweep%max_points
       branch%x_scale = displacement_scale(system)
-      branch%step = 1.0_wp/real(max(1, case%sweep%n_points - 1), wp)
+      branch%step = 1.0_wp/real(default_steps, wp)
+      if (case%sweep%n_points > 1) branch%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       if (case%harmonics%method == method_hdhb) then
          in_time = new_hdhb(system)
          recorder%in_time => in_time
@@ -112,6 +118,9 @@ contains
       real(wp), allocatable :: coefficients(:)
       integer(int64) :: clock, rate
 
+      ! A fold is located by steps of its own: the system may stand at another frequency.
+      call self%system%set_frequency(p, error)
+      if (allocated(error)) return
       coefficients = x
       if (associated(self%in_time)) then
          call self%in_time%to_coefficients(self%system%structure%n_coordinates, x, coefficients)
@@ -121,6 +130,7 @@ contains
       point%iterations = report%iterations
       point%residual = report%residual
       point%fold = fold
+      call self%system%residual(coefficients, self%r)
       call recover_point(self%system, coefficients, self%case%harmonics%n_harmonics, &
                          self%case%output%contact, point)
       call system_clock(clock, rate)

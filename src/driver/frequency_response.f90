@@ -39,7 +39,7 @@ contains
          call observer%on_start(case%title, 0)
          call run_branch(case, system, solver, observer, writer, summary, error)
          call observer%on_end()
-         call summary%describe_work(system, solver%method%newton%linear)
+         call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
          return
       end if
       n_points = 1
@@ -54,7 +54,7 @@ contains
          call observer%on_point(k, n_points, point)
       end do
       call observer%on_end()
-      call summary%describe_work(system, solver%method%newton%linear)
+      call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
       if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
    end subroutine run_frequency_response
 

@@ -23,18 +23,26 @@ module fw_point_solver
 
    !> Halvings of a frequency step that fails.
    integer, parameter :: max_halvings = 6
+   !> Steps of the pseudo-time fallback, and failures in a row after which it is left alone: a
+   !> joint that cannot carry its load has no solution to flow to.
+   integer, parameter :: fallback_steps = 60, max_flow_failures = 2
    !> First and smallest step of the load on the way to a first solution.
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
    type :: point_solver
       type(solution_method) :: method
       !> The present solution, and the last two converged ones with their frequencies.
-      real(wp), allocatable :: x(:), last(:), before(:)
+      real(wp), allocatable :: x(:), last(:), before(:), r(:)
+      !> The point to be solved, and the best that was found of it where nothing converged.
+      real(wp) :: omega_wanted = -1.0_wp
+      real(wp) :: best_residual = huge(1.0_wp)
+      real(wp), allocatable :: best(:)
       real(wp) :: omega_last = -1.0_wp
       real(wp) :: omega_before = -1.0_wp
       integer :: n_converged = 0
       !> Points that the pseudo-time fallback has saved.
       integer :: n_by_flow = 0
+      integer :: flow_failures = 0
    contains
       procedure :: start
       procedure :: solve
@@ -48,7 +56,7 @@ contains
       integer, intent(in) :: n
 
       call self%method%start(case)
-      allocate (self%x(n), self%last(n), self%before(n), source=0.0_wp)
+      allocate (self%x(n), self%last(n), self%before(n), self%r(n), source=0.0_wp)
    end subroutine start
 
    !> Solve at a frequency; not converging is an outcome, marked in the point.
@@ -63,8 +71,16 @@ contains
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
+      self%omega_wanted = omega
+      self%best_residual = huge(1.0_wp)
       call reach(self, case, system, omega, report, point%iterations, error)
       if (allocated(error)) return
+      if (.not. report%converged .and. self%best_residual < huge(1.0_wp)) then
+         self%x = self%best
+         report%residual = self%best_residual
+      end if
+      ! Forces and states of this very point: the last trial may have been another.
+      call system%residual(self%x, self%r)
       point%omega = omega
       point%converged = report%converged
       point%residual = report%residual
@@ -102,16 +118,18 @@ contains
          call raise_load(self, system, omega, report, iterations, error)
          if (allocated(error) .or. report%converged) return
       end if
-      call by_flow(self, case, pseudo_time_options(), system, omega, report, iterations, error)
-      if (allocated(error)) return
-      if (report%converged) then
-         self%n_by_flow = self%n_by_flow + 1
-         return
+      if (self%flow_failures < max_flow_failures) then
+         call by_flow(self, case, pseudo_time_options(max_steps=fallback_steps), system, omega, &
+                      report, iterations, error)
+         if (allocated(error)) return
+         self%flow_failures = merge(0, self%flow_failures + 1, report%converged)
+         if (report%converged) self%n_by_flow = self%n_by_flow + 1
+         if (report%converged) return
       end if
       call from_free_guess(self, system, omega, report, iterations)
    end subroutine reach
 
-   !> The last resort; what was reached before it stays where this fails too.
+   !> The last resort.
    subroutine from_free_guess(self, system, omega, report, iterations)
       class(point_solver), intent(inout) :: self
       type(hbm_system), intent(inout), target :: system
@@ -119,18 +137,13 @@ contains
       type(solver_report), intent(inout) :: report
       integer, intent(inout) :: iterations
       type(solver_report) :: last_report
-      real(wp), allocatable :: closest(:)
 
-      closest = self%x
       call free_guess(system, self%x)
-      call self%method%solve(system, self%x, last_report)
+      call attempt(self, system, last_report)
       iterations = iterations + last_report%iterations
-      if (last_report%converged) then
-         report = last_report
-         call remember(self, omega)
-      else
-         self%x = closest
-      end if
+      if (.not. last_report%converged) return
+      report = last_report
+      call remember(self, omega)
    end subroutine from_free_guess
 
    !> Integrate in pseudo-time from the last solution, or from the stuck guess.
@@ -154,7 +167,11 @@ contains
       call self%method%solve_by_flow(case, pseudo, system, self%x, report, error)
       if (allocated(error)) return
       iterations = iterations + report%iterations
-      if (report%converged) call remember(self, omega)
+      if (report%converged) then
+         call remember(self, omega)
+      else
+         call note_best(self, report)
+      end if
    end subroutine by_flow
 
    !> From the static position to the full vibratory load, by steps that adapt.
@@ -179,7 +196,7 @@ contains
          system%load_share = min(1.0_wp, share + step)
          call system%set_frequency(omega, error)
          if (allocated(error)) exit
-         call self%method%solve(system, self%x, report)
+         call attempt(self, system, report)
          iterations = iterations + report%iterations
          if (report%converged) then
             reached = self%x
@@ -249,11 +266,31 @@ contains
          case (3)
             call stuck_guess(system, self%x)
          end select
-         call self%method%solve(system, self%x, report)
+         call attempt(self, system, report)
          iterations = iterations + report%iterations
          if (report%converged .or. .not. self%method%newton%options%fallback) exit
       end do
    end subroutine try_guesses
+
+   !> One solution from the guess in x; the best that fails at the point itself is noted.
+   subroutine attempt(self, system, report)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout), target :: system
+      type(solver_report), intent(out) :: report
+
+      call self%method%solve(system, self%x, report)
+      if (report%converged .or. system%load_share < 1.0_wp) return
+      if (abs(system%structure%omega - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
+   end subroutine attempt
+
+   subroutine note_best(self, report)
+      class(point_solver), intent(inout) :: self
+      type(solver_report), intent(in) :: report
+
+      if (.not. report%residual < self%best_residual) return
+      self%best_residual = report%residual
+      self%best = self%x
+   end subroutine note_best
 
    subroutine remember(self, omega)
       class(point_solver), intent(inout) :: self

@@ -98,6 +98,11 @@ contains
                              'spring power; use ''auto'' or ''all''', status_input)
             return
          end if
+         if (modulo(n_time, 2) == 1) then
+            call fatal_error(error, '&harmonics parity = ''odd'' needs an even n_time: with '// &
+                             to_text(n_time)//' instants the symmetry is not kept', status_input)
+            return
+         end if
          odd_only = .true.
       end select
       fourier = new_fourier(case%harmonics%n_harmonics, n_time, odd_only)

@@ -22,7 +22,6 @@ module fw_solution
    use fw_solver_options, only: pseudo_time_options
    use fw_solver_options, only: solver_kinsol
    use fw_solver_options, only: solver_powell
-   use fw_solver_options, only: solver_pseudo_time
    implicit none (type, external)
    private
 
@@ -32,7 +31,7 @@ module fw_solution
       type(newton_solver) :: newton
       type(powell_solver) :: powell
       type(kinsol_solver) :: kinsol
-      !> 'pseudo_time' was asked for; otherwise it is the last resort of the others.
+      !> The solver that the case asks for.
       integer :: kind = 0
       !> Unknowns are values at the instants (hdhb).
       logical :: in_time = .false.
@@ -59,8 +58,9 @@ contains
       self%in_time = case%harmonics%method == method_hdhb
    end subroutine start
 
-   !> From the guess in the coefficients x. A solution with every pair open, of a structure that
-   !> its contact alone holds, is no equilibrium that lasts: it does not count.
+   !> From the guess in the coefficients x. What does not count as converged: forces whose march
+   !> is not periodic, and a position with every pair open of a structure that its contact alone
+   !> holds, which is no equilibrium that lasts.
    subroutine solve(self, system, x, report)
       class(solution_method), intent(inout) :: self
       type(hbm_system), intent(inout), target :: system
@@ -80,7 +80,7 @@ contains
       else
          call solve_system(self, system, x, report)
       end if
-      if (report%converged) report%converged = held(system)
+      if (report%converged) report%converged = held(system) .and. system%contact%all_periodic()
    end subroutine solve
 
    !> Whether something holds the structure at the last evaluated point.

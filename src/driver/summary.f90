@@ -7,6 +7,7 @@ module fw_summary
    use fw_hbm, only: hbm_system
    use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
+   use fw_solver_options, only: solver_newton
    use fw_text, only: string_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -70,10 +71,12 @@ contains
    end subroutine mark_incomplete
 
    !> What the linear solver did, and what the case did not need.
-   subroutine describe_work(self, system, linear)
+   subroutine describe_work(self, system, linear, kind)
       class(summary_type), intent(inout) :: self
       type(hbm_system), intent(in) :: system
       type(linear_step_type), intent(in) :: linear
+      !> The solver of the case; the counts are those of Newton's method.
+      integer, intent(in) :: kind
 
       self%work = [line('unknowns', to_text(system%n)//' ('//to_text(system%structure%n_coordinates)// &
                         ' coordinates, '//to_text(system%fourier%n_coefficients)//' coefficients, '// &
@@ -92,7 +95,8 @@ contains
                       to_text(nint(100.0_wp*linear%share_skipped/real(linear%n_problems, wp)))// &
                       ' % of the unknowns of the linear problems')]
       end if
-      if (linear%n_problems == 0) then
+      if (linear%n_problems == 0 .and. system%contact%n_pairs > 0 .and. &
+          kind == solver_newton .and. self%n_converged == self%n_points) then
          self%work = [self%work, line('skipped', 'every linear problem: the joint stays stuck')]
       end if
    end subroutine describe_work

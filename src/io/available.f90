@@ -1,11 +1,13 @@
 !> What this version can run. The one place to change when a method arrives.
 module fw_available
    use fw_case, only: case_type, analysis_words, analysis_frf, analysis_point, analysis_time
+   use fw_contact_data, only: memory_carried
    use fw_contact_data, only: law_words, law_dlft, law_dlft_velocity, law_penalty
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_words, method_hbm, method_tcm, &
                                    method_tcm_least_squares, method_hdhb, sampling_words, &
                                    sampling_uniform
+   use fw_solver_options, only: jacobian_words, jacobian_analytic
    use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
                                  solver_pseudo_time, continuation_words, &
                                 continuation_natural, continuation_arclength
@@ -29,8 +31,10 @@ contains
       call check('harmonics%sampling', sampling_words, case%harmonics%sampling, [sampling_uniform])
       call check('solver%kind', solver_words, case%solver%kind, &
                  [solver_newton, solver_powell, solver_kinsol, solver_pseudo_time])
+      call check('solver%jacobian', jacobian_words, case%solver%jacobian, [jacobian_analytic])
       call check('sweep%continuation', continuation_words, case%sweep%continuation, &
                  [continuation_natural, continuation_arclength])
+      call check_memory()
       call check_off('harmonics%adaptive', case%harmonics%adaptive)
       call check_off('sweep%stability', case%sweep%stability)
 
@@ -53,6 +57,14 @@ contains
          call fatal_error(error, name//" = '"//trim(words(choice))//"' is not available in "// &
                           'this version: use '//list, status_input)
       end subroutine check
+
+      !> A branch turns back on itself: there is no one last point to carry the memory from.
+      subroutine check_memory()
+         if (allocated(error) .or. case%contact%memory /= memory_carried) return
+         if (case%sweep%continuation /= continuation_arclength) return
+         call fatal_error(error, "contact%memory = 'carried' does not go with sweep%continuation "// &
+                          "= 'arclength': use 'assembly'", status_input)
+      end subroutine check_memory
 
       subroutine check_off(name, is_on)
          character(*), intent(in) :: name

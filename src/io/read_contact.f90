@@ -276,7 +276,8 @@ contains
                             most=n_dof)
       call reader%get_array('spring', 'coefficient', springs%coefficient, [m], .true., &
                             required=m > 0)
-      call reader%get_array('spring', 'power', springs%power, [m], .true., least=1)
+      call reader%get_array('spring', 'power', springs%power, [m], .true., least=1, &
+                            most=99)
       if (.not. allocated(springs%side_1)) allocate (springs%side_1(m), source=0)
       if (.not. allocated(springs%coefficient)) allocate (springs%coefficient(m), source=0.0_wp)
       if (reader%failed()) return

@@ -37,7 +37,7 @@ contains
 
       call reader%get_word('harmonics', 'method', options%method, method_words)
       call reader%get('harmonics', 'n_harmonics', options%n_harmonics, least=1, most=10000)
-      call reader%get('harmonics', 'n_time', options%n_time, least=0)
+      call reader%get('harmonics', 'n_time', options%n_time, least=0, most=1000000)
       call reader%get('harmonics', 'n_collocation', options%n_collocation, least=0)
       call reader%get('harmonics', 'filter_harmonics', options%filter_harmonics, least=0)
       call reader%get_word('harmonics', 'sampling', options%sampling, sampling_words)

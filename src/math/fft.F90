@@ -39,10 +39,10 @@ contains
       rows = int(n_rows, c_int)
       self%forward = fftw_plan_many_dft_r2c(1_c_int, length, rows, self%values, length, rows, &
                                             1_c_int, self%spectrum, length/2 + 1, rows, 1_c_int, &
-                                            FFTW_MEASURE)
+                                            FFTW_ESTIMATE)
       self%backward = fftw_plan_many_dft_c2r(1_c_int, length, rows, self%spectrum, length/2 + 1, &
                                              rows, 1_c_int, self%values, length, rows, 1_c_int, &
-                                             FFTW_MEASURE)
+                                             FFTW_ESTIMATE)
    end subroutine plan
 
    !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.

@@ -30,6 +30,8 @@ module fw_fourier
       !> (n_coefficients, n_time).
       real(wp), allocatable :: synthesis(:, :), analysis(:, :)
       logical :: use_fft = .false.
+      !> The analysis is the projection, not a collocation.
+      logical :: projects = .true.
       type(fft_type), allocatable :: fft
    contains
       procedure :: to_time
@@ -121,6 +123,7 @@ contains
 
       ! As even as the instants allow; distinct, because n_points <= n_time.
       instant = [((j*self%n_time)/n_points + 1, j=0, n_points - 1)]
+      self%projects = .false.
       call normal%reserve(self%n_coefficients)
       normal%matrix = matmul(self%synthesis(:, instant), transpose(self%synthesis(:, instant)))
       call normal%factor(singular)
@@ -171,7 +174,7 @@ contains
       real(wp), intent(in) :: values(n_rows, *)
       real(wp), intent(inout) :: coefficients(n_rows, *)
 
-      if (fft_serves(self, n_rows)) then
+      if (self%projects .and. fft_serves(self, n_rows)) then
          call self%fft%analyse(self%harmonic, self%column, values, coefficients)
       else
          call dgemm('N', 'T', n_rows, self%n_coefficients, self%n_time, 1.0_wp, values, n_rows, &

@@ -1,6 +1,7 @@
 !> Restarted GMRES with right preconditioning (Saad and Schultz 1986): the norm that it watches is
 !> that of the true residual. The operator knows nothing of the solver, nor the reverse.
 module fw_krylov
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
    implicit none (type, external)
@@ -96,7 +97,11 @@ contains
          converged = norm <= rounding_allowance*target
          if (converged) exit
          if (norm < before) cycle
-         x = x - self%direction
+         where (ieee_is_finite(self%direction))
+            x = x - self%direction
+         else where
+            x = 0.0_wp
+         end where
          exit
       end do
    end subroutine solve

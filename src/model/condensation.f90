@@ -81,6 +81,8 @@ contains
       integer :: h, n_failed
 
       if (omega >= self%omega .and. omega <= self%omega) return
+      if (self%n_coordinates == 0) self%omega = omega
+      if (self%n_coordinates == 0) return
       n_failed = 0
       !$omp parallel do default(none) shared(self, omega) private(h) reduction(+:n_failed) &
       !$omp schedule(dynamic) if(self%n_coordinates > 80)

@@ -27,7 +27,8 @@ module fw_continuation
    end type branch_observer
 
    abstract interface
-      !> A converged point; `fold` marks the points where p turns.
+      !> A point of the branch, converged but perhaps for the last; the system may stand at
+      !> another p. `fold` marks the points where p turns.
       subroutine take_point(self, x, p, report, fold, error)
          import :: branch_observer, wp, solver_report, error_type
          class(branch_observer), intent(inout) :: self
@@ -128,6 +129,7 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       type(branch_point), intent(out) :: here
       type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: towards_finish
       logical :: done
 
       self%linear%kind = self%options%linear
@@ -136,10 +138,11 @@ contains
       here%p = self%start
       self%x_scale = max(self%x_scale, norm2(x), tiny(1.0_wp))
       allocate (here%t(size(x)), source=0.0_wp)
-      here%t_p = sign(1.0_wp, self%finish - self%start)
+      here%t_p = sign(self%p_scale, self%finish - self%start)
+      towards_finish = here
       call system%set_parameter(here%p, error)
       if (allocated(error)) return
-      call find_tangent(self, system, here, here, done)
+      call find_tangent(self, system, towards_finish, here, done)
    end subroutine begin
 
    !> Unit tangent (dx/dp, 1) at a point, in the direction of another one's.
@@ -274,6 +277,7 @@ contains
          if (.not. done) exit
          call system%parameter_derivative(next%x, slope)
          call self%linear%solve_prepared(system, slope, forcing, dx_dp, done)
+         if (.not. done) exit
          report%iterations = report%iterations + 1
          dp = -inner(self, here%t, here%t_p, step, 0.0_wp)/inner(self, here%t, here%t_p, dx_dp, 1.0_wp)
          next%x = next%x + step + dp*dx_dp
@@ -352,7 +356,7 @@ contains
          x = x + step
          report%iterations = report%iterations + 1
       end do
-      self%ending = 'the branch left the interval of frequencies'
+      self%ending = 'followed to the bound of the interval'
       self%complete = report%converged
       call observer%take(x, bound, report, .false., error)
    end subroutine land

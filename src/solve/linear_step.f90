@@ -11,10 +11,13 @@ module fw_linear_step
    implicit none (type, external)
    private
 
-   public :: linear_step_type
+   public :: linear_step_type, lu_pays_up_to
 
    !> Unknowns up to which LU is the faster; measured by bench/run.py (docs/benchmarks.md).
    integer, parameter :: lu_pays_up_to = 60
+
+   !> Unknowns up to which LU is tried where GMRES has failed (200 MB).
+   integer, parameter :: lu_possible_up_to = 5000
 
    type :: linear_step_type
       integer :: kind = linear_auto
@@ -91,7 +94,9 @@ contains
          call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
          self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
          ! A last resort that costs more, but only where GMRES has failed.
-         if (.not. done .and. self%kind /= linear_krylov) call factor(self, system, n, done)
+         if (.not. done .and. self%kind /= linear_krylov .and. n <= lu_possible_up_to) then
+            call factor(self, system, n, done)
+         end if
          ! Where LU is not wanted, Newton's method judges what GMRES has reached.
          if (self%kind == linear_krylov) done = .true.
          if (.not. done) return

@@ -60,7 +60,8 @@ contains
          call self%linear%solve(system, self%r, forcing, self%step, done)
          report%iterations = report%iterations + 1
          if (.not. done) exit
-         call search(self, system, x, norm)
+         call search(self, system, x, norm, done)
+         if (.not. done) exit
          stalled = stalled + 1
          if (norm < 0.99_wp*best) stalled = 0
          best = min(best, norm)
@@ -69,11 +70,13 @@ contains
 
    !> Halve the step until the residual decreases; if it never does, take the best of the trials,
    !> which lets the path leave the corner between two states of a pair.
-   subroutine search(self, system, x, norm)
+   subroutine search(self, system, x, norm, done)
       type(newton_solver), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
       real(wp), intent(inout), contiguous :: x(:)
       real(wp), intent(inout) :: norm
+      !> False where no trial is finite; x stays then.
+      logical, intent(out) :: done
       real(wp) :: fraction, trial_norm, best_fraction, best_norm
       integer :: halving
 
@@ -91,6 +94,8 @@ contains
          if (trial_norm <= (1.0_wp - 1.0e-4_wp*fraction)*norm) exit
          fraction = 0.5_wp*fraction
       end do
+      done = best_norm < huge(1.0_wp)
+      if (.not. done) return
       if (fraction < best_fraction .or. halving > max_halvings) then
          self%trial = x + best_fraction*self%step
          call system%residual(self%trial, self%r)

@@ -3,6 +3,7 @@
 module fw_pseudo_linear
    use fw_kinds, only: wp
    use fw_krylov, only: gmres_type
+   use fw_linear_step, only: lu_pays_up_to
    use fw_linalg, only: lu_type
    use fw_pseudo_system, only: pseudo_system
    use fw_solver_options, only: linear_auto
@@ -12,8 +13,6 @@ module fw_pseudo_linear
 
    public :: shifted_linear
 
-   !> Unknowns up to which LU is taken; as for the steps of Newton (fw_linear_step).
-   integer, parameter :: lu_pays_up_to = 200
    !> Relative residual of iterative solutions. The schemes estimate their errors from differences
    !> of such solutions.
    real(wp), parameter :: tolerance = 1.0e-6_wp

@@ -111,8 +111,8 @@ def test_wrong_override_names_the_option(fw_run, override, expected):
 
 
 @pytest.mark.parametrize("override, instead", [
-    ("case%analysis=time", "'frf'"), ("solver%kind=kinsol", "'newton'"),
-    ("sweep%continuation=arclength", "'natural'"), ("sweep%stability=.true.", ".false.")])
+    ("solver%jacobian=difference", "'analytic'"), ("harmonics%sampling=events", "'uniform'"),
+    ("harmonics%adaptive=.true.", ".false."), ("sweep%stability=.true.", ".false.")])
 def test_what_is_not_available_yet(fw_run, override, instead):
     message = fw_run.refused("--set", override, "case.nml")
     assert override.split("=")[0] in message and instead in message
