@@ -19,6 +19,8 @@ from fretwear.sector.reduction import bonded_basis
 ROUND_OFF = 1e-11
 # Asked of the generator; the dense reference itself keeps about eleven digits.
 DENSE_EIGENVALUE = 1e-9
+# A dense solution with the full stiffness: round-off times its condition number of some 1e8.
+DENSE_SOLUTION = 1e-8
 # S^-1 - kappa I loses the digits between the compliance of a patch and that of the blade.
 COMPLIANCE = 1e-8
 SPEED = 8000.0 * math.pi / 30.0
@@ -124,7 +126,7 @@ def test_static_tip_displacement_is_exact(
     n = 3 * reduced.n_pairs
     modal = reduced.cosine[n:]
     actual = reduced.observe_matrix[0, n:] @ np.linalg.solve(reduced.stiffness[n:, n:], modal)
-    assert actual == pytest.approx(expected, rel=DENSE_EIGENVALUE)
+    assert actual == pytest.approx(expected, rel=DENSE_SOLUTION)
     without = modal[:-1] @ (modal[:-1] / np.diag(reduced.stiffness)[n:-1])
     assert abs(without / expected - 1.0) > 1e-6
 

@@ -15,8 +15,10 @@ module fw_branch
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
+   use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_result, only: result_writer
+   use fw_solution, only: is_lasting
    use fw_summary, only: summary_type
    implicit none (type, external)
    private
@@ -126,13 +128,17 @@ contains
          call self%in_time%to_coefficients(self%system%structure%n_coordinates, x, coefficients)
       end if
       point%omega = p
-      point%converged = report%converged
+      point%converged = report%converged .and. is_lasting(self%system)
       point%iterations = report%iterations
       point%residual = report%residual
       point%fold = fold
       call self%system%residual(coefficients, self%r)
       call recover_point(self%system, coefficients, self%case%harmonics%n_harmonics, &
                          self%case%output%contact, point)
+      if (self%case%output%histories) then
+         call recover_histories(self%system, size(self%system%balance, 1), coefficients, &
+                                self%case%harmonics%n_harmonics, point)
+      end if
       call system_clock(clock, rate)
       point%seconds = real(clock - self%clock, wp)/real(rate, wp)
       self%clock = clock

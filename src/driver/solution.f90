@@ -25,7 +25,7 @@ module fw_solution
    implicit none (type, external)
    private
 
-   public :: solution_method
+   public :: solution_method, is_lasting
 
    type :: solution_method
       type(newton_solver) :: newton
@@ -80,18 +80,18 @@ contains
       else
          call solve_system(self, system, x, report)
       end if
-      if (report%converged) report%converged = held(system) .and. system%contact%all_periodic()
+      if (report%converged) report%converged = is_lasting(system)
    end subroutine solve
 
-   !> Whether something holds the structure at the last evaluated point.
-   logical function held(system)
+   !> Whether the point that was evaluated last can last: its forces repeat from period to period,
+   !> and something holds the structure. (Linear springs count among what holds it.)
+   logical function is_lasting(system)
       type(hbm_system), intent(in) :: system
 
-      held = .true.
-      if (system%contact%n_pairs == 0) return
-      if (.not. system%contact%all_open()) return
-      held = held_without_contact(system)
-   end function held
+      is_lasting = system%contact%all_periodic()
+      if (system%contact%n_pairs == 0 .or. any(system%springs%power == 1)) return
+      if (system%contact%all_open()) is_lasting = is_lasting .and. held_without_contact(system)
+   end function is_lasting
 
    subroutine solve_system(self, system, x, report)
       class(solution_method), intent(inout) :: self
@@ -146,7 +146,7 @@ contains
       report = outcome%solver_report
       if (.not. outcome%converged) self%message = outcome%message
       call carry_solution(self%whole, whole_x, system, x)
-      if (report%converged) report%converged = held(self%whole)
+      if (report%converged) report%converged = is_lasting(self%whole)
    end subroutine solve_by_flow
 
 end module fw_solution

@@ -119,7 +119,7 @@ contains
 
       table = [line('converged', to_text(self%n_converged)//' of '//to_text(self%n_points)//' points'), &
                line('iterations', to_text(self%iterations))]
-      do i = 1, min(size(self%name), max_shown)
+      do i = 1, merge(min(size(self%name), max_shown), 0, self%n_converged > 0)
          write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', self%peak_omega(i), &
             ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'
          table = [table, line('peak '//self%name(i)%text, trim(adjustl(text)))]

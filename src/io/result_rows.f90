@@ -11,6 +11,7 @@ module fw_result_rows
    use fw_hdf5, only: write_attribute
    use fw_kinds, only: wp
    use fw_point, only: point_type
+   use fw_solver_options, only: continuation_arclength
    implicit none (type, external)
    private
 
@@ -20,8 +21,8 @@ module fw_result_rows
    integer, parameter :: d_omega = 1, d_coefficients = 2, d_amplitude = 3, d_converged = 4, &
                          d_iterations = 5, d_residual = 6, d_seconds = 7, d_force = 8, &
                          d_fraction = 9, d_dissipation = 10, d_observed = 11, &
-                         d_force_history = 12, d_slip_history = 13
-   integer, parameter :: n_datasets = 13
+                         d_force_history = 12, d_slip_history = 13, d_fold = 14
+   integer, parameter :: n_datasets = 14
 
    type :: row_set
       integer, private :: n_rows = 0, n_coefficients = 1, expected = 1
@@ -61,6 +62,10 @@ contains
       call self%new(file, d_residual, '/residual', scalar, error, units='1')
       if (allocated(error)) return
       call self%new(file, d_seconds, '/seconds', scalar, error, units='s')
+      if (allocated(error)) return
+      if (case%sweep%continuation == continuation_arclength) then
+         call self%new(file, d_fold, '/fold', scalar, error, kind_of=growing_logical)
+      end if
       n_pairs = case%contact%n_pairs
       if (allocated(error) .or. .not. case%output%contact .or. n_pairs == 0) return
       call self%new(file, d_force, '/contact/force', [3, n_pairs, self%n_coefficients], error)
@@ -96,6 +101,8 @@ contains
       call self%list(d_residual)%append(file, point%residual, error)
       if (allocated(error)) return
       call self%list(d_seconds)%append(file, point%seconds, error)
+      if (allocated(error)) return
+      if (self%list(d_fold)%is_created()) call self%list(d_fold)%append(file, point%fold, error)
       if (.not. allocated(error)) call self%append_contact(file, point, error)
       if (.not. allocated(error)) call self%append_histories(file, point, error)
    end subroutine append

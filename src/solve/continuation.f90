@@ -356,8 +356,12 @@ contains
          x = x + step
          report%iterations = report%iterations + 1
       end do
-      self%ending = 'followed to the bound of the interval'
-      self%complete = report%converged
+      if (abs(bound - self%start) <= 0.0_wp) then
+         self%ending = 'it returned to the start of the sweep; the end was not reached'
+      else
+         self%ending = 'followed to the end of the sweep'
+         self%complete = report%converged
+      end if
       call observer%take(x, bound, report, .false., error)
    end subroutine land
 

@@ -1,0 +1,70 @@
+"""Branches through folds: the Duffing oscillator of the reference solutions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+REFERENCE = Path(__file__).parents[1] / "reference" / "oracle_a_duffing.json"
+
+# The folds of the reference are known to 1e-10; the branch locates them to 1e-10 of omega.
+FOLD = 1e-8
+# The tolerance of the solver, on the norm of the residual over that of the load.
+EQUILIBRIUM = 1e-8
+
+CASE = """
+&case title = 'Duffing branch' analysis = 'frf' /
+&model n_dof = 1 mass = 1 stiffness = 1 damping = 0.1 /
+&spring n_springs = 1 side_1 = 1 coefficient = 0.5 /
+&load cosine = 0.25 /
+&harmonics n_harmonics = 15 method = '{method}' /
+&sweep start = 0.3 end = 2.0 n_points = 50 continuation = 'arclength' /
+"""
+
+
+def _residual(omega: float, row: np.ndarray) -> float:
+    """Balance of one row of coefficients by plain sums over 256 instants."""
+    tau = 2 * np.pi * np.arange(256) / 256
+    n = np.arange(1, len(row) // 2 + 1)
+    base = np.vstack([np.ones_like(tau), *np.ravel(
+        [[np.cos(k * tau), np.sin(k * tau)] for k in n]).reshape(2 * len(n), -1)])
+    velocity = np.zeros_like(row)
+    velocity[1::2], velocity[2::2] = n * row[2::2], -n * row[1::2]
+    stiffness = np.concatenate([[1.0], np.repeat(1.0 - (n * omega) ** 2, 2)])
+    u = row @ base
+    force = stiffness * row + 0.1 * omega * velocity
+    weights = np.full(len(row), 2.0 / len(tau))
+    weights[0] /= 2
+    force += weights * (base @ (0.5 * u**3 - 0.25 * np.cos(tau)))
+    return float(np.linalg.norm(force)) / 0.25
+
+
+@pytest.mark.parametrize("method", ["hbm", "hdhb"])
+def test_folds_of_the_duffing_oscillator(fw_run, method: str) -> None:
+    fw_run.write(CASE.format(method=method), "branch.nml")
+    done = fw_run("-q", "-o", "branch.h5", "branch.nml")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(fw_run.directory / "branch.h5") as file:
+        omega, fold = file["omega"][:], file["fold"][:]
+        rows = file["coefficients"][:, :, 0]
+        assert file["converged"][:].all()
+    assert omega[0] == 0.3 and omega[-1] == 2.0
+    # hdhb aliases: its folds lie elsewhere, by the little that 15 harmonics leave.
+    expected = sorted(p["omega"] for p in json.loads(REFERENCE.read_text())["folds_multi"])
+    assert sorted(omega[fold]) == pytest.approx(expected, rel=FOLD if method == "hbm" else 1e-6)
+    if method == "hbm":
+        for w, row in zip(omega, rows):
+            assert _residual(w, row) < EQUILIBRIUM, f"row at omega = {w}"
+
+
+def test_a_branch_that_turns_back_says_so(fw_run) -> None:
+    """max_points ends the run with the status of a sweep that is not complete."""
+    fw_run.write(CASE.format(method="hbm"), "branch.nml")
+    result = fw_run("-o", "branch.h5", "--set", "sweep%max_points=5", "branch.nml")
+    assert result.returncode == 4
+    with h5py.File(fw_run.directory / "branch.h5") as file:
+        assert len(file["omega"]) == 5
