@@ -6,7 +6,6 @@ program fw_run_program
    use fw_error, only: error_type, status_ok
    use fw_help, only: write_help
    use fw_outcome, only: outcome_type
-   use fw_paths, only: check_writable
    use fw_progress, only: progress_type, new_progress
    use fw_read_case, only: read_case
    use fw_run, only: run_case
@@ -58,8 +57,6 @@ contains
          write (output_unit, '(a)', advance='no') case%namelist
          return
       end if
-      call check_writable(case%output%file, error)
-      if (allocated(error)) return
       progress = new_progress(options%quiet, options%verbose)
       call run_case(case, progress, outcome, error)
       if (allocated(error)) return

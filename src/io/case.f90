@@ -6,6 +6,7 @@ module fw_case
    use fw_contact_data, only: contact_type, spring_type
    use fw_harmonics_options, only: harmonics_options
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options
+   use fw_text, only: string_type
    use fw_wear_options, only: wear_options
    use fw_time_options, only: time_options
    implicit none (type, external)
@@ -44,6 +45,8 @@ module fw_case
       type(output_options) :: output
       !> The effective input, as a namelist.
       character(:), allocatable :: namelist
+      !> Absolute paths of the files it was read from: no result replaces them.
+      type(string_type), allocatable :: inputs(:)
    end type case_type
 
 end module fw_case

@@ -12,6 +12,7 @@ module fw_matrix_market
    use fw_text, only: lower_case
    use fw_text, only: string_type
    use fw_text, only: to_text
+   use fw_text_list, only: append
    implicit none (type, external)
    private
 
@@ -58,13 +59,17 @@ contains
    subroutine read_matrix_market_model(path, model, error)
       !> A prefix, a folder, or the path of one of the files.
       character(*), intent(in) :: path
-      !> Only mass, stiffness and damping are set.
+      !> Only mass, stiffness, damping and the files are set.
       type(file_model_type), intent(out) :: model
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: prefix
       integer :: n
 
       prefix = prefix_of(path)
+      allocate (model%files(0))
+      call append(model%files, found_file(prefix, 'mass'))
+      call append(model%files, found_file(prefix, 'stiffness'))
+      call append(model%files, found_file(prefix, 'damping'))
       call read_part(prefix, 'mass', 0, model%mass, error)
       if (allocated(error)) return
       n = size(model%mass, 1)

@@ -32,6 +32,8 @@ module fw_model_file
    !> What a model file holds; a component is not allocated where the file has none.
    type :: file_model_type
       character(:), allocatable :: title, unit_system
+      !> Paths of the files it was read from.
+      type(string_type), allocatable :: files(:)
       !> Structure (n_dof, n_dof), not checked for symmetry.
       real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
       !> Stiffness per square of the rotation speed (n_dof, n_dof) [force/length/(rad/s)**2].
@@ -64,6 +66,8 @@ contains
 
       call file%open_read(path, error)
       if (allocated(error)) return
+      allocate (model%files(1))
+      model%files(1)%text = path
       call read_header(file, model, error)
       if (.not. allocated(error)) call read_structure(file, model, error)
       if (.not. allocated(error)) call read_contact(file, model, error)

@@ -7,6 +7,12 @@ module fw_paths
    private
 
    public :: read_text_file, resolve_path, directory_of, stem_of, check_writable
+   public :: real_path, follow_links, is_directory
+
+   !> The longest path that the system takes.
+   integer, parameter :: longest = 4096
+   !> As many symbolic links in a row are taken for a circle.
+   integer, parameter :: most_links = 40
 
    interface
       function c_getcwd(buffer, size) bind(c, name='getcwd') result(pointer)
@@ -24,6 +30,24 @@ module fw_paths
          integer(c_int), value :: mode
          integer(c_int) :: status
       end function c_access
+
+      function c_realpath(path, buffer) bind(c, name='realpath') result(pointer)
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr), value :: buffer
+         type(c_ptr) :: pointer
+      end function c_realpath
+
+      !> The length of what stands in the buffer, without a null; -1 where it is no link.
+      function c_readlink(path, buffer, size) bind(c, name='readlink') result(length)
+         import :: c_char, c_ptr, c_size_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr), value :: buffer
+         integer(c_size_t), value :: size
+         integer(c_size_t) :: length
+      end function c_readlink
    end interface
 
 contains
@@ -90,7 +114,7 @@ contains
       if (c_access(directory//c_null_char, exists) /= 0) then
          call fatal_error(error, path//': cannot be written: the directory '//directory// &
                           ' does not exist; create it or choose another file with -o', status_io)
-      else if (c_access(path//'/.'//c_null_char, exists) == 0) then
+      else if (is_directory(path)) then
          call fatal_error(error, path//': cannot be written: it is a directory; choose '// &
                           'a file with -o', status_io)
       else if (c_access(directory//c_null_char, writable) /= 0) then
@@ -102,16 +126,62 @@ contains
    !> With a slash at its end; '' where the system does not tell.
    function current_directory() result(directory)
       character(:), allocatable :: directory
-      character(kind=c_char), target :: buffer(4096)
-      integer :: i
+      character(kind=c_char), target :: buffer(longest)
 
       directory = ''
       if (.not. c_associated(c_getcwd(c_loc(buffer), size(buffer, kind=c_size_t)))) return
-      do i = 1, size(buffer)
-         if (buffer(i) == c_null_char) exit
-         directory = directory//buffer(i)
-      end do
-      directory = directory//'/'
+      directory = from_buffer(buffer)//'/'
    end function current_directory
+
+   !> The one absolute name of a file without links, `.` and `..`; '' where there is none.
+   function real_path(path) result(actual)
+      character(*), intent(in) :: path
+      character(:), allocatable :: actual
+      character(kind=c_char), target :: buffer(longest + 1)
+
+      actual = ''
+      if (c_associated(c_realpath(path//c_null_char, c_loc(buffer)))) actual = from_buffer(buffer)
+   end function real_path
+
+   !> What a symbolic link points to in the end, whether that exists or not; else the path itself.
+   subroutine follow_links(path, target, found)
+      character(*), intent(in) :: path
+      character(:), allocatable, intent(out) :: target
+      !> Whether the links have an end.
+      logical, intent(out) :: found
+      character(kind=c_char), target :: buffer(longest + 1)
+      integer(c_size_t) :: length
+      integer :: i
+
+      target = path
+      do i = 0, most_links
+         length = c_readlink(target//c_null_char, c_loc(buffer), int(longest, c_size_t))
+         found = length < 0_c_size_t
+         if (found) return
+         buffer(length + 1) = c_null_char
+         target = resolve_path(from_buffer(buffer), directory_of(target))
+      end do
+   end subroutine follow_links
+
+   logical function is_directory(path)
+      character(*), intent(in) :: path
+      integer(c_int), parameter :: exists = 0
+
+      is_directory = c_access(path//'/.'//c_null_char, exists) == 0
+   end function is_directory
+
+   !> What stands before the null.
+   pure function from_buffer(buffer) result(text)
+      character(kind=c_char), intent(in) :: buffer(:)
+      character(:), allocatable :: text
+      integer :: i, length
+
+      length = findloc(buffer, c_null_char, 1) - 1
+      if (length < 0) length = size(buffer)
+      allocate (character(length) :: text)
+      do i = 1, length
+         text(i:i) = buffer(i)
+      end do
+   end function from_buffer
 
 end module fw_paths

@@ -4,7 +4,7 @@ module fw_read_case
    use fw_case, only: case_type, analysis_wear
    use fw_error, only: error_type
    use fw_model_file, only: file_model_type
-   use fw_paths, only: directory_of, read_text_file, stem_of
+   use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
    use fw_read_model, only: read_model, read_loads, finish_model, model_options
    use fw_read_options, only: read_case_group, read_harmonics, read_sweep, read_solver, &
@@ -12,6 +12,7 @@ module fw_read_case
    use fw_read_output, only: read_output, read_observed
    use fw_reader, only: reader_type, new_reader
    use fw_text, only: string_type
+   use fw_text_list, only: append
    use fw_values, only: quoted_text
    implicit none (type, external)
    private
@@ -49,6 +50,7 @@ contains
       call read_case_group(reader, case)
       call read_structure(reader, path, case, raw, error)
       if (allocated(error)) return
+      call list_inputs(path, raw, case%inputs)
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep)
       call read_solver(reader, case%solver)
@@ -63,6 +65,21 @@ contains
       case%namelist = reader%effective()
       call check_available(case, error)
    end subroutine read_case_text
+
+   !> The files that the case was read from.
+   subroutine list_inputs(path, raw, inputs)
+      character(*), intent(in) :: path
+      type(file_model_type), intent(in) :: raw
+      type(string_type), allocatable, intent(out) :: inputs(:)
+      integer :: i
+
+      allocate (inputs(0))
+      call append(inputs, resolve_path(path, ''))
+      if (.not. allocated(raw%files)) return
+      do i = 1, size(raw%files)
+         if (len(raw%files(i)%text) > 0) call append(inputs, resolve_path(raw%files(i)%text, ''))
+      end do
+   end subroutine list_inputs
 
    !> The model with its contact, springs and loads.
    subroutine read_structure(reader, path, case, raw, error)

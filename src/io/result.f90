@@ -8,6 +8,8 @@ module fw_result
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
    use fw_hdf5, only: hdf5_file
    use fw_hdf5, only: write_attribute
    use fw_hdf5, only: write_text
@@ -16,6 +18,7 @@ module fw_result
    use fw_result_part, only: create_part
    use fw_result_part, only: delete_part
    use fw_result_part, only: publish_part
+   use fw_result_target, only: result_format
    use fw_result_rows, only: row_set
    use fw_version, only: version
    implicit none (type, external)
@@ -23,7 +26,6 @@ module fw_result
 
    public :: result_writer, result_format, result_format_version
 
-   character(*), parameter :: result_format = 'fretwear-result'
    integer, parameter :: result_format_version = 1
 
    !> A flush waits until this many times its own duration has passed since the last.
@@ -51,11 +53,17 @@ contains
       class(result_writer), intent(out) :: self
       !> Case whose output file, title, namelist, sizes and choices of output are taken.
       type(case_type), intent(in) :: case
-      !> status_io where the folder does not exist or is not writable.
+      !> status_input where the file is one that the case was read from; status_io where it
+      !> cannot be written or is anything but an earlier result.
       type(error_type), allocatable, intent(out) :: error
 
-      self%path = case%output%file
-      call create_part(self%path, self%file, error)
+      if (.not. allocated(case%output%file)) then
+         call fatal_error(error, 'no result file is named: set output%file', status_input)
+      else if (allocated(case%inputs)) then
+         call create_part(case%output%file, self%path, self%file, error, case%inputs)
+      else
+         call create_part(case%output%file, self%path, self%file, error)
+      end if
       if (allocated(error)) return
       call write_header(self%file, case, error)
       if (.not. allocated(error)) call self%rows%create(self%file, case, error)

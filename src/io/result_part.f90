@@ -9,7 +9,9 @@ module fw_result_part
    use fw_error, only: fatal_error
    use fw_error, only: status_io
    use fw_hdf5, only: hdf5_file
-   use fw_paths, only: check_writable
+   use fw_result_target, only: check_replaceable
+   use fw_result_target, only: find_target
+   use fw_text, only: string_type
    use fw_text, only: to_text
    implicit none (type, external)
    private
@@ -43,20 +45,25 @@ module fw_result_part
 
 contains
 
-   !> Create the temporary file that will become `path`.
-   subroutine create_part(path, file, error)
+   !> Create the temporary file that will become `path`, or what `path` links to.
+   subroutine create_part(path, target, file, error, inputs)
       character(*), intent(in) :: path
+      !> The name to publish under.
+      character(:), allocatable, intent(out) :: target
       type(hdf5_file), intent(out) :: file
-      !> status_io where the folder does not exist or is not writable.
+      !> status_input where `path` is one of the inputs; status_io where the folder does not
+      !> exist or is not writable, or where the name belongs to anything but an earlier result.
       type(error_type), allocatable, intent(out) :: error
+      !> Paths of the files that the run reads.
+      type(string_type), intent(in), optional :: inputs(:)
       character(:), allocatable :: part
       logical :: occupied
       integer :: i
 
-      call check_writable(path, error)
+      call find_target(path, target, error, inputs)
       if (allocated(error)) return
       do i = 0, most_tries
-         part = path//'.part'
+         part = target//'.part'
          if (i > 0) part = part//'.'//to_text(int(c_getpid()))
          if (i > 1) part = part//'.'//to_text(i)
          inquire (file=part, exist=occupied)
@@ -71,11 +78,17 @@ contains
                        ' is taken; remove what is left of earlier runs', status_io)
    end subroutine create_part
 
-   !> Give a closed temporary file its final name, replacing what bears it, in one step.
+   !> Give a closed temporary file its final name, replacing an earlier result, in one step.
    subroutine publish_part(part, path, error)
       character(*), intent(in) :: part, path
       type(error_type), allocatable, intent(out) :: error
 
+      ! Somebody may have put another file there while the run was at work.
+      call check_replaceable(path, error)
+      if (allocated(error)) then
+         error%message = error%message//'; the result is complete in '//part
+         return
+      end if
       if (c_rename(part//c_null_char, path//c_null_char) == 0) return
       call fatal_error(error, path//': cannot be replaced; the result is complete in '//part, &
                        status_io)

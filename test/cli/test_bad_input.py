@@ -1,5 +1,6 @@
 """Every kind of wrong input: the exit status, and a message with the place and the remedy."""
 import hashlib
+import os
 
 import pytest
 
@@ -160,6 +161,73 @@ def test_unwritable_output_is_refused_before_the_run(fw_run):
     assert "nowhere/x.h5" in message and "does not exist" in message and "-o" in message
     message = fw_run.refused("-o", ".", "case.nml", status=5)
     assert "is a directory" in message
+
+
+@pytest.mark.parametrize("output", ["model.h5", "./sub/../model.h5", "link.h5", "case.nml"])
+def test_a_run_never_replaces_what_it_reads(with_model, output):
+    folder = with_model.directory
+    (folder / "sub").mkdir()
+    (folder / "link.h5").symlink_to("model.h5")
+    before = {name: (folder / name).read_bytes() for name in ["model.h5", "case.nml"]}
+    message = with_model.refused("-o", output, "case.nml")
+    assert f"{folder}/{output}" in message and "which this run reads" in message
+    assert "-o" in message
+    with_model.refused("--set", f"output%file={output}", "case.nml")
+    assert before == {name: (folder / name).read_bytes() for name in before}
+    assert (folder / "link.h5").is_symlink()
+
+
+def test_default_name_that_is_the_model_file(with_model):
+    (with_model.directory / "case.nml").rename(with_model.directory / "model.nml")
+    before = (with_model.directory / "model.h5").read_bytes()
+    message = with_model.refused("model.nml")
+    assert "model.h5" in message and "which this run reads" in message
+    assert (with_model.directory / "model.h5").read_bytes() == before
+
+
+def test_matrix_market_files_are_not_replaced(fw_run):
+    text = "%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 1.0\n"
+    fw_run.write(text, "k_mass.mtx")
+    fw_run.write(text, "k_stiffness.mtx")
+    fw_run.write("&model source = 'matrix_market' file = 'k' /\n"
+                 "&sweep start = 0.5 end = 0.8 n_points = 2 /\n&load cosine = 1 /\n")
+    for name in ["k_mass.mtx", "k_stiffness.mtx"]:
+        assert "which this run reads" in fw_run.refused("-o", name, "case.nml")
+        assert (fw_run.directory / name).read_text() == text
+
+
+def test_only_an_earlier_result_is_replaced(fw_run):
+    folder = fw_run.directory
+    (folder / "notes.txt").write_text("mine")
+    (folder / "empty.h5").touch()
+    write_model(folder / "other.h5")
+    os.mkfifo(folder / "pipe")
+    (folder / "circle").symlink_to("circle")
+    before = (folder / "other.h5").read_bytes()
+    for name, part in [("notes.txt", "remove it"), ("other.h5", "remove it"), ("empty.h5", "empty"),
+                       ("pipe", "no regular file"), ("/dev/null", "no regular file"),
+                       ("circle", "circle"), ("blank ", "blank")]:
+        message = fw_run.refused("-o", name, "case.nml", status=5)
+        assert name in message and part in message and "-o" in message, message
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert (folder / "other.h5").read_bytes() == before
+    assert fw_run("-o", "x.h5", "case.nml").returncode == 0
+    assert fw_run("-o", "x.h5", "case.nml").returncode == 0
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_a_link_stays_and_its_target_is_written(fw_run, exists):
+    folder = fw_run.directory
+    (folder / "store").mkdir()
+    (folder / "x.h5").symlink_to("store/real.h5")
+    if exists:
+        assert fw_run("-o", "store/real.h5", "case.nml").returncode == 0
+    done = fw_run("-o", "x.h5", "case.nml")
+    assert done.returncode == 0, done.stderr
+    assert (folder / "x.h5").is_symlink()
+    assert [path.name for path in (folder / "store").iterdir()] == ["real.h5"]
+    with h5py.File(folder / "x.h5") as file:
+        assert file.attrs["format"] in (b"fretwear-result", "fretwear-result")
 
 
 def test_existing_result_survives_a_refused_run(fw_run):
