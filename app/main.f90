@@ -8,6 +8,7 @@ program fw_run_program
    use fw_outcome, only: outcome_type
    use fw_progress, only: progress_type, new_progress
    use fw_read_case, only: read_case
+   use fw_reader_text, only: printable
    use fw_run, only: run_case
    use fw_text, only: string_type
    use fw_version, only: version
@@ -69,11 +70,12 @@ contains
 
    !> One line of the standard error for each line of the message.
    subroutine report(error, status)
-      type(error_type), intent(in) :: error
+      type(error_type), intent(inout) :: error
       integer, intent(out) :: status
       integer :: first, last
 
       status = error%status
+      error%message = printable(error%message)
       first = 1
       do while (first <= len(error%message))
          last = index(error%message(first:), new_line('a'))

@@ -6,7 +6,7 @@
 module fw_namelist
    use fw_cursor, only: cursor_type
    use fw_error, only: error_type, fatal_error, status_input, status_usage
-   use fw_namelist_data, only: namelist_type, group_type, entry_type, value_type, &
+   use fw_namelist_data, only: namelist_type, group_type, entry_type, &
                                add_entry, location
    use fw_namelist_values, only: parse_sections, parse_values
    use fw_text, only: to_text
@@ -64,7 +64,9 @@ contains
             ! Any text may follow the =, also one that is no list of values: `case%title=it's`.
             if (allocated(error) .and. len(entry%raw) > 0) then
                deallocate (error)
-               entry%values = [value_type(text=entry%raw)]
+               if (allocated(entry%values)) deallocate (entry%values)
+               allocate (entry%values(1))
+               entry%values(1)%text = entry%raw
             end if
             if (.not. allocated(error)) return
             deallocate (error)
@@ -107,6 +109,8 @@ contains
       type(namelist_type), intent(inout) :: namelist
       type(group_type), intent(out) :: group
       type(error_type), allocatable, intent(out) :: error
+      !> A binary file may have no ends of lines.
+      integer, parameter :: most_quoted = 60
       character(:), allocatable :: rest
       logical :: found
       integer :: i
@@ -114,7 +118,8 @@ contains
       group%line = cursor%line
       if (cursor%peek() /= '&') then
          call cursor%take_through(achar(10), rest, found)
-         call fatal_error(error, at_line(namelist, group%line)//': "'//trim(rest)// &
+         rest = trim(rest(:min(len(rest), most_quoted)))
+         call fatal_error(error, at_line(namelist, group%line)//': "'//rest// &
                           '" stands outside of any group: a group is &name ... /, and a / '// &
                           'outside of quotes ends it', status_input)
          return

@@ -99,6 +99,7 @@ contains
       character(*), intent(in) :: place
       type(value_type), intent(out) :: value
       type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: count_text
       integer :: star, status
       logical :: ok
 
@@ -110,14 +111,20 @@ contains
          ok = verify(value%text(:star - 1), '0123456789') == 0
          if (ok) read (value%text(:star - 1), *, iostat=status) value%repeat
          if (ok) ok = status == 0 .and. value%repeat > 0
+         count_text = value%text(:star - 1)
          value%text = value%text(star + 1:)
       end if
-      if (ok .and. len(value%text) == 0 .and. scan(cursor%peek(), '''"') > 0) then
+      if (.not. ok) then
+         call fatal_error(error, place//': the repeat count '//count_text//' of '//count_text// &
+                          '*'//value%text//' must be a whole number from 1 to '// &
+                          to_text(huge(1))//' (line '//to_text(value%line)//'); a text '// &
+                          'needs quotes', status_input)
+      else if (len(value%text) == 0 .and. scan(cursor%peek(), '''"') > 0) then
          value%quoted = .true.
          call cursor%take_quoted(value%text, ok)
          if (.not. ok) call fatal_error(error, place//': a text is not closed by its quote in '// &
                                         'line '//to_text(value%line), status_input)
-      else if (len(value%text) == 0 .or. .not. ok) then
+      else if (len(value%text) == 0) then
          call fatal_error(error, place//': "'//cursor%peek()//'" stands where a value is '// &
                           'expected (line '//to_text(value%line)//')', status_input)
       end if

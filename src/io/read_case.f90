@@ -11,6 +11,7 @@ module fw_read_case
                               read_pseudo_time, read_wear, read_time
    use fw_read_output, only: read_output, read_observed
    use fw_reader, only: reader_type, new_reader
+   use fw_reader_text, only: printable
    use fw_text, only: string_type
    use fw_text_list, only: append
    use fw_values, only: quoted_text
@@ -42,6 +43,17 @@ contains
       type(string_type), intent(in) :: overrides(:)
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
+
+      call read_groups(text, path, overrides, case, error)
+      if (allocated(error)) error%message = printable(error%message)
+   end subroutine read_case_text
+
+   !> The same, with messages that may hold any byte of the text.
+   subroutine read_groups(text, path, overrides, case, error)
+      character(*), intent(in) :: text, path
+      type(string_type), intent(in) :: overrides(:)
+      type(case_type), intent(out) :: case
+      type(error_type), allocatable, intent(out) :: error
       type(reader_type) :: reader
       type(file_model_type) :: raw
 
@@ -64,7 +76,7 @@ contains
       if (allocated(error)) return
       case%namelist = reader%effective()
       call check_available(case, error)
-   end subroutine read_case_text
+   end subroutine read_groups
 
    !> The files that the case was read from.
    subroutine list_inputs(path, raw, inputs)

@@ -7,9 +7,11 @@ module fw_read_options
    use fw_reader, only: reader_type
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options, solver_words, &
                                 linear_words, jacobian_words, flow_words, scheme_words, &
-                                unit_words, unit_hertz, continuation_words, continuation_natural
+                                unit_words, unit_hertz, continuation_words, continuation_natural, &
+                                continuation_arclength
    use fw_text, only: to_text
    use fw_time_options, only: time_options
+   use fw_values, only: number_text
    use fw_wear_options, only: wear_options, wear_scheme_words
    implicit none (type, external)
    private
@@ -26,7 +28,7 @@ contains
 
       call reader%get('case', 'title', case%title)
       call reader%get_word('case', 'analysis', case%analysis, analysis_words)
-      call reader%get('case', 'threads', case%threads, least=0)
+      call reader%get('case', 'threads', case%threads, least=0, most=1024)
    end subroutine read_case_group
 
    !> Group &harmonics.
@@ -73,10 +75,24 @@ contains
       call reader%get('sweep', 'n_points', options%n_points, least=1, required=is_sweep)
       call reader%get('sweep', 'max_points', options%max_points, least=1)
       call reader%get('sweep', 'stability', options%stability)
+      call check_ends()
       if (options%unit == unit_hertz) then
          options%start = 2.0_wp*pi*options%start
          options%end = 2.0_wp*pi*options%end
       end if
+
+   contains
+
+      !> A branch is followed from one end to the other: it needs two.
+      subroutine check_ends()
+         if (analysis /= analysis_frf .or. options%continuation /= continuation_arclength) return
+         if (.not. (reader%given('sweep', 'start') .and. reader%given('sweep', 'end'))) return
+         if (abs(options%end - options%start) > epsilon(1.0_wp)*abs(options%start)) return
+         call reader%refuse('sweep', 'end', '= '//number_text(options%end)//': must differ '// &
+                            "from start with continuation = 'arclength', which follows the "// &
+                            "branch from start to end: give another end, or analysis = 'point'")
+      end subroutine check_ends
+
    end subroutine read_sweep
 
    !> Group &solver.
@@ -87,7 +103,7 @@ contains
       call reader%get_word('solver', 'kind', options%kind, solver_words)
       call reader%get_word('solver', 'linear', options%linear, linear_words)
       call reader%get_word('solver', 'jacobian', options%jacobian, jacobian_words)
-      call reader%get('solver', 'tolerance', options%tolerance, above=0.0_wp)
+      call reader%get('solver', 'tolerance', options%tolerance, above=0.0_wp, below=1.0_wp)
       call reader%get('solver', 'max_iterations', options%max_iterations, least=1)
       call reader%get('solver', 'fallback', options%fallback)
       call reader%get('solver', 'skips', options%skips)

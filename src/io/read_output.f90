@@ -43,10 +43,12 @@ contains
       type(value_type), allocatable :: chosen(:)
       type(string_type), allocatable :: names(:)
       real(wp), allocatable :: rows(:, :)
-      integer :: i
+      integer :: i, most
 
+      most = model%n_dof
+      if (allocated(raw%observe_name)) most = most + size(raw%observe_name)
       call reader%get_list('output', 'observe', 'dof numbers or names of observed '// &
-                           'quantities', chosen)
+                           'quantities', chosen, most)
       if (reader%failed()) return
       call list_default(raw, model%n_dof, names, rows)
       if (size(chosen) == 0) then
@@ -60,6 +62,7 @@ contains
          call choose(reader, chosen(i), names, rows, model%observe_name(i)%text, &
                      model%observe_matrix(i, :))
          call refuse_repeated(reader, model%observe_name(:i))
+         if (reader%failed()) return
       end do
    end subroutine read_observed
 

@@ -14,7 +14,7 @@ module fw_reader
                                is_entry, last_entry, multiply_out
    use fw_records, only: record_list
    use fw_reader_text, only: near, shown, to_strings, words_text, element_text, dims_text, &
-                             real_list
+                             real_list, repeat_hint
    use fw_text, only: string_type, lower_case, to_text, join
    use fw_text_list, only: append
    use fw_values, only: range_type, new_range, read_real, read_integer, read_logical, &
@@ -92,19 +92,20 @@ contains
       end do
    end subroutine new_reader
 
-   subroutine get_real(self, group, key, value, above, least, most, required)
+   subroutine get_real(self, group, key, value, above, least, most, required, below)
       class(reader_type), intent(inout) :: self
       character(*), intent(in) :: group, key
       !> The default on entry.
       real(wp), intent(inout) :: value
       real(wp), intent(in), optional :: above, least, most
       logical, intent(in), optional :: required
+      real(wp), intent(in), optional :: below
       type(range_type) :: range
       real(wp) :: number
       integer :: i
       logical :: ok
 
-      range = new_range(real_kind, above, least, most)
+      range = new_range(real_kind, above, least, most, below)
       call self%find_scalar(group, key, range%accepts, required, i)
       if (i > 0) then
          call read_real(self%input%entries(i)%values(1)%text, number, ok)
@@ -167,7 +168,7 @@ contains
       character(*), parameter :: accepts = 'a text in quotes'
       integer :: i
 
-      call self%find_scalar(group, key, accepts, required, i)
+      call self%find_scalar(group, key, accepts, required, i, free_text=.true.)
       if (i > 0) then
          associate (entry => self%input%entries(i))
             if (entry%values(1)%quoted) then
@@ -283,21 +284,28 @@ contains
       call self%amend(group, key, real_list(real(values, wp), dims, repeats))
    end subroutine get_integers
 
-   subroutine get_list(self, group, key, accepts, values)
+   subroutine get_list(self, group, key, accepts, values, most)
       class(reader_type), intent(inout) :: self
       character(*), intent(in) :: group, key
       !> What is accepted, in words.
       character(*), intent(in) :: accepts
       !> Empty where nothing is given; repeat counts are multiplied out.
       type(value_type), allocatable, intent(out) :: values(:)
+      !> As many values can differ.
+      integer, intent(in), optional :: most
       character(:), allocatable :: text
-      integer :: i, k
+      integer :: i, k, limit
 
       allocate (values(0))
       call self%find_last(group, key, accepts, i)
-      if (i == 0) return
-      if (value_count(self%input%entries(i)) > most_listed) then
-         call self%refuse(group, key, 'has too many values: must be '//accepts)
+      ! How many values there may be is not known where something failed before.
+      if (i == 0 .or. self%failed()) return
+      limit = most_listed
+      if (present(most)) limit = min(most, most_listed)
+      if (value_count(self%input%entries(i)) > limit) then
+         call self%refuse(group, key, 'has '//to_text(value_count(self%input%entries(i)))// &
+                          ' values: must be at most '//to_text(limit)//' '//accepts// &
+                          ', none of them twice')
          return
       end if
       call multiply_out(self%input%entries(i)%values, values)
@@ -435,11 +443,14 @@ contains
    end subroutine find_unknown
 
    !> Register a key and find its one value: an entry, or 0 for none or a refused one.
-   subroutine find_scalar(self, group, key, accepts, required, i_entry)
+   subroutine find_scalar(self, group, key, accepts, required, i_entry, free_text)
       class(reader_type), intent(inout) :: self
       character(*), intent(in) :: group, key, accepts
       logical, intent(in), optional :: required
       integer, intent(out) :: i_entry
+      !> Whether the value of an override may be any words without quotes (default: no).
+      logical, intent(in), optional :: free_text
+      logical :: is_alone
 
       call self%find_last(group, key, accepts, i_entry)
       if (i_entry == 0 .and. is_true(required) .and. .not. self%given(group, key)) then
@@ -447,9 +458,17 @@ contains
       end if
       if (i_entry == 0) return
       associate (entry => self%input%entries(i_entry))
-         if (value_count(entry) == 1 .or. allocated(entry%raw)) return
-         call self%refuse(group, key, 'has '//to_text(value_count(entry))// &
-                          ' values: must be one, '//accepts//stray_word(entry))
+         if (allocated(entry%raw)) then
+            is_alone = size(entry%values) == 1 .and. index(entry%raw, ',', .true.) < len(entry%raw)
+            if (is_true(free_text)) is_alone = is_alone .or. .not. entry%values(1)%quoted
+            if (is_alone) return
+            call self%refuse(group, key, '= '//entry%raw//': must be one value and nothing '// &
+                             'behind it, '//accepts)
+         else
+            if (value_count(entry) == 1) return
+            call self%refuse(group, key, 'has '//to_text(value_count(entry))// &
+                             ' values: must be one, '//accepts//stray_word(entry))
+         end if
          i_entry = 0
       end associate
    end subroutine find_scalar
@@ -534,9 +553,11 @@ contains
          name = '&'//entry%group//' '//entry%key
          if (present(element)) name = name//element_text(element, dims)
          if (present(value)) then
-            call self%blame(i_entry, name//' = '//shown(value)//': must be '//accepts, value%line)
+            call self%blame(i_entry, name//' = '//shown(value)//': must be '//accepts// &
+                            repeat_hint(value), value%line)
          else if (allocated(entry%raw)) then
-            call self%blame(i_entry, name//' = '//entry%raw//': must be '//accepts)
+            call self%blame(i_entry, name//' = '//entry%raw//': must be '//accepts// &
+                            repeat_hint(entry%values(1)))
          else
             call self%blame(i_entry, name//' = '//shown(entry%values(1))//': must be '//accepts)
          end if

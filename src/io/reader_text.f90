@@ -8,6 +8,7 @@ module fw_reader_text
    private
 
    public :: near, shown, to_strings, words_text, element_text, dims_text, real_list
+   public :: repeat_hint, printable
 
 contains
 
@@ -32,6 +33,81 @@ contains
       text = value%text
       if (value%quoted) text = quoted_text(value%text)
    end function shown
+
+   !> What a `*` in a value that could not be read may have been meant for.
+   pure function repeat_hint(value) result(hint)
+      type(value_type), intent(in) :: value
+      character(:), allocatable :: hint
+      integer :: star
+
+      hint = ''
+      star = index(value%text, '*')
+      if (star < 2 .or. value%quoted) return
+      hint = '; the repeat count '//value%text(:star - 1)//' before the * must be a whole '// &
+             'number from 1 on'
+   end function repeat_hint
+
+   !> A message that a terminal and UTF-8 readers take: every control byte and every byte that
+   !> is no part of UTF-8 as `\x1b`, ends of lines excepted.
+   pure function printable(message) result(text)
+      character(*), intent(in) :: message
+      character(:), allocatable :: text
+      character(*), parameter :: digits = '0123456789abcdef'
+      integer :: i, k, n, code
+
+      ! Four letters at most for a byte.
+      allocate (character(4*len(message)) :: text)
+      n = 0
+      i = 1
+      do while (i <= len(message))
+         k = sound_bytes(message(i:min(i + 3, len(message))))
+         if (k > 0) then
+            text(n + 1:n + k) = message(i:i + k - 1)
+            n = n + k
+            i = i + k
+         else
+            code = iachar(message(i:i))
+            text(n + 1:n + 4) = '\x'//digits(code/16 + 1:code/16 + 1)// &
+                                digits(mod(code, 16) + 1:mod(code, 16) + 1)
+            n = n + 4
+            i = i + 1
+         end if
+      end do
+      text = text(:n)
+   end function printable
+
+   !> Length of the printable character that begins a text; 0 where there is none.
+   pure integer function sound_bytes(text) result(n)
+      !> Not empty; four bytes tell.
+      character(*), intent(in) :: text
+      integer :: first, second, i
+
+      first = iachar(text(1:1))
+      second = 0
+      if (len(text) > 1) second = iachar(text(2:2))
+      select case (first)
+      case (10, 32:126)
+         n = 1
+      case (194:223)
+         n = 2
+      case (224:239)
+         n = 3
+      case (240:244)
+         n = 4
+      case default
+         n = 0
+      end select
+      if (n > len(text)) n = 0
+      do i = 2, n
+         if (iand(iachar(text(i:i)), 192) == 128) cycle
+         n = 0
+         return
+      end do
+      ! Control characters of two bytes, needlessly long forms, surrogates, beyond Unicode.
+      if ((first == 194 .and. second < 160) .or. (first == 224 .and. second < 160) &
+          .or. (first == 237 .and. second > 159) .or. (first == 240 .and. second < 144) &
+          .or. (first == 244 .and. second > 143)) n = 0
+   end function sound_bytes
 
    pure function to_strings(words) result(strings)
       character(*), intent(in) :: words(:)

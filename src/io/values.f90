@@ -13,13 +13,16 @@ module fw_values
    public :: range_type, new_range, read_real, read_integer, read_logical
    public :: number_text, quoted_text
 
-   !> What a number may be: strictly above, or from `least` to `most`.
+   !> What a number may be: strictly above and below, or from `least` to `most`.
    type :: range_type
       !> What is accepted, in words: `a real above 0`.
       character(:), allocatable :: accepts
       real(wp) :: above = -huge(1.0_wp)
       real(wp) :: least = -huge(1.0_wp)
       real(wp) :: most = huge(1.0_wp)
+      !> Binds where `has_below`.
+      real(wp) :: below = huge(1.0_wp)
+      logical :: has_below = .false.
    contains
       procedure :: holds
    end type range_type
@@ -27,10 +30,10 @@ module fw_values
 contains
 
    !> A range with its description; bounds not given do not bind.
-   function new_range(kind, above, least, most) result(range)
+   function new_range(kind, above, least, most, below) result(range)
       !> `a real`, `an integer` or the like.
       character(*), intent(in) :: kind
-      real(wp), intent(in), optional :: above, least, most
+      real(wp), intent(in), optional :: above, least, most, below
       type(range_type) :: range
 
       range%accepts = kind
@@ -47,6 +50,11 @@ contains
       else if (present(most)) then
          range%accepts = range%accepts//' and at most '//number_text(most)
       end if
+      if (present(below)) then
+         range%has_below = .true.
+         range%below = below
+         range%accepts = range%accepts//' and below '//number_text(below)
+      end if
    end function new_range
 
    pure logical function holds(self, number)
@@ -55,6 +63,7 @@ contains
 
       holds = ieee_is_finite(number) .and. number > self%above .and. number >= self%least &
               .and. number <= self%most
+      if (self%has_below) holds = holds .and. number < self%below
    end function holds
 
    !> A finite real; Fortran d-exponents are understood.

@@ -111,6 +111,66 @@ def test_wrong_override_names_the_option(fw_run, override, expected):
         assert part in message, message
 
 
+@pytest.mark.parametrize("override", [
+    "sweep%start=0.7, end=3 garbage", "sweep%start=0.7 /", "sweep%start=0.7 / &load cosine=5",
+    "contact%n_pairs=1,2", "contact%n_pairs=1,", "solver%fallback=T F", "harmonics%method=hbm x",
+    "case%title='a' b", "solver%tolerance=1e-9 1e-9", "contact%mu=0.3, gap=1"])
+def test_nothing_may_follow_the_value_of_an_override(fw_run, override):
+    message = fw_run.refused("--set", override, "case.nml")
+    assert "--set " + override in message and "must be" in message
+
+
+@pytest.mark.parametrize("override", ["case%title=it's a, b / c", "case%title='a b'",
+                                      "load%cosine=1, 0", "load%cosine=1 0", "contact%mu=1*0.3"])
+def test_what_an_override_may_hold(fw_run, override):
+    done = fw_run("--check", "--set", override, "case.nml")
+    assert done.returncode == 0, done.stderr
+
+
+def test_observing_more_than_there_is(fw_run):
+    for count in ["100000", "2000000000"]:
+        message = fw_run.refused("--set", f"output%observe={count}*1", "case.nml")
+        assert f"has {count} values: must be at most 2" in message, message
+    assert "twice" in fw_run.refused("--set", "output%observe=1,1", "case.nml")
+
+
+@pytest.mark.parametrize("value, count", [("0*0.3", "0"), ("-1*0.3", "-1"), ("1.5*0.3", "1.5"),
+                                          ("99999999999*0.3", "99999999999")])
+def test_wrong_repeat_count(fw_run, value, count):
+    fw_run.edit("mu = 0.3", "mu = " + value)
+    assert f"case.nml:12: &contact mu: the repeat count {count} of" in fw_run.refused()
+    fw_run.edit("mu = 0.3", "mu = 0.3")
+    message = fw_run.refused("--set", "contact%mu=" + value, "case.nml")
+    assert f"the repeat count {count} before" in message, message
+
+
+@pytest.mark.parametrize("content, shown", [
+    (b"\x7fELF\x02\x01\x00\x1b[31m\xff\xc2\x9b" + bytes(range(128, 256))*100,
+     ["\\x7fELF\\x02\\x01\\x00\\x1b[31m\\xff\\xc2\\x9b"]),
+    (b"&case title = \x1b[2J /", ["\\x1b[2J"]), (b"&case \x07 = 1 /", ["\\x07"]),
+    ("&case größe = 1 /".encode(), ["case.nml:1"])])
+def test_bytes_of_a_binary_namelist_are_escaped(fw_run, content, shown):
+    (fw_run.directory / "case.nml").write_bytes(content)
+    message = fw_run.refused()
+    assert all(part in message for part in shown), message
+    assert len(message) < 2000
+    assert all(letter.isprintable() or letter == "\n" for letter in message), repr(message)
+
+
+@pytest.mark.parametrize("override, expected", [
+    ("solver%tolerance=1", "above 0 and below 1"), ("solver%tolerance=1e300", "below 1"),
+    ("case%threads=1025", "from 0 to 1024"), ("case%threads=2000000000", "from 0 to 1024")])
+def test_upper_limits(fw_run, override, expected):
+    assert expected in fw_run.refused("--set", override, "case.nml")
+
+
+def test_a_branch_needs_two_ends(fw_run):
+    arguments = ["--set", "sweep%end=0.5", "case.nml"]
+    message = fw_run.refused("--set", "sweep%continuation=arclength", *arguments)
+    assert "&sweep end = 0.5: must differ from start" in message
+    assert fw_run("--check", *arguments).returncode == 0
+
+
 @pytest.mark.parametrize("override, instead", [
     ("solver%jacobian=difference", "'analytic'"), ("harmonics%sampling=events", "'uniform'"),
     ("harmonics%adaptive=.true.", ".false."), ("sweep%stability=.true.", ".false.")])
