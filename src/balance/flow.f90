@@ -9,8 +9,8 @@
 !> linear part have the real part c/2m. The identity flow grows wherever n omega passes a natural
 !> frequency.
 !>
-!> A step of implicit Euler solves the same problem with artificial damping, Z + P/h and
-!> F + P U_old/h, the contact laws included: stuck pairs stay as they are.
+!> A shift adds P (U - U_old)/h to the residual, outside of the contact laws, so that a step of
+!> implicit Euler is one of the flow to the letter. All coordinates stay in the linear problem.
 module fw_flow
    use fw_kinds, only: wp
    use fw_hbm, only: hbm_system
@@ -32,12 +32,11 @@ module fw_flow
       !> P of each harmonic (n_coordinates, n_coordinates, n_retained), and its factors.
       complex(wp), allocatable :: p(:, :, :)
       type(complex_lu_type), allocatable :: factors(:)
-      !> Stiffness and load without a shift.
-      complex(wp), allocatable :: stiffness(:, :, :)
-      real(wp), allocatable :: load(:, :)
+      !> 1/h of the shift, 0 without one, and where its step started (n).
+      real(wp) :: inverse_step = 0.0_wp
+      real(wp), allocatable :: start(:), moved(:), shifted(:)
       !> Workspace (n_coordinates, n_retained), (n_coordinates, n_coefficients).
       complex(wp), allocatable :: input(:, :), output(:, :)
-      real(wp), allocatable :: product(:, :)
    contains
       procedure :: residual
       procedure :: linearize
@@ -71,10 +70,9 @@ contains
       self%balance => balance
       self%n = balance%n
       self%reference = balance%reference
-      self%stiffness = balance%structure%stiffness
-      self%load = balance%load
-      allocate (self%p(m, m, nh), self%factors(nh))
-      allocate (self%input(m, nh), self%output(m, nh), self%product(m, size(self%load, 2)))
+      self%reduced = .false.
+      allocate (self%p(m, m, nh), self%factors(nh), self%input(m, nh), self%output(m, nh))
+      allocate (self%start(self%n), self%moved(self%n), self%shifted(self%n), source=0.0_wp)
       do h = 1, nh
          call fill_flow(balance, flow, h, self%p(:, :, h))
          call factor_flow(self, h)
@@ -146,7 +144,7 @@ contains
       smallest = minval([(abs(self%factors(h)%matrix(i, i)), i=1, m)])
       if (.not. singular .and. smallest > 1.0e-12_wp*maxval(abs(self%p(:, :, h)))) return
       do i = 1, m
-         self%p(i, i, h) = self%p(i, i, h) + massless_share*abs(self%stiffness(i, i, h))
+         self%p(i, i, h) = self%p(i, i, h) + massless_share*abs(self%balance%structure%stiffness(i, i, h))
       end do
       self%factors(h)%matrix = self%p(:, :, h)
       call self%factors(h)%factor(singular)
@@ -194,16 +192,16 @@ contains
       real(wp), intent(in) :: h
       real(wp), intent(in), contiguous :: x_old(:)
 
-      self%balance%structure%stiffness = self%stiffness + self%p/h
-      call multiply(self, size(self%p, 1), x_old, self%product)
-      self%balance%load = self%load + self%product/h
+      self%inverse_step = 1.0_wp/h
+      self%start = x_old
+      self%balance%shift = self%p/h
    end subroutine set_shift
 
    subroutine clear_shift(self)
       class(flow_system), intent(inout) :: self
 
-      self%balance%structure%stiffness = self%stiffness
-      self%balance%load = self%load
+      self%inverse_step = 0.0_wp
+      if (allocated(self%balance%shift)) deallocate (self%balance%shift)
    end subroutine clear_shift
 
    ! The system of the balance, shifted or not.
@@ -213,15 +211,19 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       real(wp), intent(out), contiguous :: r(:)
 
-      self%balance%reduced = self%reduced
+      self%balance%reduced = .false.
       call self%balance%residual(x, r)
+      if (self%inverse_step <= 0.0_wp) return
+      self%moved = x - self%start
+      call self%flow_product(self%moved, self%shifted)
+      r = r + self%inverse_step*self%shifted
    end subroutine residual
 
    subroutine linearize(self, n_linear)
       class(flow_system), intent(inout) :: self
       integer, intent(out) :: n_linear
 
-      self%balance%reduced = self%reduced
+      self%balance%reduced = .false.
       call self%balance%linearize(n_linear)
    end subroutine linearize
 

@@ -45,6 +45,9 @@ module fw_hbm
       real(wp), allocatable :: gap(:), depth(:), normal_load(:)
       !> F - Z q - f_springs, and the loads (n_coordinates, n_coefficients).
       real(wp), allocatable :: balance(:, :), load(:, :)
+      !> What a step of pseudo-time adds to the derivative, P/h, outside of the contact laws
+      !> (n_coordinates, n_coordinates, n_retained); only allocated during such a step.
+      complex(wp), allocatable :: shift(:, :, :)
       !> Share of the vibratory load that acts; below 1 only on the way to a first solution.
       real(wp) :: load_share = 1.0_wp
       !> Workspace (n_coordinates, n_retained).

@@ -212,10 +212,27 @@ contains
       call outputs_to_real(self)
       if (self%springs%n_springs > 0) call spring_product(self, na, vector, spread_out=.false.)
       if (self%contact%n_pairs > 0) call contact_product(self, na, vector, spread_out=.false.)
+      if (allocated(self%shift)) call add_shift(self)
       do k = 1, self%fourier%n_coefficients
          product((k - 1)*na + 1:k*na) = self%active_out(:na, k)
       end do
    end procedure apply
+
+   !> active_out = active_out + P/h v, all coordinates being active and v in complex_in.
+   subroutine add_shift(self)
+      class(hbm_system), intent(inout) :: self
+      integer :: h, k, m
+
+      m = self%n_active
+      do h = 1, self%fourier%n_retained
+         call zgemv('N', m, m, one, self%shift(1, 1, h), m, self%complex_in(1, h), 1, zero, &
+                    self%complex_out(1, h), 1)
+         k = self%fourier%column(h)
+         self%active_out(:m, k) = self%active_out(:m, k) + real(self%complex_out(:m, h), wp)
+         if (self%fourier%harmonic(h) == 0) cycle
+         self%active_out(:m, k + 1) = self%active_out(:m, k + 1) - aimag(self%complex_out(:m, h))
+      end do
+   end subroutine add_shift
 
    subroutine active_to_complex(self, na, vector)
       type(hbm_system), intent(inout) :: self
@@ -390,6 +407,7 @@ contains
             m(:na, :na) = self%active_stiffness(:na, :na, h)
             call add_mean_springs(self, h, m)
             call add_mean_contact(self, h, m)
+            if (allocated(self%shift)) m(:na, :na) = m(:na, :na) + self%shift(:, :, h)
          end associate
          call self%preconditioner(h)%factor(singular)
       end do

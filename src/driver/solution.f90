@@ -138,7 +138,6 @@ contains
       allocate (whole_x(self%whole%n))
       call carry_solution(system, x, self%whole, whole_x)
       call new_flow(self%whole, pseudo%flow, flow)
-      flow%reduced = system%reduced
       solver%options = case%solver
       solver%pseudo = pseudo
       call solver%solve(flow, whole_x, outcome)
