@@ -90,8 +90,8 @@ contains
       end if
       if (format == result_format) return
       call fatal_error(error, path//': cannot be written: it exists and is no sound result '// &
-                       'file, and only an earlier result is replaced; remove it, or '//remedy, &
-                       status_io)
+                       'file, or one that is open for writing: only an earlier result is '// &
+                       'replaced; remove it, or '//remedy, status_io)
    end subroutine check_replaceable
 
    !> Refuse a file that the run reads, under whatever name.
