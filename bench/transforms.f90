@@ -47,7 +47,7 @@ contains
       call measure(fft, coefficients, values, by_fft, fft_seconds)
       write (output_unit, '(3(i0, ","), 3(es12.5, ","), a)') n_harmonics, n_time, n_rows, &
          matrix_seconds, fft_seconds, maxval(abs(by_matrix - by_fft)), &
-         trim(merge('fft   ', 'matrix', fft_pays(matrix%n_coefficients, n_time)))
+         trim(merge('fft   ', 'matrix', fft_pays(matrix%n_coefficients)))
    end subroutine compare
 
    !> Median time of a pair of transforms [s].

@@ -144,7 +144,8 @@ contains
       smallest = minval([(abs(self%factors(h)%matrix(i, i)), i=1, m)])
       if (.not. singular .and. smallest > 1.0e-12_wp*maxval(abs(self%p(:, :, h)))) return
       do i = 1, m
-         self%p(i, i, h) = self%p(i, i, h) + massless_share*abs(self%balance%structure%stiffness(i, i, h))
+         self%p(i, i, h) = self%p(i, i, h) + &
+            massless_share*abs(self%balance%structure%stiffness(i, i, h))
       end do
       self%factors(h)%matrix = self%p(:, :, h)
       call self%factors(h)%factor(singular)

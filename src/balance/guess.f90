@@ -3,7 +3,6 @@
 module fw_guess
    use fw_kinds, only: wp
    use fw_hbm, only: hbm_system
-   use fw_hbm, only: to_complex
    use fw_hbm, only: to_real
    use fw_linalg, only: complex_lu_type
    use fw_linalg, only: is_positive_definite
@@ -72,7 +71,8 @@ contains
          stiffness = system%structure%stiffness(:, :, h)
          force = system%structure%load(:, h)
          held = .false.
-         call close_pairs(system, closed, system%fourier%harmonic(h), stiffness, force, held, q(:, h))
+         call close_pairs(system, closed, system%fourier%harmonic(h), stiffness, force, held, &
+            q(:, h))
          call solve_free(stiffness, force, held, q(:, h))
          if (system%fourier%harmonic(h) == 0) call mean_tension(system, q(:, h), tension)
       end do
@@ -157,10 +157,11 @@ contains
             last = r%first(row + 1) - 1
             if (system%rigid) then
                tension(i) = system%load(r%coordinate(first), 1) - &
-                            real(dot_product(conjg(system%structure%stiffness(r%coordinate(first), :, 1)), q), wp)
+                            real(sum(system%structure%stiffness(r%coordinate(first), :, 1)*q), wp)
             else
                tension(i) = system%stiffness(i, 3)* &
-                            (sum(r%coefficient(first:last)*real(q(r%coordinate(first:last)), wp)) + &
+                            (sum(r%coefficient(first:last)*real(q(r%coordinate(first:last)), &
+                               wp)) + &
                              system%gap(i) + system%depth(i))
             end if
          end do

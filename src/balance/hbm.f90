@@ -8,7 +8,6 @@
 module fw_hbm
    use fw_kinds, only: wp
    use fw_condensation, only: condensation_type
-   use fw_condensation, only: new_condensation
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: spring_type
    use fw_contact_data, only: law_dlft_velocity
@@ -190,7 +189,8 @@ contains
             stiffness(1:2) = sum(stiffness(1:2), mask=counts)/real(max(1, count(counts)), wp)
             self%stiffness(i, :) = contact%penalty_scale*stiffness
          else
-            if (any(self%joint%row(1:2, i) > 0)) self%stiffness(i, 1:2) = contact%tangential_stiffness(i)
+            if (any(self%joint%row(1:2, i) > 0)) self%stiffness(i, 1:2) &
+               = contact%tangential_stiffness(i)
             if (self%joint%row(3, i) > 0) self%stiffness(i, 3) = contact%normal_stiffness(i)
          end if
       end do
@@ -252,7 +252,8 @@ contains
          static = norm2(self%load(:, 1))
       end if
       load_norm = max(load_norm, static_share*static)
-      if (load_norm <= 0.0_wp) load_norm = norm2(self%normal_load) + norm2(self%stiffness(:, 3)*self%gap)
+      if (load_norm <= 0.0_wp) load_norm = norm2(self%normal_load) + norm2(self%stiffness(:, &
+         3)*self%gap)
       if (load_norm <= 0.0_wp) load_norm = 1.0_wp
    end function load_norm
 

@@ -129,7 +129,8 @@ contains
       if (self%n_active == m .or. self%n_active == 0) return
       call to_complex(self%fourier, m, self%balance, self%complex_in)
       do h = 1, self%fourier%n_retained
-         call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, self%complex_in(1, h), 1, &
+         call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, self%complex_in(1, h), &
+            1, &
                     zero, self%complex_out(1, h), 1)
          self%complex_out(:self%n_used, h) = self%complex_out(self%used(:self%n_used), h)
       end do
@@ -259,7 +260,8 @@ contains
       do h = 1, self%fourier%n_retained
          k = self%fourier%column(h)
          self%active_out(:nu, k) = real(self%complex_out(:nu, h), wp)
-         if (self%fourier%harmonic(h) > 0) self%active_out(:nu, k + 1) = -aimag(self%complex_out(:nu, h))
+         if (self%fourier%harmonic(h) > 0) self%active_out(:nu, k + 1) &
+            = -aimag(self%complex_out(:nu, h))
       end do
    end subroutine outputs_to_real
 
@@ -288,7 +290,8 @@ contains
             do e = r%first(row(i)), r%first(row(i) + 1) - 1
                place = self%place(r%coordinate(e))
                if (place == 0) cycle
-               self%active_out(place, :) = self%active_out(place, :) + r%coefficient(e)*s%force(i, :)
+               self%active_out(place, :) = self%active_out(place, :) + &
+                  r%coefficient(e)*s%force(i, :)
             end do
          end do
       end associate
@@ -310,7 +313,8 @@ contains
          if (self%contact%state(i) == pair_open) cycle
          call gather_inputs(self, i, n_rows, vector, spread_out, self%pair_in(:, i))
          if (self%contact%state(i) == pair_mixed) then
-            call dgemv('T', n, n, 1.0_wp, self%contact%jacobian(1, 1, i), n, self%pair_in(1, i), 1, &
+            call dgemv('T', n, n, 1.0_wp, self%contact%jacobian(1, 1, i), n, self%pair_in(1, i), &
+               1, &
                        0.0_wp, self%pair_out(1, i), 1)
          else
             self%pair_out(:, i) = self%pair_in(:, i)
@@ -338,7 +342,8 @@ contains
             do e = r%first(row), r%first(row + 1) - 1
                place = merge(r%coordinate(e), self%place(r%coordinate(e)), spread_out)
                if (place == 0 .or. place > n_rows) cycle
-               inputs(:, c) = inputs(:, c) + self%stiffness(pair, c)*r%coefficient(e)*vector(place, :nc)
+               inputs(:, c) = inputs(:, c) + self%stiffness(pair, &
+                  c)*r%coefficient(e)*vector(place, :nc)
             end do
             if (.not. self%rigid) cycle
             if (c < 3 .and. self%velocity_level) then
@@ -501,7 +506,8 @@ contains
             do f = r%first(row(c_in, pair)), r%first(row(c_in, pair) + 1) - 1
                p_in = self%place(r%coordinate(f))
                if (p_in == 0) cycle
-               if (self%rigid) m(p_out, :na) = m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h)
+               if (self%rigid) m(p_out, :na) = m(p_out, :na) - mean*self%active_stiffness(p_in, &
+                  :na, h)
                if (p_in > na) cycle
                m(p_out, p_in) = m(p_out, p_in) + r%coefficient(e)*r%coefficient(f)* &
                                 self%stiffness(pair, c_in)*factor*mean
@@ -523,7 +529,8 @@ contains
       do h = 1, self%fourier%n_retained
          k = self%fourier%column(h)
          vector((k - 1)*na + 1:k*na) = real(self%complex_in(:na, h), wp)
-         if (self%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) = -aimag(self%complex_in(:na, h))
+         if (self%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
+            = -aimag(self%complex_in(:na, h))
       end do
    end procedure precondition
 

@@ -88,7 +88,8 @@ contains
       moving(1:) = abs(model%load_static) + abs(model%load_cosine) + abs(model%load_sine) > 0.0_wp
       do i = 1, contact%n_pairs
          ! An interference pushes both sides.
-         if (contact%gap(i) < 0.0_wp) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) = .true.
+         if (contact%gap(i) < 0.0_wp) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) &
+            = .true.
       end do
       moving(0) = .false.
       do
@@ -148,8 +149,8 @@ contains
             if (self%row(c, i) == 0) cycle
             if (self%relative%independent(self%row(c, i))) cycle
             call fatal_error(error, '&contact pair '//to_text(i)//', '//trim(component(c))// &
-                             ': its relative displacement follows from that of earlier pairs, so '// &
-                             'rigid contact forces are not determined; remove the pair or use '// &
+                             ': its relative displacement follows from that of earlier pairs, '// &
+                             'so rigid contact forces are not determined; remove the pair or use '// &
                              'law = ''penalty''', status_input)
             return
          end do

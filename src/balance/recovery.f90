@@ -43,7 +43,8 @@ contains
          end if
       end do
       point%amplitude = [(largest_magnitude(point%coefficients(:, i)), i=1, n_observed)]
-      if (with_contact .and. system%contact%n_pairs > 0) call recover_contact(system, x, n_harmonics, point)
+      if (with_contact .and. system%contact%n_pairs > 0) call recover_contact(system, x, &
+         n_harmonics, point)
    end subroutine recover_point
 
    !> Carry a solution between the condensed and the whole system of a case: the relative

@@ -44,7 +44,8 @@ contains
             d = y(1:2, k) - x
             length = sqrt(d(1)**2 + d(2)**2)
             if (p > 0.0_wp .and. length <= mu*p) then
-               if (turn == n_turns) call stick_rows(n_coef, base(:, k), present, dx, rows(:, :, :, k))
+               if (turn == n_turns) call stick_rows(n_coef, base(:, k), present, dx, rows(:, :, &
+                  :, k))
             else if (p <= 0.0_wp) then
                rows(:, :, :, k) = 0.0_wp
                call follow(n_coef, base(:, k), present, rows(:, :, :, k), dx)

@@ -92,7 +92,8 @@ contains
       allocate (self%prediction(n, 3, nc), self%force(n, 3, nc), source=0.0_wp)
       allocate (self%prediction_time(n, 3, nt), self%force_time(n, 3, nt), source=0.0_wp)
       allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
-      allocate (self%margin(n), self%pressure(n), self%offset(n), self%scale(n), self%drift(n), source=0.0_wp)
+      allocate (self%margin(n), self%pressure(n), self%offset(n), self%scale(n), self%drift(n), &
+         source=0.0_wp)
       allocate (self%turns(n), source=0)
       allocate (self%state(n), source=pair_stuck)
    end function new_forces

@@ -10,6 +10,7 @@ module fw_frequency_response
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
+   use fw_problem, only: sweep_frequency
    use fw_result, only: result_writer
    use fw_solver_options, only: continuation_arclength
    use fw_summary, only: summary_type
@@ -35,7 +36,8 @@ contains
       call build_system(case, system, error)
       if (allocated(error)) return
       call solver%start(case, system%n)
-      if (case%analysis == analysis_frf .and. case%sweep%continuation == continuation_arclength) then
+      if (case%analysis == analysis_frf .and. &
+          case%sweep%continuation == continuation_arclength) then
          call observer%on_start(case%title, 0)
          call run_branch(case, system, solver, observer, writer, summary, error)
          call observer%on_end()
@@ -46,7 +48,7 @@ contains
       if (case%analysis == analysis_frf) n_points = case%sweep%n_points
       call observer%on_start(case%title, n_points)
       do k = 1, n_points
-         call solver%solve(case, system, frequency(case, k, n_points), point, error)
+         call solver%solve(case, system, sweep_frequency(case%sweep, k, n_points), point, error)
          if (allocated(error)) exit
          call writer%add_point(point, error)
          if (allocated(error)) exit
@@ -57,17 +59,5 @@ contains
       call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
       if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
    end subroutine run_frequency_response
-
-   !> Evenly spaced from start to end, both exact.
-   pure real(wp) function frequency(case, k, n_points) result(omega)
-      type(case_type), intent(in) :: case
-      integer, intent(in) :: k, n_points
-      real(wp) :: share
-
-      omega = case%sweep%start
-      if (n_points == 1) return
-      share = real(k - 1, wp)/real(n_points - 1, wp)
-      omega = (1.0_wp - share)*case%sweep%start + share*case%sweep%end
-   end function frequency
 
 end module fw_frequency_response

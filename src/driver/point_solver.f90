@@ -86,7 +86,8 @@ contains
       point%residual = report%residual
       call recover_point(system, self%x, case%harmonics%n_harmonics, case%output%contact, point)
       if (case%output%histories) then
-         call recover_histories(system, size(system%balance, 1), self%x, case%harmonics%n_harmonics, point)
+         call recover_histories(system, size(system%balance, 1), self%x, &
+            case%harmonics%n_harmonics, point)
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then
          system%contact%x_start = system%contact%x
@@ -236,7 +237,8 @@ contains
       end if
       if (depth == max_halvings .or. self%n_converged == 0) return
       if (.not. self%method%newton%options%fallback) return
-      call approach(self, system, 0.5_wp*(self%omega_last + omega), depth + 1, report, iterations, error)
+      call approach(self, system, 0.5_wp*(self%omega_last + omega), depth + 1, report, &
+         iterations, error)
       if (allocated(error)) return
       if (report%converged) call approach(self, system, omega, depth + 1, report, iterations, error)
       if (allocated(error)) return

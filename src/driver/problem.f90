@@ -21,11 +21,12 @@ module fw_problem
    use fw_hbm, only: new_hbm
    use fw_joint, only: joint_type
    use fw_joint, only: new_joint
+   use fw_solver_options, only: sweep_options
    use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: build_system, automatic_n_time
+   public :: build_system, sweep_frequency
 
    !> Instants per harmonic below which the sampling error exceeds that of the truncation: with
    !> friction alone, and where pairs may separate or the normal load varies.
@@ -54,7 +55,8 @@ contains
       if (case%analysis == analysis_frf) then
          range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
       end if
-      call new_condensation(case%model, joint%relative, fourier%harmonic, range, structure, error, keep_all)
+      call new_condensation(case%model, joint%relative, fourier%harmonic, range, structure, &
+         error, keep_all)
       if (allocated(error)) return
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
@@ -89,7 +91,8 @@ contains
          odd_only = .false.
       case (parity_odd)
          if (case%harmonics%method /= method_hbm) then
-            call fatal_error(error, '&harmonics parity = ''odd'' needs method = ''hbm''', status_input)
+            call fatal_error(error, '&harmonics parity = ''odd'' needs method = ''hbm''', &
+               status_input)
             return
          end if
          if (.not. joint%half_wave_symmetric) then
@@ -143,5 +146,17 @@ contains
       end if
       n_time = n_time + modulo(n_time, 2)
    end function automatic_n_time
+
+   !> Point k of a sweep: evenly spaced from start to end, both exact [rad/s].
+   pure real(wp) function sweep_frequency(sweep, k, n_points) result(omega)
+      type(sweep_options), intent(in) :: sweep
+      integer, intent(in) :: k, n_points
+      real(wp) :: share
+
+      omega = sweep%start
+      if (n_points == 1) return
+      share = real(k - 1, wp)/real(n_points - 1, wp)
+      omega = (1.0_wp - share)*sweep%start + share*sweep%end
+   end function sweep_frequency
 
 end module fw_problem

@@ -52,7 +52,8 @@ contains
       call threads%leave()
       call system_clock(clock_end)
       elapsed = real(clock_end - clock, wp)/real(rate, wp)
-      if (summary%n_converged < summary%n_points .or. summary%incomplete) outcome%status = status_not_converged
+      if (summary%n_converged < summary%n_points .or. summary%incomplete) &
+         outcome%status = status_not_converged
       if (allocated(error)) then
          if (summary%n_points == 0) then
             call writer%discard()

@@ -78,8 +78,10 @@ contains
       !> The solver of the case; the counts are those of Newton's method.
       integer, intent(in) :: kind
 
-      self%work = [line('unknowns', to_text(system%n)//' ('//to_text(system%structure%n_coordinates)// &
-                        ' coordinates, '//to_text(system%fourier%n_coefficients)//' coefficients, '// &
+      self%work = [line('unknowns', to_text(system%n)//' ('// &
+         to_text(system%structure%n_coordinates)// &
+                        ' coordinates, '//to_text(system%fourier%n_coefficients)// &
+                           ' coefficients, '// &
                         to_text(system%fourier%n_time)//' instants)'), &
                    line('linear solver', to_text(linear%factorizations)//' LU factorizations, '// &
                         to_text(linear%krylov_iterations)//' Krylov iterations')]
@@ -117,15 +119,18 @@ contains
       character(80) :: text
       integer :: i
 
-      table = [line('converged', to_text(self%n_converged)//' of '//to_text(self%n_points)//' points'), &
+      table = [line('converged', to_text(self%n_converged)//' of '//to_text(self%n_points)// &
+         ' points'), &
                line('iterations', to_text(self%iterations))]
       do i = 1, merge(min(size(self%name), max_shown), 0, self%n_converged > 0)
-         write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', self%peak_omega(i), &
+         write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', &
+            self%peak_omega(i), &
             ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'
          table = [table, line('peak '//self%name(i)%text, trim(adjustl(text)))]
       end do
       if (size(self%name) > max_shown) then
-         table = [table, line('...', to_text(size(self%name) - max_shown)//' more in the result file')]
+         table = [table, line('...', to_text(size(self%name) - max_shown)// &
+            ' more in the result file')]
       end if
       write (text, '(f0.3, a)') seconds, ' s'
       if (text(1:1) == '.') text = '0'//text

@@ -20,6 +20,7 @@ module fw_time_response
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
+   use fw_problem, only: sweep_frequency
    use fw_recovery, only: recover_point
    use fw_result, only: result_writer
    use fw_summary, only: summary_type
@@ -68,7 +69,7 @@ contains
       call observer%on_start(case%title, n_points)
       do k = 1, n_points
          call solve_point(case, start_case, system, solver, structure, &
-                          frequency(start_case, k, n_points), observer, point, error)
+                          sweep_frequency(start_case%sweep, k, n_points), observer, point, error)
          if (allocated(error)) exit
          call writer%add_point(point, error)
          if (allocated(error)) exit
@@ -112,18 +113,6 @@ contains
          start%model%observe_matrix(i, i) = 1.0_wp
       end do
    end function case_of_start
-
-   !> Evenly spaced from start to end, both exact.
-   pure real(wp) function frequency(case, k, n_points) result(omega)
-      type(case_type), intent(in) :: case
-      integer, intent(in) :: k, n_points
-      real(wp) :: share
-
-      omega = case%sweep%start
-      if (n_points == 1) return
-      share = real(k - 1, wp)/real(n_points - 1, wp)
-      omega = (1.0_wp - share)*case%sweep%start + share*case%sweep%end
-   end function frequency
 
    !> Initial state, integration, time spent.
    subroutine solve_point(case, start_case, system, solver, structure, omega, observer, point, &

@@ -25,7 +25,8 @@ contains
 
       call check('case%analysis', analysis_words, case%analysis, &
                  [analysis_frf, analysis_point, analysis_time])
-      call check('contact%law', law_words, case%contact%law, [law_dlft, law_dlft_velocity, law_penalty])
+      call check('contact%law', law_words, case%contact%law, [law_dlft, law_dlft_velocity, &
+         law_penalty])
       call check('harmonics%method', method_words, case%harmonics%method, &
                  [method_hbm, method_tcm, method_tcm_least_squares, method_hdhb])
       call check('harmonics%sampling', sampling_words, case%harmonics%sampling, [sampling_uniform])
@@ -62,7 +63,8 @@ contains
       subroutine check_memory()
          if (allocated(error) .or. case%contact%memory /= memory_carried) return
          if (case%sweep%continuation /= continuation_arclength) return
-         call fatal_error(error, "contact%memory = 'carried' does not go with sweep%continuation "// &
+         call fatal_error(error, &
+            "contact%memory = 'carried' does not go with sweep%continuation "// &
                           "= 'arclength': use 'assembly'", status_input)
       end subroutine check_memory
 

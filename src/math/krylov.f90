@@ -140,7 +140,8 @@ contains
       self%hessenberg(:, j) = 0.0_wp
       do pass = 1, 2
          call dgemv('T', n, j, 1.0_wp, self%basis, n, self%product, 1, 0.0_wp, self%coefficients, 1)
-         call dgemv('N', n, j, -1.0_wp, self%basis, n, self%coefficients, 1, 1.0_wp, self%product, 1)
+         call dgemv('N', n, j, -1.0_wp, self%basis, n, self%coefficients, 1, 1.0_wp, &
+            self%product, 1)
          self%hessenberg(:j, j) = self%hessenberg(:j, j) + self%coefficients(:j)
       end do
       self%hessenberg(j + 1, j) = norm2(self%product)

@@ -4,8 +4,8 @@ module fw_lapack
    implicit none (type, external)
    private
 
-   public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd, dgecon
-   public :: dlange, dgeev
+   public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
+   public :: dgeev
 
    interface
       subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
@@ -94,17 +94,6 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dsygvd
 
-      subroutine dgecon(norm, n, a, lda, anorm, rcond, work, iwork, info)
-         import :: wp
-         character, intent(in) :: norm
-         integer, intent(in) :: n, lda
-         real(wp), intent(in) :: a(lda, *), anorm
-         real(wp), intent(out) :: rcond
-         real(wp), intent(inout) :: work(*)
-         integer, intent(inout) :: iwork(*)
-         integer, intent(out) :: info
-      end subroutine dgecon
-
       subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
          import :: wp
          character, intent(in) :: jobvl, jobvr
@@ -115,14 +104,6 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dgeev
 
-      function dlange(norm, m, n, a, lda, work) result(value)
-         import :: wp
-         character, intent(in) :: norm
-         integer, intent(in) :: m, n, lda
-         real(wp), intent(in) :: a(lda, *)
-         real(wp), intent(inout) :: work(*)
-         real(wp) :: value
-      end function dlange
    end interface
 
 end module fw_lapack

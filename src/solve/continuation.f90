@@ -107,7 +107,8 @@ contains
             self%ending = 'the corrector failed at the smallest step'
             return
          end if
-         if (here%t_p*next%t_p < 0.0_wp) call report_fold(self, system, here, next, ds, observer, error)
+         if (here%t_p*next%t_p < 0.0_wp) call report_fold(self, system, here, next, ds, observer, &
+            error)
          if (allocated(error)) return
          if ((next%p - self%start)*(next%p - self%finish) > 0.0_wp) then
             call land(self, system, here, next, observer, error)
@@ -279,7 +280,8 @@ contains
          call self%linear%solve_prepared(system, slope, forcing, dx_dp, done)
          if (.not. done) exit
          report%iterations = report%iterations + 1
-         dp = -inner(self, here%t, here%t_p, step, 0.0_wp)/inner(self, here%t, here%t_p, dx_dp, 1.0_wp)
+         dp = -inner(self, here%t, here%t_p, step, 0.0_wp)/inner(self, here%t, here%t_p, dx_dp, &
+            1.0_wp)
          next%x = next%x + step + dp*dx_dp
          next%p = next%p + dp
       end do
@@ -340,7 +342,8 @@ contains
       real(wp) :: bound, share
       logical :: done
 
-      bound = merge(self%start, self%finish, (next%p - self%start)*(self%finish - self%start) < 0.0_wp)
+      bound = merge(self%start, self%finish, (next%p - self%start)*(self%finish - &
+         self%start) < 0.0_wp)
       share = (bound - here%p)/(next%p - here%p)
       x = here%x + share*(next%x - here%x)
       allocate (r(system%n), step(system%n))
