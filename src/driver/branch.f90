@@ -127,12 +127,12 @@ contains
       if (associated(self%in_time)) then
          call self%in_time%to_coefficients(self%system%structure%n_coordinates, x, coefficients)
       end if
+      call self%system%residual(coefficients, self%r)
       point%omega = p
       point%converged = report%converged .and. is_lasting(self%system)
       point%iterations = report%iterations
       point%residual = report%residual
       point%fold = fold
-      call self%system%residual(coefficients, self%r)
       call recover_point(self%system, coefficients, self%case%harmonics%n_harmonics, &
                          self%case%output%contact, point)
       if (self%case%output%histories) then

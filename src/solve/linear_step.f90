@@ -16,8 +16,9 @@ module fw_linear_step
    !> Unknowns up to which LU is the faster; measured by bench/run.py (docs/benchmarks.md).
    integer, parameter :: lu_pays_up_to = 60
 
-   !> Unknowns up to which LU is tried where GMRES has failed (200 MB).
-   integer, parameter :: lu_possible_up_to = 5000
+   !> Unknowns up to which LU is tried where GMRES has failed: above, it costs more than the other
+   !> guesses that are left.
+   integer, parameter :: lu_possible_up_to = 600
 
    type :: linear_step_type
       integer :: kind = linear_auto
@@ -97,8 +98,8 @@ contains
          if (.not. done .and. self%kind /= linear_krylov .and. n <= lu_possible_up_to) then
             call factor(self, system, n, done)
          end if
-         ! Where LU is not wanted, Newton's method judges what GMRES has reached.
-         if (self%kind == linear_krylov) done = .true.
+         ! Without LU, Newton's method judges what GMRES has reached.
+         if (self%kind == linear_krylov .or. n > lu_possible_up_to) done = .true.
          if (.not. done) return
       end if
       if (self%factored) then
