@@ -9,8 +9,9 @@ program fw_run_program
    use fw_progress, only: progress_type, new_progress
    use fw_read_case, only: read_case
    use fw_reader_text, only: printable
-   use fw_run, only: run_case
+   use fw_run, only: check_case, run_case
    use fw_text, only: string_type
+   use fw_threads, only: thread_scope
    use fw_version, only: version
    implicit none (type, external)
 
@@ -50,11 +51,17 @@ contains
       type(case_type) :: case
       type(outcome_type) :: outcome
       type(progress_type) :: progress
+      type(thread_scope) :: threads
       integer :: i
 
+      ! Damping and checks of a model must not depend on the threads of the BLAS either.
+      call threads%enter(0)
       call read_case(options%input, options%overrides, case, error)
+      call threads%leave()
       if (allocated(error)) return
       if (options%check) then
+         call check_case(case, error)
+         if (allocated(error)) return
          write (output_unit, '(a)', advance='no') case%namelist
          return
       end if

@@ -9,8 +9,10 @@ module fw_run
    use fw_error, only: status_not_converged
    use fw_error, only: status_ok
    use fw_frequency_response, only: run_frequency_response
+   use fw_hbm, only: hbm_system
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
+   use fw_problem, only: build_system
    use fw_result, only: result_writer
    use fw_summary, only: summary_type
    use fw_summary, only: new_summary
@@ -19,9 +21,23 @@ module fw_run
    implicit none (type, external)
    private
 
-   public :: run_case
+   public :: run_case, check_case
 
 contains
+
+   !> Everything that would refuse a case before it is computed; nothing is written.
+   subroutine check_case(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(hbm_system) :: system
+      type(thread_scope) :: threads
+
+      call check_available(case, error)
+      if (allocated(error)) return
+      call threads%enter(case%threads)
+      call build_system(case, system, error)
+      call threads%leave()
+   end subroutine check_case
 
    !> Run a case and write its result file. Points that did not converge make the outcome
    !> status_not_converged; `error` is for what ends the run.
