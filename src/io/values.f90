@@ -129,6 +129,7 @@ contains
       integer, parameter :: trials(*) = [6, 15, 16, 17]
       character(40) :: buffer, form
       real(wp) :: back
+      logical :: ok
       integer :: i
 
       if (.not. ieee_is_finite(number)) then
@@ -139,7 +140,9 @@ contains
       do i = 1, size(trials)
          write (form, '(a, i0, a)') '(es40.', trials(i) - 1, 'e3)'
          write (buffer, form) number
-         read (buffer, *) back
+         ! The largest numbers, rounded to few digits, lie beyond the range.
+         call read_real(trim(adjustl(buffer)), back, ok)
+         if (.not. ok) cycle
          if (abs(back - number) <= 0.0_wp) exit
       end do
       text = plain_text(adjustl(buffer))

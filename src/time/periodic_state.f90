@@ -94,7 +94,7 @@ contains
          report%converged = report%change <= tolerance .or. &
             (plain .and. n_idle > 2*patience .and. report%change <= chatter_tolerance)
          if (report%converged .or. report%n_periods >= n_periods) return
-         if (report%change > worst_growth*best .or. plain) then
+         if (report%change/worst_growth > best .or. plain) then
             n_history = 0
          else if (report%n_periods > n_settling) then
             call remember(n_history, d_image, d_change, image - last_image, change - last_change)
