@@ -16,6 +16,10 @@ module fw_point
       logical :: converged = .false.
       !> The branch turns here.
       logical :: fold = .false.
+      !> Floquet multipliers, only when asked for (n_multipliers), and whether all lie in the unit
+      !> circle.
+      complex(wp), allocatable :: multipliers(:)
+      logical :: stable = .false.
       integer :: iterations = 0
       !> norm(R)/norm(F) at the end.
       real(wp) :: residual = 0.0_wp

@@ -18,6 +18,7 @@ module fw_branch
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_result, only: result_writer
+   use fw_solution, only: find_stability
    use fw_solution, only: is_lasting
    use fw_summary, only: summary_type
    implicit none (type, external)
@@ -138,6 +139,10 @@ contains
       if (self%case%output%histories) then
          call recover_histories(self%system, size(self%system%balance, 1), coefficients, &
                                 self%case%harmonics%n_harmonics, point)
+      end if
+      if (point%converged .and. self%case%sweep%stability) then
+         call find_stability(self%system, self%case%model, coefficients, point, error)
+         if (allocated(error)) return
       end if
       call system_clock(clock, rate)
       point%seconds = real(clock - self%clock, wp)/real(rate, wp)

@@ -13,6 +13,7 @@ module fw_point_solver
    use fw_point, only: point_type
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
+   use fw_solution, only: find_stability
    use fw_solution, only: solution_method
    use fw_solver_options, only: pseudo_time_options
    use fw_solver_options, only: solver_pseudo_time
@@ -88,6 +89,10 @@ contains
       if (case%output%histories) then
          call recover_histories(system, size(system%balance, 1), self%x, &
             case%harmonics%n_harmonics, point)
+      end if
+      if (report%converged .and. case%sweep%stability) then
+         call find_stability(system, case%model, self%x, point, error)
+         if (allocated(error)) return
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then
          system%contact%x_start = system%contact%x

@@ -42,12 +42,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Condense nothing (pseudo-time flows live on the whole structure).
       logical, intent(in), optional :: keep_all
+      logical :: skip_idle
       type(joint_type) :: joint
       type(fourier_type) :: fourier
       type(condensation_type) :: structure
       real(wp) :: range(2)
 
-      call new_joint(case%model, case%contact, case%springs, case%solver%skips, joint, error)
+      ! A perturbation moves what no load moves.
+      skip_idle = case%solver%skips .and. .not. case%sweep%stability
+      call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
       call choose_harmonics(case, joint, fourier, error)
       if (allocated(error)) return

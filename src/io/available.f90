@@ -37,7 +37,7 @@ contains
                  [continuation_natural, continuation_arclength])
       call check_memory()
       call check_off('harmonics%adaptive', case%harmonics%adaptive)
-      call check_off('sweep%stability', case%sweep%stability)
+      call check_stability()
 
    contains
 
@@ -58,6 +58,14 @@ contains
          call fatal_error(error, name//" = '"//trim(words(choice))//"' is not available in "// &
                           'this version: use '//list, status_input)
       end subroutine check
+
+      !> Rigid contact has no derivative in the state from which a multiplier could be computed.
+      subroutine check_stability()
+         if (allocated(error) .or. .not. case%sweep%stability) return
+         if (case%contact%n_pairs == 0 .or. case%contact%law == law_penalty) return
+         call fatal_error(error, "sweep%stability = .true. needs contact%law = 'penalty' (or no "// &
+                          "contact pairs): rigid contact has no Floquet multipliers", status_input)
+      end subroutine check_stability
 
       !> A branch turns back on itself: there is no one last point to carry the memory from.
       subroutine check_memory()

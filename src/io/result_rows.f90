@@ -21,8 +21,9 @@ module fw_result_rows
    integer, parameter :: d_omega = 1, d_coefficients = 2, d_amplitude = 3, d_converged = 4, &
                          d_iterations = 5, d_residual = 6, d_seconds = 7, d_force = 8, &
                          d_fraction = 9, d_dissipation = 10, d_observed = 11, &
-                         d_force_history = 12, d_slip_history = 13, d_fold = 14
-   integer, parameter :: n_datasets = 14
+                         d_force_history = 12, d_slip_history = 13, d_fold = 14, &
+                         d_stable = 15, d_multipliers = 16
+   integer, parameter :: n_datasets = 16
 
    type :: row_set
       integer, private :: n_rows = 0, n_coefficients = 1, expected = 1
@@ -66,6 +67,9 @@ contains
       if (case%sweep%continuation == continuation_arclength) then
          call self%new(file, d_fold, '/fold', scalar, error, kind_of=growing_logical)
       end if
+      if (.not. allocated(error) .and. case%sweep%stability) then
+         call self%new(file, d_stable, '/floquet/stable', scalar, error, kind_of=growing_integer)
+      end if
       n_pairs = case%contact%n_pairs
       if (allocated(error) .or. .not. case%output%contact .or. n_pairs == 0) return
       call self%new(file, d_force, '/contact/force', [3, n_pairs, self%n_coefficients], error)
@@ -103,6 +107,7 @@ contains
       call self%list(d_seconds)%append(file, point%seconds, error)
       if (allocated(error)) return
       if (self%list(d_fold)%is_created()) call self%list(d_fold)%append(file, point%fold, error)
+      if (.not. allocated(error)) call append_stability(self, file, point, error)
       if (.not. allocated(error)) call self%append_contact(file, point, error)
       if (.not. allocated(error)) call self%append_histories(file, point, error)
    end subroutine append
@@ -154,6 +159,33 @@ contains
       row(:, :n) = transpose(coefficients)
       call dataset%append(file, row, error)
    end subroutine append_coefficients
+
+   !> 1 stable, 0 unstable, -1 not known; multipliers as (n_multipliers, real and imaginary part).
+   subroutine append_stability(self, file, point, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: row(:, :)
+
+      if (.not. self%list(d_stable)%is_created()) return
+      if (.not. allocated(point%multipliers)) then
+         call self%list(d_stable)%append(file, -1, error)
+         if (allocated(error) .or. .not. self%list(d_multipliers)%is_created()) return
+         call self%list(d_multipliers)%skip(file, 1, error)
+         return
+      end if
+      call self%list(d_stable)%append(file, merge(1, 0, point%stable), error)
+      if (allocated(error)) return
+      allocate (row(2, size(point%multipliers)))
+      row(1, :) = real(point%multipliers, wp)
+      row(2, :) = aimag(point%multipliers)
+      if (.not. self%list(d_multipliers)%is_created()) then
+         call self%new_late(file, d_multipliers, '/floquet/multipliers', shape(row), error)
+         if (allocated(error)) return
+      end if
+      call self%list(d_multipliers)%append(file, row, error)
+   end subroutine append_stability
 
    subroutine append_contact(self, file, point, error)
       class(row_set), intent(inout) :: self

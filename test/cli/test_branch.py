@@ -61,6 +61,26 @@ def test_folds_of_the_duffing_oscillator(fw_run, method: str) -> None:
             assert _residual(w, row) < EQUILIBRIUM, f"row at omega = {w}"
 
 
+def test_the_branch_is_unstable_between_its_folds(fw_run) -> None:
+    fw_run.write(CASE.format(method="hbm"), "branch.nml")
+    done = fw_run("-q", "-o", "branch.h5", "--set", "sweep%stability=.true.", "branch.nml")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(fw_run.directory / "branch.h5") as file:
+        stable, fold = file["floquet/stable"][:], np.flatnonzero(file["fold"][:])
+        multipliers = file["floquet/multipliers"][:]
+    # The folds themselves have a multiplier of one: either answer is right there.
+    inside = np.zeros(len(stable), dtype=bool)
+    inside[fold[0] + 1:fold[1]] = True
+    elsewhere = ~inside
+    elsewhere[fold] = False
+    assert (stable[inside] == 0).all() and (stable[elsewhere] == 1).all()
+    # Liouville: the product of the multipliers is exp(-c T / m), whatever the stiffness.
+    with h5py.File(fw_run.directory / "branch.h5") as file:
+        omega = file["omega"][:]
+    value = multipliers[..., 0] + 1j * multipliers[..., 1]
+    assert np.prod(value, axis=1) == pytest.approx(np.exp(-0.1 * 2 * np.pi / omega), rel=1e-6)
+
+
 def test_a_branch_that_turns_back_says_so(fw_run) -> None:
     """max_points ends the run with the status of a sweep that is not complete."""
     fw_run.write(CASE.format(method="hbm"), "branch.nml")
