@@ -9,10 +9,8 @@
 !> mixed units do not decide what counts as massless.
 module fw_stability_basis
    use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_failure
    use fw_kinds, only: wp
-   use fw_lapack, only: dsyevd
+   use fw_linalg, only: diagonalize
    use fw_linalg, only: lu_type
    use fw_model, only: model_type
    use fw_relative, only: relative_type
@@ -81,7 +79,7 @@ contains
       do j = 1, n
          vectors(:, j) = scale*model%mass(:, j)*scale(j)
       end do
-      call solve_eigen(vectors, values, error)
+      call diagonalize(vectors, values, 'sweep%stability', error)
       if (allocated(error)) return
       ! Ascending eigenvalues: the massless directions come first.
       n_massless = count(values <= rank_tolerance*max(values(n), 0.0_wp))
@@ -135,7 +133,7 @@ contains
       if (n_massless == 0) return
       whole = matmul(transpose(basis), matmul(damping, basis))
       vectors = whole(n_massive + 1:, n_massive + 1:)
-      call solve_eigen(vectors, values, error)
+      call diagonalize(vectors, values, 'sweep%stability', error)
       if (allocated(error)) return
       n_damped = count(values > rank_tolerance*maxval(abs(whole)))
       ! Descending eigenvalues: the damped directions come first.
@@ -179,22 +177,5 @@ contains
          rows(relative%free, row) = matmul(weights, relative%r)
       end do
    end subroutine rows_of_dofs
-
-   !> Eigenvalues in ascending order; the matrix becomes its eigenvectors.
-   subroutine solve_eigen(matrix, values, error)
-      real(wp), contiguous, intent(inout) :: matrix(:, :)
-      real(wp), allocatable, intent(out) :: values(:)
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: work(:)
-      integer, allocatable :: iwork(:)
-      integer :: n, info
-
-      n = size(matrix, 1)
-      allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
-      call dsyevd('V', 'U', n, matrix, n, values, work, size(work), iwork, size(iwork), info)
-      if (info == 0) return
-      call fatal_error(error, '&sweep stability: the massless directions could not be found; '// &
-                       'check the mass and damping matrices', status_failure)
-   end subroutine solve_eigen
 
 end module fw_stability_basis

@@ -50,6 +50,9 @@ contains
       do k = 1, n_points
          call solver%solve(case, system, sweep_frequency(case%sweep, k, n_points), point, error)
          if (allocated(error)) exit
+         if (.not. point%converged .and. allocated(solver%method%message)) then
+            call observer%on_message('pseudo-time: '//solver%method%message)
+         end if
          call writer%add_point(point, error)
          if (allocated(error)) exit
          call summary%add(point)

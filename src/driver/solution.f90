@@ -160,6 +160,7 @@ contains
       call solver%solve(flow, whole_x, outcome)
       call flow%clear_shift()
       report = outcome%solver_report
+      if (allocated(self%message)) deallocate (self%message)
       if (.not. outcome%converged) self%message = outcome%message
       call carry_solution(self%whole, whole_x, system, x)
       if (report%converged) report%converged = is_lasting(self%whole)

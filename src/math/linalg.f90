@@ -1,6 +1,9 @@
 !> Dense linear algebra above LAPACK: factors that are kept and used many times, and symmetric
 !> eigenproblems.
 module fw_linalg
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_failure
    use fw_kinds, only: wp
    use fw_lapack, only: dgetrf
    use fw_lapack, only: dgetrs
@@ -11,7 +14,8 @@ module fw_linalg
    implicit none (type, external)
    private
 
-   public :: lu_type, complex_lu_type, solve_symmetric_eigen, is_positive_definite
+   public :: lu_type, complex_lu_type, solve_symmetric_eigen, diagonalize, &
+             is_positive_definite
 
    !> LU factors of a real matrix. The storage only grows, so that refactoring does not allocate.
    type :: lu_type
@@ -129,26 +133,46 @@ contains
       done = info == 0
    end subroutine solve_symmetric_eigen
 
+   !> Eigenvalues of a symmetric matrix in ascending order; the matrix becomes its eigenvectors.
+   subroutine diagonalize(matrix, values, purpose, error)
+      real(wp), contiguous, intent(inout) :: matrix(:, :)
+      real(wp), allocatable, intent(out) :: values(:)
+      !> What the eigenvalues are for, for the message.
+      character(*), intent(in) :: purpose
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: work(:)
+      integer, allocatable :: iwork(:)
+      integer :: n, info
+
+      n = size(matrix, 1)
+      allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
+      call dsyevd('V', 'U', n, matrix, n, values, work, size(work), iwork, size(iwork), info)
+      if (info == 0) return
+      call fatal_error(error, 'the eigenvalues for '//purpose//' could not be computed: check '// &
+                       'the mass, stiffness and damping matrices', status_failure)
+   end subroutine diagonalize
+
    !> Whether a symmetric matrix is positive definite, beyond the round-off of its eigenvalues,
    !> after its rows and columns are scaled to a unit diagonal.
    logical function is_positive_definite(a) result(positive)
       real(wp), intent(in) :: a(:, :)
       real(wp), parameter :: round_off = 1.0e-10_wp
-      real(wp), allocatable :: scaled(:, :), values(:), work(:)
-      integer, allocatable :: iwork(:)
-      integer :: i, j, n, info
+      real(wp), allocatable :: scaled(:, :), values(:)
+      type(error_type), allocatable :: error
+      integer :: i, j, n
 
       n = size(a, 1)
       positive = all([(a(i, i) > 0.0_wp, i=1, n)])
       if (.not. positive .or. n == 0) return
-      allocate (scaled(n, n), values(n), work(2*n + 1), iwork(1))
+      allocate (scaled(n, n))
       do j = 1, n
          do i = 1, n
             scaled(i, j) = a(i, j)/sqrt(a(i, i)*a(j, j))
          end do
       end do
-      call dsyevd('N', 'U', n, scaled, n, values, work, size(work), iwork, 1, info)
-      positive = info == 0 .and. values(1) > round_off
+      call diagonalize(scaled, values, 'a static check', error)
+      positive = .not. allocated(error)
+      if (positive) positive = values(1) > round_off
    end function is_positive_definite
 
 end module fw_linalg

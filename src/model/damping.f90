@@ -5,9 +5,10 @@
 !> better than M does (a node held by its contact alone). Rows are scaled to a unit diagonal
 !> of M first, so that mixed units do not decide what counts as massless.
 module fw_damping
-   use fw_error, only: error_type, fatal_error, status_failure
+   use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_lapack, only: dgemm, dsyevd
+   use fw_lapack, only: dgemm
+   use fw_linalg, only: diagonalize
    implicit none (type, external)
    private
 
@@ -35,7 +36,7 @@ contains
 
       scale = unit_scale(mass, stiffness)
       vectors = scaled(mass, scale)
-      call solve_eigen(vectors, values, error)
+      call diagonalize(vectors, values, 'modal_damping', error)
       if (allocated(error)) return
       ! Ascending eigenvalues: the massless directions come first.
       n_free = count(values <= rank_tolerance*max(values(size(values)), 0.0_wp))
@@ -112,7 +113,7 @@ contains
       condensed = rotated(n_free + 1:, n_free + 1:)
       if (n_free == 0) return
       free = rotated(:n_free, :n_free)
-      call solve_eigen(free, values, error)
+      call diagonalize(free, values, 'modal_damping', error)
       if (allocated(error)) return
       followed = rotated(:n_free, n_free + 1:)
       call multiply('T', free, 'N', followed, coupling)
@@ -138,7 +139,7 @@ contains
       integer :: j
 
       vectors = matrix
-      call solve_eigen(vectors, values, error)
+      call diagonalize(vectors, values, 'modal_damping', error)
       if (allocated(error)) return
       least = rank_tolerance*maxval(abs(values))
       scaled_vectors = vectors
@@ -148,23 +149,6 @@ contains
       end do
       call multiply('N', scaled_vectors, 'T', vectors, root)
    end subroutine take_root
-
-   !> Eigenvalues in ascending order; the matrix becomes its eigenvectors.
-   subroutine solve_eigen(matrix, values, error)
-      real(wp), contiguous, intent(inout) :: matrix(:, :)
-      real(wp), allocatable, intent(out) :: values(:)
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: work(:)
-      integer, allocatable :: iwork(:)
-      integer :: n, info
-
-      n = size(matrix, 1)
-      allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
-      call dsyevd('V', 'U', n, matrix, n, values, work, size(work), iwork, size(iwork), info)
-      if (info == 0) return
-      call fatal_error(error, 'the modes for modal_damping could not be computed: check the '// &
-                       'mass and stiffness matrices', status_failure)
-   end subroutine solve_eigen
 
    !> c = op(a) op(b), op: 'N' as it is, 'T' transposed.
    subroutine multiply(op_a, a, op_b, b, c)
