@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help deps build debug run test bench clean
+.PHONY: help deps build debug run test lint bench clean
 
 BUILD := build/release
 RUN := build/run
@@ -58,6 +58,10 @@ $(RUN)/frf.png: $(RUN)/frf.h5 $(RUN)/frf_stuck.h5 $(wildcard python/fretwear/*.p
 # The closing line has to be the last one, whatever the build said before.
 test: build ## every test; the last line counts the cases
 	@$(PYTHON) test/support/run_tests.py --build $(BUILD) --python $(PYTHON)
+
+lint: build/deps.stamp ## type checker and linter of the Python code
+	@$(PYTHON) -m mypy
+	@$(PYTHON) -m ruff check python
 
 bench: build ## error against run time
 	PYTHONPATH=python $(PYTHON) bench/run.py

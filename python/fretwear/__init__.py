@@ -2,12 +2,25 @@
 
 Modules
 -------
+fretwear.result
+    Result files.
 fretwear.sector
     Generator of the reduced bladed-disk sector with a dovetail root.
 fretwear.plots
     Pictures of result files.
+fretwear.cli
+    The command `fretwear`.
 """
 
-__all__ = ["__version__"]
+from .errors import (
+    ConvergenceError,
+    FretwearError,
+    InputError,
+    OutputError,
+    RunInterrupted,
+)
+
+__all__ = ["ConvergenceError", "FretwearError", "InputError", "OutputError", "RunInterrupted",
+           "__version__"]
 
 __version__: str = "0.1.0"

@@ -156,7 +156,7 @@ def facet_means(mesh: MeshHex1, facets: Ints, group: Ints, n_groups: int) -> Fac
     shape = np.array([np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis])
     integral = np.einsum("afq,fq->af", shape, basis.dx)
     rows = np.broadcast_to(group, integral.shape)
-    area = np.bincount(group, weights=basis.dx.sum(axis=1), minlength=n_groups)
+    area = np.asarray(np.bincount(group, basis.dx.sum(axis=1), n_groups), dtype=np.float64)
     sums = sp.csr_array(sp.coo_array((integral.ravel(), (rows.ravel(), basis.element_dofs.ravel())),
                                      shape=(n_groups, basis.doflocs.shape[1])))
     means = sp.csr_array(sp.diags_array(1.0 / area) @ sums)

@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -70,7 +71,7 @@ def _write_attributes(file: h5py.File, model: ReducedModel, title: str | None) -
     file.attrs["parameters"] = np.bytes_(json.dumps(asdict(model.parameters)).encode())
 
 
-def _datasets(model: ReducedModel) -> dict[str, NDArray]:
+def _datasets(model: ReducedModel) -> dict[str, NDArray[Any]]:
     """Datasets of the model file by name."""
     n_pairs, n = model.n_pairs, len(model.mass)
     return {

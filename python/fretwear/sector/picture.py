@@ -73,7 +73,7 @@ def _draw_solid(axes: Axes, full: FullModel, bodies: tuple[int, ...], azimuth: f
     shade = 0.5 + 0.5 * np.clip(facing @ (light / np.linalg.norm(light)), 0.0, 1.0)
     order = np.argsort((quads @ towards).mean(axis=1))
     flat = np.stack((quads @ right, quads @ up), axis=-1)[order]
-    axes.add_collection(PolyCollection(flat, facecolors=(colour * shade[:, None])[order],
+    axes.add_collection(PolyCollection(list(flat), facecolors=(colour * shade[:, None])[order],
                                        edgecolors=[(*_EDGE, 0.55)], linewidths=0.45))
     _frame(axes, flat.reshape(-1, 2))
 
@@ -151,7 +151,7 @@ def _draw_section(axes: Axes, full: FullModel) -> None:
         points = ends[0] + np.linspace(0, 1, d.slope_patches + 1)[:, None] * (ends[1] - ends[0])
         first = number * d.axial_patches * d.slope_patches
         shades = [_patch_colour(full, first + k * d.axial_patches) for k in range(d.slope_patches)]
-        axes.add_collection(LineCollection(np.stack((points[:-1], points[1:]), axis=1),
+        axes.add_collection(LineCollection(list(np.stack((points[:-1], points[1:]), axis=1)),
                                            colors=shades, linewidths=4.0, capstyle="butt"))
         axes.annotate(name, ends.mean(axis=0), (side * 13.5, g.airfoil_radius + 4.0), ha="center",
                       color=_FLANK_COLOURS[number][0], fontsize=11,

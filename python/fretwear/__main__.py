@@ -1,0 +1,7 @@
+"""`python -m fretwear` is the command `fretwear`."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())

@@ -1,0 +1,74 @@
+"""Command `fretwear`: each subcommand is a module of this package.
+
+A module offers ``add_arguments(parser)``, which adds its arguments to an argparse parser, and
+``main(options) -> int``, which does the work and returns the exit status. It may raise a
+`FretwearError`. Exit status: 0 done, 2 usage, 3 bad input, 4 not converged, 5 a file cannot be
+read or written, 130 interrupted, 1 anything else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.util
+import sys
+from collections.abc import Sequence
+
+from . import __version__
+from .errors import FretwearError, OutputError
+
+__all__ = ["COMMANDS", "main"]
+
+#: Subcommand: module below `fretwear`, and what it does.
+COMMANDS = {
+    "plot": ("plot", "pictures of a result file"),
+    "compare": ("compare", "two result files beside each other"),
+    "report": ("report", "one self-contained HTML page of a result file"),
+    "export": ("export", "mesh with deformation, contact state and wear, for ParaView"),
+    "import": ("importer", "a model file from the matrices of another program"),
+    "study": ("study", "a parameter study on all local cores or a cluster"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one subcommand; returns the exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser(words).parse_args(words)
+    try:
+        return int(options.run(options))
+    except FretwearError as error:
+        return _complain(options.command, error, error.exit_status)
+    except OSError as error:
+        return _complain(options.command, error, OutputError.exit_status)
+    except KeyboardInterrupt:
+        return _complain(options.command, "interrupted", 130)
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser; only the module of the subcommand at hand is imported."""
+    parser = argparse.ArgumentParser(
+        prog="fretwear", allow_abbrev=False,
+        description="Pictures, reports, models and studies around fw_run.")
+    parser.add_argument("--version", action="version", version=f"fretwear {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    wanted = next((word for word in words if not word.startswith("-")), None)
+    for name, (module_name, purpose) in COMMANDS.items():
+        if importlib.util.find_spec(f"fretwear.{module_name}") is None:
+            continue
+        command = commands.add_parser(name, help=purpose, description=purpose.capitalize() + ".",
+                                      allow_abbrev=False)
+        if name == wanted:
+            module = importlib.import_module(f"fretwear.{module_name}")
+            module.add_arguments(command)
+            command.set_defaults(run=module.main)
+    return parser
+
+
+def _complain(command: str, problem: object, status: int) -> int:
+    for line in str(problem).splitlines() or [""]:
+        print(f"fretwear {command}: error: {line}", file=sys.stderr)
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+"""Errors of the package, each with the exit status that the commands return for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .result import Result
+
+__all__ = ["ConvergenceError", "FretwearError", "InputError", "OutputError", "RunInterrupted"]
+
+
+class FretwearError(Exception):
+    """Base of every error of this package.
+
+    Attributes
+    ----------
+    exit_status : int
+        What `fw_run` and `fretwear` return for it.
+    """
+
+    exit_status = 1
+
+
+class InputError(FretwearError, ValueError):
+    """Wrong input; the message names the place, the value found and the remedy."""
+
+    exit_status = 3
+
+
+class ConvergenceError(FretwearError, RuntimeError):
+    """Points that did not converge. What was computed is saved.
+
+    Parameters
+    ----------
+    message : str
+        How many points failed, and where.
+    result : Result, optional
+        Everything up to there; `Result.converged` marks the points that failed.
+    report : sequence of str
+        The summary of the run, one line each.
+    """
+
+    exit_status = 4
+
+    def __init__(self, message: str, result: Result | None = None,
+                 report: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.result = result
+        self.report = tuple(report)
+
+
+class OutputError(FretwearError, OSError):
+    """A file cannot be read or written."""
+
+    exit_status = 5
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """A run was stopped (Ctrl-C); the points up to there are saved.
+
+    Parameters
+    ----------
+    result : Result, optional
+        The points up to the interruption; None where there is not even one.
+    """
+
+    exit_status = 130
+
+    def __init__(self, result: Result | None = None) -> None:
+        super().__init__("the run was interrupted")
+        self.result = result

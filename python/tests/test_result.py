@@ -1,0 +1,106 @@
+"""Result files as arrays, and the command `fretwear`."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fretwear
+from fretwear import InputError, OutputError
+from fretwear.cli import main
+from fretwear.result import Result
+
+CASE = Path(__file__).resolve().parents[2] / "example" / "jenkins" / "jenkins.nml"
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    """Response of the elastic rubbing oscillator over a few points."""
+    program = os.environ.get("FW_RUN", str(CASE.parents[2] / "build" / "release" / "fw_run"))
+    target = tmp_path_factory.mktemp("result") / "jenkins.h5"
+    subprocess.run([program, "-q", "--set", "sweep%n_points=5", "-o", target, CASE], check=True)
+    return Result(target)
+
+
+def test_every_array_has_the_shape_it_states(result: Result) -> None:
+    n, h, pairs, observed = 5, result.n_harmonics, result.n_pairs, len(result.observed)
+    assert (result.n_points, pairs, result.status) == (n, 1, "complete")
+    assert result.coefficients.shape == (n, 2 * h + 1, observed)
+    assert result.amplitude.shape == (n, observed)
+    assert result.force.shape == (n, 2 * h + 1, pairs, 3)
+    assert result.fraction.shape == (n, pairs, 3)
+    assert result.dissipation.shape == (n, pairs)
+    assert result.converged.dtype == bool and result.converged.all()
+    assert result.iterations.shape == result.residual.shape == result.seconds.shape == (n,)
+    assert result.stable is None and result.steady_state is None
+    assert "&sweep" in result.namelist and result.elapsed > 0.0
+
+
+def test_what_is_read_is_what_the_file_holds(result: Result) -> None:
+    with h5py.File(result.path) as file:
+        for name in result:
+            if name != "observed/name":
+                assert np.array_equal(result[name], file[name][()], equal_nan=True)
+    assert result.units("omega") == "rad/s"
+    with pytest.raises(ValueError, match="read-only"):
+        result.omega[0] = 1.0
+
+
+def test_harmonics_follow_the_convention(result: Result) -> None:
+    first = result.harmonic(1)
+    assert np.array_equal(first.real, result.coefficients[:, 1, 0])
+    assert np.array_equal(first.imag, -result.coefficients[:, 2, 0])
+    assert result.peak() == int(np.argmax(result.amplitude[:, 0]))
+    with pytest.raises(InputError, match="0 to"):
+        result.harmonic(result.n_harmonics + 1)
+
+
+def test_wrong_names_are_answered_with_the_right_ones(result: Result) -> None:
+    with pytest.raises(InputError, match="available: u1"):
+        result.index("tip")
+    with pytest.raises(InputError, match="/contact/force"):
+        result["contact/forces"]
+
+
+def test_a_result_can_be_pickled(result: Result) -> None:
+    again = pickle.loads(pickle.dumps(result))
+    assert np.array_equal(again.omega, result.omega)
+
+
+def test_xarray_names_every_axis(result: Result) -> None:
+    data = result.to_xarray()
+    assert data["contact_force"].dims == ("point", "coefficient", "pair", "direction")
+    assert data["omega"].attrs["units"] == "rad/s"
+    assert list(data["coefficient"].values[:3]) == ["0", "c1", "s1"]
+    assert data["coefficients"].sel(coefficient="s1", observed="u1").values == pytest.approx(
+        result.coefficients[:, 2, 0], rel=0, abs=0)
+
+
+def test_other_files_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="no such file"):
+        Result(tmp_path / "none.h5")
+    (tmp_path / "text.h5").write_text("no HDF5")
+    with pytest.raises(OutputError, match="cannot be read"):
+        Result(tmp_path / "text.h5")
+    with h5py.File(tmp_path / "model.h5", "w") as file:
+        file.attrs["format"] = "fretwear-model"
+    with pytest.raises(InputError, match="format is 'fretwear-model'"):
+        Result(tmp_path / "model.h5")
+
+
+def test_the_command_names_its_version_and_refuses_what_it_does_not_know(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"fretwear {fretwear.__version__}\n"
+    with pytest.raises(SystemExit) as ended:
+        main(["plto"])
+    assert ended.value.code == 2
+    assert "plto" in capsys.readouterr().err
