@@ -1,4 +1,5 @@
-!> Scalar attributes of HDF5 objects: strings, integers and real numbers.
+!> Attributes of HDF5 objects: one string, integer or real number, and lists of strings (which are
+!> written only).
 module fw_hdf5_attribute
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_c_binding, only: c_ptr
@@ -48,6 +49,7 @@ module fw_hdf5_attribute
    !> `call write_attribute(file, object, name, value, error)` replaces what is there.
    interface write_attribute
       module procedure write_attribute_text
+      module procedure write_attribute_texts
       module procedure write_attribute_integer
       module procedure write_attribute_real
    end interface write_attribute
@@ -128,19 +130,39 @@ contains
       character(*), intent(in) :: object, name, value
       type(error_type), allocatable, intent(out) :: error
       type(string_type) :: strings(1)
-      integer(hid_t) :: id, type_id
-      integer :: status, ignored
 
       ! Not by a structure constructor, whose text gfortran 12 does not free.
       strings(1)%text = value
+      call put_attribute(file, object, name, [integer ::], strings, error)
+   end subroutine write_attribute_text
+
+   !> A list, one dimension long.
+   subroutine write_attribute_texts(file, object, name, values, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: object, name
+      type(string_type), intent(in) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_attribute(file, object, name, [size(values)], values, error)
+   end subroutine write_attribute_texts
+
+   subroutine put_attribute(file, object, name, dims, strings, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: object, name
+      integer, intent(in) :: dims(:)
+      type(string_type), intent(in) :: strings(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: id, type_id
+      integer :: status, ignored
+
       type_id = new_string_type()
-      call new_attribute(file, object, name, type_id, id, error)
+      call new_attribute(file, object, name, dims, type_id, id, error)
       call h5tclose_f(type_id, ignored)
       if (allocated(error)) return
       call put_strings(id, .true., strings, status)
       call h5aclose_f(id, ignored)
       if (status < 0) call attribute_failure(file, object, name, 'cannot be written', error)
-   end subroutine write_attribute_text
+   end subroutine put_attribute
 
    subroutine write_attribute_integer(file, object, name, value, error)
       type(hdf5_file), intent(in) :: file
@@ -219,10 +241,11 @@ contains
       if (status < 0) call attribute_failure(file, object, name, 'cannot be read', error)
    end subroutine read_and_close
 
-   !> Create a scalar attribute, removing one of the same name.
-   subroutine new_attribute(file, object, name, type_id, id, error)
+   !> Create an attribute, removing one of the same name; no dimensions make a scalar.
+   subroutine new_attribute(file, object, name, dims, type_id, id, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
+      integer, intent(in) :: dims(:)
       integer(hid_t), intent(in) :: type_id
       integer(hid_t), intent(out) :: id
       type(error_type), allocatable, intent(out) :: error
@@ -232,7 +255,7 @@ contains
       if (has_attribute(file, object, name)) then
          call h5adelete_by_name_f(file%id, object, name, status)
       end if
-      space = new_space([integer ::])
+      space = new_space(dims)
       call h5acreate_by_name_f(file%id, object, name, type_id, space, id, status)
       call h5sclose_f(space, ignored)
       if (status < 0) call attribute_failure(file, object, name, 'cannot be created', error)
@@ -247,7 +270,7 @@ contains
       integer(hid_t) :: id
       integer :: status, ignored
 
-      call new_attribute(file, object, name, type_id, id, error)
+      call new_attribute(file, object, name, [integer ::], type_id, id, error)
       if (allocated(error)) return
       call h5awrite_f(id, type_id, address, status)
       call h5aclose_f(id, ignored)

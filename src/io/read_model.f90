@@ -180,6 +180,7 @@ contains
       end if
       model%damping = model%damping + options%rayleigh_mass*model%mass &
                       + options%rayleigh_stiffness*model%stiffness
+      if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
       if (options%modal_damping > 0.0_wp) then
          call add_modal_damping(model%mass, model%stiffness, options%modal_damping, model%damping, &
                                 error)

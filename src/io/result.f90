@@ -12,9 +12,11 @@ module fw_result
    use fw_error, only: status_input
    use fw_hdf5, only: hdf5_file
    use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: write_dataset
    use fw_hdf5, only: write_text
    use fw_kinds, only: wp
    use fw_point, only: point_type
+   use fw_result_labels, only: label_dataset
    use fw_result_part, only: create_part
    use fw_result_part, only: delete_part
    use fw_result_part, only: publish_part
@@ -66,6 +68,7 @@ contains
       end if
       if (allocated(error)) return
       call write_header(self%file, case, error)
+      if (.not. allocated(error)) call write_pairs(self%file, case, error)
       if (.not. allocated(error)) call self%rows%create(self%file, case, error)
       if (.not. allocated(error)) call self%flush(error)
       if (allocated(error)) call self%discard()
@@ -148,9 +151,40 @@ contains
       call write_optional(file, 'title', case%title, error)
       if (allocated(error)) return
       call write_optional(file, 'namelist', case%namelist, error)
+      if (allocated(error)) return
+      if (allocated(case%model%unit_system)) then
+         call write_attribute(file, '/', 'unit_system', case%model%unit_system, error)
+      end if
       if (allocated(error) .or. .not. allocated(case%model%observe_name)) return
       call write_text(file, '/observed/name', case%model%observe_name, error)
+      if (.not. allocated(error)) &
+         call label_dataset(file, '/observed/name', case%model%unit_system, error)
    end subroutine write_header
+
+   !> Where the pairs are, for pictures: what the case knows of it.
+   subroutine write_pairs(file, case, error)
+      type(hdf5_file), intent(in) :: file
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%contact%n_pairs == 0) return
+      if (allocated(case%contact%position)) then
+         call write_dataset(file, '/contact/position', case%contact%position, error)
+         if (.not. allocated(error)) &
+            call label_dataset(file, '/contact/position', case%model%unit_system, error)
+         if (allocated(error)) return
+      end if
+      if (allocated(case%contact%area)) then
+         call write_dataset(file, '/contact/area', case%contact%area, error)
+         if (.not. allocated(error)) &
+            call label_dataset(file, '/contact/area', case%model%unit_system, error)
+         if (allocated(error)) return
+      end if
+      if (.not. allocated(case%contact%patch)) return
+      call write_text(file, '/contact/patch', case%contact%patch, error)
+      if (.not. allocated(error)) &
+         call label_dataset(file, '/contact/patch', case%model%unit_system, error)
+   end subroutine write_pairs
 
    subroutine write_optional(file, name, text, error)
       type(hdf5_file), intent(in) :: file

@@ -8,9 +8,9 @@ module fw_result_rows
    use fw_hdf5, only: growing_logical
    use fw_hdf5, only: growing_real
    use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
    use fw_kinds, only: wp
    use fw_point, only: point_type
+   use fw_result_labels, only: label_dataset
    use fw_solver_options, only: continuation_arclength
    implicit none (type, external)
    private
@@ -27,6 +27,7 @@ module fw_result_rows
 
    type :: row_set
       integer, private :: n_rows = 0, n_coefficients = 1, expected = 1
+      character(:), allocatable, private :: unit_system
       type(growing_dataset), private :: list(n_datasets)
    contains
       procedure :: create
@@ -46,11 +47,12 @@ contains
       integer, parameter :: scalar(0) = [integer ::]
       integer :: n_observed, n_pairs
 
+      if (allocated(case%model%unit_system)) self%unit_system = case%model%unit_system
       n_observed = 0
       if (allocated(case%model%observe_matrix)) n_observed = size(case%model%observe_matrix, 1)
       self%n_coefficients = 2*case%harmonics%n_harmonics + 1
       if (case%analysis == analysis_frf) self%expected = max(1, case%sweep%n_points)
-      call self%new(file, d_omega, '/omega', scalar, error, units='rad/s')
+      call self%new(file, d_omega, '/omega', scalar, error)
       if (allocated(error)) return
       call self%new(file, d_coefficients, '/coefficients', [n_observed, self%n_coefficients], error)
       if (allocated(error)) return
@@ -60,9 +62,9 @@ contains
       if (allocated(error)) return
       call self%new(file, d_iterations, '/iterations', scalar, error, kind_of=growing_integer)
       if (allocated(error)) return
-      call self%new(file, d_residual, '/residual', scalar, error, units='1')
+      call self%new(file, d_residual, '/residual', scalar, error)
       if (allocated(error)) return
-      call self%new(file, d_seconds, '/seconds', scalar, error, units='s')
+      call self%new(file, d_seconds, '/seconds', scalar, error)
       if (allocated(error)) return
       if (case%sweep%continuation == continuation_arclength) then
          call self%new(file, d_fold, '/fold', scalar, error, kind_of=growing_logical)
@@ -74,7 +76,7 @@ contains
       if (allocated(error) .or. .not. case%output%contact .or. n_pairs == 0) return
       call self%new(file, d_force, '/contact/force', [3, n_pairs, self%n_coefficients], error)
       if (allocated(error)) return
-      call self%new(file, d_fraction, '/contact/fraction', [3, n_pairs], error, units='1')
+      call self%new(file, d_fraction, '/contact/fraction', [3, n_pairs], error)
       if (allocated(error)) return
       call self%new(file, d_dissipation, '/contact/dissipation', [n_pairs], error)
    end subroutine create
@@ -121,7 +123,7 @@ contains
       end do
    end subroutine close
 
-   subroutine new(self, file, i, name, row_shape, error, kind_of, units)
+   subroutine new(self, file, i, name, row_shape, error, kind_of)
       class(row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       integer, intent(in) :: i
@@ -130,14 +132,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Kind of the elements (default: growing_real).
       integer, intent(in), optional :: kind_of
-      character(*), intent(in), optional :: units
       integer :: element_kind
 
       element_kind = growing_real
       if (present(kind_of)) element_kind = kind_of
       call self%list(i)%create(file, name, element_kind, row_shape, error, self%expected)
-      if (allocated(error) .or. .not. present(units)) return
-      call write_attribute(file, name, 'units', units, error)
+      if (.not. allocated(error)) call label_dataset(file, name, self%unit_system, error)
    end subroutine new
 
    !> (2H+1, n_observed) turned to (n_observed, 2H+1), zero for harmonics not carried.

@@ -18,6 +18,8 @@ module fw_model
       !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
       real(wp), allocatable :: observe_matrix(:, :)
       type(string_type), allocatable :: observe_name(:)
+      !> Names of the units, 'length-mass-time-force', for labels; not allocated if not known.
+      character(:), allocatable :: unit_system
    end type model_type
 
 end module fw_model
