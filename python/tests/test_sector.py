@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
+from fretwear.reduction import bonded_basis
 from fretwear.sector import Discretisation, FullModel, Geometry, ReducedModel, patch_grid
 from fretwear.sector.assembly import Assembly
 from fretwear.sector.contact import held_nodes
 from fretwear.sector.mesh import BLADE
-from fretwear.sector.reduction import bonded_basis
 
 # Sums of a few thousand terms of like sign.
 ROUND_OFF = 1e-11

@@ -8,11 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..errors import InputError
+from ..reduction import Bonded, reduce
 from .assembly import Assembly
 from .contact import ContactRows, Tip, contact_rows, held_nodes, tip_rows
 from .mesh import SectorMesh, build_mesh
-from .parameters import SectorParameters
-from .reduction import Bonded, bonded_basis
+from .parameters import ParameterError, SectorParameters
 
 __all__ = ["FullModel", "ReducedModel", "build_full", "generate", "reduce_model"]
 
@@ -155,15 +156,19 @@ def build_full(parameters: SectorParameters) -> FullModel:
 
 def reduce_model(full: FullModel) -> ReducedModel:
     """Reduce to contact coordinates, bonded modes and the attachment vector of the tip force."""
-    n_modes = full.parameters.discretisation.n_modes
-    reduction = bonded_basis(full.bonded, full.mass, full.tip_force, n_modes)
+    try:
+        system = reduce(
+            full.mass, full.stiffness, full.contact, bonded=full.bonded,
+            n_modes=full.parameters.discretisation.n_modes,
+            loads=np.column_stack((full.tip_force, full.centrifugal)), attachments=full.tip_force)
+    except InputError as error:
+        raise ParameterError(f"Discretisation: {error}") from None
     observed = np.vstack((full.tip_force, full.tip.mean[:, full.free].toarray()))
-    rows = full.rows
+    rows, reduction = full.rows, system.reduction
     return ReducedModel(
-        full.parameters, reduction.matrix(full.mass), reduction.stiffness,
-        reduction.matrix(full.rotation), reduction.load(full.centrifugal),
-        reduction.load(full.tip_force), ["tip", "tip_x", "tip_y", "tip_z"],
-        observed @ reduction.basis, rows.area, rows.position, rows.frame, rows.patch)
+        full.parameters, system.mass, system.stiffness, reduction.matrix(full.rotation),
+        system.loads[:, 1], system.loads[:, 0], ["tip", "tip_x", "tip_y", "tip_z"],
+        reduction.row(observed), rows.area, rows.position, rows.frame, rows.patch)
 
 
 def generate(parameters: SectorParameters | None = None) -> ReducedModel:
