@@ -7,6 +7,7 @@ module fw_error
 
    public :: error_type, fatal_error
    public :: status_ok, status_failure, status_usage, status_input, status_not_converged, status_io
+   public :: status_stopped
 
    !> Exit statuses; part of the interface contract of `fw_run` and of the C interface.
    integer, parameter :: status_ok = 0
@@ -15,6 +16,8 @@ module fw_error
    integer, parameter :: status_input = 3
    integer, parameter :: status_not_converged = 4
    integer, parameter :: status_io = 5
+   !> Ended by the user; what was computed is kept.
+   integer, parameter :: status_stopped = 6
 
    !> What went wrong: where, which value, and the remedy, in one message.
    type :: error_type

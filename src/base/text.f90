@@ -1,4 +1,8 @@
 !> Small text helpers: numbers to text, lower case, the nearest word of a list.
+!>
+!> `to_text` declares its length instead of returning an allocatable text: gfortran keeps the
+!> length of the latter in static memory, which two threads would share, and numbers are put into
+!> texts in every layer.
 module fw_text
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
@@ -6,6 +10,9 @@ module fw_text
    private
 
    public :: to_text, lower_case, nearest_word, join, string_type
+
+   !> Room for any number.
+   integer, parameter :: field_length = 32
 
    !> A text of its own length, for lists of texts.
    type :: string_type
@@ -23,35 +30,47 @@ contains
 
    pure function integer_to_text(number) result(text)
       integer, intent(in) :: number
-      character(:), allocatable :: text
-      character(32) :: buffer
+      character(len_trim(integer_field(number))) :: text
 
-      write (buffer, '(i0)') number
-      text = trim(buffer)
+      text = integer_field(number)
    end function integer_to_text
 
    !> A real that reads back to the same bits, without needless digits.
    pure function real_to_text(number) result(text)
       real(wp), intent(in) :: number
-      character(:), allocatable :: text
-      character(32) :: buffer
-      real(wp) :: back
-      integer :: status
+      character(len_trim(real_field(number))) :: text
 
-      write (buffer, '(g0.6)') number
-      text = trim(adjustl(buffer))
-      if (.not. ieee_is_finite(number)) return
-      read (buffer, *, iostat=status) back
-      if (status /= 0 .or. abs(back - number) > 0.0_wp) write (buffer, '(es24.16e3)') number
-      text = trim(adjustl(buffer))
+      text = real_field(number)
    end function real_to_text
 
    pure function logical_to_text(flag) result(text)
       logical, intent(in) :: flag
-      character(:), allocatable :: text
+      character(merge(6, 7, flag)) :: text
 
-      text = trim(merge('.true. ', '.false.', flag))
+      text = merge('.true. ', '.false.', flag)
    end function logical_to_text
+
+   pure function integer_field(number) result(field)
+      integer, intent(in) :: number
+      character(field_length) :: field
+
+      write (field, '(i0)') number
+   end function integer_field
+
+   pure function real_field(number) result(field)
+      real(wp), intent(in) :: number
+      character(field_length) :: field
+      real(wp) :: back
+      integer :: status
+
+      write (field, '(g0.6)') number
+      field = adjustl(field)
+      if (.not. ieee_is_finite(number)) return
+      read (field, *, iostat=status) back
+      if (status == 0 .and. abs(back - number) <= 0.0_wp) return
+      write (field, '(es24.16e3)') number
+      field = adjustl(field)
+   end function real_field
 
    pure function lower_case(text) result(lower)
       character(*), intent(in) :: text

@@ -12,11 +12,16 @@ module fw_threads
    type :: thread_scope
       private
       integer :: outer = 0
-      integer(c_int) :: blas = 0
    contains
       procedure :: enter
       procedure :: leave
    end type thread_scope
+
+   !> Scopes that are open, and the threads of OpenBLAS before the first one. The switch of
+   !> OpenBLAS holds for the whole process, so what belongs to it does so too: of the scopes of
+   !> several threads, which may overlap, the first one sets it and the last one restores it.
+   integer, save :: n_open = 0
+   integer(c_int), save :: blas_before = 1_c_int
 
    interface
       integer(c_int) function openblas_get_num_threads() bind(c)
@@ -37,16 +42,24 @@ contains
       integer, intent(in) :: n_threads
 
       self%outer = omp_get_max_threads()
-      self%blas = openblas_get_num_threads()
       if (n_threads > 0) call omp_set_num_threads(n_threads)
-      call openblas_set_num_threads(1_c_int)
+      !$omp critical (fretwear_threads)
+      if (n_open == 0) then
+         blas_before = openblas_get_num_threads()
+         call openblas_set_num_threads(1_c_int)
+      end if
+      n_open = n_open + 1
+      !$omp end critical (fretwear_threads)
    end subroutine enter
 
    subroutine leave(self)
       class(thread_scope), intent(in) :: self
 
       call omp_set_num_threads(self%outer)
-      call openblas_set_num_threads(self%blas)
+      !$omp critical (fretwear_threads)
+      n_open = n_open - 1
+      if (n_open == 0) call openblas_set_num_threads(blas_before)
+      !$omp end critical (fretwear_threads)
    end subroutine leave
 
 end module fw_threads

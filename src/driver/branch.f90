@@ -76,6 +76,10 @@ contains
          call observer%on_message('the first point did not converge: no branch to follow')
          return
       end if
+      if (observer%stop_requested) then
+         call summary%mark_incomplete()
+         return
+      end if
       branch%options = case%solver
       branch%start = case%sweep%start
       branch%finish = case%sweep%end
@@ -161,6 +165,7 @@ contains
       call self%summary%add(point)
       ! How many points a branch takes is not known beforehand.
       call self%observer%on_point(self%n_points, 0, point)
+      self%stop_requested = self%observer%stop_requested
    end subroutine publish
 
    subroutine merge_work(branch, total)

@@ -17,7 +17,7 @@ module fw_frequency_response
    implicit none (type, external)
    private
 
-   public :: run_frequency_response
+   public :: run_frequency_response, solve_frequency
 
 contains
 
@@ -48,19 +48,40 @@ contains
       if (case%analysis == analysis_frf) n_points = case%sweep%n_points
       call observer%on_start(case%title, n_points)
       do k = 1, n_points
-         call solver%solve(case, system, sweep_frequency(case%sweep, k, n_points), point, error)
+         call solve_frequency(case, system, solver, sweep_frequency(case%sweep, k, n_points), &
+                              observer, point, error)
          if (allocated(error)) exit
-         if (.not. point%converged .and. allocated(solver%method%message)) then
-            call observer%on_message('pseudo-time: '//solver%method%message)
-         end if
          call writer%add_point(point, error)
          if (allocated(error)) exit
          call summary%add(point)
          call observer%on_point(k, n_points, point)
+         if (observer%stop_requested .and. k < n_points) then
+            call summary%mark_incomplete()
+            exit
+         end if
       end do
       call observer%on_end()
       call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
       if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
    end subroutine run_frequency_response
+
+   !> One point of a sweep, starting from what the solver knows of the points before it.
+   subroutine solve_frequency(case, system, solver, omega, observer, point, error)
+      type(case_type), intent(in) :: case
+      type(hbm_system), intent(inout), target :: system
+      type(point_solver), intent(inout) :: solver
+      !> [rad/s]
+      real(wp), intent(in) :: omega
+      !> Told why a pseudo-time solution failed.
+      class(observer_type), intent(inout) :: observer
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      call solver%solve(case, system, omega, point, error)
+      if (allocated(error)) return
+      if (.not. point%converged .and. allocated(solver%method%message)) then
+         call observer%on_message('pseudo-time: '//solver%method%message)
+      end if
+   end subroutine solve_frequency
 
 end module fw_frequency_response

@@ -1,4 +1,5 @@
-!> How progress leaves a run: the driver calls an observer and writes nothing itself.
+!> How progress leaves a run: the driver calls an observer and writes nothing itself. And how a
+!> run is stopped from outside: what was computed until then is kept.
 module fw_observer
    use fw_point, only: point_type
    implicit none (type, external)
@@ -7,6 +8,8 @@ module fw_observer
    public :: observer_type
 
    type, abstract :: observer_type
+      !> Set by any callback to end the run after the present point.
+      logical :: stop_requested = .false.
    contains
       !> Before the first point.
       procedure(start_callback), deferred :: on_start

@@ -8,7 +8,7 @@ module fw_outcome
    public :: outcome_type
 
    type :: outcome_type
-      !> status_ok or status_not_converged.
+      !> status_ok, status_not_converged, or status_stopped where the observer ended the run.
       integer :: status = status_ok
       !> A short table for people, one line each.
       type(string_type), allocatable :: summary(:)

@@ -8,6 +8,7 @@ module fw_run
    use fw_error, only: error_type
    use fw_error, only: status_not_converged
    use fw_error, only: status_ok
+   use fw_error, only: status_stopped
    use fw_frequency_response, only: run_frequency_response
    use fw_hbm, only: hbm_system
    use fw_observer, only: observer_type
@@ -40,12 +41,15 @@ contains
    end subroutine check_case
 
    !> Run a case and write its result file. Points that did not converge make the outcome
-   !> status_not_converged; `error` is for what ends the run.
-   subroutine run_case(case, observer, outcome, error)
+   !> status_not_converged, an observer that asks for it status_stopped; `error` is for what ends
+   !> the run.
+   subroutine run_case(case, observer, outcome, error, write_file)
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout) :: observer
       type(outcome_type), intent(out) :: outcome
       type(error_type), allocatable, intent(out) :: error
+      !> False: results leave through the observer only (default: true).
+      logical, intent(in), optional :: write_file
       type(result_writer) :: writer
       type(summary_type) :: summary
       type(thread_scope) :: threads
@@ -56,7 +60,8 @@ contains
       call system_clock(clock, rate)
       call check_available(case, error)
       if (allocated(error)) return
-      call writer%open(case, error)
+      observer%stop_requested = .false.
+      if (is_wanted(write_file)) call writer%open(case, error)
       if (allocated(error)) return
       call threads%enter(case%threads)
       summary = new_summary(case)
@@ -70,6 +75,7 @@ contains
       elapsed = real(clock_end - clock, wp)/real(rate, wp)
       if (summary%n_converged < summary%n_points .or. summary%incomplete) &
          outcome%status = status_not_converged
+      if (observer%stop_requested .and. summary%incomplete) outcome%status = status_stopped
       if (allocated(error)) then
          if (summary%n_points == 0) then
             call writer%discard()
@@ -78,9 +84,30 @@ contains
          end if
          return
       end if
-      call writer%close(merge('complete     ', 'not converged', outcome%status == status_ok), &
-                        elapsed, error)
+      call writer%close(final_status(outcome%status), elapsed, error)
       outcome%summary = summary%lines(elapsed)
    end subroutine run_case
+
+   !> What a result file says of a run that came to its end.
+   pure function final_status(status) result(words)
+      integer, intent(in) :: status
+      character(13) :: words
+
+      select case (status)
+      case (status_ok)
+         words = 'complete'
+      case (status_stopped)
+         words = 'stopped'
+      case default
+         words = 'not converged'
+      end select
+   end function final_status
+
+   pure logical function is_wanted(flag)
+      logical, intent(in), optional :: flag
+
+      is_wanted = .true.
+      if (present(flag)) is_wanted = flag
+   end function is_wanted
 
 end module fw_run

@@ -75,6 +75,10 @@ contains
          if (allocated(error)) exit
          call summary%add(point)
          call observer%on_point(k, n_points, point)
+         if (observer%stop_requested .and. k < n_points) then
+            call summary%mark_incomplete()
+            exit
+         end if
       end do
       call observer%on_end()
    end subroutine run_time_response

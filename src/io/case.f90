@@ -22,6 +22,8 @@ module fw_case
    type :: output_options
       !> Path of the result file.
       character(:), allocatable :: file
+      !> The input names the file; otherwise it has the name of the namelist.
+      logical :: names_file = .false.
       !> Write one period of every observed quantity.
       logical :: histories = .false.
       !> Write the contact forces, states and dissipation.

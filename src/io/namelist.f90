@@ -38,16 +38,19 @@ contains
       end do
    end subroutine parse_namelist
 
-   !> Parse `group%key=value` or `group%key(subscripts)=value` of a command line.
-   subroutine parse_override(option, entry, error)
+   !> Parse `group%key=value` or `group%key(subscripts)=value` of a command line or a program.
+   subroutine parse_override(option, entry, error, origin)
       character(*), intent(in) :: option
       type(entry_type), intent(out) :: entry
       type(error_type), allocatable, intent(out) :: error
+      !> What messages put before the option (default: '--set').
+      character(*), intent(in), optional :: origin
       type(cursor_type) :: cursor
       character(:), allocatable :: name
       integer :: percent
 
-      entry%option = option
+      entry%option = '--set '//option
+      if (present(origin)) entry%option = origin//' '//option
       cursor%in_file = .false.
       cursor%text = trim(adjustl(option))
       call cursor%take_name(name)
@@ -73,7 +76,7 @@ contains
          end if
       end if
       call fatal_error(error, location(entry)//': must have the form '// &
-                       '--set group%key=value, such as --set solver%tolerance=1e-9', status_usage)
+                       'group%key=value, such as solver%tolerance=1e-9', status_usage)
    end subroutine parse_override
 
    !> One group, from its & to its /.

@@ -27,7 +27,7 @@ module fw_namelist_data
       type(section_type), allocatable :: sections(:)
       type(value_type), allocatable :: values(:)
       integer :: line = 0
-      !> Of an override: the option as it was typed, and its value as it was typed.
+      !> Of an override: what messages call it, and its value as it was typed.
       character(:), allocatable :: option, raw
    end type entry_type
 
@@ -100,7 +100,7 @@ contains
       character(:), allocatable :: place
 
       if (allocated(entry%option)) then
-         place = '--set '//entry%option
+         place = entry%option
       else
          place = to_text(entry%line)
          if (present(source)) place = source//':'//place

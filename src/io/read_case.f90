@@ -35,32 +35,42 @@ contains
       if (.not. allocated(error)) call read_case_text(text, path, overrides, case, error)
    end subroutine read_case
 
-   !> Read a case from namelist text.
-   subroutine read_case_text(text, path, overrides, case, error)
+   !> Read a case from namelist text. The handling of texts serves one thread at a time (gfortran
+   !> keeps the lengths of texts that functions return in static memory), and so does HDF5: every
+   !> reading waits for its turn.
+   subroutine read_case_text(text, path, overrides, case, error, memory_model, origin)
       character(*), intent(in) :: text
       !> Path for messages, for relative files and for the default name of the result file.
       character(*), intent(in) :: path
       type(string_type), intent(in) :: overrides(:)
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
+      !> The model where the calling program gives it, with mass and stiffness.
+      type(file_model_type), intent(in), optional :: memory_model
+      !> What messages put before an override (default: '--set').
+      character(*), intent(in), optional :: origin
 
-      call read_groups(text, path, overrides, case, error)
+      !$omp critical (fretwear_io)
+      call read_groups(text, path, overrides, case, error, memory_model, origin)
       if (allocated(error)) error%message = printable(error%message)
+      !$omp end critical (fretwear_io)
    end subroutine read_case_text
 
    !> The same, with messages that may hold any byte of the text.
-   subroutine read_groups(text, path, overrides, case, error)
+   subroutine read_groups(text, path, overrides, case, error, memory_model, origin)
       character(*), intent(in) :: text, path
       type(string_type), intent(in) :: overrides(:)
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
+      type(file_model_type), intent(in), optional :: memory_model
+      character(*), intent(in), optional :: origin
       type(reader_type) :: reader
       type(file_model_type) :: raw
 
-      call new_reader(reader, text, path, overrides, error)
+      call new_reader(reader, text, path, overrides, error, origin)
       if (allocated(error)) return
       call read_case_group(reader, case)
-      call read_structure(reader, path, case, raw, error)
+      call read_structure(reader, path, case, raw, error, memory_model)
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)
       call read_harmonics(reader, case%harmonics)
@@ -94,17 +104,18 @@ contains
    end subroutine list_inputs
 
    !> The model with its contact, springs and loads.
-   subroutine read_structure(reader, path, case, raw, error)
+   subroutine read_structure(reader, path, case, raw, error, memory_model)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
       !> The parts of the model as they were given.
       type(file_model_type), intent(out) :: raw
       type(error_type), allocatable, intent(out) :: error
+      type(file_model_type), intent(in), optional :: memory_model
       type(model_options) :: options
       integer :: n_dof
 
-      call read_model(reader, directory_of(path), options, raw, error)
+      call read_model(reader, directory_of(path), options, raw, error, memory_model)
       if (allocated(error)) return
       n_dof = 0
       if (allocated(raw%stiffness)) n_dof = size(raw%stiffness, 1)

@@ -3,6 +3,7 @@ module fw_read_contact
    use fw_contact_data, only: contact_type, spring_type, law_words, law_penalty, memory_words
    use fw_kinds, only: wp
    use fw_model_file, only: file_model_type
+   use fw_read_model, only: refuse_model
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_values, only: number_text
@@ -59,11 +60,11 @@ contains
          if (allocated(file_model%area)) contact%area = file_model%area
          if (allocated(file_model%position)) contact%position = file_model%position
          if (allocated(file_model%patch)) contact%patch = file_model%patch
-         call check_from_file(reader, contact)
+         call check_from_file(reader, file_model, contact)
       else if (n_file > 0 .and. contact%n_pairs > 0 &
                .and. .not. reader%given('contact', 'side_1')) then
          call reader%refuse('contact', 'n_pairs', '= '//to_text(contact%n_pairs)// &
-                            ': the model file holds '//to_text(n_file)//'; give side_1 '// &
+                            ': the model holds '//to_text(n_file)//'; give side_1 '// &
                             'and side_2 for other pairs, or 0 for no contact')
       else if (reader%given('contact', 'side_1') &
                .and. .not. reader%given('contact', 'n_pairs')) then
@@ -181,8 +182,9 @@ contains
    end subroutine read_constants
 
    !> Values of a model file pass no getter.
-   subroutine check_from_file(reader, contact)
+   subroutine check_from_file(reader, file_model, contact)
       type(reader_type), intent(inout) :: reader
+      type(file_model_type), intent(in) :: file_model
       type(contact_type), intent(in) :: contact
 
       if (allocated(contact%mu)) &
@@ -202,13 +204,13 @@ contains
          integer :: i
 
          if (size(values) /= contact%n_pairs) then
-            call reader%refuse('model', 'file', 'holds '//to_text(size(values))//' values of '// &
-                               key//': must be '//to_text(contact%n_pairs)//', one per pair')
+            call refuse_model(reader, file_model, to_text(size(values))//' values of '//key// &
+                              ': must be '//to_text(contact%n_pairs)//', one per pair')
             return
          end if
          i = findloc(ok .and. abs(values) <= huge(1.0_wp), .false., 1)
-         if (i > 0) call reader%refuse('model', 'file', 'holds '//key//'('//to_text(i)//') = '// &
-                                       number_text(values(i))//': '//accepts)
+         if (i > 0) call refuse_model(reader, file_model, key//'('//to_text(i)//') = '// &
+                                      number_text(values(i))//': '//accepts)
       end subroutine check
 
    end subroutine check_from_file

@@ -1,4 +1,5 @@
-!> The linear structure of a case: groups &model and &load, from the namelist or a model file.
+!> The linear structure of a case: groups &model and &load, from the namelist, a model file or
+!> the calling program.
 module fw_read_model
    use fw_error, only: error_type
    use fw_kinds, only: wp
@@ -14,11 +15,12 @@ module fw_read_model
    implicit none (type, external)
    private
 
-   public :: read_model, read_loads, finish_model, model_options
+   public :: read_model, read_loads, finish_model, refuse_model, model_options
 
    character(*), parameter :: source_words(*) = &
-      [character(13) :: 'inline', 'hdf5', 'matrix_market']
-   integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3
+      [character(13) :: 'inline', 'hdf5', 'matrix_market', 'memory']
+   integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3, &
+                         source_memory = 4
    !> More dofs are taken for a mistake: the matrices are dense.
    integer, parameter :: largest = 100000
 
@@ -39,7 +41,7 @@ module fw_read_model
 contains
 
    !> Group &model: the matrices as they are given, before rotation and damping.
-   subroutine read_model(reader, directory, options, raw, error)
+   subroutine read_model(reader, directory, options, raw, error, memory_model)
       type(reader_type), intent(inout) :: reader
       !> Of the namelist; relative files start there.
       character(*), intent(in) :: directory
@@ -47,21 +49,28 @@ contains
       !> What the model consists of, whatever its source.
       type(file_model_type), intent(out) :: raw
       type(error_type), allocatable, intent(out) :: error
+      !> What the calling program hands over, with mass and stiffness.
+      type(file_model_type), intent(in), optional :: memory_model
       integer :: n_dof
-      logical :: is_inline
+      logical :: is_inline, is_file
 
-      call reader%require_group('model', 'the matrices: source and file, or n_dof, '// &
-                                'mass and stiffness')
-      call reader%get_word('model', 'source', options%source, source_words)
+      call choose_source(reader, present(memory_model), options)
       is_inline = options%source == source_inline
-      call reader%get('model', 'file', options%file, required=.not. is_inline)
+      is_file = options%source == source_hdf5 .or. options%source == source_matrix_market
+      call reader%get('model', 'file', options%file, required=is_file)
       n_dof = 0
-      if (.not. is_inline .and. allocated(options%file)) then
+      if (present(memory_model)) then
+         raw = memory_model
+         raw%in_memory = .true.
+         n_dof = size(raw%stiffness, 1)
+      else if (is_file .and. allocated(options%file)) then
          call read_file(reader, directory, options, raw, error)
          if (allocated(error)) return
          n_dof = size(raw%stiffness, 1)
-      else if (is_inline .and. allocated(options%file)) then
-         call reader%refuse('model', 'file', "is given, but source = 'inline': give source = "// &
+      end if
+      if (allocated(options%file) .and. .not. is_file) then
+         call reader%refuse('model', 'file', "is given, but source = '"// &
+                            trim(source_words(options%source))//"': give source = "// &
                             "'hdf5' or 'matrix_market', or remove file")
       end if
       call read_matrices(reader, is_inline, n_dof, raw)
@@ -70,6 +79,28 @@ contains
       call reader%get('model', 'modal_damping', options%modal_damping, least=0.0_wp)
       call reader%get('model', 'rotation_speed', options%rotation_speed, least=0.0_wp)
    end subroutine read_model
+
+   !> Key `source`; the matrices of the calling program need no group &model.
+   subroutine choose_source(reader, in_memory, options)
+      type(reader_type), intent(inout) :: reader
+      logical, intent(in) :: in_memory
+      type(model_options), intent(inout) :: options
+
+      if (in_memory) then
+         options%source = source_memory
+      else
+         call reader%require_group('model', 'the matrices: source and file, or n_dof, '// &
+                                   'mass and stiffness')
+      end if
+      call reader%get_word('model', 'source', options%source, source_words)
+      if (in_memory .and. options%source /= source_memory) then
+         call reader%refuse('model', 'source', "= '"//trim(source_words(options%source))// &
+                            "': the calling program gives its own matrices: leave source out")
+      else if (options%source == source_memory .and. .not. in_memory) then
+         call reader%refuse('model', 'source', "= 'memory': is for programs that hand their "// &
+                            "matrices to the library: use 'hdf5', 'matrix_market' or 'inline'")
+      end if
+   end subroutine choose_source
 
    !> A model file; the effective input holds its absolute path.
    subroutine read_file(reader, directory, options, raw, error)
@@ -101,8 +132,8 @@ contains
       call reader%get('model', 'n_dof', n_dof, least=1, most=largest, &
                       required=is_inline)
       if (.not. is_inline .and. n_dof /= n_file) then
-         call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model file has '// &
-                            to_text(n_file)//'; remove n_dof')
+         call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model has '// &
+                            to_text(n_file)//' dofs; remove n_dof')
       end if
       call read_one('mass', raw%mass, is_inline)
       call read_one('stiffness', raw%stiffness, is_inline)
@@ -119,8 +150,8 @@ contains
          call reader%get_array('model', key, values, [n_dof, n_dof], .false., required=required)
          if (.not. allocated(values)) return
          if (.not. is_inline) then
-            call reader%refuse('model', key, "is given beside a model file: remove it, or give "// &
-                               "source = 'inline'")
+            call reader%refuse('model', key, 'is given beside a model that is complete: remove '// &
+                               "it, or give source = 'inline'")
          else
             matrix = reshape(values, [n_dof, n_dof])
          end if
@@ -237,7 +268,7 @@ contains
          if (is_inline) then
             call reader%refuse('model', key, message)
          else
-            call reader%refuse('model', 'file', 'holds a '//key//' that '//message)
+            call refuse_model(reader, raw, 'a '//key//' that '//message)
          end if
       end subroutine check_one
 
@@ -247,11 +278,24 @@ contains
          character(:), allocatable :: message
 
          call check_vector(load, n_dof, message)
-         if (allocated(message)) &
-            call reader%refuse('model', 'file', 'holds a load '//key//' that '//message)
+         if (allocated(message)) call refuse_model(reader, raw, 'a load '//key//' that '//message)
       end subroutine check_load
 
    end subroutine check_parts
+
+   !> Record that a model file, or the model of the calling program, holds something wrong.
+   subroutine refuse_model(reader, raw, message)
+      type(reader_type), intent(inout) :: reader
+      type(file_model_type), intent(in) :: raw
+      !> What it holds and what must be.
+      character(*), intent(in) :: message
+
+      if (raw%in_memory) then
+         call reader%refuse('model', 'source', "= 'memory' holds "//message)
+      else
+         call reader%refuse('model', 'file', 'holds '//message)
+      end if
+   end subroutine refuse_model
 
    pure function in_directory(file, directory) result(path)
       character(*), intent(in) :: file, directory

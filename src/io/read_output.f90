@@ -24,6 +24,7 @@ contains
       !> `file` holds its default on entry.
       type(output_options), intent(inout) :: options
 
+      options%names_file = reader%given('output', 'file')
       call reader%get('output', 'file', options%file)
       if (len_trim(options%file) == 0) then
          call reader%refuse('output', 'file', "= '': must name a file")

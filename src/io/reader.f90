@@ -72,7 +72,7 @@ module fw_reader
 contains
 
    !> Parse the text of a namelist file and the overrides.
-   subroutine new_reader(reader, text, source, overrides, error)
+   subroutine new_reader(reader, text, source, overrides, error, origin)
       type(reader_type), intent(out) :: reader
       character(*), intent(in) :: text
       !> Name of the file, for messages.
@@ -80,6 +80,8 @@ contains
       !> `group%key=value` each; the last of several holds.
       type(string_type), intent(in) :: overrides(:)
       type(error_type), allocatable, intent(out) :: error
+      !> What messages put before an override (default: '--set').
+      character(*), intent(in), optional :: origin
       type(entry_type) :: entry
       integer :: i
 
@@ -87,7 +89,7 @@ contains
       call parse_namelist(text, source, reader%input, error)
       do i = 1, size(overrides)
          if (allocated(error)) return
-         call parse_override(overrides(i)%text, entry, error)
+         call parse_override(overrides(i)%text, entry, error, origin)
          if (.not. allocated(error)) call add_entry(reader%input, entry)
       end do
    end subroutine new_reader

@@ -33,7 +33,9 @@ module fw_result
    !> A flush waits until this many times its own duration has passed since the last.
    integer, parameter :: flush_patience = 20
 
-   !> Writes one result file. Not to be copied while it is open.
+   !> Writes one result file, or nothing where it was never opened. Not to be copied while it is
+   !> open. HDF5 and the handling of texts serve one thread at a time: every procedure waits for
+   !> its turn.
    type :: result_writer
       !> The open file, for analyses that add groups of their own.
       type(hdf5_file) :: file
@@ -59,6 +61,16 @@ contains
       !> cannot be written or is anything but an earlier result.
       type(error_type), allocatable, intent(out) :: error
 
+      !$omp critical (fretwear_io)
+      call create_file(self, case, error)
+      !$omp end critical (fretwear_io)
+   end subroutine open
+
+   subroutine create_file(self, case, error)
+      class(result_writer), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
       if (.not. allocated(case%output%file)) then
          call fatal_error(error, 'no result file is named: set output%file', status_input)
       else if (allocated(case%inputs)) then
@@ -70,13 +82,24 @@ contains
       call write_header(self%file, case, error)
       if (.not. allocated(error)) call write_pairs(self%file, case, error)
       if (.not. allocated(error)) call self%rows%create(self%file, case, error)
-      if (.not. allocated(error)) call self%flush(error)
-      if (allocated(error)) call self%discard()
-   end subroutine open
+      if (.not. allocated(error)) call flush_file(self, error)
+      if (allocated(error)) call discard_file(self)
+   end subroutine create_file
 
    !> Append a solution point. What it does not know (no allocated component) reads as NaN, and
    !> harmonics it does not carry read as zero.
    subroutine add_point(self, point, error)
+      class(result_writer), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call append_point(self, point, error)
+      !$omp end critical (fretwear_io)
+   end subroutine add_point
+
+   subroutine append_point(self, point, error)
       class(result_writer), intent(inout) :: self
       type(point_type), intent(in) :: point
       type(error_type), allocatable, intent(out) :: error
@@ -85,11 +108,22 @@ contains
       call self%rows%append(self%file, point, error)
       if (allocated(error)) return
       call system_clock(clock)
-      if (clock - self%last_flush >= flush_patience*self%flush_duration) call self%flush(error)
-   end subroutine add_point
+      if (clock - self%last_flush >= flush_patience*self%flush_duration) &
+         call flush_file(self, error)
+   end subroutine append_point
 
    !> Make what was written so far safe against the end of the program.
    subroutine flush(self, error)
+      class(result_writer), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call flush_file(self, error)
+      !$omp end critical (fretwear_io)
+   end subroutine flush
+
+   subroutine flush_file(self, error)
       class(result_writer), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       integer(int64) :: start
@@ -98,7 +132,7 @@ contains
       call self%file%flush(error)
       call system_clock(self%last_flush)
       self%flush_duration = self%last_flush - start
-   end subroutine flush
+   end subroutine flush_file
 
    !> Complete the file and give it its name.
    subroutine close(self, status, elapsed, error)
@@ -106,6 +140,18 @@ contains
       !> 'complete', 'not converged', or what else became of the run.
       character(*), intent(in) :: status
       !> Time of the whole run [s].
+      real(wp), intent(in) :: elapsed
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call close_file(self, status, elapsed, error)
+      !$omp end critical (fretwear_io)
+   end subroutine close
+
+   subroutine close_file(self, status, elapsed, error)
+      class(result_writer), intent(inout) :: self
+      character(*), intent(in) :: status
       real(wp), intent(in) :: elapsed
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: close_error
@@ -120,10 +166,18 @@ contains
          call move_alloc(close_error, error)
       end if
       if (.not. allocated(error)) call publish_part(self%file%path, self%path, error)
-   end subroutine close
+   end subroutine close_file
 
    !> Give the file up: nothing of it stays.
    subroutine discard(self)
+      class(result_writer), intent(inout) :: self
+
+      !$omp critical (fretwear_io)
+      call discard_file(self)
+      !$omp end critical (fretwear_io)
+   end subroutine discard
+
+   subroutine discard_file(self)
       class(result_writer), intent(inout) :: self
       type(error_type), allocatable :: ignored
 
@@ -131,7 +185,7 @@ contains
       call self%rows%close()
       call self%file%close(ignored)
       call delete_part(self%file%path)
-   end subroutine discard
+   end subroutine discard_file
 
    subroutine write_header(file, case, error)
       type(hdf5_file), intent(in) :: file

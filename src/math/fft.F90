@@ -26,7 +26,8 @@ module fw_fft
 
 contains
 
-   !> Plan transforms of n_rows rows with n_time instants (not thread-safe).
+   !> Plan transforms of n_rows rows with n_time instants. The planner of FFTW serves one thread
+   !> at a time; transforms with plans of their own may run side by side.
    subroutine plan(self, n_rows, n_time)
       class(fft_type), intent(inout) :: self
       integer, intent(in) :: n_rows, n_time
@@ -37,12 +38,14 @@ contains
       allocate (self%values(n_rows, n_time), self%spectrum(n_rows, n_time/2 + 1))
       length = int(n_time, c_int)
       rows = int(n_rows, c_int)
+      !$omp critical (fretwear_fftw)
       self%forward = fftw_plan_many_dft_r2c(1_c_int, length, rows, self%values, length, rows, &
                                             1_c_int, self%spectrum, length/2 + 1, rows, 1_c_int, &
                                             FFTW_ESTIMATE)
       self%backward = fftw_plan_many_dft_c2r(1_c_int, length, rows, self%spectrum, length/2 + 1, &
                                              rows, 1_c_int, self%values, length, rows, 1_c_int, &
                                              FFTW_ESTIMATE)
+      !$omp end critical (fretwear_fftw)
    end subroutine plan
 
    !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.
@@ -92,8 +95,10 @@ contains
    subroutine destroy(self)
       type(fft_type), intent(inout) :: self
 
+      !$omp critical (fretwear_fftw)
       if (c_associated(self%forward)) call fftw_destroy_plan(self%forward)
       if (c_associated(self%backward)) call fftw_destroy_plan(self%backward)
+      !$omp end critical (fretwear_fftw)
       self%forward = c_null_ptr
       self%backward = c_null_ptr
    end subroutine destroy

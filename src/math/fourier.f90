@@ -100,8 +100,8 @@ contains
       if (self%n_retained > 0) has_constant = self%harmonic(1) == 0
    end function has_constant
 
-   !> Plan the transforms of arrays with n_rows rows through FFTW (not thread-safe: call it while
-   !> building a system, outside parallel regions).
+   !> Plan the transforms of arrays with n_rows rows through FFTW: work for the construction of
+   !> a system, outside of parallel regions.
    subroutine prepare_fft(self, n_rows)
       class(fourier_type), intent(inout) :: self
       integer, intent(in) :: n_rows

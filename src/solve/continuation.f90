@@ -22,6 +22,8 @@ module fw_continuation
 
    !> Receives the points of a branch in order.
    type, abstract :: branch_observer
+      !> Set by `take` to end the branch there.
+      logical :: stop_requested = .false.
    contains
       procedure(take_point), deferred :: take
    end type branch_observer
@@ -116,6 +118,10 @@ contains
          end if
          call observer%take(next%x, next%p, report, .false., error)
          if (allocated(error)) return
+         if (observer%stop_requested) then
+            self%ending = 'stopped by the user'
+            return
+         end if
          if (report%iterations <= quick) ds = min(1.4_wp*ds, largest_growth*self%step)
          if (report%iterations >= slow) ds = 0.6_wp*ds
          here = next

@@ -151,7 +151,8 @@ contains
    end subroutine solve_columns
 
    !> Right-hand side for CVODE.
-   integer(c_int) function evaluate(t, y_vector, slope_vector, user_data) bind(c) result(status)
+   integer(c_int) function evaluate(t, y_vector, slope_vector, user_data) bind(c, name='') &
+      result(status)
       real(c_double), value :: t
       type(n_vector) :: y_vector, slope_vector
       type(c_ptr), value :: user_data
