@@ -7,6 +7,7 @@ module fw_harmonics_options
    public :: harmonics_options
    public :: method_words, method_hbm, method_tcm, method_tcm_least_squares, method_hdhb
    public :: sampling_words, sampling_uniform, sampling_events
+   public :: instants_per_event_wave
    public :: parity_words, parity_auto, parity_all, parity_odd
 
    character(*), parameter :: method_words(*) = &
@@ -16,6 +17,9 @@ module fw_harmonics_options
 
    character(*), parameter :: sampling_words(*) = [character(7) :: 'uniform', 'events']
    integer, parameter :: sampling_uniform = 1, sampling_events = 2
+
+   !> Instants for each wave of the highest harmonic that isolate every event.
+   integer, parameter :: instants_per_event_wave = 4
 
    character(*), parameter :: parity_words(*) = [character(4) :: 'auto', 'all', 'odd']
    integer, parameter :: parity_auto = 1, parity_all = 2, parity_odd = 3

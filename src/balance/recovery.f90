@@ -83,7 +83,7 @@ contains
       n_pairs = system%contact%n_pairs
       all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
       allocate (force(n_pairs, 3, all_harmonics%n_coefficients))
-      call all_harmonics%to_coefficients(3*n_pairs, system%contact%force_time, force)
+      call system%contact%coefficients(all_harmonics, force)
       allocate (point%force(3, n_pairs, all_harmonics%n_coefficients))
       do c = 1, 3
          do i = 1, n_pairs
@@ -159,6 +159,7 @@ contains
       end associate
       slip_time = matmul(slip, system%fourier%synthesis)
       point%slip_history = reshape(slip_time, [3, n_pairs, n_time])
+      call system%contact%sample()
       allocate (point%force_history(3, n_pairs, n_time))
       do k = 1, n_time
          point%force_history(:, :, k) = transpose(system%contact%force_time(:, :, k))

@@ -5,11 +5,14 @@
 !> `linearize` the derivative of each pair is in `jacobian`, or is the identity (pair_stuck) or
 !> zero (pair_open) and not stored.
 module fw_forces
+   use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_correction, only: march_turn_1d
    use fw_correction, only: march_turn_2d
    use fw_correction, only: project_turn
    use fw_correction_derivative, only: march_derivative
+   use fw_event_contact, only: event_contact_type
+   use fw_event_contact, only: new_event_contact
    use fw_fourier, only: fourier_type
    use fw_lapack, only: dgemm
    implicit none (type, external)
@@ -61,7 +64,13 @@ module fw_forces
       !> Transposed derivative of the force by the prediction of each pair:
       !> (coefficient, component) of the input, then of the output, pair.
       real(wp), allocatable :: jacobian(:, :, :)
+      !> Paths event by event; not allocated where the instants decide (uniform sampling).
+      type(event_contact_type), allocatable :: events
    contains
+      procedure :: resolve_events
+      procedure :: sample
+      procedure :: coefficients
+      procedure :: friction_path
       procedure :: evaluate
       procedure :: linearize
       procedure :: always_closed
@@ -105,6 +114,10 @@ contains
       integer :: first, n_blocks, block, k
 
       if (self%n_pairs == 0) return
+      if (allocated(self%events)) then
+         call evaluate_events(self, fourier)
+         return
+      end if
       call fourier%to_time(3*self%n_pairs, self%prediction, self%prediction_time)
       do k = 1, fourier%n_time
          self%prediction_time(:, 3, k) = self%prediction_time(:, 3, k) + self%offset
@@ -124,6 +137,87 @@ contains
       call fourier%to_coefficients(3*self%n_pairs, self%force_time, self%force)
       call classify(self)
    end subroutine evaluate
+
+   !> Follow the pairs from event to event instead of from instant to instant. Set `remembers`
+   !> before.
+   pure subroutine resolve_events(self, fourier)
+      class(forces_type), intent(inout) :: self
+      type(fourier_type), intent(in) :: fourier
+
+      allocate (self%events)
+      call new_event_contact(self%mu, self%present, self%remembers, fourier, self%events)
+   end subroutine resolve_events
+
+   !> Contact forces along the paths. `margin` and `pressure` only have their signs.
+   subroutine evaluate_events(self, fourier)
+      type(forces_type), intent(inout) :: self
+      type(fourier_type), intent(inout) :: fourier
+      integer :: i
+
+      call self%events%evaluate(fourier, self%prediction, self%offset, self%x_start, self%force, &
+                                self%x)
+      self%turns = 1
+      do i = 1, self%n_pairs
+         associate (path => self%events%pair(i)%path)
+            self%pressure(i) = merge(1.0_wp, 0.0_wp, path%closed)
+            self%margin(i) = merge(-1.0_wp, 0.0_wp, path%moved)
+            self%state(i) = pair_mixed
+            if (path%open) self%state(i) = pair_open
+            if (path%closed .and. .not. path%moved) self%state(i) = pair_stuck
+         end associate
+      end do
+   end subroutine evaluate_events
+
+   !> Make the forces at the instants available in `force_time`; under uniform sampling they are.
+   subroutine sample(self)
+      class(forces_type), intent(inout) :: self
+
+      if (allocated(self%events)) call self%events%values(self%force_time)
+   end subroutine sample
+
+   !> Coefficients of the contact forces on another set of harmonics over the same instants
+   !> (n_pairs, 3, n_coefficients).
+   subroutine coefficients(self, fourier, force)
+      class(forces_type), intent(inout) :: self
+      type(fourier_type), intent(inout) :: fourier
+      real(wp), intent(inout) :: force(:, :, :)
+
+      if (allocated(self%events)) then
+         call self%events%coefficients(fourier, force)
+      else
+         call fourier%to_coefficients(3*self%n_pairs, self%force_time, force)
+      end if
+   end subroutine coefficients
+
+   !> int |lambda_n| |dx| of every pair over a period, x the corrected position in units of force
+   !> [force**2] (n_pairs): divided by the tangential prediction stiffness, what Archard's law
+   !> takes.
+   !> Exact with events, a sum over the instants otherwise.
+   subroutine friction_path(self, path)
+      class(forces_type), intent(inout) :: self
+      real(wp), intent(out) :: path(:)
+      real(wp) :: x(2), before(2)
+      integer :: i, k, n_time
+
+      if (allocated(self%events)) then
+         call self%events%friction_path(path)
+         return
+      end if
+      n_time = size(self%force_time, 3)
+      path = 0.0_wp
+      do i = 1, self%n_pairs
+         before = self%prediction_time(i, 1:2, n_time) - self%force_time(i, 1:2, n_time)
+         do k = 1, n_time
+            x = self%prediction_time(i, 1:2, k) - self%force_time(i, 1:2, k)
+            if (self%remembers) then
+               path(i) = path(i) - self%force_time(i, 3, k)*norm2(x - before)
+            else
+               path(i) = path(i) - self%force_time(i, 3, k)*norm2(x)*2.0_wp*pi/real(n_time, wp)
+            end if
+            before = x
+         end do
+      end do
+   end subroutine friction_path
 
    !> State of every pair over the whole march.
    pure subroutine classify(self)
@@ -193,6 +287,10 @@ contains
       if (.not. any(self%state == pair_mixed)) return
       nc = fourier%n_coefficients
       if (.not. allocated(self%jacobian)) allocate (self%jacobian(3*nc, 3*nc, self%n_pairs))
+      if (allocated(self%events)) then
+         call self%events%linearize(fourier, self%state == pair_mixed, self%jacobian)
+         return
+      end if
       !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i) &
       !$omp if(self%n_pairs > threads_pay_from)
       allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
@@ -269,6 +367,10 @@ contains
       ! A slipping force lies on the cone to round-off.
       real(wp), parameter :: on_cone = 1.0_wp - 1.0e-12_wp
 
+      if (allocated(self%events)) then
+         call self%events%fractions(share)
+         return
+      end if
       n_time = size(self%force_time, 3)
       share = 0.0_wp
       do k = 1, n_time

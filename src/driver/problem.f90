@@ -17,6 +17,7 @@ module fw_problem
    use fw_harmonics_options, only: method_tcm_least_squares
    use fw_harmonics_options, only: parity_all
    use fw_harmonics_options, only: parity_odd
+   use fw_harmonics_options, only: sampling_events
    use fw_hbm, only: hbm_system
    use fw_hbm, only: new_hbm
    use fw_joint, only: joint_type
@@ -32,6 +33,8 @@ module fw_problem
    !> friction alone, and where pairs may separate or the normal load varies.
    integer, parameter :: instants_friction = 16, instants_separation = 32
    integer, parameter :: fewest_instants = 64
+   !> Instants at least where the events decide and instants only isolate them.
+   integer, parameter :: fewest_for_events = 8
 
 contains
 
@@ -54,6 +57,12 @@ contains
       if (allocated(error)) return
       call choose_harmonics(case, joint, fourier, error)
       if (allocated(error)) return
+      if (case%harmonics%sampling == sampling_events .and. &
+          any(joint%row(1, :) > 0 .and. joint%row(2, :) > 0)) then
+         call fatal_error(error, "&harmonics sampling = 'events' takes pairs with one "// &
+                          "tangential direction that moves: use 'uniform'", status_input)
+         return
+      end if
       range = case%sweep%start
       if (case%analysis == analysis_frf) then
          range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
@@ -64,6 +73,9 @@ contains
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
       call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
+      if (case%harmonics%sampling == sampling_events .and. case%contact%n_pairs > 0) then
+         call system%contact%resolve_events(system%fourier)
+      end if
       system%reduced = case%solver%skips
       if (case%harmonics%filter_harmonics > 0) then
          system%springs%highest_harmonic = case%harmonics%filter_harmonics
@@ -143,12 +155,25 @@ contains
       if (case%harmonics%method == method_hdhb) return
       n_time = 2*h + 2
       if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
-      if (case%contact%n_pairs > 0) then
+      if (case%harmonics%sampling == sampling_events) then
+         n_time = max(n_time, least_events(case))
+      else if (case%contact%n_pairs > 0) then
          n_time = max(n_time, fewest_instants, instants_friction*h)
          if (any(joint%row(3, :) > 0)) n_time = max(n_time, instants_separation*h)
       end if
       n_time = n_time + modulo(n_time, 2)
    end function automatic_n_time
+
+   !> Instants that isolate the events: twice the 2H+1 of a collocation, which then lie evenly.
+   pure integer function least_events(case) result(n_time)
+      type(case_type), intent(in) :: case
+      integer :: n_points
+
+      n_time = max(fewest_for_events, 2*(2*case%harmonics%n_harmonics + 1))
+      n_points = case%harmonics%n_collocation
+      if (case%harmonics%method /= method_tcm_least_squares .or. n_points == 0) return
+      n_time = n_points*((n_time + n_points - 1)/n_points)
+   end function least_events
 
    !> Point k of a sweep: evenly spaced from start to end, both exact [rad/s].
    pure real(wp) function sweep_frequency(sweep, k, n_points) result(omega)

@@ -5,8 +5,8 @@ module fw_available
    use fw_contact_data, only: law_words, law_dlft, law_dlft_velocity, law_penalty
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_words, method_hbm, method_tcm, &
-                                   method_tcm_least_squares, method_hdhb, sampling_words, &
-                                   sampling_uniform
+                                   method_tcm_least_squares, method_hdhb, &
+                                   sampling_words, sampling_uniform, sampling_events
    use fw_solver_options, only: jacobian_words, jacobian_analytic
    use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
                                  solver_pseudo_time, continuation_words, &
@@ -29,7 +29,8 @@ contains
          law_penalty])
       call check('harmonics%method', method_words, case%harmonics%method, &
                  [method_hbm, method_tcm, method_tcm_least_squares, method_hdhb])
-      call check('harmonics%sampling', sampling_words, case%harmonics%sampling, [sampling_uniform])
+      call check('harmonics%sampling', sampling_words, case%harmonics%sampling, &
+                 [sampling_uniform, sampling_events])
       call check('solver%kind', solver_words, case%solver%kind, &
                  [solver_newton, solver_powell, solver_kinsol, solver_pseudo_time])
       call check('solver%jacobian', jacobian_words, case%solver%jacobian, [jacobian_analytic])

@@ -2,7 +2,7 @@
 module fw_read_options
    use fw_case, only: case_type, analysis_words, analysis_frf, analysis_wear
    use fw_harmonics_options, only: harmonics_options, method_words, method_hdhb, sampling_words, &
-                                   parity_words
+                                   sampling_events, parity_words, instants_per_event_wave
    use fw_kinds, only: wp, pi
    use fw_reader, only: reader_type
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options, solver_words, &
@@ -46,11 +46,21 @@ contains
       call reader%get_word('harmonics', 'parity', options%parity, parity_words)
       call reader%get('harmonics', 'adaptive', options%adaptive)
       call reader%get('harmonics', 'adaptive_tolerance', options%adaptive_tolerance, above=0.0_wp)
+      if (options%sampling == sampling_events .and. options%method == method_hdhb) then
+         call reader%refuse('harmonics', 'sampling', "= 'events': method 'hdhb' is defined by "// &
+                            "its 2*n_harmonics + 1 instants; use 'hbm' or 'tcm', or 'uniform'")
+      end if
       least = 2*options%n_harmonics + 1
       if (options%n_time == 0) return
       if (options%n_time < least) then
          call reader%refuse('harmonics', 'n_time', '= '//to_text(options%n_time)// &
                             ': must be at least 2*n_harmonics + 1 = '//to_text(least)// &
+                            ', or 0 to have it chosen')
+      else if (options%sampling == sampling_events .and. &
+               options%n_time < instants_per_event_wave*options%n_harmonics) then
+         call reader%refuse('harmonics', 'n_time', '= '//to_text(options%n_time)// &
+                            ": sampling = 'events' needs at least 4*n_harmonics = "// &
+                            to_text(instants_per_event_wave*options%n_harmonics)// &
                             ', or 0 to have it chosen')
       else if (options%method == method_hdhb .and. options%n_time /= least) then
          call reader%refuse('harmonics', 'n_time', '= '//to_text(options%n_time)//': method '// &

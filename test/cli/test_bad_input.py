@@ -172,11 +172,22 @@ def test_a_branch_needs_two_ends(fw_run):
 
 
 @pytest.mark.parametrize("override, instead", [
-    ("solver%jacobian=difference", "'analytic'"), ("harmonics%sampling=events", "'uniform'"),
+    ("solver%jacobian=difference", "'analytic'"),
     ("harmonics%adaptive=.true.", ".false."), ("sweep%stability=.true.", "'penalty'")])
 def test_what_is_not_available_yet(fw_run, override, instead):
     message = fw_run.refused("--set", override, "case.nml")
     assert override.split("=")[0] in message and instead in message
+
+
+@pytest.mark.parametrize("options, key, remedy", [
+    (["harmonics%method=hdhb"], "&harmonics sampling = 'events'", "use 'hbm' or 'tcm'"),
+    (["harmonics%n_harmonics=5", "harmonics%n_time=19"], "&harmonics n_time = 19",
+     "at least 4*n_harmonics = 20")])
+def test_what_events_need(fw_run, options, key, remedy):
+    settings = [part for option in ["harmonics%sampling=events", *options]
+                for part in ("--set", option)]
+    message = fw_run.refused(*settings, "case.nml")
+    assert key in message and remedy in message, message
 
 
 def test_missing_namelist(fw_run):

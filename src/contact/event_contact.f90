@@ -1,0 +1,298 @@
+!> Event-resolved contact forces of all pairs: from the coefficients of the predicted forces to
+!> those of the contact forces, and their derivative, without any sampling error. The instants of
+!> the transform only serve to isolate the events, for which four for each wave of the highest
+!> harmonic are enough.
+module fw_event_contact
+   use fw_event_pair, only: event_pair_type
+   use fw_fourier, only: fourier_type
+   use fw_kinds, only: wp
+   use fw_lapack, only: dgemm
+   use fw_lapack, only: dgemv
+   implicit none (type, external)
+   private
+
+   public :: event_contact_type, new_event_contact
+
+   !> Pairs above which threads pay; with fewer, a parallel region costs more than its work.
+   integer, parameter :: threads_pay_from = 24
+
+   type :: event_contact_type
+      integer :: n_pairs = 0
+      type(event_pair_type), allocatable :: pair(:)
+      !> Component of the one tangential direction of each pair, 0 where there is none.
+      integer, allocatable :: direction(:)
+      !> Whether a normal dof exists (n_pairs).
+      logical, allocatable :: has_normal(:)
+      !> Coefficients (n_coefficients, 6, n_pairs) of P, P', P'', N, N', N'' and their samples.
+      real(wp), allocatable, private :: batch(:, :, :), samples(:, :, :)
+      !> Coefficients of the contact forces (n_coefficients, tangential and normal, n_pairs).
+      real(wp), allocatable, private :: out(:, :, :)
+   contains
+      procedure :: evaluate
+      procedure :: linearize
+      procedure :: coefficients
+      procedure :: values
+      procedure :: friction_path
+      procedure :: fractions
+   end type event_contact_type
+
+contains
+
+   !> Room for the events of pairs.
+   pure subroutine new_event_contact(mu, present, remembers, fourier, self)
+      !> Friction coefficient (n_pairs).
+      real(wp), intent(in) :: mu(:)
+      !> Which of t1, t2, n exist (3, n_pairs).
+      logical, intent(in) :: present(:, :)
+      !> Whether pairs remember their position (false: velocity-level law).
+      logical, intent(in) :: remembers
+      !> Harmonics and instants, at least four for each wave of the highest one.
+      type(fourier_type), intent(in) :: fourier
+      type(event_contact_type), intent(out) :: self
+      integer :: i
+
+      self%n_pairs = size(mu)
+      allocate (self%pair(self%n_pairs))
+      self%direction = findloc(present(1:2, :), .true., dim=1)
+      self%has_normal = present(3, :)
+      do i = 1, self%n_pairs
+         call self%pair(i)%reserve(maxval(fourier%harmonic), fourier%n_time, fourier%n_coefficients)
+         self%pair(i)%curves%mu = mu(i)
+         self%pair(i)%rubs = self%direction(i) > 0
+         self%pair(i)%remembers = remembers
+      end do
+      allocate (self%batch(fourier%n_coefficients, 6, self%n_pairs), source=0.0_wp)
+      allocate (self%out(fourier%n_coefficients, 2, self%n_pairs), source=0.0_wp)
+      allocate (self%samples(fourier%n_time, 6, self%n_pairs), source=0.0_wp)
+   end subroutine new_event_contact
+
+   !> Contact forces and the position at the end of the period.
+   subroutine evaluate(self, fourier, prediction, offset, x_start, force, x)
+      class(event_contact_type), intent(inout) :: self
+      type(fourier_type), intent(inout) :: fourier
+      !> Coefficients of the predicted forces (n_pairs, 3, n_coefficients), and what the normal ones
+      !> have in the mean beside (n_pairs).
+      real(wp), intent(in) :: prediction(:, :, :), offset(:)
+      !> Corrected position at the start and at the end (n_pairs, 2).
+      real(wp), intent(in) :: x_start(:, :)
+      real(wp), intent(inout) :: x(:, :)
+      !> Coefficients of the contact forces (n_pairs, 3, n_coefficients).
+      real(wp), intent(inout) :: force(:, :, :)
+      integer :: i
+
+      call fill_batch(self, fourier, prediction)
+      call dgemm('T', 'N', fourier%n_time, 6*self%n_pairs, fourier%n_coefficients, 1.0_wp, &
+                 fourier%synthesis, fourier%n_coefficients, self%batch, fourier%n_coefficients, &
+                 0.0_wp, self%samples, fourier%n_time)
+      !$omp parallel do default(none) shared(self, fourier, offset, x_start, force, x) private(i) &
+      !$omp schedule(dynamic) if(self%n_pairs > threads_pay_from)
+      do i = 1, self%n_pairs
+         call evaluate_pair(self%pair(i), fourier, self%batch(:, :, i), self%samples(:, :, i), &
+                            offset(i), x_start(i, max(1, self%direction(i))))
+         call collect(self%pair(i), fourier, self%out(:, :, i))
+         force(i, :, :) = 0.0_wp
+         x(i, :) = x_start(i, :)
+         force(i, 3, :) = self%out(:, 2, i)
+         if (self%direction(i) == 0) cycle
+         force(i, self%direction(i), :) = self%out(:, 1, i)
+         x(i, self%direction(i)) = self%pair(i)%path%z_end
+      end do
+      !$omp end parallel do
+   end subroutine evaluate
+
+   !> Coefficients of P and N and of their first two derivatives.
+   pure subroutine fill_batch(self, fourier, prediction)
+      type(event_contact_type), intent(inout) :: self
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: prediction(:, :, :)
+      integer :: d, i, k
+
+      do k = 1, fourier%n_coefficients
+         do i = 1, self%n_pairs
+            if (self%direction(i) > 0) then
+               self%batch(k, 1, i) = prediction(i, self%direction(i), k)
+            end if
+            self%batch(k, 4, i) = -prediction(i, 3, k)
+         end do
+      end do
+      do i = 1, self%n_pairs
+         do d = 1, 4, 3
+            call differentiate(fourier, self%batch(:, d, i), self%batch(:, d + 1, i))
+            call differentiate(fourier, self%batch(:, d + 1, i), self%batch(:, d + 2, i))
+         end do
+      end do
+   end subroutine fill_batch
+
+   pure subroutine differentiate(fourier, p, derivative)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: p(*)
+      real(wp), intent(inout) :: derivative(*)
+
+      call fourier%differentiate(1, p, derivative)
+   end subroutine differentiate
+
+   pure subroutine evaluate_pair(pair, fourier, coefficients, samples, offset, x_start)
+      type(event_pair_type), intent(inout) :: pair
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: coefficients(:, :), samples(:, :), offset, x_start
+      integer :: h, k, n
+
+      associate (c => pair%curves)
+         do h = 1, fourier%n_retained
+            n = fourier%harmonic(h)
+            k = fourier%column(h)
+            c%tangential(n, 1) = coefficients(k, 1)
+            c%normal(n, 1) = coefficients(k, 4)
+            if (n == 0) cycle
+            c%tangential(n, 2) = coefficients(k + 1, 1)
+            c%normal(n, 2) = coefficients(k + 1, 4)
+         end do
+         if (.not. fourier%has_constant()) c%normal(0, 1) = 0.0_wp
+         c%normal(0, 1) = c%normal(0, 1) - offset
+         c%samples = samples
+         c%samples(:, 4) = samples(:, 4) - offset
+         call c%combine(c%mu)
+      end associate
+      call pair%follow(x_start)
+   end subroutine evaluate_pair
+
+   !> Coefficients of the forces of a pair: projected exactly, or fitted at the instants of the
+   !> collocation.
+   subroutine collect(pair, fourier, force)
+      type(event_pair_type), intent(inout) :: pair
+      type(fourier_type), intent(in) :: fourier
+      !> (n_coefficients, tangential and normal).
+      real(wp), intent(inout) :: force(fourier%n_coefficients, 2)
+      integer :: nc
+
+      if (fourier%projects) then
+         call pair%force(fourier%n_retained, fourier%harmonic, fourier%column, force(:, 1), &
+                         force(:, 2))
+         return
+      end if
+      nc = fourier%n_coefficients
+      ! The samples of the bounds have served.
+      associate (tangential => pair%curves%values, normal => pair%curves%slopes)
+         call pair%values_at(fourier%n_time, tangential, normal)
+         call dgemv('N', nc, fourier%n_time, 1.0_wp, fourier%analysis, nc, tangential, 1, 0.0_wp, &
+                    force(1, 1), 1)
+         call dgemv('N', nc, fourier%n_time, 1.0_wp, fourier%analysis, nc, normal, 1, 0.0_wp, &
+                    force(1, 2), 1)
+      end associate
+   end subroutine collect
+
+   !> Transposed derivatives of pairs at the last evaluation: (coefficient, component) of the input,
+   !> then of the output, pair.
+   subroutine linearize(self, fourier, wanted, jacobian)
+      class(event_contact_type), intent(inout) :: self
+      type(fourier_type), intent(in) :: fourier
+      !> Pairs to differentiate (n_pairs).
+      logical, intent(in) :: wanted(:)
+      real(wp), intent(inout) :: jacobian(:, :, :)
+      real(wp), allocatable :: block(:, :, :)
+      integer :: i, nc, t, n
+
+      nc = fourier%n_coefficients
+      n = 2*nc
+      !$omp parallel default(none) shared(self, fourier, wanted, jacobian, nc, n) &
+      !$omp private(block, i, t) if(self%n_pairs > threads_pay_from)
+      allocate (block(nc, nc, 3))
+      !$omp do schedule(dynamic)
+      do i = 1, self%n_pairs
+         if (.not. wanted(i)) cycle
+         jacobian(:, :, i) = 0.0_wp
+         if (fourier%projects) then
+            call self%pair(i)%derivative(fourier%n_retained, fourier%harmonic, fourier%column, &
+                                         block(:, :, 1), block(:, :, 2), block(:, :, 3))
+         else
+            call collocate(self%pair(i), fourier, block)
+         end if
+         if (self%has_normal(i)) jacobian(n + 1:, n + 1:, i) = block(:, :, 3)
+         if (self%direction(i) == 0) cycle
+         t = (self%direction(i) - 1)*nc
+         jacobian(t + 1:t + nc, t + 1:t + nc, i) = block(:, :, 1)
+         if (self%has_normal(i)) jacobian(n + 1:, t + 1:t + nc, i) = block(:, :, 2)
+      end do
+      !$omp end do
+      !$omp end parallel
+   end subroutine linearize
+
+   !> The derivatives of forces that are fitted at instants.
+   subroutine collocate(pair, fourier, block)
+      type(event_pair_type), intent(inout) :: pair
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: block(fourier%n_coefficients, fourier%n_coefficients, 3)
+      real(wp) :: rows(fourier%n_coefficients, fourier%n_time, 3)
+      logical :: bears(fourier%n_time)
+      integer :: c, k, nc
+
+      nc = fourier%n_coefficients
+      call pair%rows_at(fourier%n_retained, fourier%harmonic, fourier%column, fourier%synthesis, &
+                        rows(:, :, 1), rows(:, :, 2), bears)
+      do k = 1, fourier%n_time
+         rows(:, k, 3) = merge(fourier%synthesis(:, k), 0.0_wp, bears(k))
+      end do
+      do c = 1, 3
+         call dgemm('N', 'T', nc, nc, fourier%n_time, 1.0_wp, rows(1, 1, c), nc, &
+                    fourier%analysis, nc, 0.0_wp, block(1, 1, c), nc)
+      end do
+   end subroutine collocate
+
+   !> Coefficients of the contact forces on any set of harmonics (n_pairs, 3, n_coefficients).
+   subroutine coefficients(self, fourier, force)
+      class(event_contact_type), intent(inout) :: self
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp) :: out(fourier%n_coefficients, 2)
+      integer :: i, n
+
+      force = 0.0_wp
+      out = 0.0_wp
+      do i = 1, self%n_pairs
+         ! Harmonics beyond those of the prediction are even ones, which symmetry makes vanish.
+         n = count(fourier%harmonic <= self%pair(i)%curves%degree)
+         call self%pair(i)%force(n, fourier%harmonic, fourier%column, out(:, 1), &
+                                 out(:, 2))
+         if (self%direction(i) > 0) force(i, self%direction(i), :) = out(:, 1)
+         force(i, 3, :) = out(:, 2)
+      end do
+   end subroutine coefficients
+
+   !> Contact forces at uniform instants (n_pairs, 3, n_time).
+   subroutine values(self, force)
+      class(event_contact_type), intent(inout) :: self
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp) :: out(size(force, 3), 2)
+      integer :: i
+
+      force = 0.0_wp
+      do i = 1, self%n_pairs
+         call self%pair(i)%values_at(size(force, 3), out(:, 1), out(:, 2))
+         if (self%direction(i) > 0) force(i, self%direction(i), :) = out(:, 1)
+         force(i, 3, :) = out(:, 2)
+      end do
+   end subroutine values
+
+   !> int |lambda_n| |dx| over a period [force**2] (n_pairs), x in units of force.
+   subroutine friction_path(self, path)
+      class(event_contact_type), intent(inout) :: self
+      real(wp), intent(out) :: path(:)
+      integer :: i
+
+      do i = 1, self%n_pairs
+         path(i) = self%pair(i)%friction_path()
+      end do
+   end subroutine friction_path
+
+   !> Share of the period that each pair spends in stick, slip and open (3, n_pairs).
+   pure subroutine fractions(self, share)
+      class(event_contact_type), intent(in) :: self
+      real(wp), intent(out) :: share(:, :)
+      integer :: i
+
+      do i = 1, self%n_pairs
+         share(:, i) = self%pair(i)%shares()
+      end do
+   end subroutine fractions
+
+end module fw_event_contact

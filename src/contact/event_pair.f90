@@ -1,0 +1,359 @@
+!> Contact force of one pair with at most one tangential direction, integrated exactly along its
+!> path: with the Gram matrices G(chi) of the waves under the sets of stick, slip and contact,
+!>
+!>   F_t = G(stick) P + (G(forward) - G(backward)) Q - sum_i z_i g_i,   F_n = -G(contact) N,
+!>   dF_t/dP = G(stick) - sum_i g_i e_i^T,
+!>   dF_t/dQ = G(forward) - G(backward) - sum_i s_i g_i e_i^T,
+!>
+!> g_i being the waves integrated over stick i, e_i the waves at the angle where its z was set and
+!> s_i its weight (-1 at the end of forward slip, +1 of backward slip, -P'/Q' at a landing). The
+!> angles of all other events drop out of the derivative, because the force is continuous there.
+module fw_event_pair
+   use fw_event_curves, only: curves_type
+   use fw_event_moments, only: moments_type
+   use fw_event_path, only: path_type
+   use fw_event_path, only: phase_backward
+   use fw_event_path, only: phase_forward
+   use fw_event_path, only: phase_open
+   use fw_event_path, only: phase_stick
+   use fw_event_polynomial, only: fill_waves
+   use fw_event_polynomial, only: value_of
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: event_pair_type
+
+   type :: event_pair_type
+      type(curves_type) :: curves
+      type(path_type) :: path
+      !> Whether the tangential prediction is that of the velocity-level law.
+      logical :: remembers = .true.
+      !> Whether there is a tangential direction.
+      logical :: rubs = .true.
+      !> Sets of stick, forward less backward slip, contact, and stick weighted by z.
+      type(moments_type) :: stick, slip, contact, held
+      !> Workspace: waves of an angle (0:2 degree), waves at an origin and integrals of one stick.
+      real(wp), allocatable, private :: cosines(:), sines(:), origin(:), integral(:)
+      type(moments_type), private :: one
+   contains
+      procedure :: reserve
+      procedure :: follow
+      procedure :: force
+      procedure :: derivative
+      procedure :: values_at
+      procedure :: rows_at
+      procedure :: friction_path
+      procedure :: shares
+   end type event_pair_type
+
+contains
+
+   !> Room for polynomials of a degree, sampled on a grid, and n_coefficients waves.
+   pure subroutine reserve(self, degree, n_grid, n_coefficients)
+      class(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: degree, n_grid, n_coefficients
+
+      call self%curves%reserve(degree, n_grid)
+      call self%path%reserve(degree)
+      call self%stick%reserve(degree)
+      call self%slip%reserve(degree)
+      call self%contact%reserve(degree)
+      call self%held%reserve(degree)
+      call self%one%reserve(degree)
+      allocate (self%cosines(0:2*degree), self%sines(0:2*degree))
+      allocate (self%origin(n_coefficients), self%integral(n_coefficients))
+   end subroutine reserve
+
+   !> Find the path of the pair from x_start, and the moments of its sets. The curves have been
+   !> filled before.
+   pure subroutine follow(self, x_start)
+      class(event_pair_type), intent(inout) :: self
+      real(wp), intent(in) :: x_start
+
+      if (.not. self%rubs) then
+         call self%path%trace_contact(self%curves)
+      else if (self%remembers) then
+         call self%path%trace(self%curves, x_start)
+      else
+         call self%path%trace_rates(self%curves)
+      end if
+      call fill_moments(self)
+   end subroutine follow
+
+   pure subroutine fill_moments(self)
+      type(event_pair_type), intent(inout) :: self
+      real(wp) :: before(4), behind(4)
+      integer :: j
+
+      call self%stick%clear()
+      call self%slip%clear()
+      call self%contact%clear()
+      call self%held%clear()
+      before = 0.0_wp
+      do j = 1, self%path%n_segments + 1
+         behind = 0.0_wp
+         if (j <= self%path%n_segments) then
+            select case (self%path%phase(j))
+            case (phase_stick)
+               behind = [1.0_wp, 0.0_wp, 1.0_wp, self%path%z(j)]
+            case (phase_forward)
+               behind = [0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp]
+            case (phase_backward)
+               behind = [0.0_wp, -1.0_wp, 1.0_wp, 0.0_wp]
+            end select
+         end if
+         before = before - behind
+         call set_waves(self, j)
+         associate (angle => self%path%angle(j), c => self%cosines, s => self%sines)
+            if (abs(before(1)) > 0.0_wp) call self%stick%add_step(before(1), angle, c, s)
+            if (abs(before(2)) > 0.0_wp) call self%slip%add_step(before(2), angle, c, s)
+            if (abs(before(3)) > 0.0_wp) call self%contact%add_step(before(3), angle, c, s)
+            if (abs(before(4)) > 0.0_wp) call self%held%add_step(before(4), angle, c, s)
+         end associate
+         before = behind
+      end do
+      call self%stick%finish()
+      call self%slip%finish()
+      call self%contact%finish()
+      call self%held%finish()
+   end subroutine fill_moments
+
+   !> Waves at the start of segment j; those at both ends of the period are the same to the last
+   !> bit.
+   pure subroutine set_waves(self, j)
+      type(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: j
+
+      if (j == 1 .or. j > self%path%n_segments) then
+         self%cosines = 1.0_wp
+         self%sines = 0.0_wp
+      else
+         call fill_waves(2*self%curves%degree, self%path%angle(j), self%cosines, self%sines)
+      end if
+   end subroutine set_waves
+
+   !> Coefficients of the contact forces.
+   pure subroutine force(self, n_retained, harmonic, column, tangential, normal)
+      class(event_pair_type), intent(in) :: self
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> (n_coefficients).
+      real(wp), intent(out) :: tangential(:), normal(:)
+
+      normal = 0.0_wp
+      tangential = 0.0_wp
+      associate (c => self%curves)
+         call self%contact%project(-1.0_wp, c%normal, n_retained, harmonic, column, normal)
+         if (.not. self%rubs) return
+         call self%stick%project(1.0_wp, c%tangential, n_retained, harmonic, column, tangential)
+         call self%slip%project(c%mu, c%normal, n_retained, harmonic, column, tangential)
+         call add_means(self%held, -1.0_wp, n_retained, harmonic, column, tangential)
+      end associate
+   end subroutine force
+
+   !> Add factor times the coefficients of the weight of `moments` itself.
+   pure subroutine add_means(moments, factor, n_retained, harmonic, column, coefficient)
+      type(moments_type), intent(in) :: moments
+      real(wp), intent(in) :: factor
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      real(wp), intent(inout) :: coefficient(:)
+      integer :: h, k
+
+      do h = 1, n_retained
+         k = harmonic(h)
+         associate (to => coefficient(column(h):))
+            if (k == 0) then
+               to(1) = to(1) + 0.5_wp/pi*factor*moments%cosine(0)
+            else
+               to(1) = to(1) + factor/pi*moments%cosine(k)
+               to(2) = to(2) + factor/pi*moments%sine(k)
+            end if
+         end associate
+      end do
+   end subroutine add_means
+
+   !> Transposed derivatives (input, output) of the tangential force by the tangential and normal
+   !> predictions, and of the normal force by the normal one.
+   pure subroutine derivative(self, n_retained, harmonic, column, by_tangential, by_normal, normal)
+      class(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> (n_coefficients, n_coefficients); overwritten.
+      real(wp), intent(inout) :: by_tangential(:, :), by_normal(:, :), normal(:, :)
+      integer :: j, k
+
+      by_tangential = 0.0_wp
+      by_normal = 0.0_wp
+      normal = 0.0_wp
+      call self%contact%add_gram(1.0_wp, n_retained, harmonic, column, normal)
+      if (.not. self%rubs) return
+      call self%stick%add_gram(1.0_wp, n_retained, harmonic, column, by_tangential)
+      ! Q = -mu y_n.
+      call self%slip%add_gram(-self%curves%mu, n_retained, harmonic, column, by_normal)
+      do j = 1, self%path%n_segments
+         if (self%path%phase(j) /= phase_stick .or. .not. self%path%set(j)) cycle
+         call integrate_segment(self, j)
+         self%integral = 0.0_wp
+         call add_means(self%one, 1.0_wp, n_retained, harmonic, column, self%integral)
+         call waves_at_origin(self, j, n_retained, harmonic, column)
+         do k = 1, size(self%integral)
+            by_tangential(:, k) = by_tangential(:, k) - self%integral(k)*self%origin
+            by_normal(:, k) = by_normal(:, k) + &
+                              (self%curves%mu*self%path%weight(j)*self%integral(k))*self%origin
+         end do
+      end do
+   end subroutine derivative
+
+   !> Moments of one segment.
+   pure subroutine integrate_segment(self, j)
+      type(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: j
+
+      call self%one%clear()
+      call set_waves(self, j)
+      call self%one%add_step(-1.0_wp, self%path%angle(j), self%cosines, self%sines)
+      call set_waves(self, j + 1)
+      call self%one%add_step(1.0_wp, self%path%angle(j + 1), self%cosines, self%sines)
+      call self%one%finish()
+   end subroutine integrate_segment
+
+   !> Waves at the angle where the z of a stick was set.
+   pure subroutine waves_at_origin(self, j, n_retained, harmonic, column)
+      type(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: j, n_retained, harmonic(n_retained), column(n_retained)
+      integer :: h
+
+      call fill_waves(self%curves%degree, self%path%set_at(j), self%cosines, self%sines)
+      do h = 1, n_retained
+         self%origin(column(h)) = self%cosines(harmonic(h))
+         if (harmonic(h) > 0) self%origin(column(h) + 1) = self%sines(harmonic(h))
+      end do
+   end subroutine waves_at_origin
+
+   !> Contact forces at n_time uniform instants: what collocation and histories take.
+   pure subroutine values_at(self, n_time, tangential, normal)
+      class(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: n_time
+      real(wp), intent(out) :: tangential(n_time), normal(n_time)
+      real(wp) :: angle, pressure, p
+      integer :: j, k
+
+      tangential = 0.0_wp
+      normal = 0.0_wp
+      j = 1
+      do k = 1, n_time
+         angle = 2.0_wp*pi*real(k - 1, wp)/real(n_time, wp)
+         call advance(self%path, angle, j)
+         if (self%path%phase(j) == phase_open) cycle
+         call fill_waves(self%curves%degree, angle, self%cosines, self%sines)
+         pressure = value_of(self%curves%degree, self%curves%normal, self%cosines, self%sines)
+         normal(k) = -pressure
+         if (.not. self%rubs) cycle
+         select case (self%path%phase(j))
+         case (phase_stick)
+            p = value_of(self%curves%degree, self%curves%tangential, self%cosines, self%sines)
+            tangential(k) = p - self%path%z(j)
+         case (phase_forward)
+            tangential(k) = self%curves%mu*pressure
+         case (phase_backward)
+            tangential(k) = -self%curves%mu*pressure
+         end select
+      end do
+   end subroutine values_at
+
+   !> Move j on to the segment that holds an angle.
+   pure subroutine advance(path, angle, j)
+      type(path_type), intent(in) :: path
+      real(wp), intent(in) :: angle
+      integer, intent(inout) :: j
+
+      do while (j < path%n_segments)
+         if (path%angle(j + 1) > angle) exit
+         j = j + 1
+      end do
+   end subroutine advance
+
+   !> Derivatives of the tangential force at the instants of a set of waves (n_coefficients,
+   !> n_time), by the tangential and the normal prediction; and whether the pair bears there.
+   pure subroutine rows_at(self, n_retained, harmonic, column, waves, by_tangential, by_normal, &
+                           bears)
+      class(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      real(wp), intent(in) :: waves(:, :)
+      real(wp), intent(out) :: by_tangential(:, :), by_normal(:, :)
+      logical, intent(out) :: bears(:)
+      real(wp) :: angle
+      integer :: j, k, last
+
+      by_tangential = 0.0_wp
+      by_normal = 0.0_wp
+      j = 1
+      last = 0
+      do k = 1, size(waves, 2)
+         angle = 2.0_wp*pi*real(k - 1, wp)/real(size(waves, 2), wp)
+         call advance(self%path, angle, j)
+         bears(k) = self%path%phase(j) /= phase_open
+         if (.not. self%rubs) cycle
+         select case (self%path%phase(j))
+         case (phase_stick)
+            by_tangential(:, k) = waves(:, k)
+            if (.not. self%path%set(j)) cycle
+            if (j /= last) call waves_at_origin(self, j, n_retained, harmonic, column)
+            last = j
+            by_tangential(:, k) = by_tangential(:, k) - self%origin
+            by_normal(:, k) = (self%curves%mu*self%path%weight(j))*self%origin
+         case (phase_forward)
+            by_normal(:, k) = -self%curves%mu*waves(:, k)
+         case (phase_backward)
+            by_normal(:, k) = self%curves%mu*waves(:, k)
+         end select
+      end do
+   end subroutine rows_at
+
+   !> int N |dx| over the period, x the corrected position in units of force: what wears. At
+   !> velocity level x moves by P - T for each radian.
+   real(wp) function friction_path(self) result(path)
+      class(event_pair_type), intent(inout) :: self
+      integer :: j
+
+      path = 0.0_wp
+      if (.not. self%rubs) return
+      do j = 1, self%path%n_segments
+         if (all(self%path%phase(j) /= [phase_forward, phase_backward])) cycle
+         call integrate_segment(self, j)
+         associate (c => self%curves)
+            if (self%remembers .and. self%path%phase(j) == phase_forward) then
+               path = path + self%one%pairing(c%normal, c%lower_slope)
+            else if (self%remembers) then
+               path = path - self%one%pairing(c%normal, c%upper_slope)
+            else if (self%path%phase(j) == phase_forward) then
+               path = path + self%one%pairing(c%normal, c%lower)
+            else
+               path = path - self%one%pairing(c%normal, c%upper)
+            end if
+         end associate
+      end do
+   end function friction_path
+
+   !> Share of the period in stick, slip and open.
+   pure function shares(self)
+      class(event_pair_type), intent(in) :: self
+      real(wp) :: shares(3)
+      real(wp) :: length
+      integer :: j
+
+      shares = 0.0_wp
+      do j = 1, self%path%n_segments
+         length = (self%path%angle(j + 1) - self%path%angle(j))/(2.0_wp*pi)
+         select case (self%path%phase(j))
+         case (phase_stick)
+            shares(1) = shares(1) + length
+         case (phase_open)
+            shares(3) = shares(3) + length
+         case default
+            shares(2) = shares(2) + length
+         end select
+      end do
+   end function shares
+
+end module fw_event_pair
