@@ -4,6 +4,10 @@ Modules
 -------
 fretwear.result
     Result files.
+fretwear.importer
+    Models of other programs.
+fretwear.reduction
+    Reduction of sparse models on relative displacements.
 fretwear.sector
     Generator of the reduced bladed-disk sector with a dovetail root.
 fretwear.plots

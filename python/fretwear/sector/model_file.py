@@ -1,13 +1,12 @@
 """Model file (HDF5, format_version 1) of a reduced sector.
 
 The contact coordinates are degrees of freedom of the reduced model: side_1 holds their numbers
-and side_2 is the ground. Strings have fixed length, which Fortran reads without pointers.
+and side_2 is the ground.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..model_file import strings, write_model_file
 from .model import ReducedModel
 from .parameters import Discretisation, Geometry, Material, SectorParameters
 
 __all__ = ["read_parameters", "write_model"]
 
-FORMAT, FORMAT_VERSION, UNIT_SYSTEM = "fretwear-model", 1, "mm-tonne-s-N"
+UNIT_SYSTEM = "mm-tonne-s-N"
 
 
 def write_model(model: ReducedModel, path: str | Path, title: str | None = None) -> None:
@@ -36,18 +36,10 @@ def write_model(model: ReducedModel, path: str | Path, title: str | None = None)
     title : str, optional
         Title attribute.
     """
-    path = Path(path)
-    partial = path.with_name(path.name + ".part")
-    try:
-        with h5py.File(partial, "w") as file:
-            _write_attributes(file, model, title)
-            for name, data in _datasets(model).items():
-                # Filters pay for themselves on matrices only.
-                packed = {"compression": "gzip", "compression_opts": 9, "shuffle": True}
-                file.create_dataset(name, data=data, **(packed if data.size > 10_000 else {}))
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    default = f"Bladed-disk sector with a dovetail root, {model.n_pairs} contact pairs"
+    # The parameters are not part of the format; they make the file reproducible.
+    write_model_file(path, _datasets(model), title=title or default, unit_system=UNIT_SYSTEM,
+                     attributes={"parameters": json.dumps(asdict(model.parameters))})
 
 
 def read_parameters(path: str | Path) -> SectorParameters:
@@ -59,16 +51,6 @@ def read_parameters(path: str | Path) -> SectorParameters:
         groups = json.loads(bytes(file.attrs["parameters"]))
     return SectorParameters(Geometry(**groups["geometry"]), Material(**groups["material"]),
                             Discretisation(**groups["discretisation"]))
-
-
-def _write_attributes(file: h5py.File, model: ReducedModel, title: str | None) -> None:
-    default = f"Bladed-disk sector with a dovetail root, {model.n_pairs} contact pairs"
-    file.attrs["format"] = np.bytes_(FORMAT)
-    file.attrs["format_version"] = np.int32(FORMAT_VERSION)
-    file.attrs["title"] = np.bytes_((title or default).encode())
-    file.attrs["unit_system"] = np.bytes_(UNIT_SYSTEM)
-    # Not part of the format; makes the file reproducible.
-    file.attrs["parameters"] = np.bytes_(json.dumps(asdict(model.parameters)).encode())
 
 
 def _datasets(model: ReducedModel) -> dict[str, NDArray[Any]]:
@@ -84,15 +66,11 @@ def _datasets(model: ReducedModel) -> dict[str, NDArray[Any]]:
         "contact/gap": np.zeros(n_pairs),
         "contact/area": model.area,
         "contact/position": model.position,
-        "contact/patch": _strings(model.patch),
+        "contact/patch": strings(model.patch),
         "load/static": np.zeros(n),
         "load/cosine": model.cosine,
         "load/sine": np.zeros(n),
         "load/static_rotation": model.static_rotation,
-        "observe/name": _strings(model.observe_name),
+        "observe/name": strings(model.observe_name),
         "observe/matrix": model.observe_matrix,
     }
-
-
-def _strings(values: Iterable[str]) -> NDArray[np.bytes_]:
-    return np.array([value.encode("ascii") for value in values])

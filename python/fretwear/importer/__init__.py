@@ -1,0 +1,101 @@
+"""Models of other programs: ``fretwear import`` reads matrices, pairs and loads, checks them,
+reduces them if wanted, and writes a model file."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from ..errors import InputError, OutputError
+from .build import ROLES, FullModel, Source, drop, gather, model_datasets, save
+from .checks import Finding, check_model
+from .labels import Dofs, read_label_table
+from .matrices import FORMATS, MatrixFile, read_matrices
+from .tables import Pairs, contact_rows, read_loads, read_pairs
+
+__all__ = ["FORMATS", "Dofs", "Finding", "FullModel", "MatrixFile", "Pairs", "Source",
+           "add_arguments", "check_model", "contact_rows", "drop", "gather", "main",
+           "model_datasets", "read_label_table", "read_loads", "read_matrices", "read_pairs",
+           "save"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the subcommand."""
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE",
+                        help="files searched for mass, stiffness and damping by the usual names")
+    parser.add_argument("-o", "--output", type=Path, metavar="MODEL.h5", help="model file to write")
+    parser.add_argument("--check", action="store_true",
+                        help="read and check, say what is found, write nothing")
+    for role in ROLES:
+        parser.add_argument("--" + role.replace("_", "-"), metavar="FILE[#NAME]",
+                            type=Source.of, help=f"{role.replace('_', ' ')} matrix")
+    parser.add_argument("--format", choices=sorted(FORMATS), help="of all files; else found out")
+    parser.add_argument("--mirror", action="store_true",
+                        help="a matrix with one triangle only is symmetric")
+    parser.add_argument("--mass-factor", type=float, default=1.0, metavar="X",
+                        help="multiplies the mass, such as 1e-3 from kg to tonnes")
+    parser.add_argument("--labels", type=Path, metavar="TABLE",
+                        help="equation, node and component of every degree of freedom")
+    parser.add_argument("--drop-empty", action="store_true",
+                        help="leave out degrees of freedom without mass and stiffness")
+    parser.add_argument("--pairs", type=Path, metavar="TABLE", help="contact pairs")
+    parser.add_argument("--loads", type=Path, metavar="TABLE", help="loads by degree of freedom")
+    parser.add_argument("--observe", action="append", default=[], metavar="NAME=DOF",
+                        help="observed degree of freedom: number or node:component; repeatable")
+    parser.add_argument("--reduce", type=int, metavar="N_MODES",
+                        help="reduce to relative displacements and so many bonded modes")
+    parser.add_argument("--title", default="", help="title of the model")
+    parser.add_argument("--unit-system", default="", metavar="TEXT",
+                        help="such as mm-tonne-s-N or m-kg-s-N; with one of these two, sizes are "
+                             "checked too")
+    parser.add_argument("-q", "--quiet", action="store_true", help="errors and warnings only")
+
+
+def main(options: argparse.Namespace) -> int:
+    """Import a model as told by the command line; returns the exit status."""
+    if not options.check:
+        if options.output is None:
+            raise InputError("nothing to write: give -o MODEL.h5, or --check")
+        if not options.output.absolute().parent.is_dir():
+            raise OutputError(f"no folder to write {options.output} into")
+    model = _read(options)
+    found = [Finding("note", "files", note) for note in model.notes] + check_model(model)
+    wrong = [finding for finding in found if finding.kind == "error"]
+    if not wrong and options.check and options.reduce is not None:
+        model_datasets(model, options.reduce)  # says what a reduction would refuse
+    for finding in found:
+        if finding.kind == "warning" or (finding.kind == "note" and not options.quiet):
+            print(finding, file=sys.stdout if options.check else sys.stderr)
+    if wrong:
+        raise InputError("\n".join(f"{finding.where}: {finding.text}" for finding in wrong))
+    if options.check:
+        print(f"no errors in {model.dofs.n} degrees of freedom, "
+              f"{0 if model.pairs is None else len(model.pairs)} pairs")
+        return 0
+    for finding in save(model, options.output, options.reduce):
+        if finding.kind == "warning" or not options.quiet:
+            print(finding, file=sys.stderr)
+    return 0
+
+
+def _read(options: argparse.Namespace) -> FullModel:
+    sources = {role: getattr(options, role) for role in ROLES
+               if getattr(options, role) is not None}
+    labels = None if options.labels is None else read_label_table(options.labels)
+    model = gather(sources, options.files, format=options.format, mirror=options.mirror,
+                   mass_factor=options.mass_factor, labels=labels)
+    model = drop(model, empty=options.drop_empty)
+    observe = {}
+    for text in options.observe:
+        name, equals, dof = text.rpartition("=")
+        if not equals or not name:
+            raise InputError(f"--observe {text}: expected NAME=DOF")
+        observe[name] = model.dofs.signed(dof, f"--observe {text}")
+        if observe[name] == 0:
+            raise InputError(f"--observe {text}: the ground does not move")
+    return replace(
+        model, observe=observe, title=options.title, unit_system=options.unit_system,
+        pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs),
+        loads={} if options.loads is None else read_loads(options.loads, model.dofs))

@@ -1,0 +1,288 @@
+"""From files to a model file: read, check, reduce, write."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..model_file import strings, write_model_file
+from ..reduction import reduce
+from .checks import Finding
+from .labels import Dofs
+from .matrices import HELD, MatrixFile, mirrored, one_triangle, read_matrices
+from .tables import LOADS, Pairs, contact_rows
+
+__all__ = ["ROLES", "FullModel", "Source", "drop", "gather", "model_datasets", "save"]
+
+Floats = NDArray[np.float64]
+
+#: Matrices of a model file and the names (lower case) under which programs write them.
+ROLES = {
+    "mass": ("mass", "m", "mgg", "maa", "mxx", "maax", "mmat", "mass_matrix"),
+    "stiffness": ("stiffness", "k", "kgg", "kaa", "kxx", "kaax", "kmat", "stif",
+                  "stiffness_matrix"),
+    "damping": ("damping", "c", "b", "bgg", "baa", "bxx", "baax", "viscous_damping",
+                "damping_matrix"),
+    "stiffness_rotation": ("stiffness_rotation",),
+}
+# fw_run works with full matrices.
+_LARGE = 3000
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a matrix is: a file, and its name there if the file has several."""
+
+    path: Path
+    name: str | None = None
+
+    @classmethod
+    def of(cls, text: str) -> Source:
+        """From FILE or FILE#NAME."""
+        path, _, name = text.partition("#")
+        return cls(Path(path), name.lower() or None)
+
+
+@dataclass(frozen=True)
+class FullModel:
+    """Matrices, loads, pairs and observed quantities, before any reduction.
+
+    Attributes
+    ----------
+    matrices : dict of str to (n, n) sparse array
+        'mass' and 'stiffness', perhaps 'damping' and 'stiffness_rotation'.
+    dofs : Dofs
+        Their degrees of freedom.
+    pairs : Pairs or None
+        Contact pairs.
+    loads : dict of str to (n,)
+        'static', 'cosine', 'sine', 'static_rotation'.
+    observe : dict of str to int
+        Signed numbers of observed degrees of freedom by name.
+    title, unit_system : str
+        Attributes of the model file.
+    notes : list of str
+        What was done on the way.
+    """
+
+    matrices: dict[str, sp.csr_array]
+    dofs: Dofs
+    pairs: Pairs | None = None
+    loads: dict[str, Floats] = field(default_factory=dict)
+    observe: dict[str, int] = field(default_factory=dict)
+    title: str = ""
+    unit_system: str = ""
+    notes: list[str] = field(default_factory=list)
+
+
+def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
+           format: str | None = None, mirror: bool = False, mass_factor: float = 1.0,
+           labels: Sequence[tuple[int, int]] | None = None) -> FullModel:
+    """Read the matrices of a model.
+
+    Parameters
+    ----------
+    sources : mapping of role to Source
+        Roles as in `ROLES`.
+    files : sequence of Path
+        Files that are searched for the roles without a source, by the usual names.
+    format : str, optional
+        Format of all files.
+    mirror : bool
+        Whether a matrix with one triangle only is meant to be symmetric.
+    mass_factor : float
+        Multiplies the mass, such as 1e-3 from kg to tonnes.
+    labels : sequence of (node, component), optional
+        Of the rows, where the files have none.
+    """
+    cache: dict[Path, MatrixFile] = {}
+
+    def read(path: Path) -> MatrixFile:
+        if path not in cache:
+            cache[path] = read_matrices(path, format)
+        return cache[path]
+
+    found: dict[str, tuple[sp.csr_array, list[tuple[int, int]] | None]] = {}
+    for role in ROLES:
+        if role in sources:
+            matrix_file = read(sources[role].path)
+            found[role] = _pick(matrix_file, sources[role].name, role), matrix_file.labels
+            continue
+        for path in files:
+            matrix_file = read(path)
+            name = next((name for name in ROLES[role] if name in matrix_file.matrices), None)
+            if name is not None:
+                found[role] = matrix_file.matrices[name], matrix_file.labels
+                break
+    for role in ("mass", "stiffness"):
+        if role not in found:
+            names = [f"{path}: {', '.join(read(path).matrices)}" for path in files]
+            raise InputError(f"no {role} matrix: give --{role} FILE or FILE#NAME"
+                             + (f"; there are {'; '.join(names)}" if names else ""))
+    dofs, matrices = _align(found, labels)
+    for role, matrix in matrices.items():
+        if mirror and one_triangle(matrix):
+            matrices[role] = mirrored(matrix)
+    matrices["mass"] = matrices["mass"] * mass_factor
+    return FullModel(matrices, dofs, notes=[note for file in cache.values()
+                                            for note in file.notes])
+
+
+def _pick(file: MatrixFile, name: str | None, role: str) -> sp.csr_array:
+    """The matrix of that name, or the only one, or the one with a usual name."""
+    names = list(file.matrices)
+    if name is None:
+        usual = [known for known in ROLES[role] if known in names]
+        if len(names) > 1 and not usual:
+            raise InputError(f"{file.path}: holds {', '.join(names)}; say which is the {role} "
+                             f"with {file.path}#NAME")
+        name = names[0] if len(names) == 1 else usual[0]
+    if name not in names:
+        raise InputError(f"{file.path}: holds no matrix '{name}'; there are {', '.join(names)}")
+    return file.matrices[name]
+
+
+def _align(found: Mapping[str, tuple[sp.csr_array, list[tuple[int, int]] | None]],
+           given: Sequence[tuple[int, int]] | None) -> tuple[Dofs, dict[str, sp.csr_array]]:
+    """The matrices on common degrees of freedom: by their labels where they have them."""
+    for role, (matrix, _) in found.items():
+        if matrix.shape[0] != matrix.shape[1]:
+            raise InputError(f"{role} is {matrix.shape[0]} x {matrix.shape[1]}; expected a "
+                             "square matrix")
+    if all(labels is not None for _, labels in found.values()):
+        union = sorted({label for _, labels in found.values() for label in labels or ()})
+        lists = [labels for _, labels in found.values()]
+        if all(labels == lists[0] for labels in lists):
+            union = list(lists[0] or ())  # the order of the file
+        place = {label: i for i, label in enumerate(union)}
+        matrices = {}
+        for role, (matrix, labels) in found.items():
+            number = np.array([place[label] for label in labels or ()])
+            part = sp.coo_array(matrix)
+            matrices[role] = sp.csr_array((part.data, (number[part.row], number[part.col])),
+                                          (len(union),) * 2)
+        return Dofs(len(union), union), matrices
+    sizes = {role: matrix.shape[0] for role, (matrix, _) in found.items()}
+    if len(set(sizes.values())) > 1:
+        raise InputError("the matrices do not have one size: "
+                         + ", ".join(f"{role} {size}" for role, size in sizes.items()))
+    n = next(iter(sizes.values()))
+    known = given or next((labels for _, labels in found.values() if labels is not None), None)
+    if known is not None and len(known) != n:
+        raise InputError(f"{len(known)} labels for {n} degrees of freedom")
+    return Dofs(n, known), {role: matrix for role, (matrix, _) in found.items()}
+
+
+def drop(model: FullModel, *, empty: bool) -> FullModel:
+    """Leave out held degrees of freedom, and those without mass and stiffness if `empty`.
+
+    A held one is the ground wherever its node is named; plain numbers count what is left.
+    """
+    stiffness = model.matrices["stiffness"]
+    held = stiffness.diagonal() >= HELD
+    size = abs(stiffness).sum(axis=1) + abs(model.matrices["mass"]).sum(axis=1)
+    out = held | ((size == 0.0) if empty else np.zeros(model.dofs.n, dtype=bool))
+    if not out.any():
+        return model
+    kept = np.flatnonzero(~out)
+    labels = model.dofs.labels
+    return replace(
+        model, matrices={role: sp.csr_array(matrix[kept][:, kept])
+                         for role, matrix in model.matrices.items()},
+        dofs=Dofs(len(kept), None if labels is None else [labels[k] for k in kept],
+                  held=() if labels is None else [labels[k] for k in np.flatnonzero(held)]),
+        notes=[*model.notes, f"{int(held.sum())} held and {int((out & ~held).sum())} empty "
+               f"degrees of freedom are left out; {len(kept)} remain"])
+
+
+def model_datasets(model: FullModel, n_modes: int | None) -> dict[str, NDArray[Any]]:
+    """Datasets of the model file by name.
+
+    Parameters
+    ----------
+    model : FullModel
+        The model, checked.
+    n_modes : int or None
+        Reduce to the contact coordinates, so many bonded modes and the attachment vectors of
+        the loads; None: leave the degrees of freedom as they are.
+    """
+    symmetric = {role: (matrix + matrix.T) * 0.5 for role, matrix in model.matrices.items()}
+    observed = _observed(model)
+    if n_modes is None:
+        if model.pairs is not None and model.pairs.rows is not None:
+            raise InputError("pairs given by nodes and normals are no degrees of freedom of the "
+                             "matrices; reduce the model with --reduce N_MODES")
+        data: dict[str, NDArray[Any]] = {role: matrix.toarray()
+                                         for role, matrix in symmetric.items()}
+        data.update({f"load/{name}": load for name, load in model.loads.items()})
+        if model.pairs is not None:
+            data["contact/side_1"], data["contact/side_2"] = model.pairs.side_1, model.pairs.side_2
+    else:
+        data = _reduced(model, symmetric, n_modes)
+        basis = data.pop("basis")
+        observed = np.asarray(observed @ basis)
+    if model.pairs is not None:
+        data.update(_pair_values(model.pairs))
+    if model.observe:
+        data["observe/name"] = strings(model.observe)
+        data["observe/matrix"] = observed if n_modes is not None else observed.toarray()
+    return data
+
+
+def _reduced(model: FullModel, matrices: dict[str, sp.csr_array],
+             n_modes: int) -> dict[str, NDArray[Any]]:
+    if model.pairs is None:
+        raise InputError("--reduce needs contact pairs (--pairs): the reduction keeps their "
+                         "relative displacements")
+    rows, number = contact_rows(model.pairs, model.dofs.n)
+    loads = np.column_stack([model.loads[name] for name in model.loads] or
+                            [np.zeros(model.dofs.n)])
+    attached = np.column_stack((loads, _observed(model).toarray().T))
+    system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
+                    damping=matrices.get("damping"), attachments=attached)
+    data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
+    if system.damping is not None:
+        data["damping"] = system.damping
+    if "stiffness_rotation" in matrices:
+        data["stiffness_rotation"] = system.reduction.matrix(matrices["stiffness_rotation"])
+    data.update({f"load/{name}": system.loads[:, k] for k, name in enumerate(model.loads)})
+    data["contact/side_1"] = number.astype(np.int32)
+    data["contact/side_2"] = np.zeros_like(data["contact/side_1"])
+    data["basis"] = system.reduction.basis
+    return data
+
+
+def _observed(model: FullModel) -> sp.csr_array:
+    """Rows of the observed degrees of freedom (n_observed, n)."""
+    signed = np.array(list(model.observe.values()), dtype=int)
+    return sp.csr_array((np.sign(signed).astype(float),
+                         (np.arange(len(signed)), np.abs(signed) - 1)),
+                        (len(signed), model.dofs.n))
+
+
+def _pair_values(pairs: Pairs) -> dict[str, NDArray[Any]]:
+    values = {"mu": pairs.mu, "gap": pairs.gap, "area": pairs.area, "position": pairs.position,
+              "patch": None if pairs.patch is None else strings(pairs.patch)}
+    return {f"contact/{name}": value for name, value in values.items() if value is not None}
+
+
+def save(model: FullModel, path: str | Path, n_modes: int | None = None) -> list[Finding]:
+    """Write the model file of a checked model; returns what is to be known about it."""
+    data = model_datasets(model, n_modes)
+    write_model_file(path, data, title=model.title or Path(path).stem,
+                     unit_system=model.unit_system)
+    n = len(data["mass"])
+    found = [Finding("note", str(path), f"{n} degrees of freedom, "
+                     f"{0 if model.pairs is None else len(model.pairs)} pairs, loads "
+                     + (", ".join(name for name in LOADS if name in model.loads) or "none"))]
+    if n > _LARGE:
+        found.append(Finding("warning", str(path), f"fw_run works with full matrices of {n} x {n}; "
+                             "reduce the model with --reduce N_MODES"))
+    return found

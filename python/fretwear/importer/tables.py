@@ -1,0 +1,249 @@
+"""Small tables with a heading: contact pairs and loads, separated by commas, semicolons or tabs."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import InputError, OutputError
+from .labels import Dofs
+
+__all__ = ["LOADS", "Pairs", "contact_rows", "read_loads", "read_pairs"]
+
+Floats = NDArray[np.float64]
+
+DIRECTIONS = ("t1", "t2", "n")
+#: Loads of a model file; the last per square of the rotation speed.
+LOADS = ("static", "cosine", "sine", "static_rotation")
+_SIDES = [f"side_{side}_{direction}" for side in (1, 2) for direction in DIRECTIONS]
+_NODES = ["node_1", "node_2"]
+_NORMAL, _TANGENT = ["nx", "ny", "nz"], ["t1x", "t1y", "t1z"]
+_POSITION = ["x", "y", "z"]
+_VALUES = ["mu", "gap", "area"]
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Contact pairs of a table.
+
+    Attributes
+    ----------
+    side_1, side_2 : (n_pairs, 3) int
+        Signed dof numbers (from 1) of t1, t2 and n; 0 for none or the ground.
+    rows : (n_rows, n) sparse array or None
+        Relative displacements of pairs given by nodes and normals; their side_1 counts these rows.
+    mu, gap, area : (n_pairs,) or None
+        Where the table has them; area [L^2], gap [L].
+    position : (n_pairs, 3) or None
+        [L].
+    patch : list of str or None
+        Names.
+    where : list of str
+        Line of the table, for messages.
+    """
+
+    side_1: NDArray[np.int32]
+    side_2: NDArray[np.int32]
+    rows: sp.csr_array | None
+    mu: Floats | None
+    gap: Floats | None
+    area: Floats | None
+    position: Floats | None
+    patch: list[str] | None
+    where: list[str]
+
+    def __len__(self) -> int:
+        return len(self.where)
+
+
+@dataclass(frozen=True)
+class _Table:
+    path: Path
+    columns: list[str]
+    lines: list[dict[str, str]]
+    where: list[str]
+
+    def has(self, names: Sequence[str]) -> bool:
+        return all(name in self.columns for name in names)
+
+    def numbers(self, name: str) -> Floats | None:
+        """A column of finite numbers; None where there is none."""
+        if name not in self.columns:
+            return None
+        values = []
+        for line, where in zip(self.lines, self.where):
+            try:
+                value = float(line[name])
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value):
+                raise InputError(f"{where}, column {name}: '{line[name]}' is not a finite number")
+            values.append(value)
+        return np.array(values)
+
+    def vectors(self, names: Sequence[str]) -> Floats | None:
+        """Columns side by side, all or none of them there."""
+        if not any(name in self.columns for name in names):
+            return None
+        missing = [name for name in names if name not in self.columns]
+        if missing:
+            raise InputError(f"{self.path}: column {missing[0]} is missing beside "
+                             + ", ".join(name for name in names if name in self.columns))
+        columns = [self.numbers(name) for name in names]
+        return np.column_stack([column for column in columns if column is not None])
+
+
+def read_pairs(path: str | Path, dofs: Dofs) -> Pairs:
+    """Read contact pairs.
+
+    Parameters
+    ----------
+    path : str or Path
+        Table with a heading. Either columns side_1_t1 ... side_2_n with signed degrees of
+        freedom (numbers, node:component, empty or 0 for none), or node_1, node_2 (0 for the
+        ground) with the normal nx, ny, nz from side 2 to side 1 and, if wanted, the first
+        tangent t1x, t1y, t1z. Then any of mu, gap, area, x, y, z, patch. Lines that start with
+        # are comments.
+    dofs : Dofs
+        Degrees of freedom of the matrices.
+
+    Raises
+    ------
+    InputError
+        A column is not known or missing, or a value is wrong; the message names the line.
+    """
+    table = _read_table(Path(path), [*_SIDES, *_NODES, *_NORMAL, *_TANGENT, *_POSITION, *_VALUES,
+                                     "patch"])
+    if table.has(_NODES) and table.has(_NORMAL):
+        side_1, rows = _rows_of_nodes(table, dofs)
+        side_2 = np.zeros_like(side_1)
+    elif any(name in table.columns for name in _SIDES):
+        side_1, side_2 = (_sides(table, dofs, side) for side in (1, 2))
+        rows = None
+    else:
+        raise InputError(f"{path}: names no sides; expected columns side_1_t1 ... side_2_n, or "
+                         "node_1, node_2, nx, ny, nz")
+    mu, gap, area = (table.numbers(name) for name in _VALUES)
+    patch = [line["patch"] for line in table.lines] if "patch" in table.columns else None
+    return Pairs(side_1, side_2, rows, mu, gap, area, table.vectors(_POSITION), patch, table.where)
+
+
+def contact_rows(pairs: Pairs, n: int) -> tuple[sp.csr_array, NDArray[np.int32]]:
+    """Relative displacements u_side1 - u_side2 as rows of B, and their numbers by pair.
+
+    Returns
+    -------
+    rows : (n_rows, n) sparse array
+        One for every direction that a pair has.
+    number : (n_pairs, 3) int
+        Row (from 1) of t1, t2 and n; 0 where the pair has no such direction.
+    """
+    if pairs.rows is not None:
+        return pairs.rows, pairs.side_1
+    number = np.zeros_like(pairs.side_1)
+    there = (pairs.side_1 != 0) | (pairs.side_2 != 0)
+    number[there] = np.arange(1, there.sum() + 1)
+    entries: list[tuple[int, int, float]] = []
+    for sides, factor in ((pairs.side_1, 1.0), (pairs.side_2, -1.0)):
+        entries += [(int(row) - 1, abs(int(dof)) - 1, factor * math.copysign(1.0, dof))
+                    for row, dof in zip(number[there], sides[there]) if dof != 0]
+    row, column, value = (np.array(part) for part in zip(*entries))
+    return sp.csr_array((value, (row.astype(int), column.astype(int))),
+                        (int(there.sum()), n)), number
+
+
+def read_loads(path: str | Path, dofs: Dofs) -> dict[str, Floats]:
+    """Loads (n) by name from a table with the columns dof and some of `LOADS`; lines add up."""
+    table = _read_table(Path(path), ["dof", *LOADS])
+    names = [name for name in LOADS if name in table.columns]
+    if "dof" not in table.columns or not names:
+        raise InputError(f"{path}: expected the column dof and at least one of "
+                         + ", ".join(LOADS))
+    loads = {}
+    for name in names:
+        values = table.numbers(name)
+        assert values is not None
+        loads[name] = np.zeros(dofs.n)
+        for line, where, value in zip(table.lines, table.where, values):
+            dof = dofs.signed(line["dof"], f"{where}, column dof")
+            if dof == 0:
+                raise InputError(f"{where}, column dof: a load needs a degree of freedom")
+            loads[name][abs(dof) - 1] += math.copysign(1.0, dof) * value
+    return loads
+
+
+def _read_table(path: Path, known: Sequence[str]) -> _Table:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read: {error.strerror}") from None
+    numbered = [(k, line) for k, line in enumerate(text.splitlines(), 1)
+                if line.strip() and not line.lstrip().startswith("#")]
+    if len(numbered) < 2:
+        raise InputError(f"{path}: expected a heading and at least one line")
+    heading = numbered[0][1]
+    separator = next((mark for mark in "\t;," if mark in heading), ",")
+    rows = list(csv.reader((line for _, line in numbered), delimiter=separator))
+    columns = [name.strip().lower() for name in rows[0]]
+    for name in columns:
+        if name not in known:
+            raise InputError(f"{path}: column '{name}' is not known; expected some of "
+                             + ", ".join(known))
+        if columns.count(name) > 1:
+            raise InputError(f"{path}: column {name} is there twice")
+    lines, where = [], []
+    for (number, _), row in zip(numbered[1:], rows[1:]):
+        where.append(f"{path}, line {number}")
+        if len(row) != len(columns):
+            raise InputError(f"{where[-1]}: has {len(row)} values; expected {len(columns)}, one "
+                             "per column")
+        lines.append({name: value.strip() for name, value in zip(columns, row)})
+    return _Table(path, columns, lines, where)
+
+
+def _sides(table: _Table, dofs: Dofs, side: int) -> NDArray[np.int32]:
+    names = [f"side_{side}_{direction}" for direction in DIRECTIONS]
+    return np.array([[dofs.signed(line.get(name, ""), f"{where}, column {name}")
+                      for name in names]
+                     for line, where in zip(table.lines, table.where)], dtype=np.int32)
+
+
+def _rows_of_nodes(table: _Table, dofs: Dofs) -> tuple[NDArray[np.int32], sp.csr_array]:
+    """Rows of B in the frames of the pairs, and their numbers by pair (n_pairs, 3)."""
+    normals, tangents = table.vectors(_NORMAL), table.vectors(_TANGENT)
+    assert normals is not None
+    blocks = []
+    for k, (line, where) in enumerate(zip(table.lines, table.where)):
+        frame = _frame(normals[k], None if tangents is None else tangents[k], where)
+        block = np.zeros((3, dofs.n))
+        for name, factor in (("node_1", 1.0), ("node_2", -1.0)):
+            if line[name] in ("", "0"):
+                continue
+            columns = [dofs.signed(f"{line[name]}:{component}", f"{where}, column {name}") - 1
+                       for component in (1, 2, 3)]
+            block[:, columns] += factor * frame
+        blocks.append(sp.csr_array(block))
+    number = np.arange(1, 3 * len(blocks) + 1, dtype=np.int32).reshape(-1, 3)
+    return number, sp.csr_array(sp.vstack(blocks))
+
+
+def _frame(normal: Floats, tangent: Floats | None, where: str) -> Floats:
+    """Rows t1, t2 = n x t1, n; t1 as given, made normal to n, or the nearest global axis."""
+    length = np.linalg.norm(normal)
+    if length == 0.0:
+        raise InputError(f"{where}: the normal is zero")
+    n = normal / length
+    if tangent is None:
+        tangent = np.eye(3)[np.abs(n).argmin()]
+    t1 = tangent - (tangent @ n) * n
+    if np.linalg.norm(t1) < 1e-6 * np.linalg.norm(tangent) or not tangent.any():
+        raise InputError(f"{where}: the tangent is zero or along the normal")
+    t1 /= np.linalg.norm(t1)
+    return np.stack((t1, np.cross(n, t1), n))
