@@ -1,21 +1,39 @@
 """Fretwear: vibration with contact, friction and fretting wear by harmonic balance.
 
+    import fretwear as fw
+    result = fw.frf("sector.h5", 1017, 1029, 121, unit="Hz", load={"harmonic_scale": 0.5})
+
 Modules
 -------
+fretwear.model, fretwear.case, fretwear.settings
+    The structure, and what is to be computed.
+fretwear.analyses
+    Runs of the library in this process.
 fretwear.result
     Result files.
 fretwear.importer
     Models of other programs.
 fretwear.reduction
     Reduction of sparse models on relative displacements.
+fretwear.operators
+    Operators of the library: harmonics, dynamic stiffness, condensation, contact forces.
+fretwear.errors
+    Errors.
 fretwear.sector
     Generator of the reduced bladed-disk sector with a dovetail root.
-fretwear.plots
-    Pictures of result files.
 fretwear.cli
     The command `fretwear`.
 """
 
+from pkgutil import extend_path
+
+# In a build tree the compiled part lies in a directory of its own.
+__path__ = extend_path(__path__, __name__)
+
+__version__: str = "0.1.0"
+
+from .analyses import frf, run, wear
+from .case import Case
 from .errors import (
     ConvergenceError,
     FretwearError,
@@ -23,8 +41,8 @@ from .errors import (
     OutputError,
     RunInterrupted,
 )
+from .model import ContactPairs, Model, Spring
+from .result import Result
 
-__all__ = ["ConvergenceError", "FretwearError", "InputError", "OutputError", "RunInterrupted",
-           "__version__"]
-
-__version__: str = "0.1.0"
+__all__ = ["Case", "ContactPairs", "ConvergenceError", "FretwearError", "InputError", "Model",
+           "OutputError", "Result", "RunInterrupted", "Spring", "__version__", "frf", "run", "wear"]

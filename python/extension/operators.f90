@@ -1,0 +1,77 @@
+!> Core operators for post-processing, with plain arrays: what the wrapper for Python calls.
+module fw_python_operators
+   use fw_condensation, only: condensation_type
+   use fw_condensation, only: new_condensation
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_forces, only: forces_type
+   use fw_forces, only: pair_mixed
+   use fw_forces, only: pair_stuck
+   use fw_kinds, only: wp
+   use fw_model, only: model_type
+   use fw_relative, only: relative_type
+   use fw_relative, only: new_relative
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: build_condensation, unpack_jacobian
+
+contains
+
+   !> Condense a structure to the relative displacements u(side_1) - u(side_2) at one frequency.
+   subroutine build_condensation(model, side_1, side_2, harmonic, omega, structure, error)
+      type(model_type), intent(in) :: model
+      !> Signed dof numbers, 0 for ground (n_rows).
+      integer, intent(in) :: side_1(:), side_2(:)
+      !> Harmonics (n_harmonics).
+      integer, intent(in) :: harmonic(:)
+      !> [rad/s]
+      real(wp), intent(in) :: omega
+      type(condensation_type), intent(out) :: structure
+      !> Raised where the rows depend on each other, and at a pole of the condensed stiffness.
+      type(error_type), allocatable, intent(out) :: error
+      type(relative_type) :: relative
+      integer :: dependent
+
+      call new_relative(model%n_dof, side_1, side_2, relative)
+      dependent = findloc(relative%independent, .false., dim=1)
+      if (dependent > 0) then
+         call fatal_error(error, 'row '//to_text(dependent)//' of side_1 and side_2 follows '// &
+                          'from the rows before it: remove it', status_input)
+         return
+      end if
+      call new_condensation(model, relative, harmonic, [omega, omega], structure, error)
+      if (allocated(error)) return
+      if (structure%n_coordinates > size(side_1)) then
+         call fatal_error(error, 'omega = '//to_text(omega)//' rad/s: one of the harmonics is '// &
+                          'an undamped natural frequency of the structure with the rows held, '// &
+                          'where the condensed stiffness is infinite; give damping, or shift '// &
+                          'omega', status_input)
+         return
+      end if
+      call structure%update(omega, error)
+   end subroutine build_condensation
+
+   !> Derivative of the force coefficients by those of the prediction, pair by pair, with nothing
+   !> left out: (coefficient, component) of the prediction, then of the force, pair.
+   subroutine unpack_jacobian(contact, n_coefficients, jacobian)
+      type(forces_type), intent(in) :: contact
+      integer, intent(in) :: n_coefficients
+      real(wp), intent(out) :: jacobian(3*n_coefficients, 3*n_coefficients, contact%n_pairs)
+      integer :: i, k
+
+      jacobian = 0.0_wp
+      do i = 1, contact%n_pairs
+         if (contact%state(i) == pair_stuck) then
+            do k = 1, 3*n_coefficients
+               if (contact%present((k - 1)/n_coefficients + 1, i)) jacobian(k, k, i) = 1.0_wp
+            end do
+         else if (contact%state(i) == pair_mixed) then
+            jacobian(:, :, i) = contact%jacobian(:, :, i)
+         end if
+      end do
+   end subroutine unpack_jacobian
+
+end module fw_python_operators

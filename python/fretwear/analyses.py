@@ -1,0 +1,273 @@
+"""Runs of the library in this process."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import tempfile
+import threading
+import weakref
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._native import NOT_CONVERGED, STOPPED, Session, raise_status
+from .case import Case, ModelLike
+from .errors import ConvergenceError, InputError, RunInterrupted
+from .result import Result
+
+if TYPE_CHECKING:
+    import sys
+    from typing import Literal
+
+    from .settings import CaseGroup, Groups, Sweep, Wear
+
+    if sys.version_info >= (3, 11):
+        from typing import Unpack
+    else:
+        from typing_extensions import Unpack
+
+__all__ = ["frf", "run", "wear"]
+
+#: Called with the number of points done and of points to come (0: not known).
+Progress = Callable[[int, int], object]
+
+#: Time between two calls of a progress function [s].
+_BETWEEN_CALLS = 0.1
+
+
+def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool = True,
+        progress: Progress | None = None) -> Result:
+    """Run a case and open its result file.
+
+    The library computes in this process with the interpreter lock released; the numbers are those
+    of `fw_run`, to the last digit. Ctrl-C stops after the point at work and keeps what is done.
+
+    Parameters
+    ----------
+    case : Case, str or Path
+        The case, or the path of a namelist.
+    file : str or Path, optional
+        Result file. Without it: where the case says; beside its namelist; or a temporary file
+        that disappears with the result.
+    check : bool, optional
+        Raise ConvergenceError where points have not converged (default).
+    progress : callable, optional
+        Called now and then with the points done and the points to come (0: not known).
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    InputError
+        The library does not accept the case; the message names group, key and value.
+    OutputError
+        A file cannot be read or written.
+    ConvergenceError
+        Points have not converged; its `result` holds all that was computed, its `report` the
+        summary of the run.
+    RunInterrupted
+        The run was stopped (a KeyboardInterrupt); its `result` holds the points up to there.
+    """
+    if not isinstance(case, Case):
+        case = Case.from_file(case)
+    folder = None
+    if file is not None:
+        case = case.replace(output={"file": os.path.abspath(file)})
+    elif not case.names_output:
+        folder = tempfile.mkdtemp(prefix="fretwear-")
+        case = case.replace(output={"file": os.path.join(folder, "result.h5")})
+    try:
+        with case.open() as session:
+            status, interrupted = _watched(session, progress)
+            report = (session.text("remarks") + session.text("summary")).splitlines()
+            message = session.text("message")
+            path = session.text("output")
+        if status not in (NOT_CONVERGED, STOPPED):
+            raise_status(status, message)
+        result = Result(path)
+    except BaseException:
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    if folder is not None:
+        weakref.finalize(result, shutil.rmtree, folder, True)
+    if status == STOPPED or interrupted:
+        raise RunInterrupted(result)
+    if status == NOT_CONVERGED and check:
+        raise ConvergenceError(_failure(result, report), result, report)
+    return result
+
+
+def frf(model: ModelLike, start: float, end: float, n_points: int | None = None, *,
+        unit: Literal["rad/s", "Hz"] | None = None, file: str | Path | None = None,
+        check: bool = True, progress: Progress | None = None, **groups: Unpack[Groups]) -> Result:
+    """Frequency response: periodic solutions over a range of frequencies.
+
+    Parameters
+    ----------
+    model : Model, str or Path
+        The structure, or the path of a model file.
+    start, end : float
+        First and last frequency [unit]; may go down.
+    n_points : int, optional
+        Points, evenly spaced.
+    unit : {'rad/s', 'Hz'}, optional
+        Unit of the frequencies (default: rad/s).
+    file, check, progress
+        See `run`.
+    **groups
+        Further settings by group, see `Case`.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    InputError, OutputError, ConvergenceError, RunInterrupted
+        See `run`.
+    """
+    sweep: Sweep = {"start": start, "end": end}
+    if n_points is not None:
+        sweep["n_points"] = n_points
+    if unit is not None:
+        sweep["unit"] = unit
+    case = _case(model, {"analysis": "frf"}, sweep, groups)
+    return run(case, file, check=check, progress=progress)
+
+
+def wear(model: ModelLike, frequency: float, coefficient: ArrayLike, n_cycles: float, *,
+         scheme: Literal["explicit", "implicit", "pseudo_time"] | None = None,
+         unit: Literal["rad/s", "Hz"] | None = None, file: str | Path | None = None,
+         check: bool = True, progress: Progress | None = None,
+         **groups: Unpack[Groups]) -> Result:
+    """Fretting wear of the contact pairs under vibration at one frequency.
+
+    Parameters
+    ----------
+    model : Model, str or Path
+        The structure, or the path of a model file; its pairs have areas.
+    frequency : float
+        Frequency of the excitation [unit].
+    coefficient : float or (n_pairs,)
+        Archard's coefficient [length^2/force], in the units of the model.
+    n_cycles : float
+        Cycles of vibration.
+    scheme : {'explicit', 'implicit', 'pseudo_time'}, optional
+        How the two time scales are coupled (default: implicit).
+    unit : {'rad/s', 'Hz'}, optional
+        Unit of the frequency (default: rad/s).
+    file, check, progress
+        See `run`.
+    **groups
+        Further settings by group, see `Case`; such as ``wear={"max_depth_step": 1e-4}``.
+
+    Returns
+    -------
+    Result
+        With `cycles`, `depth`, `rate` and `steady_state`; one row per wear step.
+
+    Raises
+    ------
+    InputError, OutputError, ConvergenceError, RunInterrupted
+        See `run`.
+    """
+    sweep: Sweep = {"start": frequency}
+    if unit is not None:
+        sweep["unit"] = unit
+    settings: Wear = {"coefficient": coefficient, "n_cycles": n_cycles}
+    if scheme is not None:
+        settings["scheme"] = scheme
+    _refuse_twice("wear", settings, groups.get("wear", {}))
+    case = _case(model, {"analysis": "wear"}, sweep, groups).replace(wear=settings)
+    return run(case, file, check=check, progress=progress)
+
+
+def _case(model: ModelLike, analysis: CaseGroup, sweep: Sweep, groups: Groups) -> Case:
+    """A case of one kind of analysis; what has an argument of its own is given there alone."""
+    _refuse_twice("case", analysis, groups.get("case", {}))
+    _refuse_twice("sweep", sweep, groups.get("sweep", {}))
+    return Case(model, **groups).replace(case=analysis, sweep=sweep)
+
+
+def _refuse_twice(group: str, own: Mapping[str, object], given: Mapping[str, object]) -> None:
+    for key in own.keys() & given.keys():
+        raise InputError(f"{group}[{key!r}]: is set by an argument of the function already; leave "
+                         "it out, or make a Case and run it")
+
+
+def _watched(session: Session, progress: Progress | None) -> tuple[int, bool]:
+    """Run a session so that it can be interrupted; its status, and whether it was.
+
+    The main thread alone gets signals, and only while it runs Python: the library works in another
+    thread, while the main one waits.
+    """
+    control = np.zeros(3, dtype=np.int64)
+    if threading.current_thread() is not threading.main_thread():
+        return session.run(control), False
+    status: list[int] = []
+    worker = threading.Thread(target=lambda: status.append(session.run(control)), name="fretwear")
+    with _stops_on_interrupt(control) as interrupted:
+        worker.start()
+        try:
+            _wait(worker, control, progress)
+        except BaseException:
+            control[0] = 1
+            worker.join()
+            raise
+    return status[0], bool(interrupted)
+
+
+def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: Progress | None) -> None:
+    if progress is None:
+        worker.join()
+        return
+    told = -1
+    while worker.is_alive():
+        worker.join(_BETWEEN_CALLS)
+        if told != control[1]:
+            told = int(control[1])
+            progress(told, int(control[2]))
+
+
+@contextmanager
+def _stops_on_interrupt(control: NDArray[np.int64]) -> Iterator[list[int]]:
+    """Let Ctrl-C set the stop flag instead of raising; yields the list of signals received.
+
+    A handler of the calling program gets its signal afterwards.
+    """
+    received: list[int] = []
+
+    def stop(number: int, _frame: object) -> None:
+        received.append(number)
+        control[0] = 1
+
+    before = signal.getsignal(signal.SIGINT)
+    if before is None or before == signal.SIG_IGN:  # not ours to handle
+        yield received
+        return
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if received and callable(before) and before is not signal.default_int_handler:
+        before(received[-1], None)
+
+
+def _failure(result: Result, report: list[str]) -> str:
+    """How many points failed, and where, or why a branch ended."""
+    failed = result.omega[~result.converged]
+    if not len(failed):
+        return f"{result.path}: the run ended early: {'; '.join(report[:1])}"
+    where = ", ".join(f"{omega:.6g}" for omega in failed[:5]) + (", ..." if len(failed) > 5 else "")
+    return (f"{result.path}: {len(failed)} of {result.n_points} points did not converge, at omega "
+            f"= {where} rad/s; try other settings of solver and harmonics, or a finer sweep")

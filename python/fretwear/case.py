@@ -1,0 +1,210 @@
+"""A case: a model and the settings of its groups, or a namelist."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Union
+
+import numpy as np
+
+from ._native import Session
+from .errors import InputError, OutputError
+from .model import Model
+
+if TYPE_CHECKING:
+    import sys
+
+    from .settings import Groups
+
+    if sys.version_info >= (3, 11):
+        from typing import Unpack
+    else:
+        from typing_extensions import Unpack
+
+__all__ = ["Case"]
+
+#: What a model may be given as: itself, or the path of a model file.
+ModelLike = Union[Model, str, "os.PathLike[str]"]
+
+
+class Case:
+    """Everything that one run needs.
+
+    Parameters
+    ----------
+    model : Model, str or Path
+        The structure, or the path of a model file.
+    **groups
+        Settings by group, such as ``harmonics={"n_harmonics": 5}, contact={"law": "dlft"}``; names
+        and meaning as in the namelist (`fretwear.settings`, user guide), the group &model is
+        called `structure` here. Texts, numbers, truth values and arrays are taken.
+
+    Notes
+    -----
+    A case does not change: `replace` makes another one. It is read and checked by the library, when
+    `namelist`, `check` or `fretwear.run` is called, and by nothing else.
+
+    Examples
+    --------
+    >>> case = Case("sector.h5", structure={"modal_damping": 1e-3}, load={"harmonic_scale": 0.5},
+    ...             sweep={"start": 1017, "end": 1029, "n_points": 121, "unit": "Hz"})
+    >>> finer = case.replace(harmonics={"n_harmonics": 7})
+    """
+
+    def __init__(self, model: ModelLike, **groups: Unpack[Groups]) -> None:
+        self._text, self._path = "", _in_current_directory("case.nml")
+        self._model: Model | None = None
+        self._overrides: tuple[str, ...] = ()
+        if isinstance(model, Model):
+            self._model = model
+        elif isinstance(model, (str, os.PathLike)):
+            source: Groups = {"structure": {
+                "source": "hdf5", "file": os.path.abspath(os.fspath(model))}}
+            self._overrides = tuple(_settings(source))
+        else:
+            raise InputError(f"model: is a {type(model).__name__}, must be a Model or the path of "
+                             "a model file")
+        self._overrides += tuple(_settings(groups))
+
+    @classmethod
+    def from_text(cls, text: str, path: str | Path = "case.nml", **groups: Unpack[Groups]) -> Case:
+        """A case from the text of a namelist.
+
+        Parameters
+        ----------
+        text : str
+            The namelist.
+        path : str or Path, optional
+            Where it comes from: for messages, for relative paths in it, and for the default name of
+            the result file. It need not exist.
+        **groups
+            Settings that replace those of the namelist.
+        """
+        if not isinstance(text, str):
+            raise InputError(f"text: is a {type(text).__name__}, must be the text of a namelist")
+        case = cls.__new__(cls)
+        case._text, case._path = text, _in_current_directory(path)
+        case._model, case._overrides = None, tuple(_settings(groups))
+        return case
+
+    @classmethod
+    def from_file(cls, path: str | Path, **groups: Unpack[Groups]) -> Case:
+        """A case from a namelist file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The namelist.
+        **groups
+            Settings that replace those of the namelist.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be read.
+        """
+        try:
+            text = Path(path).read_bytes().decode(errors="surrogateescape")
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be read: {error.strerror}") from None
+        return cls.from_text(text, path, **groups)
+
+    def replace(self, **groups: Unpack[Groups]) -> Case:
+        """The same case with other settings."""
+        case = type(self).__new__(type(self))
+        case._text, case._path, case._model = self._text, self._path, self._model
+        case._overrides = self._overrides + tuple(_settings(groups))
+        return case
+
+    @property
+    def model(self) -> Model | None:
+        """The model; None where the case names a file, or is a namelist."""
+        return self._model
+
+    @property
+    def names_output(self) -> bool:
+        """Whether the result file has a place: one that was set, or one beside a namelist."""
+        return bool(self._text) or any(word.startswith("output%file=") for word in self._overrides)
+
+    def __repr__(self) -> str:
+        what = repr(str(self._path)) if self._text else repr(self._model)
+        return " ".join(["<Case", what, *self._overrides]) + ">"
+
+    def open(self) -> Session:
+        """A session with this case, read and validated.
+
+        Raises
+        ------
+        InputError
+            What the library does not accept; the message names group, key and value.
+        OutputError
+            A file that the case names cannot be read.
+        """
+        session = Session()
+        try:
+            settings = () if self._model is None else self._model.give_to(session)
+            session.read(self._text, os.fspath(self._path), (*settings, *self._overrides))
+        except BaseException:
+            session.close()
+            raise
+        return session
+
+    def namelist(self) -> str:
+        """The effective input: every key with its value and what it accepts.
+
+        Raises
+        ------
+        InputError, OutputError
+            See `open`.
+        """
+        with self.open() as session:
+            return session.text("namelist")
+
+    def check(self) -> None:
+        """Refuse what a run would refuse before it computes; nothing is written.
+
+        Raises
+        ------
+        InputError, OutputError
+            See `open`.
+        """
+        with self.open() as session:
+            session.check()
+
+
+def _in_current_directory(path: str | Path) -> Path:
+    return Path(os.path.abspath(path))
+
+
+def _settings(groups: Mapping[str, Any]) -> Iterator[str]:
+    """Settings as the library takes them: group%key=value."""
+    for group, keys in groups.items():
+        if not isinstance(keys, Mapping):
+            raise InputError(f"{group}: is a {type(keys).__name__}, must be a dictionary of the "
+                             f"keys of the group, such as {group}={{'key': value}}")
+        name = "model" if group == "structure" else group
+        for key, value in keys.items():
+            yield f"{name}%{key}={_value(f'{group}[{key!r}]', value)}"
+
+
+def _value(argument: str, value: object) -> str:
+    """A value as a namelist has it, every digit kept."""
+    if isinstance(value, (bool, np.bool_)):
+        return ".true." if value else ".false."
+    if isinstance(value, (str, os.PathLike)):
+        return "'" + os.fspath(value).replace("'", "''") + "'"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind not in "iufb":
+            raise InputError(f"{argument}: its elements are of type {value.dtype}, must be numbers")
+        # Matrices stand row by row; they are symmetric.
+        return _value(argument, value.ravel().tolist())
+    if isinstance(value, np.generic):
+        return _value(argument, value.item())
+    if isinstance(value, (list, tuple)) and value:
+        return " ".join(_value(argument, item) for item in value)
+    raise InputError(f"{argument}: is {value!r}, must be a text, a number, a truth value, or a "
+                     "list or array of these")

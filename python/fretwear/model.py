@@ -1,0 +1,432 @@
+"""The structure: matrices, contact pairs, springs, loads and what is observed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Union
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._arguments import array, dofs
+from ._native import Session
+from .errors import InputError, OutputError
+
+__all__ = ["ContactPairs", "Model", "Spring"]
+
+Floats = NDArray[np.float64]
+
+FORMAT, FORMAT_VERSION = "fretwear-model", 1
+
+
+@dataclass(frozen=True)
+class ContactPairs:
+    """Points that face each other.
+
+    A pair moves by ``u(side_1) - u(side_2)`` in its directions (t1, t2, n), n from side 2 to
+    side 1: positive opens. Numbers are per pair, or one for all.
+
+    Parameters
+    ----------
+    side_1, side_2 : (n_pairs, 3) int
+        Signed dof numbers, counted from 1: a negative one takes the dof with its sign turned, 0
+        is the ground or a direction that the pair does not have. side_2 is the ground by default.
+    mu : float or (n_pairs,), optional
+        Friction coefficient [-].
+    gap : float or (n_pairs,), optional
+        Initial gap [length], 0 by default; negative for an interference.
+    area : float or (n_pairs,), optional
+        Area of a pair [length^2]; wear needs it.
+    normal_load : float or (n_pairs,), optional
+        Constant compressive force of pairs without a normal dof [force].
+    tangential_stiffness, normal_stiffness : float or (n_pairs,), optional
+        Stiffness of the elastic law ('penalty') [force/length].
+    position : (n_pairs, 3), optional
+        Coordinates, for pictures [length].
+    patch : sequence of str, optional
+        The surface that each pair belongs to (n_pairs).
+    """
+
+    side_1: ArrayLike
+    side_2: ArrayLike | None = None
+    mu: ArrayLike | None = None
+    gap: ArrayLike | None = None
+    area: ArrayLike | None = None
+    normal_load: ArrayLike | None = None
+    tangential_stiffness: ArrayLike | None = None
+    normal_stiffness: ArrayLike | None = None
+    position: ArrayLike | None = None
+    patch: Sequence[str] | None = None
+
+    def checked(self, n_dof: int) -> ContactPairs:
+        """The same with arrays that fit each other; raises InputError where they do not."""
+        side_1 = dofs("contact.side_1", self.side_1, (None, 3), n_dof)
+        n_pairs = len(side_1)
+        side_2 = np.zeros_like(side_1) if self.side_2 is None else self.side_2
+        values: dict[str, Any] = {
+            name: None if getattr(self, name) is None else
+            array(f"contact.{name}", getattr(self, name), (n_pairs,))
+            for name in ("mu", "gap", "area", "normal_load", "tangential_stiffness",
+                         "normal_stiffness")}
+        if self.position is not None:
+            values["position"] = array("contact.position", self.position, (n_pairs, 3))
+        if self.patch is not None:
+            if isinstance(self.patch, str) or len(self.patch) != n_pairs:
+                raise InputError(f"contact.patch: must be {n_pairs} names, one per pair")
+            values["patch"] = tuple(str(name) for name in self.patch)
+        return ContactPairs(side_1, dofs("contact.side_2", side_2, (n_pairs, 3), n_dof), **values)
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A nonlinear spring: force ``coefficient * u_r**power``, u_r = u(side_1) - u(side_2).
+
+    Parameters
+    ----------
+    side_1, side_2 : int
+        Signed dof numbers, counted from 1; 0 is the ground.
+    coefficient : float
+        [force/length^power]
+    power : int
+        1 is a linear spring, 3 a cubic one.
+    """
+
+    side_1: int
+    side_2: int = 0
+    coefficient: float = 0.0
+    power: int = 3
+
+
+#: A dof number, counted from 1, or a row of factors, one per dof.
+Observation = Union[int, ArrayLike]
+
+
+class Model:
+    """A linear structure with contact pairs and nonlinear springs.
+
+    ``M u'' + C u' + K u + B^T lambda = f_0 + f_c cos(omega t) + f_s sin(omega t)``. Units are
+    yours, as long as they fit each other. Arrays are kept without a copy where they are float64
+    and Fortran-ordered, and not written to; the properties give read-only views.
+
+    Parameters
+    ----------
+    M, K : (n_dof, n_dof)
+        Mass and stiffness, symmetric; both may be singular.
+    C : (n_dof, n_dof), optional
+        Viscous damping, symmetric; None for none here (a case may add modal or Rayleigh damping).
+    contact : ContactPairs, optional
+        Pairs in contact.
+    springs : iterable of Spring, optional
+        Nonlinear springs.
+    static, cosine, sine : (n_dof,), optional
+        Loads [force].
+    stiffness_rotation : (n_dof, n_dof), optional
+        Stiffness per square of the rotation speed [force/length/(rad/s)^2].
+    static_rotation : (n_dof,), optional
+        Static load per square of the rotation speed [force/(rad/s)^2].
+    observe : mapping, optional
+        Name of every observed quantity, with a dof number, counted from 1, or with a row of
+        factors (n_dof,). Every dof without it.
+    title, unit_system : str, optional
+        Texts for people.
+
+    Raises
+    ------
+    InputError
+        An argument has the wrong shape or type, or holds what is not finite. Symmetry and
+        definiteness are checked when a case is read.
+    """
+
+    def __init__(self, M: ArrayLike, C: ArrayLike | None, K: ArrayLike, *,
+                 contact: ContactPairs | None = None, springs: Iterable[Spring] = (),
+                 static: ArrayLike | None = None, cosine: ArrayLike | None = None,
+                 sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
+                 static_rotation: ArrayLike | None = None,
+                 observe: Mapping[str, Observation] | None = None,
+                 title: str = "", unit_system: str = "") -> None:
+        stiffness = array("K", K, (None, None))
+        n = self.n_dof = len(stiffness)
+        if n == 0:
+            raise InputError("K: is empty, must have at least one degree of freedom")
+        square = (n, n)
+        self._matrices = {"stiffness": array("K", K, square), "mass": array("M", M, square)}
+        for name, argument, value in (
+                ("damping", "C", C), ("stiffness_rotation", "stiffness_rotation",
+                                      stiffness_rotation)):
+            if value is not None:
+                self._matrices[name] = array(argument, value, square)
+        self._loads = {
+            name: array(name, value, (n,)) for name, value in (
+                ("static", static), ("cosine", cosine), ("sine", sine),
+                ("static_rotation", static_rotation)) if value is not None}
+        self.contact = None if contact is None else contact.checked(n)
+        self.springs = tuple(springs)
+        for number, spring in enumerate(self.springs):
+            dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
+            array(f"springs[{number}].coefficient", spring.coefficient, ())
+        self._observe = None if observe is None else _rows(observe, n)
+        self.title, self.unit_system = title, unit_system
+
+    def __repr__(self) -> str:
+        title = f" {self.title!r}" if self.title else ""
+        return (f"<Model{title}: {self.n_dof} dofs, {self.n_pairs} pairs, "
+                f"{len(self.springs)} springs>")
+
+    # ------------------------------------------------------------------ what it consists of
+
+    @property
+    def M(self) -> Floats:
+        """Mass (n_dof, n_dof), read-only."""
+        return _read_only(self._matrices["mass"])
+
+    @property
+    def C(self) -> Floats | None:
+        """Viscous damping (n_dof, n_dof), read-only; None for none."""
+        found = self._matrices.get("damping")
+        return None if found is None else _read_only(found)
+
+    @property
+    def K(self) -> Floats:
+        """Stiffness (n_dof, n_dof), read-only."""
+        return _read_only(self._matrices["stiffness"])
+
+    @property
+    def stiffness_rotation(self) -> Floats | None:
+        """Stiffness per square of the rotation speed (n_dof, n_dof), read-only; None for none."""
+        found = self._matrices.get("stiffness_rotation")
+        return None if found is None else _read_only(found)
+
+    @property
+    def static(self) -> Floats:
+        """Static load (n_dof,), read-only [force]."""
+        return self._load("static")
+
+    @property
+    def cosine(self) -> Floats:
+        """Load in phase with cos(omega t) (n_dof,), read-only [force]."""
+        return self._load("cosine")
+
+    @property
+    def sine(self) -> Floats:
+        """Load in phase with sin(omega t) (n_dof,), read-only [force]."""
+        return self._load("sine")
+
+    @property
+    def static_rotation(self) -> Floats:
+        """Static load per square of the rotation speed (n_dof,), read-only."""
+        return self._load("static_rotation")
+
+    def _load(self, name: str) -> Floats:
+        return _read_only(self._loads.get(name, np.zeros(self.n_dof)))
+
+    @property
+    def n_pairs(self) -> int:
+        """Contact pairs."""
+        return 0 if self.contact is None else len(np.asarray(self.contact.side_1))
+
+    @property
+    def observe(self) -> dict[str, Floats] | None:
+        """Row of factors (n_dof,) of every observed quantity; None for every dof."""
+        if self._observe is None:
+            return None
+        names, rows = self._observe
+        return {name: _read_only(row) for name, row in zip(names, rows)}
+
+    # ------------------------------------------------------------------ model files
+
+    @classmethod
+    def from_hdf5(cls, path: str | Path) -> Model:
+        """Read a model file (format "fretwear-model").
+
+        Parameters
+        ----------
+        path : str or Path
+            Model file.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be read.
+        InputError
+            It is no model file, or what it holds does not fit.
+        """
+        try:
+            file = h5py.File(path, "r")
+        except OSError as error:
+            reason = str(error) if Path(path).exists() else "there is no such file"
+            raise OutputError(f"{path}: cannot be read: {reason}") from None
+        with file:
+            kind = _text(file.attrs.get("format", ""))
+            if kind != FORMAT:
+                raise InputError(f"{path}: format is '{kind}', expected '{FORMAT}'")
+            for name in ("mass", "stiffness"):
+                if name not in file:
+                    raise InputError(f"{path}: dataset /{name} is missing")
+            found = {name: file[name][()] for name in (
+                "mass", "stiffness", "damping", "stiffness_rotation", *_CONTACT, *_LOADS)
+                if name in file}
+            loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
+            try:
+                return cls(
+                    found["mass"], found.get("damping"), found["stiffness"],
+                    contact=_contact_of(found), observe=_observed_of(file), **loads,
+                    stiffness_rotation=found.get("stiffness_rotation"),
+                    title=_text(file.attrs.get("title", "")),
+                    unit_system=_text(file.attrs.get("unit_system", "")))
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from None
+
+    def to_hdf5(self, path: str | Path) -> None:
+        """Write a model file (format "fretwear-model").
+
+        Parameters
+        ----------
+        path : str or Path
+            Target; an older file of that name is replaced once the new one is complete.
+
+        Raises
+        ------
+        InputError
+            The model has springs, constant normal loads or contact stiffnesses, which the format
+            does not hold.
+        OutputError
+            The file cannot be written.
+        """
+        self._refuse_what_no_file_holds()
+        path = Path(path)
+        partial = path.with_name(path.name + ".part")
+        try:
+            try:
+                with h5py.File(partial, "w") as file:
+                    self._write(file)
+                partial.replace(path)
+            finally:
+                partial.unlink(missing_ok=True)
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written: {error}") from None
+
+    def _refuse_what_no_file_holds(self) -> None:
+        kept_out = ["springs"] if self.springs else []
+        kept_out += [f"contact.{name}" for name in _IN_NAMELIST
+                     if self.contact is not None and getattr(self.contact, name) is not None]
+        if kept_out:
+            raise InputError(f"{', '.join(kept_out)}: a model file cannot hold it; leave it out "
+                             "and give it to the case")
+
+    def _write(self, file: h5py.File) -> None:
+        file.attrs["format"] = np.bytes_(FORMAT)
+        file.attrs["format_version"] = np.int32(FORMAT_VERSION)
+        file.attrs["title"] = np.bytes_(self.title.encode())
+        file.attrs["unit_system"] = np.bytes_(self.unit_system.encode())
+        for name, values in self._matrices.items():
+            file[name] = values
+        for name, argument in _LOADS.items():
+            if argument in self._loads:
+                file[name] = self._loads[argument]
+        if self.contact is not None:
+            for name in _CONTACT:
+                value = getattr(self.contact, name.split("/")[1])
+                if value is not None:
+                    file[name] = _fixed(value) if name == "contact/patch" else value
+        if self._observe is not None:
+            file["observe/name"] = _fixed(self._observe[0])
+            file["observe/matrix"] = self._observe[1]
+
+    # ------------------------------------------------------------------ to the library
+
+    def give_to(self, session: Session) -> tuple[str, ...]:
+        """Hand the model to a session; returns the settings that say the rest of it."""
+        for name, values in self._matrices.items():
+            session.give_matrix(name, values)
+        for name, values in self._loads.items():
+            session.give_vector(f"load_{name}", values)
+        if self.title:
+            session.give_text("title", self.title)
+        if self._observe is not None:
+            session.give_texts("observe_name", self._observe[0])
+            session.give_matrix("observe_matrix", self._observe[1])
+        settings = self._spring_settings()
+        if self.contact is not None:
+            settings += self._give_contact(session, self.contact)
+        return tuple(settings)
+
+    def _give_contact(self, session: Session, contact: ContactPairs) -> list[str]:
+        session.give_sides(np.asarray(contact.side_1), np.asarray(contact.side_2))
+        for name in ("mu", "gap", "area"):
+            if getattr(contact, name) is not None:
+                session.give_vector(name, getattr(contact, name))
+        if contact.position is not None:
+            session.give_matrix("position", np.asfortranarray(np.asarray(contact.position).T))
+        if contact.patch is not None:
+            session.give_texts("patch", contact.patch)
+        return [f"contact%{name}={_list(getattr(contact, name))}" for name in _IN_NAMELIST
+                if getattr(contact, name) is not None]
+
+    def _spring_settings(self) -> list[str]:
+        if not self.springs:
+            return []
+        return [f"spring%n_springs={len(self.springs)}"] + [
+            f"spring%{name}={_list([getattr(spring, name) for spring in self.springs])}"
+            for name in ("side_1", "side_2", "coefficient", "power")]
+
+
+_CONTACT = tuple(f"contact/{name}" for name in (
+    "side_1", "side_2", "mu", "gap", "area", "position", "patch"))
+_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness")
+_LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
+          "load/static_rotation": "static_rotation"}
+
+
+def _rows(observe: Mapping[str, Observation], n_dof: int) -> tuple[tuple[str, ...], Floats]:
+    rows = np.zeros((len(observe), n_dof), order="F")
+    for i, (name, wanted) in enumerate(observe.items()):
+        argument = f"observe['{name}']"
+        if isinstance(wanted, (int, np.integer)):
+            if not 1 <= wanted <= n_dof:
+                raise InputError(f"{argument} = {wanted}: must be a dof from 1 to {n_dof}")
+            rows[i, wanted - 1] = 1.0
+        else:
+            rows[i] = array(argument, wanted, (n_dof,))
+    return tuple(observe), rows
+
+
+def _contact_of(found: Mapping[str, Any]) -> ContactPairs | None:
+    if "contact/side_1" not in found:
+        return None
+    parts = {name: found.get(f"contact/{name}") for name in (
+        "side_2", "mu", "gap", "area", "position")}
+    patch = found.get("contact/patch")
+    names = None if patch is None else [_text(name) for name in patch]
+    return ContactPairs(found["contact/side_1"], **parts, patch=names)
+
+
+def _observed_of(file: h5py.File) -> dict[str, Observation] | None:
+    if "observe/name" not in file:
+        return None
+    names = [_text(name) for name in file["observe/name"][()]]
+    if "observe/matrix" in file:
+        return dict(zip(names, file["observe/matrix"][()]))
+    return {name: int(dof) for name, dof in zip(names, file["observe/dof"][()])}
+
+
+def _read_only(values: Floats) -> Floats:
+    view = values.view()
+    view.flags.writeable = False
+    return view
+
+
+def _list(values: ArrayLike) -> str:
+    """Values as a namelist has them, every digit kept."""
+    return " ".join(repr(value) for value in np.asarray(values).ravel().tolist())
+
+
+def _fixed(names: Iterable[str]) -> NDArray[np.bytes_]:
+    """Texts of fixed length, which Fortran reads without pointers."""
+    return np.array([name.encode() for name in names])
+
+
+def _text(value: object) -> str:
+    return (value.decode() if isinstance(value, bytes) else str(value)).strip()
