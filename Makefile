@@ -27,8 +27,10 @@ build/deps.stamp: tools/deps.sh
 	@touch $@
 
 build: build/deps.stamp ## optimised program build/release/fw_run
-	@if [ ! -f $(BUILD)/build.ninja ] || [ -n "$(CMAKE_OPTIONS)" ]; then \
-	   cmake -S . -B $(BUILD) -G Ninja -DFRETWEAR_NATIVE=ON $(CMAKE_OPTIONS); \
+	@if ! grep -qs FRETWEAR_PYTHON:BOOL=ON $(BUILD)/CMakeCache.txt || \
+	   [ ! -f $(BUILD)/build.ninja ] || [ -n "$(CMAKE_OPTIONS)" ]; then \
+	   cmake -S . -B $(BUILD) -G Ninja -DFRETWEAR_NATIVE=ON -DFRETWEAR_PYTHON=ON \
+	      "-DPython3_EXECUTABLE=$(CURDIR)/$(PYTHON)" $(CMAKE_OPTIONS); \
 	fi
 	@cmake --build $(BUILD)
 
@@ -61,7 +63,7 @@ test: build ## every test; the last line counts the cases
 
 lint: build/deps.stamp ## type checker and linter of the Python code
 	@$(PYTHON) -m mypy
-	@$(PYTHON) -m ruff check python
+	@$(PYTHON) -m ruff check python conftest.py
 
 bench: build ## error against run time
 	PYTHONPATH=python $(PYTHON) bench/run.py

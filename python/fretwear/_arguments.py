@@ -39,7 +39,7 @@ def array(name: str, value: ArrayLike, shape: Sequence[int | None], *,
     if not np.isfinite(given).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(given))[0])
         raise InputError(f"{name}{list(where)} = {given[where]}: must be finite")
-    return np.asfortranarray(given, dtype=wanted)
+    return np.asarray(given, dtype=wanted, order="F")
 
 
 def dofs(name: str, value: ArrayLike, shape: Sequence[int | None], n_dof: int) -> NDArray[np.int32]:

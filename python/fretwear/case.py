@@ -54,7 +54,7 @@ class Case:
     """
 
     def __init__(self, model: ModelLike, **groups: Unpack[Groups]) -> None:
-        self._text, self._path = "", _in_current_directory("case.nml")
+        self._text, self._path = "", Path("case")  # for messages: there is no namelist
         self._model: Model | None = None
         self._overrides: tuple[str, ...] = ()
         if isinstance(model, Model):
@@ -85,7 +85,7 @@ class Case:
         if not isinstance(text, str):
             raise InputError(f"text: is a {type(text).__name__}, must be the text of a namelist")
         case = cls.__new__(cls)
-        case._text, case._path = text, _in_current_directory(path)
+        case._text, case._path = text, Path(os.path.abspath(path))
         case._model, case._overrides = None, tuple(_settings(groups))
         return case
 
@@ -172,10 +172,6 @@ class Case:
         """
         with self.open() as session:
             session.check()
-
-
-def _in_current_directory(path: str | Path) -> Path:
-    return Path(os.path.abspath(path))
 
 
 def _settings(groups: Mapping[str, Any]) -> Iterator[str]:
