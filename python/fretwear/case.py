@@ -187,7 +187,9 @@ def _settings(groups: Mapping[str, Any]) -> Iterator[str]:
 
 def _value(argument: str, value: object) -> str:
     """A value as a namelist has it, every digit kept."""
-    if isinstance(value, (bool, np.bool_)):
+    if isinstance(value, np.generic):  # np.float64 is a float, but prints as an expression
+        value = value.item()
+    if isinstance(value, bool):
         return ".true." if value else ".false."
     if isinstance(value, (str, os.PathLike)):
         return "'" + os.fspath(value).replace("'", "''") + "'"
@@ -198,8 +200,6 @@ def _value(argument: str, value: object) -> str:
             raise InputError(f"{argument}: its elements are of type {value.dtype}, must be numbers")
         # Matrices stand row by row; they are symmetric.
         return _value(argument, value.ravel().tolist())
-    if isinstance(value, np.generic):
-        return _value(argument, value.item())
     if isinstance(value, (list, tuple)) and value:
         return " ".join(_value(argument, item) for item in value)
     raise InputError(f"{argument}: is {value!r}, must be a text, a number, a truth value, or a "

@@ -207,12 +207,12 @@ def test_fortran_ordered_arrays_pass_without_a_copy() -> None:
     """No allocation of the size of the arguments happens on the way to Fortran and back."""
     coefficients = np.asfortranarray(RNG.normal(size=(40_000, 7)))
     out = np.empty((40_000, 16), order="F")
-    matrices = [np.asfortranarray(np.eye(500)) for _ in range(3)]
+    matrix = np.asfortranarray(np.eye(500))
     z = np.empty((500, 500, 1), dtype=complex, order="F")
     calls: list[tuple[Callable[[], object], int]] = [
         (lambda: op.to_time(coefficients, 16, out=out), coefficients.nbytes),
         (lambda: op.to_coefficients(out, 3, out=coefficients), out.nbytes),
-        (lambda: op.dynamic_stiffness(*matrices, 1.0, out=z), matrices[0].nbytes),
+        (lambda: op.dynamic_stiffness(matrix, matrix, matrix, 1.0, out=z), matrix.nbytes),
     ]
     for call, size in calls:
         call()
@@ -254,7 +254,7 @@ I2 = np.eye(2)
      lambda: op.to_time(np.zeros((2, 3)), 16, out=np.zeros((4, 16), order="F")[::2])),
     ("out: is of type float32",
      lambda: op.to_time(np.zeros((2, 3)), 16,
-                        out=np.zeros((2, 16), np.float32, order="F"))),  # type: ignore[arg-type]
+                        out=np.zeros((2, 16), np.float32, order="F"))),
     (r"out: its shape is \(2, 15\)",
      lambda: op.to_time(np.zeros((2, 3)), 16, out=np.zeros((2, 15), order="F"))),
     ("out: is of type list",

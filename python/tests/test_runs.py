@@ -138,16 +138,16 @@ def test_a_group_has_the_keys_that_the_library_knows() -> None:
 
 
 def test_texts_numbers_and_arrays_reach_the_library_unchanged() -> None:
-    case = fw.Case(RUBBING, case={"title": "it's = \"a\" / title!"}, contact={"law": "penalty"},
+    case = fw.Case(RUBBING, case={"title": "it's = \"a\" / title!"},
                    sweep={"start": 0.1 + 0.2, "end": 1e300, "n_points": 2},
                    load={"cosine": np.array([1 / 3])}, output={"histories": True},
-                   solver={"max_iterations": np.int64(7)})
+                   contact={"law": "penalty", "mu": np.float64(0.7)})
     shown = case.namelist()
     assert "title = 'it''s = \"a\" / title!'" in shown
     assert "start = 0.30000000000000004" in shown
     assert "cosine = 0.3333333333333333" in shown
     assert "histories = .true." in shown
-    assert "max_iterations = 7" in shown
+    assert "mu = 0.7" in shown
 
 
 def test_a_case_does_not_change_with_its_copies() -> None:
