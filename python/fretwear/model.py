@@ -14,12 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from ._arguments import array, dofs
 from ._native import Session
 from .errors import InputError, OutputError
+from .model_file import FORMAT, strings, write_model_file
 
 __all__ = ["ContactPairs", "Model", "Spring"]
 
 Floats = NDArray[np.float64]
-
-FORMAT, FORMAT_VERSION = "fretwear-model", 1
 
 
 @dataclass(frozen=True)
@@ -296,15 +295,9 @@ class Model:
             The file cannot be written.
         """
         self._refuse_what_no_file_holds()
-        path = Path(path)
-        partial = path.with_name(path.name + ".part")
         try:
-            try:
-                with h5py.File(partial, "w") as file:
-                    self._write(file)
-                partial.replace(path)
-            finally:
-                partial.unlink(missing_ok=True)
+            write_model_file(path, self._datasets(), title=self.title,
+                             unit_system=self.unit_system)
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {error}") from None
 
@@ -316,24 +309,20 @@ class Model:
             raise InputError(f"{', '.join(kept_out)}: a model file cannot hold it; leave it out "
                              "and give it to the case")
 
-    def _write(self, file: h5py.File) -> None:
-        file.attrs["format"] = np.bytes_(FORMAT)
-        file.attrs["format_version"] = np.int32(FORMAT_VERSION)
-        file.attrs["title"] = np.bytes_(self.title.encode())
-        file.attrs["unit_system"] = np.bytes_(self.unit_system.encode())
-        for name, values in self._matrices.items():
-            file[name] = values
-        for name, argument in _LOADS.items():
-            if argument in self._loads:
-                file[name] = self._loads[argument]
+    def _datasets(self) -> dict[str, NDArray[Any]]:
+        """Everything that a model file holds, by its names there."""
+        found: dict[str, NDArray[Any]] = dict(self._matrices)
+        found.update((name, self._loads[argument]) for name, argument in _LOADS.items()
+                     if argument in self._loads)
         if self.contact is not None:
             for name in _CONTACT:
                 value = getattr(self.contact, name.split("/")[1])
                 if value is not None:
-                    file[name] = _fixed(value) if name == "contact/patch" else value
+                    found[name] = strings(value) if name == "contact/patch" else value
         if self._observe is not None:
-            file["observe/name"] = _fixed(self._observe[0])
-            file["observe/matrix"] = self._observe[1]
+            found["observe/name"] = strings(self._observe[0])
+            found["observe/matrix"] = self._observe[1]
+        return found
 
     # ------------------------------------------------------------------ to the library
 
@@ -421,11 +410,6 @@ def _read_only(values: Floats) -> Floats:
 def _list(values: ArrayLike) -> str:
     """Values as a namelist has them, every digit kept."""
     return " ".join(repr(value) for value in np.asarray(values).ravel().tolist())
-
-
-def _fixed(names: Iterable[str]) -> NDArray[np.bytes_]:
-    """Texts of fixed length, which Fortran reads without pointers."""
-    return np.array([name.encode() for name in names])
 
 
 def _text(value: object) -> str:
