@@ -9,7 +9,7 @@ module fw_guess
    implicit none (type, external)
    private
 
-   public :: stuck_guess, free_guess, held_without_contact
+   public :: stuck_guess, free_guess, held_without_contact, held_without_friction
 
    !> Rounds of opening pairs under tension; each opens at least one pair or is the last.
    integer, parameter :: max_rounds = 20
@@ -52,6 +52,37 @@ contains
       if (.not. system%fourier%has_constant()) return
       held = is_positive_definite(real(system%structure%stiffness(:, :, 1), wp))
    end function held_without_contact
+
+   !> Whether the structure holds a static load with its pairs closed but free of friction.
+   logical function held_without_friction(system) result(held)
+      type(hbm_system), intent(in) :: system
+      complex(wp), allocatable :: stiffness(:, :)
+      logical :: free(system%structure%n_coordinates)
+      integer, allocatable :: kept(:)
+      integer :: i, j, e, f, row
+
+      held = .true.
+      if (.not. system%fourier%has_constant()) return
+      free = .true.
+      stiffness = system%structure%stiffness(:, :, 1)
+      associate (r => system%joint%relative)
+         do i = 1, system%contact%n_pairs
+            row = system%joint%row(3, i)
+            if (row == 0) cycle
+            do e = r%first(row), r%first(row + 1) - 1
+               if (system%rigid) free(r%coordinate(e)) = .false.
+               if (system%rigid) cycle
+               do f = r%first(row), r%first(row + 1) - 1
+                  stiffness(r%coordinate(e), r%coordinate(f)) = &
+                     stiffness(r%coordinate(e), r%coordinate(f)) + &
+                     r%coefficient(e)*r%coefficient(f)*system%stiffness(i, 3)
+               end do
+            end do
+         end do
+      end associate
+      kept = pack([(j, j=1, size(free))], free)
+      held = is_positive_definite(real(stiffness(kept, kept), wp))
+   end function held_without_friction
 
    !> Solve with closed pairs stuck; tension is their mean normal force (positive: it pulls).
    subroutine linear_solution(system, closed, x, tension)

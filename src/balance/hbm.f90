@@ -51,7 +51,10 @@ module fw_hbm
       real(wp) :: load_share = 1.0_wp
       !> Workspace (n_coordinates, n_retained).
       complex(wp), allocatable :: complex_in(:, :), complex_out(:, :)
+      !> Let normal components that always bear leave the linear problem.
+      logical :: pins_normals = .true.
       ! The remaining linear problem, see fw_hbm_linear.
+      integer :: n_linear = 0
       integer :: n_active = 0
       integer :: n_used = 0
       integer, allocatable :: used(:), place(:)

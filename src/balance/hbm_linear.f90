@@ -25,6 +25,7 @@ contains
       call choose_active(self)
       call gather_stiffness(self)
       n_linear = self%n_active*self%fourier%n_coefficients
+      self%n_linear = n_linear
    end procedure linearize
 
    !> Sort the coordinates into active, used and solved at once.
@@ -43,7 +44,7 @@ contains
                ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
                if (c < 3 .and. self%velocity_level) cycle
                pinned(j) = self%contact%state(i) == pair_stuck .or. &
-                           (c == 3 .and. self%contact%always_closed(i))
+                           (c == 3 .and. self%pins_normals .and. self%contact%always_closed(i))
                wanted(j) = self%contact%state(i) == pair_mixed
             end do
          end do
@@ -539,7 +540,7 @@ contains
       real(wp) :: unit(size(matrix, 2))
       integer :: j, n
 
-      n = self%n_active*self%fourier%n_coefficients
+      n = self%n_linear
       do j = 1, n
          unit(:n) = 0.0_wp
          unit(j) = 1.0_wp

@@ -5,7 +5,6 @@
 !> `linearize` the derivative of each pair is in `jacobian`, or is the identity (pair_stuck) or
 !> zero (pair_open) and not stored.
 module fw_forces
-   use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_correction, only: march_turn_1d
    use fw_correction, only: march_turn_2d
@@ -15,6 +14,8 @@ module fw_forces
    use fw_event_contact, only: new_event_contact
    use fw_fourier, only: fourier_type
    use fw_lapack, only: dgemm
+   use fw_slip, only: slip_gradient
+   use fw_slip, only: slip_work
    implicit none (type, external)
    private
 
@@ -66,7 +67,12 @@ module fw_forces
       real(wp), allocatable :: jacobian(:, :, :)
       !> Paths event by event; not allocated where the instants decide (uniform sampling).
       type(event_contact_type), allocatable :: events
+      !> Sliding under pressure over the period [force**2] (n_pairs), and its derivative by the
+      !> coefficients of the prediction (coefficient, component; pair): only where asked for.
+      logical :: measures_slip = .false.
+      real(wp), allocatable :: slip(:), slip_derivative(:, :)
    contains
+      procedure :: measure_slip
       procedure :: resolve_events
       procedure :: sample
       procedure :: coefficients
@@ -136,6 +142,7 @@ contains
       !$omp end parallel do
       call fourier%to_coefficients(3*self%n_pairs, self%force_time, self%force)
       call classify(self)
+      if (self%measures_slip) call self%friction_path(self%slip)
    end subroutine evaluate
 
    !> Follow the pairs from event to event instead of from instant to instant. Set `remembers`
@@ -166,6 +173,7 @@ contains
             if (path%closed .and. .not. path%moved) self%state(i) = pair_stuck
          end associate
       end do
+      if (self%measures_slip) call self%friction_path(self%slip)
    end subroutine evaluate_events
 
    !> Make the forces at the instants available in `force_time`; under uniform sampling they are.
@@ -191,33 +199,28 @@ contains
 
    !> int |lambda_n| |dx| of every pair over a period, x the corrected position in units of force
    !> [force**2] (n_pairs): divided by the tangential prediction stiffness, what Archard's law
-   !> takes.
-   !> Exact with events, a sum over the instants otherwise.
+   !> takes. Exact with events, a sum over the instants otherwise.
    subroutine friction_path(self, path)
       class(forces_type), intent(inout) :: self
       real(wp), intent(out) :: path(:)
-      real(wp) :: x(2), before(2)
-      integer :: i, k, n_time
 
       if (allocated(self%events)) then
          call self%events%friction_path(path)
-         return
+      else
+         call slip_work(self%n_pairs, size(self%force_time, 3), self%mu, self%prediction_time, &
+                        self%remembers, self%x, path)
       end if
-      n_time = size(self%force_time, 3)
-      path = 0.0_wp
-      do i = 1, self%n_pairs
-         before = self%prediction_time(i, 1:2, n_time) - self%force_time(i, 1:2, n_time)
-         do k = 1, n_time
-            x = self%prediction_time(i, 1:2, k) - self%force_time(i, 1:2, k)
-            if (self%remembers) then
-               path(i) = path(i) - self%force_time(i, 3, k)*norm2(x - before)
-            else
-               path(i) = path(i) - self%force_time(i, 3, k)*norm2(x)*2.0_wp*pi/real(n_time, wp)
-            end if
-            before = x
-         end do
-      end do
    end subroutine friction_path
+
+   !> Ask for `slip`, and for its derivative after `linearize`, from now on.
+   pure subroutine measure_slip(self, n_coefficients)
+      class(forces_type), intent(inout) :: self
+      integer, intent(in) :: n_coefficients
+
+      self%measures_slip = .true.
+      allocate (self%slip(self%n_pairs), source=0.0_wp)
+      allocate (self%slip_derivative(3*n_coefficients, self%n_pairs), source=0.0_wp)
+   end subroutine measure_slip
 
    !> State of every pair over the whole march.
    pure subroutine classify(self)
@@ -304,6 +307,9 @@ contains
          call march_derivative(fourier%n_time, nc, self%turns(i), fourier%synthesis, y, &
                                self%mu(i), self%present(:, i), self%remembers, x, rows, dx)
          call project(self%jacobian(:, :, i), fourier, rows, y_n, self%present(3, i))
+         if (.not. self%measures_slip) cycle
+         call slip_gradient(fourier%n_time, nc, fourier%synthesis, y, self%mu(i), &
+                            self%present(:, i), self%remembers, x, rows, self%slip_derivative(:, i))
       end do
       !$omp end do
       !$omp end parallel

@@ -4,6 +4,7 @@ module fw_run
    use fw_kinds, only: wp
    use fw_available, only: check_available
    use fw_case, only: analysis_time
+   use fw_case, only: analysis_wear
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_error, only: status_not_converged
@@ -19,6 +20,7 @@ module fw_run
    use fw_summary, only: new_summary
    use fw_threads, only: thread_scope
    use fw_time_response, only: run_time_response
+   use fw_wear_response, only: run_wear
    implicit none (type, external)
    private
 
@@ -65,11 +67,14 @@ contains
       if (allocated(error)) return
       call threads%enter(case%threads)
       summary = new_summary(case)
-      if (case%analysis == analysis_time) then
+      select case (case%analysis)
+      case (analysis_time)
          call run_time_response(case, observer, writer, summary, error)
-      else
+      case (analysis_wear)
+         call run_wear(case, observer, writer, summary, error)
+      case default
          call run_frequency_response(case, observer, writer, summary, error)
-      end if
+      end select
       call threads%leave()
       call system_clock(clock_end)
       elapsed = real(clock_end - clock, wp)/real(rate, wp)

@@ -150,6 +150,7 @@ contains
       if (allocated(error)) return
       ! One and the same law: prediction stiffness, memory and reference of the condensed system.
       self%whole%stiffness = system%stiffness
+      self%whole%depth = system%depth
       self%whole%contact%x_start = system%contact%x_start
       self%whole%reference = system%reference
       allocate (whole_x(self%whole%n))

@@ -30,9 +30,11 @@ module fw_summary
       type(string_type), allocatable :: work(:)
    contains
       procedure :: add
+      procedure :: add_transient
       procedure :: mark_incomplete
       procedure :: describe_work
       procedure :: note_fallback
+      procedure :: describe_wear
       procedure :: lines
    end type summary_type
 
@@ -63,6 +65,14 @@ contains
          self%peak_omega(i) = point%omega
       end do
    end subroutine add
+
+   !> A point on the way, which is not meant to be in equilibrium.
+   subroutine add_transient(self, point)
+      class(summary_type), intent(inout) :: self
+      type(point_type), intent(in) :: point
+
+      self%iterations = self%iterations + point%iterations
+   end subroutine add_transient
 
    subroutine mark_incomplete(self)
       class(summary_type), intent(inout) :: self
@@ -110,6 +120,21 @@ contains
 
       self%work = [self%work, line('fallback', 'pseudo-time served '//to_text(n_points)//' points')]
    end subroutine note_fallback
+
+   !> What became of the wear.
+   subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth)
+      class(summary_type), intent(inout) :: self
+      character(*), intent(in) :: steady_state
+      integer, intent(in) :: n_steps, n_rejected
+      !> Cycles covered, and largest depth at their end [length].
+      real(wp), intent(in) :: cycles, depth
+      character(40) :: text
+
+      write (text, '(es13.6, a, es13.6)') depth, ' after ', cycles
+      self%work = [self%work, line('steady state', steady_state), &
+                   line('largest depth', trim(adjustl(text))//' cycles'), &
+                   line('wear steps', to_text(n_steps)//', '//to_text(n_rejected)//' repeated')]
+   end subroutine describe_wear
 
    !> The table (seconds: elapsed time).
    function lines(self, seconds) result(table)

@@ -1,6 +1,7 @@
 !> What this version can run. The one place to change when a method arrives.
 module fw_available
-   use fw_case, only: case_type, analysis_words, analysis_frf, analysis_point, analysis_time
+   use fw_case, only: case_type, analysis_words, analysis_frf, analysis_point, analysis_wear, &
+      analysis_time
    use fw_contact_data, only: memory_carried
    use fw_contact_data, only: law_words, law_dlft, law_dlft_velocity, law_penalty
    use fw_error, only: error_type, fatal_error, status_input
@@ -11,6 +12,7 @@ module fw_available
    use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
                                  solver_pseudo_time, continuation_words, &
                                 continuation_natural, continuation_arclength
+   use fw_wear_options, only: wear_explicit
    implicit none (type, external)
    private
 
@@ -24,7 +26,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call check('case%analysis', analysis_words, case%analysis, &
-                 [analysis_frf, analysis_point, analysis_time])
+                 [analysis_frf, analysis_point, analysis_wear, analysis_time])
       call check('contact%law', law_words, case%contact%law, [law_dlft, law_dlft_velocity, &
          law_penalty])
       call check('harmonics%method', method_words, case%harmonics%method, &
@@ -39,6 +41,7 @@ contains
       call check_memory()
       call check_off('harmonics%adaptive', case%harmonics%adaptive)
       call check_stability()
+      call check_wear()
 
    contains
 
@@ -59,6 +62,16 @@ contains
          call fatal_error(error, name//" = '"//trim(words(choice))//"' is not available in "// &
                           'this version: use '//list, status_input)
       end subroutine check
+
+      !> The derivative of the sliding path is known for sampled forces.
+      subroutine check_wear()
+         if (allocated(error) .or. case%analysis /= analysis_wear) return
+         if (case%harmonics%sampling == sampling_uniform) return
+         if (case%wear%scheme == wear_explicit) return
+         call fatal_error(error, "wear%scheme = 'implicit' and 'pseudo_time' need "// &
+                          "harmonics%sampling = 'uniform': use that, or scheme = 'explicit'", &
+                          status_input)
+      end subroutine check_wear
 
       !> Rigid contact has no derivative in the state from which a multiplier could be computed.
       subroutine check_stability()

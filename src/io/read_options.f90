@@ -12,7 +12,7 @@ module fw_read_options
    use fw_text, only: to_text
    use fw_time_options, only: time_options
    use fw_values, only: number_text
-   use fw_wear_options, only: wear_options, wear_scheme_words
+   use fw_wear_options, only: wear_options, wear_scheme_words, wear_law_words
    implicit none (type, external)
    private
 
@@ -140,11 +140,13 @@ contains
       real(wp), parameter :: most_cycles = 1.0e300_wp
 
       call reader%get_word('wear', 'scheme', options%scheme, wear_scheme_words)
+      call reader%get_word('wear', 'law', options%law, wear_law_words)
+      call reader%get('wear', 'order', options%order, least=0, most=4)
       call reader%get('wear', 'coefficient', options%coefficient, above=0.0_wp, &
                       required=analysis == analysis_wear)
       call reader%get('wear', 'n_cycles', options%n_cycles, above=0.0_wp, most=most_cycles)
       call reader%get('wear', 'max_depth_step', options%max_depth_step, least=0.0_wp)
-      call reader%get('wear', 'error_tolerance', options%error_tolerance, above=0.0_wp)
+      call reader%get('wear', 'error_tolerance', options%error_tolerance, least=0.0_wp)
       call reader%get('wear', 'steady_tolerance', options%steady_tolerance, above=0.0_wp)
       call reader%get('wear', 'max_steps', options%max_steps, least=1)
    end subroutine read_wear

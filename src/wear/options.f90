@@ -6,22 +6,55 @@ module fw_wear_options
 
    public :: wear_options
    public :: wear_scheme_words, wear_explicit, wear_implicit, wear_pseudo_time
+   public :: wear_law_words, wear_archard, wear_energy
 
    character(*), parameter :: wear_scheme_words(*) = &
       [character(11) :: 'explicit', 'implicit', 'pseudo_time']
    integer, parameter :: wear_explicit = 1, wear_implicit = 2, wear_pseudo_time = 3
 
+   character(*), parameter :: wear_law_words(*) = [character(7) :: 'archard', 'energy']
+   integer, parameter :: wear_archard = 1, wear_energy = 2
+
    type :: wear_options
       integer :: scheme = wear_implicit
-      !> Archard's wear coefficient k_w [area / force]; required, no default.
+      !> Depth proportional to pressure times slip (Archard), or to friction energy.
+      integer :: law = wear_archard
+      !> Wear coefficient k_w [area / force]; required, no default.
       real(wp) :: coefficient = -1.0_wp
+      !> Order of the scheme in the cycles (0: 1 with steps of a given size, else the highest that
+      !> pays).
+      integer :: order = 0
       !> Vibration cycles to be covered.
       real(wp) :: n_cycles = huge(1.0_wp)
-      !> Largest growth of the depth in one step [length] (0: chosen).
+      !> Largest growth of the depth in one step [length] (0: by the error alone).
       real(wp) :: max_depth_step = 0.0_wp
-      real(wp) :: error_tolerance = 1.0e-3_wp
+      !> Largest error of the depth in one step, as a part of the largest depth (0: steps of
+      !> max_depth_step where that is given, else default_error_tolerance).
+      real(wp) :: error_tolerance = 0.0_wp
+      !> A joint is steady when its largest rate has fallen to this part of the first.
       real(wp) :: steady_tolerance = 1.0e-6_wp
       integer :: max_steps = 1000
+   contains
+      procedure :: controls_error
+      procedure :: tolerance
    end type wear_options
+
+   real(wp), parameter :: default_error_tolerance = 1.0e-3_wp
+
+contains
+
+   !> Whether the error sets the steps, not the growth of the depth alone.
+   pure logical function controls_error(self)
+      class(wear_options), intent(in) :: self
+
+      controls_error = self%error_tolerance > 0.0_wp .or. self%max_depth_step <= 0.0_wp
+   end function controls_error
+
+   pure real(wp) function tolerance(self)
+      class(wear_options), intent(in) :: self
+
+      tolerance = self%error_tolerance
+      if (tolerance <= 0.0_wp) tolerance = default_error_tolerance
+   end function tolerance
 
 end module fw_wear_options

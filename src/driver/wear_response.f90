@@ -1,0 +1,201 @@
+!> Analysis 'wear': the joint wears over the cycles at the first frequency of the sweep.
+module fw_wear_response
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_guess, only: held_without_friction
+   use fw_hbm, only: hbm_system
+   use fw_kinds, only: wp
+   use fw_observer, only: observer_type
+   use fw_point, only: point_type
+   use fw_point_solver, only: point_solver
+   use fw_problem, only: build_system
+   use fw_recovery, only: recover_histories
+   use fw_recovery, only: recover_point
+   use fw_result, only: result_writer
+   use fw_solution, only: is_lasting
+   use fw_summary, only: summary_type
+   use fw_text, only: to_text
+   use fw_wear_march, only: steady_not_reached
+   use fw_wear_march, only: steady_words
+   use fw_wear_march, only: wear_march
+   use fw_wear_march, only: wear_observer
+   use fw_wear_options, only: wear_energy
+   use fw_wear_options, only: wear_pseudo_time
+   use fw_wear_rows, only: wear_row_set
+   use fw_wear_step, only: new_wear_stepper
+   use fw_wear_step, only: wear_state
+   use fw_wear_system, only: new_wear_system
+   use fw_wear_system, only: wear_system
+   implicit none (type, external)
+   private
+
+   public :: run_wear
+
+   !> Turns the states of a march into rows of the result.
+   type, extends(wear_observer) :: wear_recorder
+      type(case_type), pointer :: case => null()
+      class(observer_type), pointer :: observer => null()
+      type(result_writer), pointer :: writer => null()
+      type(summary_type), pointer :: summary => null()
+      type(wear_row_set) :: rows
+      integer :: n_rows = 0
+      integer(int64) :: clock = 0_int64
+   contains
+      procedure :: take
+   end type wear_recorder
+
+contains
+
+   !> The vibration of the unworn joint, then the march; every accepted step is written as soon as
+   !> it is known.
+   subroutine run_wear(case, observer, writer, summary, error)
+      type(case_type), intent(in), target :: case
+      class(observer_type), intent(inout), target :: observer
+      type(result_writer), intent(inout), target :: writer
+      type(summary_type), intent(inout), target :: summary
+      type(error_type), allocatable, intent(out) :: error
+      type(hbm_system), target :: balance
+      type(wear_system) :: system
+      type(point_solver) :: solver
+      type(point_type) :: point
+      type(wear_recorder), target :: recorder
+      type(wear_march) :: march
+      type(wear_state) :: state
+      type(error_type), allocatable :: row_error
+
+      call build_system(case, balance, error)
+      if (allocated(error)) return
+      recorder%case => case
+      recorder%observer => observer
+      recorder%writer => writer
+      recorder%summary => summary
+      call system_clock(recorder%clock)
+      call recorder%rows%create(writer%file, case%contact, cycles_units(case), error)
+      if (.not. allocated(error)) call recorder%rows%state_outcome(writer%file, &
+         steady_words(steady_not_reached), 'incomplete', error)
+      if (allocated(error)) return
+      call observer%on_start(case%title, 0)
+      call solver%start(case, balance%n)
+      call solver%solve(case, balance, case%sweep%start, point, error)
+      if (allocated(error)) return
+      march%options = case%wear
+      if (point%converged) then
+         call new_wear_system(balance, case%contact, case%wear%coefficient, &
+                              case%wear%law == wear_energy, system)
+         call first_state(system, solver%x, point, state)
+         march%stepper = new_wear_stepper(case%wear, solver%method%newton)
+         call march%run(system, state, recorder, error)
+      else
+         march%ending = why_no_vibration(balance, solver)
+         call writer%add_point(point, error)
+         call summary%add(point)
+      end if
+      call observer%on_end()
+      if (.not. allocated(error)) then
+         call observer%on_message('wear: '//march%ending)
+         if (.not. march%complete) call summary%mark_incomplete()
+         call summary%describe_work(balance, march%stepper%newton%linear, case%solver%kind)
+         call summary%describe_wear(trim(steady_words(march%steady)), march%n_steps, &
+                                    march%n_rejected, state%cycles, depth_of(system, state))
+         call recorder%rows%state_outcome(writer%file, trim(steady_words(march%steady)), &
+                                          march%ending, row_error)
+         if (allocated(row_error)) call move_alloc(row_error, error)
+      end if
+      call recorder%rows%close()
+   end subroutine run_wear
+
+   function cycles_units(case) result(units)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: units
+
+      units = 'cycles'
+      if (case%wear%scheme == wear_pseudo_time) units = 'pseudo-time in cycles'
+   end function cycles_units
+
+   pure real(wp) function depth_of(system, state) result(depth)
+      type(wear_system), intent(in) :: system
+      type(wear_state), intent(in) :: state
+
+      depth = 0.0_wp
+      if (allocated(state%x)) depth = maxval(state%x(system%n_vibration() + 1:))
+   end function depth_of
+
+   !> The unworn joint.
+   subroutine first_state(system, x, point, state)
+      type(wear_system), intent(inout) :: system
+      real(wp), intent(in) :: x(:)
+      type(point_type), intent(in) :: point
+      type(wear_state), intent(out) :: state
+      real(wp), allocatable :: r(:)
+
+      state%x = [x, spread(0.0_wp, 1, system%contact%n_pairs)]
+      allocate (r(system%n))
+      call system%begin_step(system%base, 0.0_wp)
+      call system%residual(state%x, r)
+      state%rate = system%rate
+      state%residual = point%residual
+   end subroutine first_state
+
+   !> In words, why there is no vibration to start from.
+   function why_no_vibration(system, solver) result(reason)
+      type(hbm_system), intent(inout) :: system
+      type(point_solver), intent(inout) :: solver
+      character(:), allocatable :: reason
+
+      reason = 'the vibration of the unworn joint did not converge: nothing was worn'
+   end function why_no_vibration
+
+   !> A state of the march becomes a row of the result.
+   subroutine take(self, system, state, iterations, go_on, error)
+      class(wear_recorder), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: state
+      integer, intent(in) :: iterations
+      logical, intent(out) :: go_on
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: point
+      integer(int64) :: clock, rate
+      integer :: n
+
+      go_on = .true.
+      n = system%n_vibration()
+      point%omega = system%structure%omega
+      point%iterations = iterations
+      point%residual = state%residual
+      point%converged = state%residual <= self%case%solver%tolerance .and. &
+                        is_lasting(system%hbm_system)
+      call recover_point(system%hbm_system, state%x(:n), self%case%harmonics%n_harmonics, &
+                         self%case%output%contact, point)
+      if (self%case%output%histories) then
+         call recover_histories(system%hbm_system, size(system%balance, 1), state%x(:n), &
+                                self%case%harmonics%n_harmonics, point)
+      end if
+      call system_clock(clock, rate)
+      point%seconds = real(clock - self%clock, wp)/real(rate, wp)
+      self%clock = clock
+      call self%rows%append(self%writer%file, state%cycles, state%x(n + 1:), state%rate, &
+                            friction_energy(self%case, state%x(n + 1:)), error)
+      if (allocated(error)) return
+      call self%writer%add_point(point, error)
+      if (allocated(error)) return
+      self%n_rows = self%n_rows + 1
+      if (self%case%wear%scheme == wear_pseudo_time .and. .not. point%converged) then
+         call self%summary%add_transient(point)
+      else
+         call self%summary%add(point)
+      end if
+      call self%observer%on_point(self%n_rows, 0, point)
+   end subroutine take
+
+   !> Friction energy that the worn depth stands for: both laws wear in proportion to it.
+   pure function friction_energy(case, depth) result(energy)
+      type(case_type), intent(in) :: case
+      real(wp), intent(in) :: depth(:)
+      real(wp) :: energy(size(depth))
+
+      energy = case%contact%area*depth/case%wear%coefficient
+      if (case%wear%law /= wear_energy) energy = case%contact%mu*energy
+   end function friction_energy
+
+end module fw_wear_response

@@ -1,0 +1,147 @@
+!> The datasets of group /wear of a result file: one row per accepted step, the start included.
+module fw_wear_rows
+   use fw_contact_data, only: contact_type
+   use fw_error, only: error_type
+   use fw_hdf5, only: growing_dataset
+   use fw_hdf5, only: growing_real
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: write_text
+   use fw_kinds, only: wp
+   use fw_text_list, only: append
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: wear_row_set
+
+   integer, parameter :: d_cycles = 1, d_depth = 2, d_rate = 3, d_energy = 4, d_volume = 5
+   integer, parameter :: n_datasets = 5
+
+   type :: wear_row_set
+      type(growing_dataset), private :: list(n_datasets)
+      !> Area of every pair, and the number of its patch (n_pairs).
+      real(wp), allocatable, private :: area(:)
+      integer, allocatable, private :: patch_of(:)
+      integer, private :: n_patches = 1
+   contains
+      procedure :: create
+      procedure :: append => append_row
+      procedure :: state_outcome
+      procedure :: close
+   end type wear_row_set
+
+contains
+
+   subroutine create(self, file, contact, cycles_units, error)
+      class(wear_row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(contact_type), intent(in) :: contact
+      !> 'cycles', or what stands for them.
+      character(*), intent(in) :: cycles_units
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: scalar(0) = [integer ::]
+      type(string_type), allocatable :: patches(:)
+      integer :: n_pairs
+
+      n_pairs = contact%n_pairs
+      self%area = contact%area
+      call number_patches(contact, patches, self%patch_of)
+      self%n_patches = size(patches)
+      call self%list(d_cycles)%create(file, '/wear/cycles', growing_real, scalar, error)
+      if (allocated(error)) return
+      call self%list(d_depth)%create(file, '/wear/depth', growing_real, [n_pairs], error)
+      if (allocated(error)) return
+      call self%list(d_rate)%create(file, '/wear/rate', growing_real, [n_pairs], error)
+      if (allocated(error)) return
+      call self%list(d_energy)%create(file, '/wear/energy', growing_real, [n_pairs], error)
+      if (allocated(error)) return
+      call self%list(d_volume)%create(file, '/wear/volume', growing_real, [self%n_patches], error)
+      if (allocated(error)) return
+      call write_text(file, '/wear/patch', patches, error)
+      if (allocated(error)) return
+      call describe('/wear/cycles', cycles_units)
+      call describe('/wear/depth', 'length')
+      call describe('/wear/rate', 'length / cycle')
+      call describe('/wear/energy', 'force * length')
+      call describe('/wear/volume', 'length**3')
+
+   contains
+
+      subroutine describe(name, units)
+         character(*), intent(in) :: name, units
+
+         if (.not. allocated(error)) call write_attribute(file, name, 'units', units, error)
+      end subroutine describe
+
+   end subroutine create
+
+   !> Patches in the order of their first pair; without names all pairs form one.
+   subroutine number_patches(contact, patches, patch_of)
+      type(contact_type), intent(in) :: contact
+      type(string_type), allocatable, intent(out) :: patches(:)
+      integer, allocatable, intent(out) :: patch_of(:)
+      integer :: i, k
+
+      allocate (patches(0))
+      allocate (patch_of(contact%n_pairs), source=1)
+      if (.not. allocated(contact%patch)) then
+         call append(patches, 'all')
+         return
+      end if
+      do i = 1, contact%n_pairs
+         do k = 1, size(patches)
+            if (patches(k)%text == contact%patch(i)%text) exit
+         end do
+         patch_of(i) = k
+         if (k > size(patches)) call append(patches, contact%patch(i)%text)
+      end do
+   end subroutine number_patches
+
+   subroutine append_row(self, file, cycles, depth, rate, energy, error)
+      class(wear_row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      real(wp), intent(in) :: cycles
+      !> Depth, depth per cycle and accumulated friction energy (n_pairs).
+      real(wp), intent(in) :: depth(:), rate(:), energy(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: volume(self%n_patches)
+      integer :: k
+
+      do k = 1, self%n_patches
+         volume(k) = sum(self%area*depth, mask=self%patch_of == k)
+      end do
+      call self%list(d_cycles)%append(file, cycles, error)
+      if (.not. allocated(error)) call self%list(d_depth)%append(file, depth, error)
+      if (.not. allocated(error)) call self%list(d_rate)%append(file, rate, error)
+      if (.not. allocated(error)) call self%list(d_energy)%append(file, energy, error)
+      if (.not. allocated(error)) call self%list(d_volume)%append(file, volume, error)
+   end subroutine append_row
+
+   !> Whether a steady state was reached, on the group and at the root of the file.
+   subroutine state_outcome(self, file, steady_state, ending, error)
+      class(wear_row_set), intent(in) :: self
+      type(hdf5_file), intent(in) :: file
+      !> 'reached', 'not reached' or 'none: gross slip'.
+      character(*), intent(in) :: steady_state
+      !> In words, how the run ended.
+      character(*), intent(in) :: ending
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. self%list(d_cycles)%is_created()) return
+      call write_attribute(file, '/wear', 'steady_state', steady_state, error)
+      if (.not. allocated(error)) call write_attribute(file, '/wear', 'ending', ending, error)
+      if (.not. allocated(error)) call write_attribute(file, '/', 'steady_state', steady_state, &
+                                                       error)
+   end subroutine state_outcome
+
+   subroutine close(self)
+      class(wear_row_set), intent(inout) :: self
+      integer :: i
+
+      do i = 1, n_datasets
+         call self%list(i)%close()
+      end do
+   end subroutine close
+
+end module fw_wear_rows

@@ -1,0 +1,267 @@
+!> Wear from cycle 0 to the end: the control of the steps, and what counts as an end.
+!>
+!> A step is accepted when it converged and, where the error is controlled, its estimate is within
+!> the tolerance; a step that fails is halved, never skipped. Steps aim at a growth of the largest
+!> depth, so that they lengthen as the rate decays.
+!>
+!> A joint is steady when the largest rate has fallen to steady_tolerance of the largest so far:
+!> no pair both slips and bears. There need not be such a state. The whole joint is in gross slip
+!> when every pair that bears also wears, by rates that no longer change although the depth has
+!> doubled and exceeds the elastic compression of the pairs: then nothing will stop it.
+module fw_wear_march
+   use fw_kinds, only: wp
+   use fw_error, only: error_type
+   use fw_text, only: to_text
+   use fw_wear_options, only: wear_explicit
+   use fw_wear_options, only: wear_options
+   use fw_wear_options, only: wear_pseudo_time
+   use fw_wear_step, only: wear_state
+   use fw_wear_step, only: wear_step_report
+   use fw_wear_step, only: wear_stepper
+   use fw_wear_system, only: wear_system
+   use fw_newton, only: solver_report
+   implicit none (type, external)
+   private
+
+   public :: wear_march, wear_observer
+   public :: steady_words, steady_reached, steady_not_reached, steady_gross_slip
+
+   character(*), parameter :: steady_words(*) = &
+      [character(16) :: 'reached', 'not reached', 'none: gross slip']
+   integer, parameter :: steady_reached = 1, steady_not_reached = 2, steady_gross_slip = 3
+
+   !> Halvings of a step in a row after which the march gives up.
+   integer, parameter :: max_halvings = 40
+   !> Limits of the change of the step from one to the next, and its safety factor.
+   real(wp), parameter :: largest_growth = 4.0_wp, smallest_shrink = 0.2_wp, safety = 0.9_wp
+   !> Growth of the first step, where only the error is controlled, as a part of the elastic
+   !> compression of the pairs.
+   real(wp), parameter :: first_growth = 1.0e-2_wp
+   !> Change of the rates, as a part of the largest, that counts as none; a pair bears and wears
+   !> above these parts of the largest pressure and rate.
+   real(wp), parameter :: unchanged = 1.0e-2_wp, bears = 1.0e-6_wp, wears = 1.0e-3_wp
+
+   type, abstract :: wear_observer
+   contains
+      !> A state of the march, the first included.
+      procedure(state_callback), deferred :: take
+   end type wear_observer
+
+   abstract interface
+      subroutine state_callback(self, system, state, iterations, go_on, error)
+         import :: wear_observer, wear_system, wear_state, error_type
+         class(wear_observer), intent(inout) :: self
+         !> Evaluated at the state.
+         type(wear_system), intent(inout) :: system
+         type(wear_state), intent(in) :: state
+         integer, intent(in) :: iterations
+         !> False ends the march.
+         logical, intent(out) :: go_on
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine state_callback
+   end interface
+
+   type :: wear_march
+      type(wear_options) :: options
+      type(wear_stepper) :: stepper
+      !> Outcome.
+      integer :: steady = steady_not_reached
+      integer :: n_steps = 0
+      integer :: n_rejected = 0
+      !> All that was asked for has been covered: a steady state, the cycles, or gross slip.
+      logical :: complete = .false.
+      !> How the march ended.
+      character(:), allocatable :: ending
+      !> Step that the error allows next (0: not known yet).
+      real(wp) :: next_cycles = 0.0_wp
+      !> Largest rate so far, and depth and rates at which gross slip was last looked for.
+      real(wp) :: largest_rate = 0.0_wp
+      real(wp) :: checked_depth = 0.0_wp
+      real(wp), allocatable :: checked_rate(:)
+   contains
+      procedure :: run
+   end type wear_march
+
+contains
+
+   !> March from a settled state (residual, rates known); the last state is left in it.
+   subroutine run(self, system, state, observer, error)
+      class(wear_march), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(inout) :: state
+      class(wear_observer), intent(inout) :: observer
+      type(error_type), allocatable, intent(out) :: error
+      type(wear_state) :: after
+      integer :: iterations
+      logical :: go_on
+
+      iterations = 0
+      do
+         call observer%take(system, state, iterations, go_on, error)
+         if (allocated(error)) return
+         call judge(self, system, state)
+         if (allocated(self%ending)) exit
+         if (.not. go_on) then
+            self%ending = 'stopped by its observer'
+            exit
+         end if
+         call one_step(self, system, state, after, iterations)
+         if (allocated(self%ending)) exit
+         state = after
+      end do
+   end subroutine run
+
+   !> Whether the march ends at this state, and why.
+   subroutine judge(self, system, state)
+      type(wear_march), intent(inout) :: self
+      type(wear_system), intent(in) :: system
+      type(wear_state), intent(in) :: state
+      real(wp) :: rate
+
+      rate = maxval(state%rate)
+      self%largest_rate = max(self%largest_rate, rate)
+      if (rate <= self%options%steady_tolerance*self%largest_rate) then
+         self%steady = steady_reached
+         self%complete = .true.
+         if (self%n_steps == 0) then
+            self%ending = 'no pair slips under pressure: nothing wears'
+         else
+            self%ending = 'steady state after '//to_text(self%n_steps)//' steps'
+         end if
+      else if (in_gross_slip(self, system, state)) then
+         self%steady = steady_gross_slip
+         self%complete = .true.
+         self%ending = 'the whole joint keeps sliding and wears at a constant rate: there is '// &
+                       'no steady state'
+      else if (state%cycles >= self%options%n_cycles) then
+         self%complete = .true.
+         self%ending = 'n_cycles reached'
+      else if (self%n_steps >= self%options%max_steps) then
+         self%ending = 'max_steps = '//to_text(self%options%max_steps)// &
+                       ' steps done: raise wear%max_steps or the size of the steps'
+      end if
+   end subroutine judge
+
+   !> See the module header. Looked for at every doubling of the depth.
+   logical function in_gross_slip(self, system, state) result(found)
+      type(wear_march), intent(inout) :: self
+      type(wear_system), intent(in) :: system
+      type(wear_state), intent(in) :: state
+      real(wp) :: pressure(size(state%rate)), depth
+      logical :: changed
+
+      found = .false.
+      depth = maxval(state%x(system%n_vibration() + 1:))
+      if (allocated(self%checked_rate) .and. depth < 2.0_wp*self%checked_depth) return
+      if (depth <= 0.0_wp) return
+      changed = .true.
+      if (allocated(self%checked_rate)) then
+         changed = maxval(abs(state%rate - self%checked_rate)) > unchanged*maxval(state%rate)
+      end if
+      self%checked_depth = depth
+      self%checked_rate = state%rate
+      if (changed) return
+      if (system%feels_depth() .and. depth < system%compression()) return
+      pressure = system%mean_pressure()
+      found = all(state%rate >= wears*maxval(state%rate) .or. pressure <= bears*maxval(pressure))
+   end function in_gross_slip
+
+   !> One accepted step, or an ending.
+   subroutine one_step(self, system, state, after, iterations)
+      type(wear_march), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: state
+      type(wear_state), intent(out) :: after
+      integer, intent(out) :: iterations
+      type(wear_step_report) :: report
+      real(wp) :: cycles, error
+      integer :: halvings
+
+      iterations = 0
+      halvings = 0
+      cycles = next_step(self, system, state)
+      do
+         call self%stepper%advance(system, state, cycles, after, report)
+         iterations = iterations + report%iterations
+         if (report%converged) call confirm(self, system, after, report, iterations)
+         if (.not. report%converged) then
+            halvings = halvings + 1
+            if (halvings > max_halvings) then
+               self%ending = 'no step from cycle '//to_text(state%cycles)// &
+                             ' on converges, down to '//to_text(cycles)//' cycles'
+               return
+            end if
+            self%n_rejected = self%n_rejected + 1
+            cycles = 0.5_wp*cycles
+            self%next_cycles = cycles
+            cycle
+         end if
+         if (.not. self%options%controls_error()) exit
+         error = maxval(abs(report%error))/ &
+                 max(maxval(after%x(system%n_vibration() + 1:)), tiny(1.0_wp))
+         call adapt(self, cycles, error)
+         if (error <= self%options%tolerance()) exit
+         self%n_rejected = self%n_rejected + 1
+         cycles = self%next_cycles
+      end do
+      if (.not. self%options%controls_error()) self%next_cycles = largest_growth*cycles
+      self%n_steps = self%n_steps + 1
+   end subroutine one_step
+
+   !> Pseudo-time steps leave a residual: a state that looks like the last has to be in equilibrium.
+   subroutine confirm(self, system, after, report, iterations)
+      type(wear_march), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(inout) :: after
+      type(wear_step_report), intent(inout) :: report
+      integer, intent(inout) :: iterations
+      type(solver_report) :: solution
+
+      if (self%options%scheme /= wear_pseudo_time) return
+      if (maxval(after%rate) > self%options%steady_tolerance*self%largest_rate .and. &
+          after%cycles < self%options%n_cycles .and. &
+          self%n_steps + 1 < self%options%max_steps) return
+      call self%stepper%settle(system, after, solution)
+      iterations = iterations + solution%iterations
+      report%converged = solution%converged
+   end subroutine confirm
+
+   !> Cycles of the next step.
+   real(wp) function next_step(self, system, state) result(cycles)
+      type(wear_march), intent(in) :: self
+      type(wear_system), intent(in) :: system
+      type(wear_state), intent(in) :: state
+      real(wp) :: rate
+
+      rate = maxval(state%rate)
+      cycles = self%next_cycles
+      if (cycles <= 0.0_wp) then
+         cycles = huge(1.0_wp)
+         if (self%options%controls_error()) cycles = first_growth*system%compression()/rate
+      end if
+      if (self%options%max_depth_step > 0.0_wp) then
+         cycles = min(cycles, self%options%max_depth_step/rate)
+      end if
+      if (cycles >= self%options%n_cycles - state%cycles) then
+         cycles = self%options%n_cycles - state%cycles
+      else if (2.0_wp*cycles > self%options%n_cycles - state%cycles) then
+         ! Two steps of a kind rather than a last one of next to nothing.
+         cycles = 0.5_wp*(self%options%n_cycles - state%cycles)
+      end if
+   end function next_step
+
+   !> The step that the error allows next.
+   subroutine adapt(self, cycles, error)
+      type(wear_march), intent(inout) :: self
+      real(wp), intent(in) :: cycles, error
+      real(wp) :: factor
+      integer :: exponent
+
+      exponent = max(2, self%stepper%order)
+      if (self%options%scheme == wear_explicit) exponent = 2
+      factor = largest_growth
+      if (error > 0.0_wp) factor = safety*(self%options%tolerance()/error)**(1.0_wp/exponent)
+      self%next_cycles = cycles*min(largest_growth, max(smallest_shrink, factor))
+   end subroutine adapt
+
+end module fw_wear_march

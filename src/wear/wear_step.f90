@@ -1,0 +1,221 @@
+!> One step of the wear depth over many cycles, by any of the schemes; the control of the steps is
+!> the caller's (fw_wear_march).
+module fw_wear_step
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use fw_kinds, only: wp
+   use fw_newton, only: newton_solver
+   use fw_newton, only: solver_report
+   use fw_wear_options, only: wear_explicit
+   use fw_wear_options, only: wear_options
+   use fw_wear_options, only: wear_pseudo_time
+   use fw_wear_system, only: wear_system
+   use fw_wear_tableau, only: new_tableau
+   use fw_wear_tableau, only: tableau_type
+   implicit none (type, external)
+   private
+
+   public :: wear_state, wear_step_report, wear_stepper, new_wear_stepper
+
+   !> Where a wear run stands.
+   type :: wear_state
+      real(wp) :: cycles = 0.0_wp
+      !> Vibration, then depths (n).
+      real(wp), allocatable :: x(:)
+      !> Depth per cycle (n_pairs) [length].
+      real(wp), allocatable :: rate(:)
+      !> norm(R)/norm(F) of the vibration.
+      real(wp) :: residual = 0.0_wp
+   end type wear_state
+
+   type :: wear_step_report
+      logical :: converged = .false.
+      integer :: iterations = 0
+      !> Estimate of the error of the depths (n_pairs) [length]; zero where the scheme has none.
+      real(wp), allocatable :: error(:)
+   end type wear_step_report
+
+   type :: wear_stepper
+      integer :: scheme = wear_explicit
+      integer :: order = 1
+      type(newton_solver) :: newton
+      !> Largest depth that a step may add, which pseudo-time enforces [length].
+      real(wp) :: max_depth_step = huge(1.0_wp)
+      type(tableau_type), private :: tableau
+      !> Estimate the error; the explicit scheme then advances with the corrected depths.
+      logical, private :: controls_error = .false.
+      real(wp), allocatable, private :: r(:), step(:)
+   contains
+      procedure :: advance
+      procedure :: settle
+   end type wear_stepper
+
+   !> Relative residual of the linear solution of a pseudo-time step, and the growth of the
+   !> residual of the vibration above which such a step is corrected.
+   real(wp), parameter :: linear_tolerance = 1.0e-4_wp, largest_lag = 1.0e-2_wp
+   integer, parameter :: max_corrections = 5
+   !> A pseudo-time step may exceed the growth of the depth that was aimed at by this factor.
+   real(wp), parameter :: depth_allowance = 1.5_wp
+
+contains
+
+   !> The stepper of a case; the Newton solver brings its options.
+   function new_wear_stepper(options, newton) result(self)
+      type(wear_options), intent(in) :: options
+      type(newton_solver), intent(in) :: newton
+      type(wear_stepper) :: self
+
+      self%scheme = options%scheme
+      self%newton = newton
+      self%controls_error = options%controls_error()
+      self%order = options%order
+      if (self%order == 0) self%order = automatic_order(options)
+      if (options%scheme == wear_pseudo_time) self%order = 1
+      self%tableau = new_tableau(self%order)
+      if (options%max_depth_step > 0.0_wp) self%max_depth_step = options%max_depth_step
+   end function new_wear_stepper
+
+   pure integer function automatic_order(options) result(order)
+      type(wear_options), intent(in) :: options
+
+      order = 1
+      if (.not. options%controls_error()) return
+      order = merge(2, 3, options%scheme == wear_explicit)
+   end function automatic_order
+
+   !> From a state to one that many cycles later. Where it does not converge, `after` is undefined
+   !> and the system stands anywhere.
+   subroutine advance(self, system, before, cycles, after, report)
+      class(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      real(wp), intent(in) :: cycles
+      type(wear_state), intent(out) :: after
+      type(wear_step_report), intent(out) :: report
+
+      allocate (report%error(size(before%rate)), source=0.0_wp)
+      select case (self%scheme)
+      case (wear_explicit)
+         call explicit_step(self, system, before, cycles, after, report)
+      case (wear_pseudo_time)
+         call linear_step(self, system, before, cycles, after, report)
+      case default
+         call implicit_step(self, system, before, cycles, after, report)
+      end select
+      after%cycles = before%cycles + cycles
+   end subroutine advance
+
+   !> The vibration at given depths, from the guess in state%x; its rates.
+   subroutine settle(self, system, state, report)
+      class(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(inout) :: state
+      type(solver_report), intent(out) :: report
+      integer :: n
+
+      n = system%n_vibration()
+      call system%hold_depths(state%x(n + 1:))
+      call self%newton%solve(system%hbm_system, state%x(:n), report)
+      call system%free_depths()
+      call system%update_rate()
+      state%rate = system%rate
+      state%residual = report%residual
+   end subroutine settle
+
+   !> Euler, or Heun where the error is controlled: the trapezoidal rule then gives the depths, and
+   !> its difference to Euler the error.
+   subroutine explicit_step(self, system, before, cycles, after, report)
+      type(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      real(wp), intent(in) :: cycles
+      type(wear_state), intent(out) :: after
+      type(wear_step_report), intent(inout) :: report
+      type(solver_report) :: solution
+      integer :: n
+
+      n = system%n_vibration()
+      after%x = before%x
+      after%x(n + 1:) = before%x(n + 1:) + cycles*before%rate
+      call self%settle(system, after, solution)
+      report%converged = solution%converged
+      report%iterations = solution%iterations
+      if (.not. solution%converged) return
+      report%error = 0.5_wp*cycles*(after%rate - before%rate)
+      if (self%order == 1) return
+      after%x(n + 1:) = after%x(n + 1:) + report%error
+      call self%settle(system, after, solution)
+      report%converged = solution%converged
+      report%iterations = report%iterations + solution%iterations
+   end subroutine explicit_step
+
+   !> The stages of the tableau, each an implicit Euler step from a base of its own.
+   subroutine implicit_step(self, system, before, cycles, after, report)
+      type(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      real(wp), intent(in) :: cycles
+      type(wear_state), intent(out) :: after
+      type(wear_step_report), intent(inout) :: report
+      type(solver_report) :: solution
+      real(wp) :: rate(size(before%rate), 0:self%tableau%n_stages)
+      real(wp) :: base(size(before%rate))
+      integer :: n, s
+
+      n = system%n_vibration()
+      after%x = before%x
+      rate(:, 0) = before%rate
+      associate (t => self%tableau)
+         do s = 1, t%n_stages
+            base = before%x(n + 1:) + cycles*matmul(rate(:, 1:s - 1), t%a(s, 1:s - 1))
+            call system%begin_step(base, t%gamma*cycles)
+            after%x(n + 1:) = base + t%gamma*cycles*rate(:, s - 1)
+            call self%newton%solve(system, after%x, solution)
+            report%iterations = report%iterations + solution%iterations
+            report%converged = solution%converged
+            if (.not. solution%converged) return
+            rate(:, s) = system%rate
+         end do
+         report%error = cycles*matmul(rate, t%error)
+         after%rate = rate(:, t%n_stages)
+      end associate
+      after%residual = solution%residual
+   end subroutine implicit_step
+
+   !> Linearly implicit Euler: one linear solution for vibration and depths together. Depths only
+   !> grow, and by no more than the allowance. What the vibration lags behind is corrected where
+   !> it is not small: wear cannot be taken back.
+   subroutine linear_step(self, system, before, cycles, after, report)
+      type(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      real(wp), intent(in) :: cycles
+      type(wear_state), intent(out) :: after
+      type(wear_step_report), intent(inout) :: report
+      real(wp) :: norm
+      integer :: n, k
+      logical :: done
+
+      n = system%n_vibration()
+      call system%begin_step(before%x(n + 1:), cycles)
+      if (.not. allocated(self%r)) allocate (self%r(system%n), self%step(system%n))
+      after%x = before%x
+      call system%residual(after%x, self%r)
+      do k = 1, max_corrections
+         call self%newton%linear%solve(system, self%r, linear_tolerance, self%step, done)
+         report%iterations = k
+         if (.not. done) return
+         after%x = after%x + self%step
+         associate (depth => after%x(n + 1:), start => before%x(n + 1:))
+            depth = min(max(depth, start), start + depth_allowance*self%max_depth_step)
+         end associate
+         call system%residual(after%x, self%r)
+         norm = norm2(self%r(:n))/system%reference
+         if (.not. ieee_is_finite(norm)) return
+         report%converged = norm <= largest_lag
+         if (report%converged) exit
+      end do
+      after%rate = system%rate
+      after%residual = norm
+   end subroutine linear_step
+
+end module fw_wear_step

@@ -1,0 +1,428 @@
+!> Vibration and wear depth together, at the end of an implicit step over many cycles:
+!>
+!>   R(q, w) = 0,     w - base - cycles rate(q, w) = 0,     rate = (k_w / A) S / eps
+!>
+!> with S the sliding under pressure over a period (fw_slip). Unknowns are those of the balance,
+!> then one depth per pair. Where a pair sticks or stays open, its depth leaves the linear problem:
+!> it equals the base. The derivative dR/dw = B^T G eps e_0 and that of the rate are exact.
+!>
+!> The preconditioner keeps the coupling of both: with M the block diagonal preconditioner of the
+!> balance, B = dR/dw and C = d(wear equations)/dq, it solves [M B; C D] through the Schur
+!> complement D - C M^-1 B, whose order is the number of pairs that wear.
+module fw_wear_system
+   use fw_kinds, only: wp
+   use fw_contact_data, only: contact_type
+   use fw_forces, only: pair_mixed
+   use fw_forces, only: pair_stuck
+   use fw_hbm, only: hbm_system
+   use fw_lapack, only: zgemm
+   use fw_linalg, only: lu_type
+   implicit none (type, external)
+   private
+
+   public :: wear_system, new_wear_system
+
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+
+   type, extends(hbm_system) :: wear_system
+      !> Cycles of the step, and the depth that it starts from (n_pairs) [length].
+      real(wp) :: cycles = 0.0_wp
+      real(wp), allocatable :: base(:)
+      !> Depth per cycle [length] at the last point (n_pairs).
+      real(wp), allocatable :: rate(:)
+      !> From S to the rate: k_w/(A eps) (n_pairs).
+      real(wp), allocatable, private :: factor(:)
+      !> Makes a force of a depth: eps in the normal direction (n_pairs).
+      real(wp), allocatable, private :: weight(:)
+      !> Pairs whose depth stays in the linear problem (first n_wearing entries).
+      integer, private :: n_wearing = 0
+      integer, allocatable, private :: wearing(:)
+      !> Unknowns of the balance in the linear problem.
+      integer, private :: n_balance = 0
+      !> Preconditioner: M^-1 B and the rows of C M^-1 per harmonic, factors of the complement.
+      complex(wp), allocatable, private :: columns(:, :, :), product(:, :)
+      type(lu_type), private :: complement
+      real(wp), allocatable, private :: adjusted(:), solved(:)
+   contains
+      procedure :: begin_step
+      procedure :: n_vibration
+      procedure :: hold_depths
+      procedure :: free_depths
+      procedure :: update_rate
+      procedure :: mean_pressure
+      procedure :: compression
+      procedure :: feels_depth
+      procedure :: residual
+      procedure :: linearize
+      procedure :: reduce
+      procedure :: expand
+      procedure :: apply
+      procedure :: build_preconditioner
+      procedure :: precondition
+   end type wear_system
+
+contains
+
+   !> Add wear to a balance.
+   subroutine new_wear_system(balance, contact, coefficient, by_energy, self)
+      type(hbm_system), intent(in) :: balance
+      type(contact_type), intent(in) :: contact
+      !> Wear coefficient k_w [area/force].
+      real(wp), intent(in) :: coefficient
+      !> The coefficient multiplies friction energy (mu p ds) instead of p ds.
+      logical, intent(in) :: by_energy
+      type(wear_system), intent(out) :: self
+      real(wp) :: tangential(contact%n_pairs)
+
+      self%hbm_system = balance
+      call self%free_depths()
+      call self%contact%measure_slip(self%fourier%n_coefficients)
+      tangential = maxval(self%stiffness(:, 1:2), dim=2)
+      allocate (self%base(contact%n_pairs), self%rate(contact%n_pairs), source=0.0_wp)
+      allocate (self%factor(contact%n_pairs), source=0.0_wp)
+      where (tangential > 0.0_wp) self%factor = coefficient/(contact%area*tangential)
+      if (by_energy) self%factor = contact%mu*self%factor
+      self%weight = self%stiffness(:, 3)
+      where (self%weight <= 0.0_wp) self%weight = tangential
+      where (self%weight <= 0.0_wp) self%weight = 1.0_wp
+      allocate (self%wearing(contact%n_pairs), source=0)
+   end subroutine new_wear_system
+
+   !> Unknowns of the vibration; the depths follow them.
+   pure integer function n_vibration(self)
+      class(wear_system), intent(in) :: self
+
+      n_vibration = self%structure%n_coordinates*self%fourier%n_coefficients
+   end function n_vibration
+
+   !> Make the balance a system of its own, at given depths.
+   subroutine hold_depths(self, depth)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in) :: depth(:)
+
+      self%n = self%n_vibration()
+      self%pins_normals = .true.
+      self%depth = depth
+   end subroutine hold_depths
+
+   !> Make the depths unknowns again.
+   subroutine free_depths(self)
+      class(wear_system), intent(inout) :: self
+
+      self%n = self%n_vibration() + self%contact%n_pairs
+      self%pins_normals = .false.
+   end subroutine free_depths
+
+   !> State the step: residuals are those of its end from now on.
+   subroutine begin_step(self, base, cycles)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in) :: base(:), cycles
+
+      self%base = base
+      self%cycles = cycles
+   end subroutine begin_step
+
+   !> Rates at the last point of the balance.
+   subroutine update_rate(self)
+      class(wear_system), intent(inout) :: self
+
+      self%rate = self%factor*self%contact%slip
+   end subroutine update_rate
+
+   !> Mean compressive force of every pair at the last point [force].
+   pure function mean_pressure(self) result(pressure)
+      class(wear_system), intent(in) :: self
+      real(wp) :: pressure(self%contact%n_pairs)
+
+      pressure = self%normal_load
+      if (self%feels_depth()) pressure = merge(-self%contact%force(:, 3, 1), pressure, &
+                                               self%joint%row(3, :) > 0)
+   end function mean_pressure
+
+   !> Largest elastic compression of a pair at the last point: the depth that would unload it
+   !> alone [length].
+   pure real(wp) function compression(self)
+      class(wear_system), intent(in) :: self
+
+      compression = maxval(self%mean_pressure()/self%weight)
+   end function compression
+
+   !> Whether the depth acts on the forces: normal loads may all be constant.
+   pure logical function feels_depth(self)
+      class(wear_system), intent(in) :: self
+
+      feels_depth = any(self%joint%row(3, :) > 0)
+   end function feels_depth
+
+   subroutine residual(self, x, r)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: r(:)
+      integer :: n
+
+      n = self%n_vibration()
+      self%depth = x(n + 1:)
+      call self%hbm_system%residual(x(:n), r(:n))
+      call self%update_rate()
+      r(n + 1:) = self%weight*(x(n + 1:) - self%base - self%cycles*self%rate)
+   end subroutine residual
+
+   subroutine linearize(self, n_linear)
+      class(wear_system), intent(inout) :: self
+      integer, intent(out) :: n_linear
+      integer :: i
+
+      call self%hbm_system%linearize(self%n_balance)
+      self%n_wearing = 0
+      do i = 1, self%contact%n_pairs
+         if (self%contact%state(i) /= pair_mixed) cycle
+         self%n_wearing = self%n_wearing + 1
+         self%wearing(self%n_wearing) = i
+      end do
+      n_linear = self%n_balance + self%n_wearing
+      self%n_linear = n_linear
+   end subroutine linearize
+
+   subroutine reduce(self, r, rhs)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: r(:)
+      real(wp), intent(out), contiguous :: rhs(:)
+      integer :: n, j, i
+
+      n = self%n_vibration()
+      self%pair_in = 0.0_wp
+      call settle_depths(self, r)
+      call self%hbm_system%reduce(self%adjusted, rhs(:self%n_balance))
+      do j = 1, self%n_wearing
+         i = self%wearing(j)
+         ! pair_in holds what the coordinates that are solved at once do to the prediction.
+         rhs(self%n_balance + j) = -r(n + i) + self%weight(i)*self%cycles*self%factor(i)* &
+                                   dot_product(self%contact%slip_derivative(:, i), &
+                                               self%pair_in(:, i))
+      end do
+   end subroutine reduce
+
+   !> Residuals of the balance after the depths that leave the linear problem have taken theirs.
+   subroutine settle_depths(self, r)
+      type(wear_system), intent(inout) :: self
+      real(wp), intent(in) :: r(:)
+      integer :: i, e, row, n
+
+      n = self%n_vibration()
+      self%adjusted = r(:n)
+      if (.not. self%fourier%has_constant()) return
+      associate (rel => self%joint%relative)
+         do i = 1, self%contact%n_pairs
+            row = self%joint%row(3, i)
+            if (row == 0 .or. self%contact%state(i) /= pair_stuck) cycle
+            do e = rel%first(row), rel%first(row + 1) - 1
+               associate (entry => self%adjusted(rel%coordinate(e)))
+                  entry = entry - rel%coefficient(e)*self%stiffness(i, 3)/self%weight(i)*r(n + i)
+               end associate
+            end do
+         end do
+      end associate
+   end subroutine settle_depths
+
+   subroutine expand(self, r, solution, step)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: r(:), solution(:)
+      real(wp), intent(out), contiguous :: step(:)
+      integer :: n, j
+
+      n = self%n_vibration()
+      call settle_depths(self, r)
+      call self%hbm_system%expand(self%adjusted, solution(:self%n_balance), step(:n))
+      step(n + 1:) = -r(n + 1:)/self%weight
+      do j = 1, self%n_wearing
+         step(n + self%wearing(j)) = solution(self%n_balance + j)
+      end do
+   end subroutine expand
+
+   subroutine apply(self, vector, product)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: vector(:)
+      real(wp), intent(out), contiguous :: product(:)
+      integer :: i, j, n
+
+      n = self%n_balance
+      call self%hbm_system%apply(vector(:n), product(:n))
+      do j = 1, self%n_wearing
+         i = self%wearing(j)
+         call add_depth_column(self, i, vector(n + j), product)
+         product(n + j) = self%weight(i)*(vector(n + j) - self%cycles*self%factor(i)*( &
+                          dot_product(self%contact%slip_derivative(:, i), self%pair_in(:, i)) + &
+                          depth_slope(self, i)*vector(n + j)))
+      end do
+   end subroutine apply
+
+   !> dS/dw of a pair at fixed displacements.
+   pure real(wp) function depth_slope(self, pair) result(slope)
+      type(wear_system), intent(in) :: self
+      integer, intent(in) :: pair
+
+      slope = 0.0_wp
+      if (self%joint%row(3, pair) == 0) return
+      slope = self%stiffness(pair, 3)* &
+              self%contact%slip_derivative(2*self%fourier%n_coefficients + 1, pair)
+   end function depth_slope
+
+   !> product = product + B^T G eps e_0 of one pair, times its depth.
+   subroutine add_depth_column(self, pair, depth, product)
+      type(wear_system), intent(in) :: self
+      integer, intent(in) :: pair
+      real(wp), intent(in) :: depth
+      real(wp), intent(inout) :: product(:)
+      integer :: c, e, k, nc, place, row
+
+      if (self%joint%row(3, pair) == 0) return
+      nc = self%fourier%n_coefficients
+      associate (rel => self%joint%relative)
+         do c = 1, 3
+            row = self%joint%row(c, pair)
+            if (row == 0) cycle
+            do e = rel%first(row), rel%first(row + 1) - 1
+               place = self%place(rel%coordinate(e))
+               if (place == 0 .or. place > self%n_active) cycle
+               do k = 1, nc
+                  associate (entry => product((k - 1)*self%n_active + place))
+                     entry = entry + rel%coefficient(e)*self%stiffness(pair, 3)*depth* &
+                             self%contact%jacobian(2*nc + 1, (c - 1)*nc + k, pair)
+                  end associate
+               end do
+            end do
+         end do
+      end associate
+   end subroutine add_depth_column
+
+   subroutine build_preconditioner(self)
+      class(wear_system), intent(inout) :: self
+      real(wp), allocatable :: column(:)
+      integer :: h, i, j, na
+      logical :: singular
+
+      call self%hbm_system%build_preconditioner()
+      if (self%n_wearing == 0) return
+      na = self%n_active
+      call reserve(self)
+      allocate (column(self%n_balance))
+      call self%complement%reserve(self%n_wearing)
+      associate (s => self%complement%matrix)
+         s(:self%n_wearing, :self%n_wearing) = 0.0_wp
+         do j = 1, self%n_wearing
+            i = self%wearing(j)
+            column = 0.0_wp
+            call add_depth_column(self, i, 1.0_wp, column)
+            call harmonics_of(self, na, column, self%columns(:, j, :))
+            s(j, j) = self%weight(i)*(1.0_wp - self%cycles*self%factor(i)*depth_slope(self, i))
+         end do
+         do h = 1, self%fourier%n_retained
+            call self%preconditioner(h)%solve(self%n_wearing, self%columns(:na, :, h))
+            call subtract_rows(self, h, self%n_wearing, self%columns(:, :, h), s)
+         end do
+      end associate
+      call self%complement%factor(singular)
+   end subroutine build_preconditioner
+
+   subroutine reserve(self)
+      type(wear_system), intent(inout) :: self
+      integer :: m, n
+
+      m = self%structure%n_coordinates
+      n = self%n_wearing
+      if (allocated(self%columns)) then
+         if (size(self%columns, 2) == n) return
+         deallocate (self%columns, self%product)
+      end if
+      allocate (self%columns(m, n, self%fourier%n_retained), self%product(m, max(n, 1)))
+   end subroutine reserve
+
+   !> Harmonics of active coordinates as complex rows.
+   pure subroutine harmonics_of(self, na, vector, harmonics)
+      type(wear_system), intent(in) :: self
+      integer, intent(in) :: na
+      real(wp), intent(in) :: vector(na, *)
+      complex(wp), intent(inout) :: harmonics(:, :)
+      integer :: h, k
+
+      do h = 1, self%fourier%n_retained
+         k = self%fourier%column(h)
+         if (self%fourier%harmonic(h) == 0) then
+            harmonics(:na, h) = cmplx(vector(:, k), kind=wp)
+         else
+            harmonics(:na, h) = cmplx(vector(:, k), -vector(:, k + 1), wp)
+         end if
+      end do
+   end subroutine harmonics_of
+
+   !> rows = rows - C z for displacements z of one harmonic (active coordinates, right-hand side).
+   subroutine subtract_rows(self, h, n_right, z, rows)
+      type(wear_system), intent(inout) :: self
+      integer, intent(in) :: h, n_right
+      complex(wp), intent(in) :: z(:, :)
+      real(wp), intent(inout) :: rows(:, :)
+      complex(wp) :: input(n_right), turn
+      integer :: c, e, i, j, k, n, nc, place, row
+
+      nc = self%fourier%n_coefficients
+      n = self%fourier%harmonic(h)
+      if (self%rigid) call zgemm('N', 'N', self%n_used, n_right, self%n_active, one, &
+                                 self%active_stiffness(1, 1, h), size(self%active_stiffness, 1), &
+                                 z, size(z, 1), zero, self%product, size(self%product, 1))
+      associate (rel => self%joint%relative)
+         do j = 1, self%n_wearing
+            i = self%wearing(j)
+            do c = 1, 3
+               row = self%joint%row(c, i)
+               if (row == 0) cycle
+               ! d/dtau is a factor i n of the complex coefficient.
+               turn = one
+               if (self%velocity_level .and. c < 3) turn = cmplx(0.0_wp, n, wp)
+               input = zero
+               do e = rel%first(row), rel%first(row + 1) - 1
+                  place = self%place(rel%coordinate(e))
+                  if (place == 0 .or. place > self%n_active) cycle
+                  input = input + turn*self%stiffness(i, c)*rel%coefficient(e)*z(place, :n_right)
+               end do
+               place = self%place(rel%coordinate(rel%first(row)))
+               if (self%rigid .and. place > 0) input = input - self%product(place, :n_right)
+               k = (c - 1)*nc + self%fourier%column(h)
+               associate (g => self%contact%slip_derivative(:, i), &
+                          scale => self%weight(i)*self%cycles*self%factor(i))
+                  rows(j, :n_right) = rows(j, :n_right) + scale*g(k)*real(input, wp)
+                  if (n > 0) rows(j, :n_right) = rows(j, :n_right) - scale*g(k + 1)*aimag(input)
+               end associate
+            end do
+         end do
+      end associate
+   end subroutine subtract_rows
+
+   subroutine precondition(self, vector)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: vector(:)
+      complex(wp), allocatable :: z(:, :, :)
+      real(wp) :: depth(self%n_wearing, 1)
+      integer :: h, k, na, n
+
+      n = self%n_balance
+      call self%hbm_system%precondition(vector(:n))
+      if (self%n_wearing == 0) return
+      na = self%n_active
+      allocate (z(self%structure%n_coordinates, 1, self%fourier%n_retained))
+      call harmonics_of(self, na, vector, z(:, 1, :))
+      depth(:, 1) = vector(n + 1:)
+      do h = 1, self%fourier%n_retained
+         call subtract_rows(self, h, 1, z(:, :, h), depth)
+      end do
+      call self%complement%solve(depth(:, 1))
+      vector(n + 1:) = depth(:, 1)
+      do h = 1, self%fourier%n_retained
+         z(:na, 1, h) = matmul(self%columns(:na, :, h), depth(:, 1))
+         k = self%fourier%column(h)
+         vector((k - 1)*na + 1:k*na) = vector((k - 1)*na + 1:k*na) - real(z(:na, 1, h), wp)
+         if (self%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
+            = vector(k*na + 1:(k + 1)*na) + aimag(z(:na, 1, h))
+      end do
+   end subroutine precondition
+
+end module fw_wear_system
