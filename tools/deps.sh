@@ -33,6 +33,7 @@ has_venv() { python3 -c 'import venv, ensurepip' 2>/dev/null; }
 missing_packages() {
    has_command gfortran || echo gfortran
    has_command gcc || echo gcc
+   has_command g++ || echo g++
    links m || echo libc6-dev
    has_command cmake || echo cmake
    has_command ninja || echo ninja-build

@@ -5,7 +5,7 @@ module fw_observer
    implicit none (type, external)
    private
 
-   public :: observer_type
+   public :: observer_type, silent_observer
 
    type, abstract :: observer_type
       !> Set by any callback to end the run after the present point.
@@ -20,6 +20,15 @@ module fw_observer
       !> After the last point, also of a run that ends early.
       procedure(end_callback), deferred :: on_end
    end type observer_type
+
+   !> An observer that does nothing.
+   type, extends(observer_type) :: silent_observer
+   contains
+      procedure :: on_start
+      procedure :: on_point
+      procedure :: on_message
+      procedure :: on_end
+   end type silent_observer
 
    abstract interface
       subroutine start_callback(self, case_title, n_points)
@@ -54,5 +63,41 @@ module fw_observer
          class(observer_type), intent(inout) :: self
       end subroutine end_callback
    end interface
+
+contains
+
+   subroutine on_start(self, case_title, n_points)
+      class(silent_observer), intent(inout) :: self
+      character(*), intent(in) :: case_title
+      integer, intent(in) :: n_points
+
+      associate (unused => self, unused_title => case_title, unused_number => n_points)
+      end associate
+   end subroutine on_start
+
+   subroutine on_point(self, index, n_points, point)
+      class(silent_observer), intent(inout) :: self
+      integer, intent(in) :: index, n_points
+      type(point_type), intent(in) :: point
+
+      associate (unused => self, unused_index => index, unused_number => n_points, &
+                 unused_point => point)
+      end associate
+   end subroutine on_point
+
+   subroutine on_message(self, text)
+      class(silent_observer), intent(inout) :: self
+      character(*), intent(in) :: text
+
+      associate (unused => self, unused_text => text)
+      end associate
+   end subroutine on_message
+
+   subroutine on_end(self)
+      class(silent_observer), intent(inout) :: self
+
+      associate (unused => self)
+      end associate
+   end subroutine on_end
 
 end module fw_observer

@@ -1,0 +1,151 @@
+/* Fretwear: vibration with contact, friction and fretting wear by harmonic balance.
+ *
+ * A handle holds one case: a namelist, single keys and a model in arrays, in whatever mixture and
+ * order. It is run as a whole, or frequency by frequency, and its results are copied out.
+ *
+ * - Every function but three returns one of the statuses below. fw_get_message has the words.
+ *   Nothing prints and nothing ends the program.
+ * - Handles share nothing: different threads may use different handles at the same time. One
+ *   handle serves one thread at a time; while a call is at work on it, its callback may read
+ *   (fw_get, fw_size, fw_count, fw_get_text), every other call is refused with FW_USAGE.
+ * - A handle that was destroyed, or never created, is recognised and refused with FW_USAGE.
+ * - Units are those of the model, as long as they fit each other; omega is in rad/s.
+ * - Callbacks must return: no longjmp and no C++ exception may pass through the library.
+ *
+ * docs/library.md says more, with what to do about threads.
+ */
+#ifndef FRETWEAR_H
+#define FRETWEAR_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What fw_get_interface_version returns for this header. */
+#define FW_INTERFACE_VERSION 1
+
+/* Statuses; those from FW_FAILURE to FW_IO are the exit statuses of the program fw_run. */
+enum fw_status {
+   FW_OK = 0,
+   FW_FAILURE = 1,       /* anything that has no status of its own */
+   FW_USAGE = 2,         /* wrong call: handle, name, size, order of calls, null pointer */
+   FW_INPUT = 3,         /* something is wrong in the case */
+   FW_NOT_CONVERGED = 4, /* what was computed is there, marked */
+   FW_IO = 5,            /* a file cannot be read or written */
+   FW_STOPPED = 6        /* by the callback; what was computed is there */
+};
+
+typedef struct fw_session *fw_handle;
+
+/* What a progress callback is told of a point that was solved. */
+typedef struct fw_progress {
+   int point;        /* from 0 */
+   int n_points;     /* points of the run, 0 where this is not known */
+   double omega;     /* [rad/s] */
+   int converged;    /* 1 or 0 */
+   int iterations;
+   double residual;  /* relative to the load */
+   double amplitude; /* the largest of the observed quantities */
+} fw_progress;
+
+/* Called after every point; anything but 0 ends the run there, or makes fw_solve return
+   FW_STOPPED. The struct is valid during the call. */
+typedef int (*fw_progress_callback)(void *user, const fw_progress *progress);
+
+/* Something worth knowing, such as a fallback that was taken. */
+typedef void (*fw_message_callback)(void *user, const char *text);
+
+/* Version of the library, such as "0.1.0", and of this interface. */
+const char *fw_get_version(void);
+int fw_get_interface_version(void);
+
+/* Create and destroy. A handle that fw_create failed to create is null. */
+int fw_create(fw_handle *handle);
+int fw_destroy(fw_handle handle);
+
+/* What the last call on this handle that failed had to say ("" after a call that did not fail).
+   Copies at most size - 1 characters and a null; returns the length of the whole text. */
+size_t fw_get_message(fw_handle handle, char *buffer, size_t size);
+
+/* Input. Take a namelist as of fw_run, from a file or as text; a later one replaces it. `name`
+   stands for the path: in messages, and for relative files. */
+int fw_load_file(fw_handle handle, const char *path);
+int fw_load_text(fw_handle handle, const char *text, const char *name);
+
+/* Set a key on top of the namelist, with or without one, by its name there: "solver%tolerance" to
+   "1e-9", "contact%mu" to "0.3, 0.4", "contact%law" to "dlft". That a key exists and that its
+   value is in range shows in fw_check, fw_start and fw_run_case. */
+int fw_set(fw_handle handle, const char *key, const char *value);
+int fw_set_real(fw_handle handle, const char *key, double value);
+int fw_set_integer(fw_handle handle, const char *key, int value);
+
+/* Begin a model in memory; it stands in for the group &model and for a model file. */
+int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
+
+/* Give a part of it by the name of its dataset in a model file; `n` says how many values there
+   are and is checked. Everything is copied.
+   n_dof * n_dof: "mass", "stiffness" (both required), "damping", "stiffness_rotation"; symmetric
+   n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
+   n_pairs:       "contact/mu", "contact/gap", "contact/area"
+   3 * n_pairs:   "contact/position", pair after pair */
+int fw_put_reals(fw_handle handle, const char *name, size_t n, const double *values);
+
+/* 3 * n_pairs: "contact/side_1" (required where there are pairs), "contact/side_2"; the signed
+   numbers, from 1, of the dofs (t1, t2, n) of a pair, 0 for none or the ground. */
+int fw_put_integers(fw_handle handle, const char *name, size_t n, const int *values);
+
+/* Observe a linear combination of the dofs (n = n_dof). Without any, every dof is observed. */
+int fw_observe(fw_handle handle, const char *name, size_t n, const double *row);
+
+/* Callbacks; NULL removes one. `user` is passed on as it is. */
+int fw_on_progress(fw_handle handle, fw_progress_callback callback, void *user);
+int fw_on_message(fw_handle handle, fw_message_callback callback, void *user);
+
+/* Everything that would refuse the case before it is computed. */
+int fw_check(fw_handle handle);
+
+/* Run the whole case, whatever its analysis. A result file is written where output%file names
+   one; the results are in the handle in any case. Forgets earlier points. */
+int fw_run_case(fw_handle handle);
+
+/* Or step by step. fw_start builds the system for the frequencies between sweep%start and
+   sweep%end and forgets earlier points; every change of the case asks for a new start. fw_solve
+   starts from the solutions before it: neighbours are cheap, jumps are not. */
+int fw_start(fw_handle handle);
+int fw_solve(fw_handle handle, double omega);
+
+/* Frequency k (from 0) of the sweep, to the bit the one that fw_run_case takes; there are
+   "frequencies" of them. */
+int fw_get_frequency(fw_handle handle, int k, double *omega);
+
+/* How many there are: "points" that were solved, "frequencies" of the sweep, "dofs", "pairs",
+   "observed" quantities, "coefficients" of a Fourier series (2 H + 1). */
+int fw_count(fw_handle handle, const char *what, int *n);
+
+/* Results of a point (from 0; -1 is the last one) by the name of their dataset in a result file,
+   in its layout: the last index runs fastest. fw_size says how many values there are; fw_get
+   copies them to a buffer with room for n, and leaves one that is too small as it is.
+   1: "omega", "converged", "iterations", "residual", "seconds", "fold"
+   (2H+1, n_observed):    "coefficients", in the order (0, c1, s1, c2, s2, ...)
+   (n_observed):          "amplitude", largest magnitude over the period
+   (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)
+   (n_pairs, 3):          "contact/fraction" of the period in stick, slip and open
+   (n_pairs):             "contact/dissipation", energy per cycle
+   "history/observed", "history/force", "history/relative_displacement",
+   "floquet/multipliers", "floquet/stable": where the case asks for them. */
+int fw_size(fw_handle handle, const char *name, int point, size_t *n);
+int fw_get(fw_handle handle, const char *name, int point, size_t n, double *values);
+
+/* Texts: "title", "namelist" (the effective input), "summary" (of fw_run_case, line by line),
+   "observed" (name of quantity k, from 0; k means nothing to the others). Copies at most
+   size - 1 characters and a null; `length`, unless it is null, is that of the whole text. */
+int fw_get_text(fw_handle handle, const char *what, int k, char *buffer, size_t size,
+                size_t *length);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,358 @@
+!> The functions of fretwear.h. Each turns its arguments into those of Fortran and hands over to
+!> fw_calls; what they mean stands in the header.
+module fw_c_interface
+   use, intrinsic :: iso_c_binding, only: c_associated
+   use, intrinsic :: iso_c_binding, only: c_char
+   use, intrinsic :: iso_c_binding, only: c_double
+   use, intrinsic :: iso_c_binding, only: c_f_pointer
+   use, intrinsic :: iso_c_binding, only: c_funptr
+   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_c_binding, only: c_intptr_t
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use, intrinsic :: iso_c_binding, only: c_null_char
+   use, intrinsic :: iso_c_binding, only: c_null_ptr
+   use, intrinsic :: iso_c_binding, only: c_ptr
+   use, intrinsic :: iso_c_binding, only: c_size_t
+   use fw_c_text, only: give_text
+   use fw_c_text, only: take_text
+   use fw_calls
+   use fw_error, only: error_type
+   use fw_error, only: status_ok
+   use fw_error, only: status_usage
+   use fw_handles, only: delete_handle
+   use fw_handles, only: enter
+   use fw_handles, only: handle_type
+   use fw_handles, only: leave
+   use fw_handles, only: new_handle
+   use fw_kinds, only: i8
+   use fw_text, only: to_text
+   use fw_version, only: version
+   implicit none (type, external)
+   private
+
+   !> Changes when a program that was built with an older header can no longer be linked.
+   integer(c_int), parameter :: interface_version = 1_c_int
+
+   character(kind=c_char, len=len(version) + 1), target, save :: version_text = &
+      version//c_null_char
+
+contains
+
+   type(c_ptr) function c_get_version() bind(c, name='fw_get_version') result(text)
+      text = c_loc(version_text)
+   end function c_get_version
+
+   integer(c_int) function c_get_interface_version() bind(c, name='fw_get_interface_version') &
+      result(number)
+      number = interface_version
+   end function c_get_interface_version
+
+   integer(c_int) function c_create(handle) bind(c, name='fw_create') result(status)
+      type(c_ptr), value :: handle
+      type(c_ptr), pointer :: created
+      integer :: id
+
+      status = int(status_usage, c_int)
+      if (.not. c_associated(handle)) return
+      call c_f_pointer(handle, created)
+      status = int(new_handle(id), c_int)
+      created = transfer(int(id, c_intptr_t), c_null_ptr)
+   end function c_create
+
+   integer(c_int) function c_destroy(handle) bind(c, name='fw_destroy') result(status)
+      type(c_ptr), value :: handle
+
+      status = int(delete_handle(id_of(handle)), c_int)
+   end function c_destroy
+
+   integer(c_size_t) function c_get_message(handle, buffer, buffer_size) &
+      bind(c, name='fw_get_message') result(length)
+      type(c_ptr), value :: handle, buffer
+      integer(c_size_t), value :: buffer_size
+      character(:), allocatable :: text
+
+      call call_message(id_of(handle), text)
+      call give_text(text, buffer, buffer_size)
+      length = len(text, c_size_t)
+   end function c_get_message
+
+   integer(c_int) function c_load_file(handle, path) bind(c, name='fw_load_file') result(status)
+      type(c_ptr), value :: handle, path
+      character(:), allocatable :: path_text
+
+      call take_text(path, path_text)
+      if (allocated(path_text)) then
+         status = int(call_load_file(id_of(handle), path_text), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_load_file: null pointer'), c_int)
+      end if
+   end function c_load_file
+
+   integer(c_int) function c_load_text(handle, text, name) bind(c, name='fw_load_text') &
+      result(status)
+      type(c_ptr), value :: handle, text, name
+      character(:), allocatable :: text_text, name_text
+
+      call take_text(text, text_text)
+      call take_text(name, name_text)
+      if (allocated(text_text) .and. allocated(name_text)) then
+         status = int(call_load_text(id_of(handle), text_text, name_text), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_load_text: null pointer'), c_int)
+      end if
+   end function c_load_text
+
+   integer(c_int) function c_set(handle, key, value) bind(c, name='fw_set') result(status)
+      type(c_ptr), value :: handle, key, value
+      character(:), allocatable :: key_text, value_text
+
+      call take_text(key, key_text)
+      call take_text(value, value_text)
+      if (allocated(key_text) .and. allocated(value_text)) then
+         status = int(call_set(id_of(handle), key_text, value_text), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_set: null pointer'), c_int)
+      end if
+   end function c_set
+
+   integer(c_int) function c_set_real(handle, key, value) bind(c, name='fw_set_real') result(status)
+      type(c_ptr), value :: handle, key
+      real(c_double), value :: value
+      character(:), allocatable :: key_text
+
+      call take_text(key, key_text)
+      if (allocated(key_text)) then
+         status = int(call_set(id_of(handle), key_text, to_text(value)), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_set_real: null pointer'), c_int)
+      end if
+   end function c_set_real
+
+   integer(c_int) function c_set_integer(handle, key, value) bind(c, name='fw_set_integer') &
+      result(status)
+      type(c_ptr), value :: handle, key
+      integer(c_int), value :: value
+      character(:), allocatable :: key_text
+
+      call take_text(key, key_text)
+      if (allocated(key_text)) then
+         status = int(call_set(id_of(handle), key_text, to_text(value)), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_set_integer: null pointer'), c_int)
+      end if
+   end function c_set_integer
+
+   integer(c_int) function c_new_model(handle, n_dof, n_pairs) bind(c, name='fw_new_model') &
+      result(status)
+      type(c_ptr), value :: handle
+      integer(c_int), value :: n_dof, n_pairs
+
+      status = int(call_new_model(id_of(handle), int(n_dof), int(n_pairs)), c_int)
+   end function c_new_model
+
+   integer(c_int) function c_put_reals(handle, name, n, values) bind(c, name='fw_put_reals') &
+      result(status)
+      type(c_ptr), value :: handle, name, values
+      integer(c_size_t), value :: n
+      character(:), allocatable :: name_text
+      real(c_double), pointer :: array(:)
+
+      call take_text(name, name_text)
+      if (allocated(name_text) .and. c_associated(values) .and. n >= 0_c_size_t) then
+         call c_f_pointer(values, array, [n])
+         status = int(call_put_reals(id_of(handle), name_text, array), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_put_reals: null pointer'), c_int)
+      end if
+   end function c_put_reals
+
+   integer(c_int) function c_put_integers(handle, name, n, values) bind(c, name='fw_put_integers') &
+      result(status)
+      type(c_ptr), value :: handle, name, values
+      integer(c_size_t), value :: n
+      character(:), allocatable :: name_text
+      integer(c_int), pointer :: array(:)
+
+      call take_text(name, name_text)
+      if (allocated(name_text) .and. c_associated(values) .and. n >= 0_c_size_t) then
+         call c_f_pointer(values, array, [n])
+         status = int(call_put_integers(id_of(handle), name_text, array), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_put_integers: null pointer'), c_int)
+      end if
+   end function c_put_integers
+
+   integer(c_int) function c_observe(handle, name, n, row) bind(c, name='fw_observe') result(status)
+      type(c_ptr), value :: handle, name, row
+      integer(c_size_t), value :: n
+      character(:), allocatable :: name_text
+      real(c_double), pointer :: array(:)
+
+      call take_text(name, name_text)
+      if (allocated(name_text) .and. c_associated(row) .and. n >= 0_c_size_t) then
+         call c_f_pointer(row, array, [n])
+         status = int(call_observe(id_of(handle), name_text, array), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_observe: null pointer'), c_int)
+      end if
+   end function c_observe
+
+   integer(c_int) function c_on_progress(handle, callback, user) bind(c, name='fw_on_progress') &
+      result(status)
+      type(c_ptr), value :: handle, user
+      type(c_funptr), value :: callback
+      type(handle_type), pointer :: handle_data
+      type(error_type), allocatable :: error
+
+      status = int(status_usage, c_int)
+      call enter(id_of(handle), handle_data)
+      if (.not. associated(handle_data)) return
+      handle_data%observer%progress = callback
+      handle_data%observer%progress_user = user
+      status = int(leave(handle_data, error), c_int)
+   end function c_on_progress
+
+   integer(c_int) function c_on_message(handle, callback, user) bind(c, name='fw_on_message') &
+      result(status)
+      type(c_ptr), value :: handle, user
+      type(c_funptr), value :: callback
+      type(handle_type), pointer :: handle_data
+      type(error_type), allocatable :: error
+
+      status = int(status_usage, c_int)
+      call enter(id_of(handle), handle_data)
+      if (.not. associated(handle_data)) return
+      handle_data%observer%message = callback
+      handle_data%observer%message_user = user
+      status = int(leave(handle_data, error), c_int)
+   end function c_on_message
+
+   integer(c_int) function c_check(handle) bind(c, name='fw_check') result(status)
+      type(c_ptr), value :: handle
+
+      status = int(call_check(id_of(handle)), c_int)
+   end function c_check
+
+   integer(c_int) function c_start(handle) bind(c, name='fw_start') result(status)
+      type(c_ptr), value :: handle
+
+      status = int(call_start(id_of(handle)), c_int)
+   end function c_start
+
+   integer(c_int) function c_run_case(handle) bind(c, name='fw_run_case') result(status)
+      type(c_ptr), value :: handle
+
+      status = int(call_run(id_of(handle)), c_int)
+   end function c_run_case
+
+   integer(c_int) function c_solve(handle, omega) bind(c, name='fw_solve') result(status)
+      type(c_ptr), value :: handle
+      real(c_double), value :: omega
+
+      status = int(call_solve(id_of(handle), omega), c_int)
+   end function c_solve
+
+   integer(c_int) function c_get_frequency(handle, k, omega) bind(c, name='fw_get_frequency') &
+      result(status)
+      type(c_ptr), value :: handle, omega
+      integer(c_int), value :: k
+      real(c_double), pointer :: found
+
+      if (c_associated(omega) .and. k < huge(k)) then
+         call c_f_pointer(omega, found)
+         status = int(call_frequency(id_of(handle), int(k) + 1, found), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_get_frequency: null pointer'), c_int)
+      end if
+   end function c_get_frequency
+
+   integer(c_int) function c_count(handle, what, n) bind(c, name='fw_count') result(status)
+      type(c_ptr), value :: handle, what, n
+      character(:), allocatable :: what_text
+      integer(c_int), pointer :: found
+      integer :: number
+
+      call take_text(what, what_text)
+      if (allocated(what_text) .and. c_associated(n)) then
+         call c_f_pointer(n, found)
+         status = int(call_count(id_of(handle), what_text, number), c_int)
+         found = int(number, c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_count: null pointer'), c_int)
+      end if
+   end function c_count
+
+   integer(c_int) function c_size(handle, name, point, n) bind(c, name='fw_size') result(status)
+      type(c_ptr), value :: handle, name, n
+      integer(c_int), value :: point
+      character(:), allocatable :: name_text
+      integer(c_size_t), pointer :: found
+      integer(i8) :: number
+
+      call take_text(name, name_text)
+      if (allocated(name_text) .and. c_associated(n)) then
+         call c_f_pointer(n, found)
+         status = int(call_size(id_of(handle), name_text, point_of(point), number), c_int)
+         found = int(number, c_size_t)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_size: null pointer'), c_int)
+      end if
+   end function c_size
+
+   integer(c_int) function c_get(handle, name, point, n, values) bind(c, name='fw_get') &
+      result(status)
+      type(c_ptr), value :: handle, name, values
+      integer(c_int), value :: point
+      integer(c_size_t), value :: n
+      character(:), allocatable :: name_text
+      real(c_double), pointer :: buffer(:)
+
+      call take_text(name, name_text)
+      if (allocated(name_text) .and. c_associated(values) .and. n >= 0_c_size_t) then
+         call c_f_pointer(values, buffer, [n])
+         status = int(call_get(id_of(handle), name_text, point_of(point), buffer), c_int)
+      else
+         status = int(call_refuse(id_of(handle), 'fw_get: null pointer'), c_int)
+      end if
+   end function c_get
+
+   integer(c_int) function c_get_text(handle, what, k, buffer, buffer_size, length) &
+      bind(c, name='fw_get_text') result(status)
+      type(c_ptr), value :: handle, what, buffer, length
+      integer(c_int), value :: k
+      integer(c_size_t), value :: buffer_size
+      character(:), allocatable :: what_text, text
+      integer(c_size_t), pointer :: needed
+
+      call take_text(what, what_text)
+      if (.not. allocated(what_text)) then
+         status = int(call_refuse(id_of(handle), 'fw_get_text: null pointer'), c_int)
+         return
+      end if
+      status = int(call_get_text(id_of(handle), what_text, point_of(k), text), c_int)
+      if (status /= status_ok) return
+      call give_text(text, buffer, buffer_size)
+      if (.not. c_associated(length)) return
+      call c_f_pointer(length, needed)
+      needed = len(text, c_size_t)
+   end function c_get_text
+
+   !> The number behind a handle; 0, which is none, for a pointer that cannot be one.
+   pure integer function id_of(handle) result(id)
+      type(c_ptr), intent(in) :: handle
+      integer(c_intptr_t) :: address
+
+      address = transfer(handle, address)
+      id = 0
+      if (address > 0_c_intptr_t .and. address <= huge(id)) id = int(address)
+   end function id_of
+
+   !> From 0 in C, with -1 for the last one, to 1 and 0.
+   pure integer function point_of(point) result(k)
+      integer(c_int), intent(in) :: point
+
+      k = int(point)
+      if (point < huge(point)) k = k + 1
+   end function point_of
+
+end module fw_c_interface

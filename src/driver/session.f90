@@ -1,0 +1,378 @@
+!> A case that lives inside another program: put together from a namelist, single keys and arrays
+!> in memory, then run as a whole or frequency by frequency, with the points kept for reading.
+!>
+!> Sessions share nothing: each may live in a thread of its own. One session serves one thread at
+!> a time.
+module fw_session
+   use fw_case, only: analysis_frf
+   use fw_case, only: analysis_point
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_usage
+   use fw_frequency_response, only: solve_frequency
+   use fw_hbm, only: hbm_system
+   use fw_kinds, only: wp
+   use fw_memory_model, only: memory_model_type
+   use fw_namelist, only: parse_override
+   use fw_namelist_data, only: entry_type
+   use fw_observer, only: observer_type
+   use fw_outcome, only: outcome_type
+   use fw_paths, only: read_text_file
+   use fw_point, only: point_type
+   use fw_point_solver, only: point_solver
+   use fw_point_values, only: get_point_values
+   use fw_problem, only: build_system
+   use fw_problem, only: sweep_frequency
+   use fw_read_case, only: read_case_text
+   use fw_run, only: check_case
+   use fw_run, only: run_case
+   use fw_session_points, only: point_list
+   use fw_session_points, only: point_recorder
+   use fw_solver_options, only: continuation_natural
+   use fw_text, only: string_type
+   use fw_text, only: to_text
+   use fw_text_list, only: append
+   use fw_threads, only: thread_scope
+   implicit none (type, external)
+   private
+
+   public :: session_type
+
+   !> What messages call the input of a session without a namelist file, and its keys.
+   character(*), parameter :: default_name = 'case', key_origin = 'set'
+
+   type :: session_type
+      !> The case as it was last read; see `prepare`.
+      type(case_type) :: case
+      !> Status and summary of the last run.
+      type(outcome_type) :: outcome
+      !> The points of the last run, or of the steps since `start`.
+      type(point_list) :: points
+      !> Namelist text, its path or name, and `group%key=value` on top of it.
+      character(:), allocatable, private :: text, path
+      type(string_type), allocatable, private :: keys(:)
+      type(memory_model_type), allocatable, private :: model
+      !> The case agrees with what was given.
+      logical, private :: is_read = .false.
+      !> Only between `start` and the next change.
+      type(hbm_system), allocatable, private :: system
+      type(point_solver), allocatable, private :: solver
+   contains
+      procedure :: load_file
+      procedure :: load_text
+      procedure :: set
+      procedure :: new_model
+      generic :: put => put_reals, put_integers
+      procedure :: observe
+      procedure :: prepare
+      procedure :: is_ready
+      procedure :: check
+      procedure :: start
+      procedure :: n_frequencies
+      procedure :: frequency
+      procedure :: solve
+      procedure :: run
+      procedure :: get
+      procedure, private :: put_reals
+      procedure, private :: put_integers
+   end type session_type
+
+contains
+
+   !> Take the namelist of a file; it replaces one given before, keys set stay on top.
+   subroutine load_file(self, path, error)
+      class(session_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      !> status_io where the file cannot be read; what is wrong in it shows in `prepare`.
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: text
+
+      call read_text_file(path, text, error)
+      if (.not. allocated(error)) call self%load_text(text, path)
+   end subroutine load_file
+
+   !> Take namelist text. Relative files in it start at the directory of `path`, which is also its
+   !> name in messages.
+   subroutine load_text(self, text, path)
+      class(session_type), intent(inout) :: self
+      character(*), intent(in) :: text, path
+
+      self%text = text
+      self%path = path
+      if (len_trim(path) == 0) self%path = default_name
+      call forget(self)
+   end subroutine load_text
+
+   !> Set a key by its name in the namelist: 'solver%tolerance' to '1e-9', 'contact%mu' to
+   !> '0.3, 0.4'. A key that is set again loses its former value.
+   subroutine set(self, key, value, error)
+      class(session_type), intent(inout) :: self
+      character(*), intent(in) :: key, value
+      !> status_usage where this is no key; whether it exists shows in `prepare`.
+      type(error_type), allocatable, intent(out) :: error
+      type(string_type), allocatable :: kept(:)
+      type(entry_type) :: entry
+      character(:), allocatable :: assignment
+      integer :: i
+
+      assignment = trim(adjustl(key))//'='
+      ! The texts of the reader serve one thread at a time.
+      !$omp critical (fretwear_io)
+      call parse_override(assignment//trim(value), entry, error, key_origin)
+      !$omp end critical (fretwear_io)
+      if (allocated(error)) return
+      allocate (kept(0))
+      if (allocated(self%keys)) then
+         do i = 1, size(self%keys)
+            if (index(self%keys(i)%text, assignment) /= 1) call append(kept, self%keys(i)%text)
+         end do
+      end if
+      call append(kept, assignment//trim(value))
+      call move_alloc(kept, self%keys)
+      call forget(self)
+   end subroutine set
+
+   !> Begin a model in memory, with `put` and `observe` to follow; it stands in for group &model
+   !> and for what a model file holds.
+   subroutine new_model(self, n_dof, n_pairs, error)
+      class(session_type), intent(inout) :: self
+      integer, intent(in) :: n_dof, n_pairs
+      type(error_type), allocatable, intent(out) :: error
+      type(memory_model_type) :: model
+
+      call model%start(n_dof, n_pairs, error)
+      if (allocated(error)) return
+      self%model = model
+      call forget(self)
+   end subroutine new_model
+
+   !> Give a real part of the model; see fw_memory_model for names and sizes.
+   subroutine put_reals(self, name, values, error)
+      class(session_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(wp), intent(in) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call require_model(self, error)
+      if (.not. allocated(error)) call self%model%put(name, values, error)
+      call forget(self)
+   end subroutine put_reals
+
+   !> Give an integer part of the model.
+   subroutine put_integers(self, name, values, error)
+      class(session_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call require_model(self, error)
+      if (.not. allocated(error)) call self%model%put(name, values, error)
+      call forget(self)
+   end subroutine put_integers
+
+   !> Observe a linear combination of the dofs (n_dof); without any, every dof is observed.
+   subroutine observe(self, name, row, error)
+      class(session_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(wp), intent(in) :: row(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call require_model(self, error)
+      if (.not. allocated(error)) call self%model%observe(name, row, error)
+      call forget(self)
+   end subroutine observe
+
+   !> Bring `case` up to date with what was given, which forgets the points of the one before;
+   !> does nothing where it is so already.
+   subroutine prepare(self, error)
+      class(session_type), intent(inout) :: self
+      !> Everything that is wrong in the input.
+      type(error_type), allocatable, intent(out) :: error
+      type(thread_scope) :: threads
+
+      if (self%is_read) return
+      call self%points%clear()
+      if (.not. allocated(self%text)) self%text = ''
+      if (.not. allocated(self%path)) self%path = default_name
+      if (.not. allocated(self%keys)) allocate (self%keys(0))
+      if (allocated(self%model)) call self%model%check(error)
+      if (allocated(error)) return
+      ! Damping and checks of a model must not depend on the threads of the BLAS.
+      call threads%enter(0)
+      if (allocated(self%model)) then
+         call read_case_text(self%text, self%path, self%keys, self%case, error, &
+                             self%model%parts, key_origin)
+      else
+         call read_case_text(self%text, self%path, self%keys, self%case, error, &
+                             origin=key_origin)
+      end if
+      call threads%leave()
+      self%is_read = .not. allocated(error)
+   end subroutine prepare
+
+   !> Whether `case` agrees with what was given.
+   pure logical function is_ready(self)
+      class(session_type), intent(in) :: self
+
+      is_ready = self%is_read
+   end function is_ready
+
+   !> Everything that would refuse the case before it is computed.
+   subroutine check(self, error)
+      class(session_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%prepare(error)
+      if (.not. allocated(error)) call check_case(self%case, error)
+   end subroutine check
+
+   !> Build the system for steps through frequencies; forgets the points of earlier ones.
+   subroutine start(self, error)
+      class(session_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(thread_scope) :: threads
+
+      call self%prepare(error)
+      if (allocated(error)) return
+      if (all(self%case%analysis /= [analysis_frf, analysis_point]) .or. &
+          self%case%sweep%continuation /= continuation_natural) then
+         call fatal_error(error, 'steps go through frequencies of harmonic balance: '// &
+                          "case%analysis must be 'frf' or 'point' and sweep%continuation "// &
+                          "'natural'; run the case as a whole instead", status_usage)
+         return
+      end if
+      call forget_system(self)
+      call self%points%clear()
+      allocate (self%system, self%solver)
+      call threads%enter(self%case%threads)
+      call build_system(self%case, self%system, error)
+      call threads%leave()
+      if (allocated(error)) then
+         call forget_system(self)
+      else
+         call self%solver%start(self%case, self%system%n)
+      end if
+   end subroutine start
+
+   !> Frequencies of the sweep of the case (0: not known beforehand, or the case was not read).
+   pure integer function n_frequencies(self) result(n)
+      class(session_type), intent(in) :: self
+
+      n = 0
+      if (.not. self%is_read .or. self%case%sweep%continuation /= continuation_natural) return
+      n = 1
+      if (self%case%analysis == analysis_frf) n = self%case%sweep%n_points
+   end function n_frequencies
+
+   !> Frequency k of the sweep, to the bit the one that a run takes [rad/s].
+   subroutine frequency(self, k, omega, error)
+      class(session_type), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(out) :: omega
+      type(error_type), allocatable, intent(out) :: error
+
+      omega = 0.0_wp
+      if (k >= 1 .and. k <= self%n_frequencies()) then
+         omega = sweep_frequency(self%case%sweep, k, self%n_frequencies())
+      else
+         call fatal_error(error, 'frequency '//to_text(k)//' of the sweep: must be from 1 to '// &
+                          to_text(self%n_frequencies())//' (0: the case was not started)', &
+                          status_usage)
+      end if
+   end subroutine frequency
+
+   !> Solve at a frequency, warm-started from the steps before; the point joins `points`, converged
+   !> or not. Frequencies beyond the bounds of &sweep may be slow or inaccurate.
+   subroutine solve(self, omega, observer, error)
+      class(session_type), intent(inout), target :: self
+      !> [rad/s]
+      real(wp), intent(in) :: omega
+      class(observer_type), intent(inout), target :: observer
+      type(error_type), allocatable, intent(out) :: error
+      type(point_recorder) :: recorder
+      type(thread_scope) :: threads
+      type(point_type) :: point
+
+      if (.not. allocated(self%solver)) then
+         call fatal_error(error, 'a step needs a start: nothing was started since the last '// &
+                          'change of the case', status_usage)
+      else if (.not. (omega > 0.0_wp .and. omega <= huge(omega))) then
+         call fatal_error(error, 'omega = '//to_text(omega)//' rad/s: must be above 0 and finite', &
+                          status_usage)
+      end if
+      if (allocated(error)) return
+      observer%stop_requested = .false.
+      recorder%list => self%points
+      recorder%observer => observer
+      call threads%enter(self%case%threads)
+      call solve_frequency(self%case, self%system, self%solver, omega, recorder, point, error)
+      call threads%leave()
+      if (allocated(error)) return
+      call recorder%on_point(self%points%n + 1, 0, point)
+   end subroutine solve
+
+   !> Run the whole case; a result file is written where the input names one (output%file).
+   subroutine run(self, observer, error)
+      class(session_type), intent(inout), target :: self
+      class(observer_type), intent(inout), target :: observer
+      !> What ends the run; not converging is an outcome.
+      type(error_type), allocatable, intent(out) :: error
+      type(point_recorder) :: recorder
+
+      call self%prepare(error)
+      if (allocated(error)) return
+      call forget_system(self)
+      call self%points%clear()
+      recorder%list => self%points
+      recorder%observer => observer
+      call run_case(self%case, recorder, self%outcome, error, &
+                    write_file=self%case%output%names_file)
+   end subroutine run
+
+   !> Values of a point by the name of their dataset in a result file; see fw_point_values.
+   subroutine get(self, name, index, values, error)
+      class(session_type), intent(in) :: self
+      character(*), intent(in) :: name
+      !> From 1; 0 is the last point.
+      integer, intent(in) :: index
+      real(wp), allocatable, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
+      k = index
+      if (k == 0) k = self%points%n
+      if (k < 1 .or. k > self%points%n) then
+         call fatal_error(error, 'point '//to_text(index)//': there are '// &
+                          to_text(self%points%n)//' points', status_usage)
+      else
+         call get_point_values(self%points%item(k)%point, name, &
+                               self%case%harmonics%n_harmonics, values, error)
+      end if
+   end subroutine get
+
+   subroutine require_model(self, error)
+      class(session_type), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(self%model)) return
+      call fatal_error(error, 'there is no model to put this in: begin with its numbers of '// &
+                       'dofs and pairs', status_usage)
+   end subroutine require_model
+
+   !> What was given has changed.
+   subroutine forget(self)
+      class(session_type), intent(inout) :: self
+
+      self%is_read = .false.
+      call forget_system(self)
+   end subroutine forget
+
+   subroutine forget_system(self)
+      class(session_type), intent(inout) :: self
+
+      if (allocated(self%system)) deallocate (self%system)
+      if (allocated(self%solver)) deallocate (self%solver)
+   end subroutine forget_system
+
+end module fw_session

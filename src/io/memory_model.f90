@@ -1,0 +1,229 @@
+!> A model that the calling program holds in arrays, put together part by part. The parts bear the
+!> names of the datasets of a model file, and have their sizes.
+module fw_memory_model
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_failure
+   use fw_error, only: status_input
+   use fw_error, only: status_usage
+   use fw_kinds, only: i8
+   use fw_kinds, only: wp
+   use fw_model_file, only: file_model_type
+   use fw_text, only: to_text
+   use fw_text_list, only: append
+   implicit none (type, external)
+   private
+
+   public :: memory_model_type
+
+   !> More dofs or pairs are taken for a mistake: the matrices are dense.
+   integer, parameter :: most_dofs = 100000, most_pairs = 1000000
+
+   !> Parts of one real kind each: of n_dof**2 values, of n_dof, of n_pairs.
+   character(*), parameter :: matrix_names(*) = &
+      [character(20) :: 'mass', 'stiffness', 'damping', 'stiffness_rotation']
+   character(*), parameter :: load_names(*) = &
+      [character(20) :: 'load/static', 'load/cosine', 'load/sine', 'load/static_rotation']
+   character(*), parameter :: pair_names(*) = &
+      [character(20) :: 'contact/mu', 'contact/gap', 'contact/area', 'contact/position']
+   character(*), parameter :: integer_names(*) = &
+      [character(20) :: 'contact/side_1', 'contact/side_2']
+
+   type :: memory_model_type
+      integer :: n_dof = 0
+      integer :: n_pairs = 0
+      type(file_model_type) :: parts
+   contains
+      procedure :: start
+      generic :: put => put_reals, put_integers
+      procedure :: observe
+      procedure :: check
+      procedure, private :: put_reals
+      procedure, private :: put_integers
+   end type memory_model_type
+
+contains
+
+   !> Begin a model, forgetting every part that was given.
+   subroutine start(self, n_dof, n_pairs, error)
+      class(memory_model_type), intent(out) :: self
+      integer, intent(in) :: n_dof, n_pairs
+      type(error_type), allocatable, intent(out) :: error
+
+      if (n_dof < 1 .or. n_dof > most_dofs) then
+         call fatal_error(error, 'n_dof = '//to_text(n_dof)//': must be from 1 to '// &
+                          to_text(most_dofs), status_input)
+      else if (n_pairs < 0 .or. n_pairs > most_pairs) then
+         call fatal_error(error, 'n_pairs = '//to_text(n_pairs)//': must be from 0 to '// &
+                          to_text(most_pairs), status_input)
+      else
+         self%n_dof = n_dof
+         self%n_pairs = n_pairs
+      end if
+   end subroutine start
+
+   !> A real part, as a flat array: the matrices are symmetric, so that their order of storage
+   !> makes no difference; contact/position is (3, n_pairs) with the coordinate innermost.
+   subroutine put_reals(self, name, values, error)
+      class(memory_model_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(wp), intent(in) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: rows, columns
+
+      rows = self%n_dof
+      columns = 1
+      if (any(matrix_names == name)) columns = self%n_dof
+      if (any(pair_names == name)) then
+         rows = 1
+         columns = self%n_pairs
+         if (name == 'contact/position') rows = 3
+      else if (.not. any(matrix_names == name) .and. .not. any(load_names == name)) then
+         call unknown_name(name, [matrix_names, load_names, pair_names], 'real', error)
+         return
+      end if
+      call check_size(name, size(values, kind=i8), rows, columns, error)
+      if (allocated(error)) return
+      associate (parts => self%parts)
+         select case (name)
+         case ('mass')
+            call take_matrix(name, values, rows, parts%mass, error)
+         case ('stiffness')
+            call take_matrix(name, values, rows, parts%stiffness, error)
+         case ('damping')
+            call take_matrix(name, values, rows, parts%damping, error)
+         case ('stiffness_rotation')
+            call take_matrix(name, values, rows, parts%stiffness_rotation, error)
+         case ('load/static')
+            parts%load_static = values
+         case ('load/cosine')
+            parts%load_cosine = values
+         case ('load/sine')
+            parts%load_sine = values
+         case ('load/static_rotation')
+            parts%load_static_rotation = values
+         case ('contact/mu')
+            parts%mu = values
+         case ('contact/gap')
+            parts%gap = values
+         case ('contact/area')
+            parts%area = values
+         case ('contact/position')
+            parts%position = reshape(values, [3, self%n_pairs])
+         end select
+      end associate
+   end subroutine put_reals
+
+   !> An integer part: the signed dof numbers (t1, t2, n) of a side, pair after pair.
+   subroutine put_integers(self, name, values, error)
+      class(memory_model_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. any(integer_names == name)) then
+         call unknown_name(name, integer_names, 'integer', error)
+         return
+      end if
+      call check_size(name, size(values, kind=i8), 3, self%n_pairs, error)
+      if (allocated(error)) return
+      if (name == 'contact/side_1') self%parts%side_1 = reshape(values, [3, self%n_pairs])
+      if (name == 'contact/side_2') self%parts%side_2 = reshape(values, [3, self%n_pairs])
+   end subroutine put_integers
+
+   !> Add an observed quantity: a linear combination of the dofs (n_dof).
+   subroutine observe(self, name, row, error)
+      class(memory_model_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(wp), intent(in) :: row(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: rows(:, :)
+      integer :: n
+
+      call check_size(name, size(row, kind=i8), self%n_dof, 1, error)
+      if (allocated(error)) return
+      if (len_trim(name) == 0) then
+         call fatal_error(error, 'the name of an observed quantity is empty', status_input)
+         return
+      end if
+      associate (parts => self%parts)
+         if (.not. allocated(parts%observe_name)) then
+            allocate (parts%observe_name(0))
+            allocate (parts%observe_matrix(0, self%n_dof))
+         end if
+         call append(parts%observe_name, trim(name))
+         n = size(parts%observe_name)
+         allocate (rows(n, self%n_dof))
+         rows(:n - 1, :) = parts%observe_matrix
+         rows(n, :) = row
+         call move_alloc(rows, parts%observe_matrix)
+      end associate
+   end subroutine observe
+
+   !> Refuse a model that lacks what every one needs.
+   subroutine check(self, error)
+      class(memory_model_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: missing
+
+      missing = ''
+      if (.not. allocated(self%parts%mass)) missing = 'mass'
+      if (.not. allocated(self%parts%stiffness)) missing = 'stiffness'
+      if (self%n_pairs > 0 .and. .not. allocated(self%parts%side_1)) missing = 'contact/side_1'
+      if (len(missing) > 0) then
+         call fatal_error(error, 'the model in memory lacks '//missing, status_input)
+      else if (self%n_pairs > 0 .and. .not. allocated(self%parts%side_2)) then
+         allocate (self%parts%side_2(3, self%n_pairs), source=0)
+      end if
+   end subroutine check
+
+   subroutine take_matrix(name, values, order, matrix, error)
+      character(*), intent(in) :: name
+      real(wp), intent(in) :: values(:)
+      integer, intent(in) :: order
+      real(wp), allocatable, intent(inout) :: matrix(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: j, status
+
+      if (allocated(matrix)) deallocate (matrix)
+      allocate (matrix(order, order), stat=status)
+      if (status /= 0) then
+         call fatal_error(error, name//': no memory for a matrix of order '//to_text(order), &
+                          status_failure)
+         return
+      end if
+      do j = 1, order
+         matrix(:, j) = values((j - 1_i8)*order + 1:j*int(order, i8))
+      end do
+   end subroutine take_matrix
+
+   subroutine check_size(name, n_given, rows, columns, error)
+      character(*), intent(in) :: name
+      integer(i8), intent(in) :: n_given
+      integer, intent(in) :: rows, columns
+      type(error_type), allocatable, intent(out) :: error
+      character(20) :: given, expected
+
+      if (n_given == int(rows, i8)*columns) return
+      write (given, '(i0)') n_given
+      write (expected, '(i0)') int(rows, i8)*columns
+      call fatal_error(error, name//' has '//trim(given)//' values: must be '//trim(expected), &
+                       status_input)
+   end subroutine check_size
+
+   subroutine unknown_name(name, names, kind_of, error)
+      character(*), intent(in) :: name, names(:), kind_of
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: list
+      integer :: i
+
+      list = ''
+      do i = 1, size(names)
+         if (i > 1) list = list//', '
+         list = list//trim(names(i))
+      end do
+      call fatal_error(error, "'"//name//"' is no "//kind_of//' part of a model: must be one '// &
+                       'of '//list, status_usage)
+   end subroutine unknown_name
+
+end module fw_memory_model
