@@ -159,7 +159,7 @@ def misuse(prefix, tmp_path_factory):
 OK, USAGE, INPUT, NOT_CONVERGED, IO, STOPPED = 0, 2, 3, 4, 5, 6
 
 
-@pytest.mark.parametrize("label, status, words", [
+@pytest.mark.parametrize(("label", "status", "words"), [
     ("null handle", USAGE, "no such handle"),
     ("invented handle", USAGE, "no such handle"),
     ("pointer as handle", USAGE, "no such handle"),
