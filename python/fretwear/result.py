@@ -153,7 +153,7 @@ class Result:
 
     @property
     def status(self) -> str:
-        """'complete', 'not converged', 'interrupted', 'incomplete' or 'failed: ...'."""
+        """'complete', 'not converged', 'stopped', 'incomplete' or 'failed: ...'."""
         return str(self._attributes.get("status", ""))
 
     @property

@@ -102,7 +102,7 @@ contains
       case (status_ok)
          words = 'complete'
       case (status_stopped)
-         words = 'interrupted'
+         words = 'stopped'
       case default
          words = 'not converged'
       end select
