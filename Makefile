@@ -6,7 +6,8 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help deps build debug run test lint bench clean
+.PHONY: help deps build debug run test lint clean
+.PHONY: bench bench-solvers bench-paper bench-time bench-full
 
 BUILD := build/release
 RUN := build/run
@@ -16,7 +17,7 @@ EXAMPLE := example/blade_sector
 CMAKE_OPTIONS ?=
 
 help: ## this list
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 16
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 22
 
 deps: build/deps.stamp ## install what is missing (system packages, build/venv)
 
@@ -65,8 +66,20 @@ lint: build/deps.stamp ## type checker and linter of the Python code
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py
 
-bench: build ## error against run time
-	PYTHONPATH=python $(PYTHON) bench/run.py
+bench: build ## error against run time, written to docs/benchmarks.md
+	PYTHONPATH=python $(PYTHON) bench/run.py speed
+
+bench-solvers: build ## every solver, flow and scheme from many starts
+	PYTHONPATH=python $(PYTHON) bench/run.py solvers
+
+bench-paper: build ## methods, iterations against frequency, aliasing
+	PYTHONPATH=python $(PYTHON) bench/run.py paper iterations aliasing
+
+bench-time: build ## harmonic balance against integration in time
+	PYTHONPATH=python $(PYTHON) bench/run.py time
+
+bench-full: build ## every part of docs/benchmarks.md
+	PYTHONPATH=python $(PYTHON) bench/run.py all
 
 clean: ## remove everything built but the Python environment
 	rm -rf $(BUILD) build/debug $(RUN)

@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ROOT", "Bench", "Run", "describe_machine"]
+__all__ = ["ROOT", "Bench", "Floats", "Groups", "Run", "describe_machine", "write_namelist"]
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
@@ -30,6 +30,8 @@ class Run:
 
     Attributes
     ----------
+    omega : (n_points,)
+        Frequencies [rad/s].
     seconds : (n_points,)
         Time spent on each point [s].
     iterations : (n_points,)
@@ -39,17 +41,24 @@ class Run:
         Points where every pair is open all the time: the blade has left its slot. The equations
         allow it, an engine does not, and such points cost next to nothing.
     coefficients : (n_points, 2H+1, n_observed)
+    amplitude : (n_points, n_observed)
+        Largest absolute value over the period.
+    residual : (n_points,)
+        Relative, at the end; of an integration in time, the change over the last period.
     elapsed : float
         Time of the whole run without reading the input [s].
     unknowns, unknowns_left : int
         Unknowns, and their mean number in the linear problems.
     """
 
+    omega: Floats
     seconds: Floats
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
     is_loose: NDArray[np.bool_]
     coefficients: Floats
+    amplitude: Floats
+    residual: Floats
     elapsed: float
     unknowns: int
     unknowns_left: int
@@ -111,19 +120,22 @@ def read_run(path: Path, summary: str) -> Run:
         loose = np.zeros(len(omega), dtype=bool)
         if "contact/fraction" in file:
             loose = file["contact/fraction"][:, :, 2].min(axis=1) > 1.0 - 1e-12
-        unknowns = int(re.search(r"^unknowns +(\d+)", summary, re.MULTILINE)[1])
+        found = re.search(r"^unknowns +(\d+)", summary, re.MULTILINE)
+        unknowns = int(found[1]) if found else 0
         skipped = re.search(r"stuck pairs, (\d+) %", summary)
         share = int(skipped[1]) / 100.0 if skipped else 0.0
-        return Run(file["seconds"][()], file["iterations"][()],
+        return Run(file["omega"][()], file["seconds"][()], file["iterations"][()],
                    file["converged"][()].astype(bool), loose, file["coefficients"][()],
-                   float(file.attrs["elapsed"]), unknowns, round(unknowns * (1.0 - share)))
+                   file["amplitude"][()], file["residual"][()], float(file.attrs["elapsed"]),
+                   unknowns, round(unknowns * (1.0 - share)))
 
 
 def write_namelist(path: Path, groups: Groups) -> None:
     """Write {group: {key: value}} as a namelist."""
     lines = []
     for group, keys in groups.items():
-        lines += [f"&{group}", *(f"   {key} = {literal(value)}" for key, value in keys.items()), "/"]
+        entries = (f"   {key} = {literal(value)}" for key, value in keys.items())
+        lines += [f"&{group}", *entries, "/"]
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -147,7 +159,7 @@ def describe_machine(build: Path) -> dict[str, str]:
         "flags": build_flags(build),
         "commit": commit(),
         "date": date.today().isoformat(),
-        "load at the start": f"{os.getloadavg()[0]:.1f} (a quiet machine is near 0)",
+        "load before": f"{os.getloadavg()[0]:.1f} (a quiet machine is near 0)",
     }
 
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from measure import ROOT, Bench, Floats, Groups
 
-__all__ = ["HARMONICS", "INSTANTS", "Sample", "measure_oscillators", "two_dof"]
+__all__ = ["HARMONICS", "INSTANTS", "Sample", "coulomb", "duffing_points", "measure_oscillators",
+           "relative_error", "single", "two_dof"]
 
 HARMONICS = (1, 3, 7, 15, 31)
 INSTANTS = (64, 256, 1024)
@@ -86,6 +87,12 @@ def duffing() -> Case:
     groups = single(p, p["F"], point["omega"])
     groups["spring"] = {"n_springs": 1, "side_1": 1, "coefficient": p["alpha"], "power": 3}
     return Case("Duffing", groups, reference(point))
+
+
+def duffing_points() -> tuple[dict[str, float], list[tuple[float, Floats]]]:
+    """Parameters, and every solution that is known with its frequency, unstable ones included."""
+    data = read("a_duffing")
+    return data["params"], [(point["omega"], reference(point)) for point in data["points"]]
 
 
 def coulomb(key: str, law: str) -> Case:

@@ -1,31 +1,113 @@
-"""Measure and write docs/benchmarks.md with its pictures.
+"""Measure, and write docs/benchmarks.md with its pictures.
 
-    python bench/run.py [--build build/release] [--quick] [-o docs]
+    python bench/run.py [PART ...] [--build build/release] [--quick] [-o docs]
 
-Uses the fw_run of a CMake build. Every time is the median of repeated runs in one thread, unless
-it is said otherwise. --quick runs everything once and small, into build/bench/docs: it tries the
-scripts and measures nothing.
+Parts: speed, solvers, paper, iterations, aliasing, time, or all; without any, speed. A part
+replaces its section of the document and leaves the others.
+
+Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
+tries the scripts and measures nothing.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import os
-import subprocess
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
+from aliasing import measure_aliasing, write_aliasing
+from document import ORDER, update_document
+from filtering import measure_filtering, write_filtering
+from integration import measure_integration, write_integration
+from iterations import measure_iterations, write_iterations
 from measure import ROOT, Bench, describe_machine
 from oscillators import measure_oscillators
-from report import Measurements, write_report
+from paper import measure_methods, write_methods
+from programs import build_programs, run_program
 from sector import measure_crossing, measure_points, measure_sweeps, measure_threads
+from solvers import measure_solvers
+from solvers_report import write_solvers
+from speed_report import Measurements, write_speed
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a part needs.
+
+    Attributes
+    ----------
+    bench : runs cases
+    build : the CMake build that is measured
+    work : folder for results and measuring programs
+    images : folder of the pictures
+    step : says what is being measured
+    """
+
+    bench: Bench
+    build: Path
+    work: Path
+    images: Path
+    step: Callable[[str], None]
+
+    def program(self, name: str) -> Path:
+        """A measuring program, built if need be."""
+        return build_programs(self.build, self.work) / name
+
+
+def speed(job: Job) -> str:
+    """Times of transforms, points, sweeps and threads; errors against time."""
+    steps = {"transforms": lambda: run_program(job.program("transforms")),
+             "oscillators": lambda: measure_oscillators(job.bench),
+             "linear solvers": lambda: measure_crossing(job.bench),
+             "points of the sector": lambda: measure_points(job.bench),
+             "threads": lambda: measure_threads(job.bench),
+             "whole sweeps": lambda: measure_sweeps(job.bench)}
+    found = []
+    for title, measure in steps.items():
+        job.step(title)
+        found.append(measure())
+    return write_speed(job.images, Measurements(*found))
+
+
+def solvers(job: Job) -> str:
+    """Every solver, flow and scheme."""
+    return write_solvers(measure_solvers(job.bench, job.program("starts"), job.step))
+
+
+def paper(job: Job) -> str:
+    """Time of 50 frequencies with every method."""
+    return write_methods(measure_methods(job.bench))
+
+
+def iterations(job: Job) -> str:
+    """Iterations against frequency."""
+    return write_iterations(job.images, measure_iterations(job.bench))
+
+
+def aliasing(job: Job) -> str:
+    """HDHB against HBM, and the filter."""
+    sector = write_aliasing(job.images, measure_aliasing(job.bench))
+    filtered = measure_filtering(job.bench, job.program("starts"))
+    return sector + "\n\n" + write_filtering(job.images, filtered)
+
+
+def integration(job: Job) -> str:
+    """Harmonic balance against integration in time."""
+    return write_integration(measure_integration(job.bench, job.step))
+
+
+PARTS = {"speed": speed, "solvers": solvers, "paper": paper, "iterations": iterations,
+         "aliasing": aliasing, "time": integration}
 
 
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description="Measure and write docs/benchmarks.md.")
+    parser.add_argument("parts", nargs="*", metavar="PART", default=["speed"],
+                        help=f"{', '.join(ORDER)}, or all (default: speed)")
     parser.add_argument("--build", type=Path, default=ROOT / "build" / "release",
                         help="folder of the CMake build that is measured")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "bench",
@@ -33,45 +115,27 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="only try the scripts")
     parser.add_argument("-o", "--output", type=Path, help="folder of the report (default: docs)")
     options = parser.parse_args()
-    output = options.output or (options.work / "docs" if options.quick else ROOT / "docs")
-    build = options.build.absolute()
-    bench = Bench(build / "fw_run", options.work.absolute(), options.quick)
-    machine = describe_machine(build)
+    parts = list(ORDER) if "all" in options.parts else options.parts
+    unknown = [part for part in parts if part not in PARTS]
+    if unknown:
+        parser.error(f"no part {unknown[0]!r}; choose from {', '.join(ORDER)} or all")
+    work, build = options.work.absolute(), options.build.absolute()
+    output = options.output or (work / "docs" if options.quick else ROOT / "docs")
+    images = output / "images"
+    images.mkdir(parents=True, exist_ok=True)
     start = time.perf_counter()
 
     def step(title: str) -> None:
         print(f"{time.perf_counter() - start:6.1f} s  {title}", flush=True)
 
-    step("transforms")
-    transforms = measure_transforms(build, options.work.absolute())
-    step("oscillators")
-    oscillators = measure_oscillators(bench)
-    step("linear solvers")
-    crossing = measure_crossing(bench)
-    step("points of the sector")
-    points = measure_points(bench)
-    step("threads")
-    threads = measure_threads(bench)
-    step("whole sweeps")
-    sweeps = measure_sweeps(bench)
-    machine["load at the end"] = f"{os.getloadavg()[0]:.1f} (the measurement itself makes 1 to 2)"
-    write_report(output, Measurements(machine, transforms, oscillators, crossing, points, threads,
-                                      sweeps))
+    job = Job(Bench(build / "fw_run", work, options.quick), build, work, images, step)
+    for part in parts:
+        step(part)
+        machine = describe_machine(build)
+        text = PARTS[part](job)
+        machine["load after"] = f"{os.getloadavg()[0]:.1f} (the measurement itself makes 1 to 2)"
+        update_document(output / "benchmarks.md", part, text, machine)
     step(f"written: {output / 'benchmarks.md'}")
-
-
-def measure_transforms(build: Path, work: Path) -> list[dict[str, str]]:
-    """Build bench/transforms.f90 against an installation and run it."""
-    prefix, target = work / "install", work / "cmake"
-    for command in (["cmake", "--install", build, "--prefix", prefix],
-                    ["cmake", "-S", ROOT / "bench", "-B", target, "-G", "Ninja",
-                     f"-DCMAKE_PREFIX_PATH={prefix}"],
-                    ["cmake", "--build", target]):
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    text = subprocess.run([target / "transforms"], check=True, capture_output=True, text=True,
-                          env=environment).stdout
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 if __name__ == "__main__":

@@ -111,7 +111,8 @@ def measure_threads(bench: Bench) -> list[ThreadTimes]:
     rows = []
     for n_harmonics in (3,) if bench.quick else (3, 7, 17):
         groups = case(48, n_harmonics, near_peak(48))
-        times = [bench.repeat(groups, lambda run: float(run.seconds.mean()), threads, 3, 4.0, wait)[0]
+        times = [bench.repeat(groups, lambda run: float(run.seconds.mean()), threads, 3, 4.0,
+                              wait)[0]
                  for threads, wait in ((1, None), (2, None), (2, "passive"))]
         rows.append(ThreadTimes(n_harmonics, *times))
     return rows
@@ -166,5 +167,6 @@ def sector_file(pairs: int, folder: Path) -> Path:
     path = folder / f"sector_{pairs}.h5"
     if not path.exists():
         subprocess.run([sys.executable, "-m", "fretwear.sector", "--pairs", str(pairs), "-q",
-                        "-o", path], check=True, env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
+                        "-o", path], check=True,
+                       env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
     return path

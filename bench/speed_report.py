@@ -1,21 +1,20 @@
-"""docs/benchmarks.md and its pictures from the measurements."""
+"""The part of docs/benchmarks.md on speed, with its pictures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from layout import finish, microseconds, milliseconds, new_figure, table
 from oscillators import HARMONICS, INSTANTS, Sample
 from sector import HARMONICS as SECTOR_HARMONICS
 from sector import LARGEST_LU, PAIRS, Crossing, PointTime, Sweep, ThreadTimes
 
-__all__ = ["Measurements", "write_report"]
+__all__ = ["Measurements", "write_speed"]
 
 #: Time [s] that a sweep may take.
 TARGETS = {"48 pairs, H = 7": 5.0, "16 pairs, H = 3": 1.0}
@@ -23,9 +22,8 @@ TARGETS = {"48 pairs, H = 7": 5.0, "16 pairs, H = 3": 1.0}
 
 @dataclass(frozen=True)
 class Measurements:
-    """Everything that the report needs."""
+    """Everything that this part needs."""
 
-    machine: dict[str, str]
     transforms: list[dict[str, str]]
     oscillators: list[Sample]
     crossing: list[Crossing]
@@ -34,27 +32,16 @@ class Measurements:
     sweeps: list[Sweep]
 
 
-def write_report(folder: Path, data: Measurements) -> None:
-    """Write benchmarks.md and images/benchmark_*.png into a folder."""
-    images = folder / "images"
-    images.mkdir(parents=True, exist_ok=True)
+def write_speed(images: Path, data: Measurements) -> str:
+    """Draw the pictures into a folder; the text of the part."""
     draw_points(images / "benchmark_points.png", data.points)
     draw_errors(images / "benchmark_errors.png", data.oscillators)
     draw_transforms(images / "benchmark_transforms.png", data.transforms)
     draw_crossing(images / "benchmark_linear.png", data.crossing)
-    parts = [head(data.machine), sweeps_part(data.sweeps), points_part(data.points),
-             threads_part(data.threads), errors_part(data.oscillators),
-             crossing_part(data.crossing), transforms_part(data.transforms)]
-    (folder / "benchmarks.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-
-
-def head(machine: dict[str, str]) -> str:
-    """Title and where it was measured."""
-    return "\n".join([
-        "# Benchmarks", "",
-        "Written by `make bench` (bench/run.py): do not edit. Times are medians of repeated runs, "
-        "in one thread unless it is said otherwise, without reading the input.", "",
-        *table(["", ""], machine.items())])
+    parts = [sweeps_part(data.sweeps), points_part(data.points), threads_part(data.threads),
+             errors_part(data.oscillators), crossing_part(data.crossing),
+             transforms_part(data.transforms)]
+    return "## Speed\n\n" + "\n\n".join(parts)
 
 
 def sweeps_part(sweeps: list[Sweep]) -> str:
@@ -67,7 +54,7 @@ def sweeps_part(sweeps: list[Sweep]) -> str:
                      int(sweep.run.is_loose.sum()), int(sweep.run.iterations.sum()),
                      f"{sweep.seconds:.2f}", f"< {target:g} s: {met}"))
     return "\n".join([
-        "## Whole sweeps", "",
+        "### Whole sweeps", "",
         "Bladed-disk sector at 2500 rpm (`rotation_speed = 261.8`), tip force 0.5 N, modal damping "
         "0.1 %, `n_time = 128`, 41 points between 1000 and 1015 Hz. A *loose* point converged to "
         "a solution in which no pair touches at any instant; it satisfies the equations and means "
@@ -93,11 +80,11 @@ def points_part(points: list[PointTime]) -> str:
                          milliseconds(krylov.seconds),
                          "not run" if lu.run is None else milliseconds(lu.seconds)))
     return "\n".join([
-        "## Time of a frequency point", "",
+        "### Time of a frequency point", "",
         "The sector at 4400 rpm (`rotation_speed = 460.8`), else the same: 9 points within 2 Hz of "
-        "the peak, where the joint slips. Unknowns are those of the system; stuck rows leave the linear problems, whose "
-        "mean size stands beside. Dense LU was not run for more than "
-        f"{LARGEST_LU} unknowns: its time grows with their cube.", "",
+        "the peak, where the joint slips. Unknowns are those of the system; stuck rows "
+        "leave the linear problems, whose mean size stands beside. Dense LU was not run for more "
+        f"than {LARGEST_LU} unknowns: its time grows with their cube.", "",
         *table(["pairs", "H", "unknowns", "in linear problems", "usable points",
                 "GMRES [ms/point]", "LU [ms/point]"], rows), "",
         "![Time of a frequency point](images/benchmark_points.png)"])
@@ -109,7 +96,7 @@ def threads_part(rows: list[ThreadTimes]) -> str:
               f"{row.one / row.two:.2f}", milliseconds(row.two_passive),
               f"{row.one / row.two_passive:.2f}") for row in rows]
     return "\n".join([
-        "## Threads", "",
+        "### Threads", "",
         "48 pairs, the points of the section before. By default idle threads spin; where other "
         "programs use the processor this can cost far more than a second thread gains, and "
         "`OMP_WAIT_POLICY=passive` lets them sleep instead.", "",
@@ -119,7 +106,7 @@ def threads_part(rows: list[ThreadTimes]) -> str:
 
 def errors_part(samples: list[Sample]) -> str:
     """Error against time of the oscillators."""
-    lines = ["## Error against run time", "",
+    lines = ["### Error against run time", "",
              "Relative L2 error of the Fourier coefficients of the first coordinate against "
              "references that were computed without harmonic balance (test/reference), and the "
              "time of the point from the first guess of a run. Rigid friction on a dof with mass "
@@ -131,7 +118,7 @@ def errors_part(samples: list[Sample]) -> str:
             found = {s.n_time: s for s in samples if (s.case, s.n_harmonics) == (case, n_harmonics)}
             if found:
                 rows.append((n_harmonics, *(cell(found.get(n)) for n in INSTANTS)))
-        lines += ["", f"### {case[0].upper() + case[1:]}", "",
+        lines += ["", f"#### {case[0].upper() + case[1:]}", "",
                   *table(["H", *(f"n_time = {n}" for n in INSTANTS)], rows)]
     return "\n".join(lines)
 
@@ -156,7 +143,7 @@ def crossing_part(rows: list[Crossing]) -> str:
     lines = [(r.case, r.n_harmonics, r.unknowns_left, milliseconds(r.lu), milliseconds(r.krylov),
               f"{r.lu / r.krylov:.2f}") for r in rows]
     return "\n".join([
-        "## LU against GMRES", "",
+        "### LU against GMRES", "",
         "Time of a point, with residuals, condensation and recovery, against "
         "the mean number of unknowns that were left in the linear problems: the sector near its "
         f"peak, and the oscillator with two dofs, stick and slip. {text}. This decides "
@@ -173,7 +160,7 @@ def transforms_part(rows: list[dict[str, str]]) -> str:
               microseconds(row["fft"]), f"{ratio(row):.2f}", row["chosen"]) for row in rows]
     worst = max((float(row["difference"]) for row in rows), default=0.0)
     return "\n".join([
-        "## Matrix products against FFTW", "",
+        "### Matrix products against FFTW", "",
         "Time of one transform to the instants and one back (bench/transforms.f90). Three rows "
         "belong to a contact pair. The results of the two ways differ by "
         f"{worst:.0e} at most (inputs between 0 and 1). `fft_pays` in src/math/fourier.f90 "
@@ -196,11 +183,12 @@ def ratio(row: dict[str, str]) -> float:
 def draw_points(path: Path, points: list[PointTime]) -> None:
     """Time of a point against harmonics."""
     figure, axes = new_figure()
+    names = {"krylov": "GMRES", "lu": "LU"}
     for pairs, colour in zip(PAIRS, ("#1f4e79", "#c0392b")):
         for linear, style in (("krylov", "o-"), ("lu", "s--")):
             found = [p for p in points if (p.pairs, p.linear) == (pairs, linear) and p.run]
             axes.plot([p.n_harmonics for p in found], [1e3 * p.seconds for p in found], style,
-                      color=colour, label=f"{pairs} pairs, {'GMRES' if linear == 'krylov' else 'LU'}")
+                      color=colour, label=f"{pairs} pairs, {names[linear]}")
     axes.set(xscale="log", yscale="log", xlabel="harmonics H", ylabel="time of a point [ms]")
     axes.set_xticks(SECTOR_HARMONICS, [str(h) for h in SECTOR_HARMONICS], minor=False)
     axes.minorticks_off()
@@ -268,34 +256,3 @@ def draw_crossing(path: Path, rows: list[Crossing]) -> None:
     axes.set(xscale="log", yscale="log", xlabel="unknowns left in the linear problem",
              ylabel="time of a point [ms]")
     finish(figure, axes, path)
-
-
-def new_figure() -> tuple[Figure, Axes]:
-    """A picture of one panel."""
-    figure = Figure(figsize=(6.6, 4.4), dpi=130, layout="constrained")
-    return figure, figure.subplots()
-
-
-def finish(figure: Figure, axes: Axes, path: Path) -> None:
-    """Grid, legend, file."""
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=8)
-    figure.savefig(path)
-
-
-def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    """Lines of a Markdown table."""
-    def line(cells: Iterable[object]) -> str:
-        return "| " + " | ".join(str(cell) for cell in cells) + " |"
-
-    return [line(header), line("---" for _ in header), *(line(row) for row in rows)]
-
-
-def milliseconds(seconds: float) -> str:
-    """Three digits are more than a time is worth."""
-    return f"{1e3 * seconds:.3g}"
-
-
-def microseconds(seconds: str) -> str:
-    """The same for a text in seconds."""
-    return f"{1e6 * float(seconds):.3g}"

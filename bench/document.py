@@ -1,0 +1,62 @@
+"""docs/benchmarks.md: a head and one part for each measurement, which its command replaces.
+
+A part stands between two comments with its name, so that a command that measures one of them
+leaves the others as they are.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from layout import table
+
+__all__ = ["ORDER", "update_document"]
+
+#: Parts in the order of the document.
+ORDER = ("speed", "solvers", "paper", "iterations", "aliasing", "time")
+#: What the head says; the rest of the description goes with each part.
+COMMON = ("processor", "compiler", "flags")
+HEAD = """# Benchmarks
+
+Written by bench/run.py: do not edit. `make bench` measures the speed, `make bench-solvers` the \
+solvers, `make bench-paper` the methods and `make bench-time` the comparison with integration in \
+time; `make bench-full` does it all. Each part says what it was measured on. Times are medians of \
+repeated runs, in one thread unless it is said otherwise, without reading the input; compare their \
+ratios."""
+
+
+def update_document(path: Path, part: str, text: str, machine: dict[str, str]) -> None:
+    """Replace one part (a Markdown section) of the document, or make the document with it."""
+    old = path.read_text(encoding="utf-8") if path.exists() else ""
+    parts = {name: body for name in ORDER if (body := find_part(old, name)) is not None}
+    parts[part] = with_origin(text, machine)
+    lines = [HEAD, "", *table(["", ""], ((key, machine[key]) for key in COMMON if key in machine))]
+    for name in ORDER:
+        if name in parts:
+            lines += ["", begin(name), "", parts[name], "", end(name)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def with_origin(text: str, machine: dict[str, str]) -> str:
+    """The section with a line below its heading that says what was measured and when."""
+    heading, _, body = text.partition("\n")
+    origin = "; ".join(f"{key} {value}" for key, value in machine.items() if key not in COMMON)
+    return f"{heading}\n\n*Measured: {origin}.*\n{body}"
+
+
+def find_part(document: str, name: str) -> str | None:
+    """The text of a part."""
+    found = re.search(re.escape(begin(name)) + r"\n\n(.*?)\n\n" + re.escape(end(name)), document,
+                      re.DOTALL)
+    return found[1] if found else None
+
+
+def begin(name: str) -> str:
+    """Comment before a part."""
+    return f"<!-- part: {name} -->"
+
+
+def end(name: str) -> str:
+    """Comment behind a part."""
+    return f"<!-- end: {name} -->"

@@ -1,0 +1,69 @@
+"""Iterations against frequency with every solver on the sector, as in the paper's figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from layout import COLOURS, milliseconds, table
+from measure import Bench, Run
+from paper import INSTANTS, first_bending
+from solvers import Solver
+
+__all__ = ["measure_iterations", "write_iterations"]
+
+N_HARMONICS = 3
+SHOWN = (Solver("newton"), Solver("powell"), Solver("kinsol"),
+         Solver("pseudo_time", "rotated", "implicit_euler"),
+         Solver("pseudo_time", "rotated", "bdf"),
+         Solver("pseudo_time", "preconditioned", "implicit_euler"))
+
+
+def measure_iterations(bench: Bench) -> dict[Solver, Run]:
+    """The sweep of the table of methods, H = 3, from point to point without any fallback."""
+    runs = {}
+    for solver in SHOWN[:2] if bench.quick else SHOWN:
+        groups = first_bending(N_HARMONICS, INSTANTS) | solver.groups
+        groups["solver"] = groups["solver"] | {"fallback": False}
+        runs[solver] = bench.run(groups)
+    return runs
+
+
+def write_iterations(images: Path, runs: dict[Solver, Run]) -> str:
+    """Draw the picture; the text of the part."""
+    draw(images / "benchmark_iterations.png", runs)
+    rows = [(solver.name, f"{int(run.converged.sum())} of {len(run.converged)}",
+             int(run.iterations.sum()), int(run.iterations[run.converged].max(initial=0)),
+             milliseconds(float(np.median(run.seconds)))) for solver, run in runs.items()]
+    return "\n".join([
+        "## Iterations against frequency", "",
+        f"The 50 frequencies of the table before, H = {N_HARMONICS}, {INSTANTS} instants, each "
+        "point from the last one that converged (Newton, Powell and KINSOL: from the "
+        "extrapolation of the last two), `fallback = .false.`. Iterations are linear solutions; "
+        "Powell's are exact derivatives, between which it updates. Points that did "
+        "not converge are crosses at the iterations that were spent.", "",
+        *table(["solver", "converged", "iterations", "most at a point", "median time [ms/point]"],
+               rows), "", "![Iterations against frequency](images/benchmark_iterations.png)"])
+
+
+def draw(path: Path, runs: dict[Solver, Run]) -> None:
+    """Iterations above the response."""
+    figure = Figure(figsize=(7.4, 6.0), dpi=130, layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    for (solver, run), colour, marker in zip(runs.items(), COLOURS, "os^Dvp"):
+        hertz = run.omega / (2.0 * np.pi)
+        good = run.converged
+        upper.plot(hertz[good], np.maximum(run.iterations[good], 0.8), marker + "-", color=colour,
+                   markersize=4, linewidth=1.0, label=solver.name)
+        upper.plot(hertz[~good], run.iterations[~good], "x", color=colour)
+    reference = next(iter(runs.values()))
+    lower.plot(reference.omega / (2.0 * np.pi), reference.amplitude[:, 0], color="0.2")
+    upper.set(yscale="log", ylabel="iterations")
+    lower.set(xlabel="frequency [Hz]", ylabel="tip displacement [mm]")
+    for axes in (upper, lower):
+        axes.grid(alpha=0.3)
+    figure.legend(*upper.get_legend_handles_labels(), loc="outside upper center", ncols=3,
+                  frameon=False, fontsize=8)
+    figure.savefig(path)

@@ -1,0 +1,46 @@
+"""Tables and pictures of the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+__all__ = ["COLOURS", "finish", "microseconds", "milliseconds", "new_figure", "table"]
+
+#: Lines of a picture, in this order; apart in brightness too.
+COLOURS = ("#1f4e79", "#c0392b", "#54a24b", "#f58518", "#7f4fa3", "#4c9aa8")
+
+
+def new_figure() -> tuple[Figure, Axes]:
+    """A picture of one panel."""
+    figure = Figure(figsize=(6.6, 4.4), dpi=130, layout="constrained")
+    return figure, figure.subplots()
+
+
+def finish(figure: Figure, axes: Axes, path: Path) -> None:
+    """Grid, legend, file."""
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, fontsize=8)
+    figure.savefig(path)
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """Lines of a Markdown table."""
+    def line(cells: Iterable[object]) -> str:
+        return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+    return [line(header), line("---" for _ in header), *(line(row) for row in rows)]
+
+
+def milliseconds(seconds: float) -> str:
+    """Three digits are more than a time is worth; a dash where there is no time."""
+    return "–" if math.isnan(seconds) else f"{1e3 * seconds:.3g}"
+
+
+def microseconds(seconds: str) -> str:
+    """The same for a text in seconds."""
+    return f"{1e6 * float(seconds):.3g}"
