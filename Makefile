@@ -64,7 +64,7 @@ test: build ## every test; the last line counts the cases
 
 lint: build/deps.stamp ## type checker and linter of the Python code
 	@$(PYTHON) -m mypy
-	@$(PYTHON) -m ruff check python conftest.py
+	@$(PYTHON) -m ruff check python conftest.py bench
 
 bench: build ## error against run time, written to docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py speed

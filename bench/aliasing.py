@@ -103,7 +103,7 @@ def peak_text(run: Run) -> str:
 
 def difference(value: float, reference: float) -> str:
     """In percent."""
-    return "–" if math.isnan(value) else f"{100.0 * (value / reference - 1.0):+.2f} %"
+    return "-" if math.isnan(value) else f"{100.0 * (value / reference - 1.0):+.2f} %"
 
 
 def draw_sweeps(path: Path, sweeps: dict[tuple[str, int], Run]) -> None:

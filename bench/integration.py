@@ -135,7 +135,7 @@ def write_integration(found: list[Comparison]) -> str:
 
 def percent(value: float) -> str:
     """With its sign."""
-    return "–" if math.isnan(value) else f"{100.0 * value:+.3f} %"
+    return "-" if math.isnan(value) else f"{100.0 * value:+.3f} %"
 
 
 def met(value: float) -> str:

@@ -38,7 +38,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
 
 def milliseconds(seconds: float) -> str:
     """Three digits are more than a time is worth; a dash where there is no time."""
-    return "–" if math.isnan(seconds) else f"{1e3 * seconds:.3g}"
+    return "-" if math.isnan(seconds) else f"{1e3 * seconds:.3g}"
 
 
 def microseconds(seconds: str) -> str:

@@ -92,7 +92,7 @@ def write_methods(cells: list[Cell]) -> str:
 def cell_text(cell: Cell | None, unit: float) -> str:
     """Normalised time, and what it was spent on."""
     if cell is None:
-        return "–"
+        return "-"
     converged = int(cell.run.converged.sum())
     text = f"{cell.seconds / unit:.2f} ("
     if converged < len(cell.run.converged):

@@ -6,8 +6,17 @@ import math
 import statistics
 
 from layout import milliseconds, table
-from solvers import (DUFFING_FREQUENCIES, DUFFING_SPREADS, N_STARTS, SECTOR_FREQUENCIES,
-                     SECTOR_SPREAD, SOLVERS, Outcome, Solver, summarize)
+from solvers import (
+    DUFFING_FREQUENCIES,
+    DUFFING_SPREADS,
+    N_STARTS,
+    SECTOR_FREQUENCIES,
+    SECTOR_SPREAD,
+    SOLVERS,
+    Outcome,
+    Solver,
+    summarize,
+)
 
 __all__ = ["write_solvers"]
 
@@ -71,7 +80,7 @@ def problem_part(outcomes: list[Outcome], name: str) -> str:
         if outcome.problem != name:
             continue
         if outcome.timed_out:
-            rows.append((outcome.solver.name, "–", "–", "–", "–", "stopped by the clock"))
+            rows.append((outcome.solver.name, "-", "-", "-", "-", "stopped by the clock"))
             continue
         s = summarize(outcome)
         rows.append((outcome.solver.name, share(s.converged, s.total), count(s.iterations),
@@ -105,7 +114,7 @@ def claim_part(outcomes: list[Outcome], names: list[str]) -> str:
         ratio = (statistics.median(euler[key].seconds / newton[key].seconds for key in both)
                  if both else math.nan)
         rows.append((name[0].upper() + name[1:], len(newton), len(euler), len(both),
-                     f"{ratio:.2g}" if both else "–"))
+                     f"{ratio:.2g}" if both else "-"))
     return "\n".join([
         "### Is pseudo-time faster than Newton's method?", "",
         "The paper finds it so. Here, start by start: implicit Euler on the rotated flow against "
@@ -118,19 +127,19 @@ def claim_part(outcomes: list[Outcome], names: list[str]) -> str:
 
 def share(converged: int, total: int) -> str:
     """Part of the starts that converged."""
-    return f"{converged}/{total} ({100.0 * converged / total:.0f} %)" if total else "–"
+    return f"{converged}/{total} ({100.0 * converged / total:.0f} %)" if total else "-"
 
 
 def failures(counts: list[tuple[str, int]]) -> str:
     """The words of failure, the most frequent two."""
-    return "; ".join(f"{number} × {message}" for message, number in counts[:2])
+    return "; ".join(f"{number} x {message}" for message, number in counts[:2])
 
 
 def count(value: float) -> str:
     """A median of counts."""
-    return "–" if math.isnan(value) else f"{value:g}"
+    return "-" if math.isnan(value) else f"{value:g}"
 
 
 def scientific(value: float) -> str:
     """Two digits of an error."""
-    return "–" if math.isnan(value) else f"{value:.1e}"
+    return "-" if math.isnan(value) else f"{value:.1e}"
