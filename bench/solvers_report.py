@@ -46,8 +46,9 @@ def introduction() -> str:
         "error of the balance wherever solvers share it. Newton's method has a line search, and "
         "ends each pseudo-time path (see the user guide). Every run ends: `max_iterations = 60`, "
         "`max_steps = 500`. *The flow runs away from its start* stands for: it has no stable "
-        "steady state there, or the steps are too long for the scheme. This is how the identity "
-        "flow ends above a resonance, or it runs out of steps.")
+        "steady state there, or the steps are too long for the scheme. Above a resonance, "
+        "where the identity flow grows, it ends so or runs out of steps, unless Newton's method "
+        "converges on the way.")
 
 
 def duffing_part(outcomes: list[Outcome], names: list[str]) -> str:
