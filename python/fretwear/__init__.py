@@ -19,6 +19,8 @@ fretwear.operators
     Operators of the library: harmonics, dynamic stiffness, condensation, contact forces.
 fretwear.errors
     Errors.
+fretwear.study
+    Parameter studies.
 fretwear.sector
     Generator of the reduced bladed-disk sector with a dovetail root.
 fretwear.cli

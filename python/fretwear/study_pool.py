@@ -1,0 +1,108 @@
+"""Where the runs of a study are carried out: cores of this machine, or a Dask cluster."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from typing import Any, TypeVar
+
+from .errors import InputError
+from .study_run import Job, Record, RunStopped, run_job
+
+__all__ = ["core_count", "each", "run_jobs"]
+
+_Item = TypeVar("_Item")
+_Answer = TypeVar("_Answer")
+
+
+def core_count() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def each(function: Callable[[_Item], _Answer], items: Sequence[_Item],
+         workers: int) -> list[_Answer]:
+    """Apply a function that waits for a program to every item, some at once."""
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(function, items))
+
+
+def run_jobs(jobs: Sequence[Job], scheduler: str, workers: int) -> Iterator[Record]:
+    """Run jobs and yield their records as they come.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        No two of one name.
+    scheduler : str
+        'processes', 'dask', or the address of a Dask scheduler.
+    workers : int
+        Runs at once on this machine.
+
+    Notes
+    -----
+    Closing the iterator, or Ctrl-C, ends the runs of this machine; those of a cluster that have
+    begun come to their end and leave their records, the others are cancelled.
+    """
+    if scheduler == "processes":
+        yield from _run_here(jobs, workers)
+    else:
+        yield from _run_on_dask(jobs, scheduler, workers)
+
+
+def _run_here(jobs: Sequence[Job], workers: int) -> Iterator[Record]:
+    """Every run is a process of its own; the threads only wait for them."""
+    stop = threading.Event()
+    with ThreadPoolExecutor(workers) as pool:
+        waiting: set[Future[Record]] = {pool.submit(run_job, job, stop) for job in jobs}
+        try:
+            while waiting:
+                # Woken now and then, or Ctrl-C would not be seen while runs last.
+                done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+        finally:
+            stop.set()
+            for future in waiting:
+                future.cancel()
+            for future in waiting:
+                if not future.cancelled():
+                    with suppress(RunStopped):
+                        future.result()
+
+
+def _run_on_dask(jobs: Sequence[Job], scheduler: str, workers: int) -> Iterator[Record]:
+    distributed: Any = _distributed()
+    local = scheduler == "dask"
+    try:
+        cluster = distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=None) if local else None
+        client = distributed.Client(cluster if local else scheduler)
+    except (OSError, ValueError) as error:
+        raise InputError(f"run.scheduler = '{scheduler}': no Dask scheduler answers there: {error}"
+                         ) from None
+    try:
+        futures = client.map(run_job, jobs, key=[job.name for job in jobs], retries=0, pure=False)
+        try:
+            for future in distributed.as_completed(futures):
+                yield future.result()
+        finally:
+            client.cancel(futures)
+    finally:
+        client.close()
+        if cluster is not None:
+            cluster.close()
+
+
+def _distributed() -> Any:
+    try:
+        return importlib.import_module("distributed")
+    except ImportError:
+        raise InputError("a study on a Dask cluster needs the package distributed; install it with "
+                         "pip install distributed, or leave run.scheduler out") from None
