@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ._native import NOT_CONVERGED, STOPPED, Session, raise_status
 from .case import Case, ModelLike
@@ -144,7 +144,8 @@ def frf(model: ModelLike, start: float, end: float, n_points: int | None = None,
     return run(case, file, check=check, progress=progress)
 
 
-def wear(model: ModelLike, frequency: float, coefficient: ArrayLike, n_cycles: float, *,
+def wear(model: ModelLike, frequency: float, coefficient: float,
+         n_cycles: float | None = None, *,
          scheme: Literal["explicit", "implicit", "pseudo_time"] | None = None,
          unit: Literal["rad/s", "Hz"] | None = None, file: str | Path | None = None,
          check: bool = True, progress: Progress | None = None,
@@ -157,10 +158,10 @@ def wear(model: ModelLike, frequency: float, coefficient: ArrayLike, n_cycles: f
         The structure, or the path of a model file; its pairs have areas.
     frequency : float
         Frequency of the excitation [unit].
-    coefficient : float or (n_pairs,)
+    coefficient : float
         Archard's coefficient [length^2/force], in the units of the model.
-    n_cycles : float
-        Cycles of vibration.
+    n_cycles : float, optional
+        Cycles of vibration; until the joint is steady without it.
     scheme : {'explicit', 'implicit', 'pseudo_time'}, optional
         How the two time scales are coupled (default: implicit).
     unit : {'rad/s', 'Hz'}, optional
@@ -183,7 +184,9 @@ def wear(model: ModelLike, frequency: float, coefficient: ArrayLike, n_cycles: f
     sweep: Sweep = {"start": frequency}
     if unit is not None:
         sweep["unit"] = unit
-    settings: Wear = {"coefficient": coefficient, "n_cycles": n_cycles}
+    settings: Wear = {"coefficient": coefficient}
+    if n_cycles is not None:
+        settings["n_cycles"] = n_cycles
     if scheme is not None:
         settings["scheme"] = scheme
     _refuse_twice("wear", settings, groups.get("wear", {}))

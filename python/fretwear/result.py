@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +42,8 @@ _DIMENSIONS: dict[str, tuple[str, ...]] = {
     "contact/dissipation": ("point", "pair"),
     "wear/depth": ("step", "pair"),
     "wear/rate": ("step", "pair"),
+    "wear/energy": ("step", "pair"),
+    "wear/volume": ("step", "patch"),
 }
 
 
@@ -71,7 +74,6 @@ class Result:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._arrays: dict[str, NDArray[Any]] = {}
-        self._attributes: dict[str, Any] = {}
         with self.open() as file:
             kind = _text(file.attrs.get("format", ""))
             if kind != FORMAT:
@@ -80,13 +82,24 @@ class Result:
             if version > FORMAT_VERSION:
                 raise InputError(f"{self.path}: format_version is {version}, this package reads "
                                  f"up to {FORMAT_VERSION}; update fretwear")
-            self._attributes = {name: _plain(value) for name, value in file.attrs.items()}
-            self._names: set[str] = set()
-            file.visititems(self._note_dataset)
 
-    def _note_dataset(self, name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset):
-            self._names.add(name)
+    @cached_property
+    def _names(self) -> frozenset[str]:
+        """Every dataset of the file."""
+        found: list[str] = []
+
+        def note(name: str, item: object) -> None:
+            if isinstance(item, h5py.Dataset):
+                found.append(name)
+
+        with self.open() as file:
+            file.visititems(note)
+        return frozenset(found)
+
+    @cached_property
+    def _attributes(self) -> dict[str, Any]:
+        with self.open() as file:
+            return {name: _plain(value) for name, value in file.attrs.items()}
 
     def __repr__(self) -> str:
         return f"<Result {str(self.path)!r}: {self.n_points} points, {self.status}>"
@@ -124,11 +137,12 @@ class Result:
         return self._arrays[name]
 
     def _read(self, name: str) -> NDArray[Any]:
-        if name not in self._names:
-            raise InputError(f"{self.path}: holds no dataset /{name}; there are "
-                             + ", ".join("/" + known for known in self))
         with self.open() as file:
-            array: NDArray[Any] = np.asarray(file[name][()])
+            found = file.get(name)
+            if not isinstance(found, h5py.Dataset):
+                raise InputError(f"{self.path}: holds no dataset /{name}; there are "
+                                 + ", ".join("/" + known for known in self))
+            array: NDArray[Any] = np.asarray(found[()])
         if array.dtype.kind in "SO":
             array = np.array([_text(word) for word in array.ravel()]).reshape(array.shape)
         array.flags.writeable = False
@@ -273,6 +287,11 @@ class Result:
         return self["wear/rate"]
 
     @property
+    def volume(self) -> Floats:
+        """Worn volume of every patch (n_steps, n_patches) [length^3]."""
+        return self["wear/volume"]
+
+    @property
     def steady_state(self) -> str | None:
         """'reached', 'not reached' or 'none: gross slip'; None without a wear analysis."""
         if "wear/depth" not in self:
@@ -341,8 +360,9 @@ class Result:
         Returns
         -------
         xarray.Dataset
-            Dimensions point, coefficient, observed, pair, direction, state, step; coordinates
-            omega and frequency on point, cycles on step. Names as in the file with `_` for `/`.
+            Dimensions point (step in a wear analysis), coefficient, observed, pair, direction,
+            state and patch; coordinates omega, frequency and cycles. Names as in the file with
+            `_` for `/`.
 
         Raises
         ------
@@ -357,18 +377,25 @@ class Result:
                 continue
             units = self.units(name)
             values = self.converged if name == "converged" else self[name]
+            dimensions = [self._row if dimension in ("point", "step") else dimension
+                          for dimension in _DIMENSIONS[name]]
             variables[name.replace("/", "_")] = xarray.Variable(
-                _DIMENSIONS[name], values, {"units": units} if units else {})
+                dimensions, values, {"units": units} if units else {})
         return xarray.Dataset(variables, self._coordinates(), {
             key: value for key, value in self._attributes.items() if key != "format_version"})
+
+    @property
+    def _row(self) -> str:
+        """What a row is: a point of a sweep, or a step of wear."""
+        return "step" if "wear/cycles" in self else "point"
 
     def _coordinates(self) -> dict[str, Any]:
         known: dict[str, Any] = {
             "observed": ("observed", list(self.observed)), "direction": list(DIRECTIONS),
             "state": list(STATES)}
         if "omega" in self:
-            known["omega"] = ("point", self.omega, {"units": "rad/s"})
-            known["frequency"] = ("point", self.frequency, {"units": "Hz"})
+            known["omega"] = (self._row, self.omega, {"units": "rad/s"})
+            known["frequency"] = (self._row, self.frequency, {"units": "Hz"})
         if "coefficients" in self:
             harmonics = range(1, self.n_harmonics + 1)
             known["coefficient"] = ["0", *(f"{part}{n}" for n in harmonics for part in "cs")]
@@ -378,6 +405,8 @@ class Result:
             del known["direction"], known["state"]
         if "wear/cycles" in self:
             known["cycles"] = ("step", self.cycles, {"units": self.units("wear/cycles") or "1"})
+        if "wear/patch" in self:
+            known["patch"] = self["wear/patch"].tolist()
         return known
 
 

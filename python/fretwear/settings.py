@@ -127,7 +127,9 @@ class Wear(TypedDict, total=False):
     """Group &wear: fretting wear at the frequency of `sweep["start"]`."""
 
     scheme: Literal["explicit", "implicit", "pseudo_time"]
-    coefficient: ArrayLike  # [length^2/force]
+    law: Literal["archard", "energy"]
+    order: int
+    coefficient: float  # [length^2/force]
     n_cycles: float
     max_depth_step: float  # [length]
     error_tolerance: float

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import fretwear as fw
-from fretwear import analyses, settings
+from fretwear import settings
 from fretwear.settings import Groups
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -393,14 +393,30 @@ def test_runs_in_several_threads_do_not_disturb_each_other() -> None:
 # ---------------------------------------------------------------------------------- wear
 
 
-def test_wear_fills_the_group_of_the_namelist(monkeypatch: pytest.MonkeyPatch) -> None:
-    cases: list[fw.Case] = []
-    monkeypatch.setattr(analyses, "run", lambda case, *_, **__: cases.append(case))
-    fw.wear(RUBBING, 1.0, 1e-9, 1e6, scheme="explicit", wear={"max_depth_step": 1e-3})
-    text = repr(cases[0])
-    for setting in ("case%analysis='wear'", "sweep%start=1.0", "wear%coefficient=1e-09",
-                    "wear%n_cycles=1000000.0", "wear%scheme='explicit'",
-                    "wear%max_depth_step=0.001"):
-        assert setting in text
+def test_wear_gives_the_numbers_of_fw_run(tmp_path: Path) -> None:
+    groups: Groups = {**SECTOR, "wear": {"max_depth_step": 2e-5}}
+    result = fw.wear(EXAMPLES / "blade_sector" / "sector_16.h5", 1022.5, 1e-9, 1e7, unit="Hz",
+                     scheme="explicit", **groups)
+    options = ["case%analysis=wear", "sweep%start=1022.5", "sweep%end=0", "wear%scheme=explicit",
+               "wear%coefficient=1e-9", "wear%n_cycles=1e7", "wear%max_depth_step=2e-5"]
+    other = by_program(tmp_path, EXAMPLES / "blade_sector" / "frf.nml",
+                       *(word for option in options for word in ("--set", option)))
+    assert_same_numbers(result, other)
+    n_steps = len(result.cycles)
+    assert n_steps > 2
+    assert result.cycles[-1] == 1e7
+    assert result.depth.shape == result.rate.shape == (n_steps, 16)
+    assert result.volume.shape == (n_steps, 2)
+    assert (result.depth[-1] > 0.0).any()
+    assert result.steady_state in ("reached", "not reached", "none: gross slip")
+    table = result.to_xarray()
+    assert table["wear_depth"].dims == ("step", "pair")
+    assert table["amplitude"].dims == ("step", "observed")
+    assert np.array_equal(table["cycles"], result.cycles)
+
+
+def test_what_wear_has_an_argument_for_is_given_there() -> None:
     with pytest.raises(fw.InputError, match=r"wear\['n_cycles'\]: is set by an argument"):
         fw.wear(RUBBING, 1.0, 1e-9, 1e6, wear={"n_cycles": 3})
+    with pytest.raises(fw.InputError, match="area"):
+        fw.wear(RUBBING, 1.0, 1e-9, 1e6, contact={"law": "penalty"})
