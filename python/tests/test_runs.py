@@ -315,6 +315,22 @@ def test_an_interrupt_stops_the_run_and_keeps_what_is_done(tmp_path: Path) -> No
     assert result.path == tmp_path / "stopped.h5"
 
 
+def test_an_interrupt_stops_wear(tmp_path: Path) -> None:
+    def interrupt(done: int, _total: int) -> None:
+        if done > 0:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    groups: Groups = {**SECTOR, "wear": {"max_depth_step": 1e-12, "max_steps": 10_000_000}}
+    with pytest.raises(fw.RunInterrupted) as stopped:
+        fw.wear(EXAMPLES / "blade_sector" / "sector_16.h5", 1022.5, 1e-9, 1e9, unit="Hz",
+                scheme="explicit", file=tmp_path / "wear.h5", progress=interrupt, **groups)
+    result = stopped.value.result
+    assert result is not None
+    assert result.status == "stopped"
+    assert 0 < len(result.cycles) < 10_000_000
+    assert result.steady_state == "not reached"
+
+
 def test_control_c_ends_a_script_with_its_result(tmp_path: Path) -> None:
     script = """
 import sys, fretwear as fw

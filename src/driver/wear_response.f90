@@ -186,6 +186,7 @@ contains
          call self%summary%add(point)
       end if
       call self%observer%on_point(self%n_rows, 0, point)
+      go_on = .not. self%observer%stop_requested
    end subroutine take
 
    !> Friction energy that the worn depth stands for: both laws wear in proportion to it.
