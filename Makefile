@@ -55,8 +55,8 @@ $(RUN)/frf_stuck.h5: $(EXAMPLE)/frf_stuck.nml $(wildcard $(EXAMPLE)/*.h5) $(BUIL
 	$(BUILD)/fw_run -o $@ $<
 
 $(RUN)/frf.png: $(RUN)/frf.h5 $(RUN)/frf_stuck.h5 $(wildcard python/fretwear/*.py)
-	PYTHONPATH=python MPLBACKEND=Agg $(PYTHON) -m fretwear.plots $(RUN)/frf.h5 \
-	   --linear $(RUN)/frf_stuck.h5 -o $@
+	PYTHONPATH=python MPLBACKEND=Agg $(PYTHON) -m fretwear plot $(RUN)/frf.h5 \
+	   --kind response --linear $(RUN)/frf_stuck.h5 -o $@
 
 # The closing line has to be the last one, whatever the build said before.
 test: build ## every test; the last line counts the cases

@@ -5,8 +5,10 @@
 #     tools/deps.sh VENV_DIRECTORY
 set -euo pipefail
 venv=$1
-python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti pyarrow distributed pytest mypy ruff)
-python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti pyarrow distributed pytest mypy ruff)
+python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed
+                pytest mypy ruff)
+python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed
+                 pytest mypy ruff)
 
 has_command() { command -v "$1" >/dev/null 2>&1; }
 

@@ -23,6 +23,10 @@ fretwear.study
     Parameter studies.
 fretwear.sector
     Generator of the reduced bladed-disk sector with a dovetail root.
+fretwear.plot
+    Pictures of results, as matplotlib figures.
+fretwear.compare, fretwear.report, fretwear.export
+    Two results beside each other; one HTML page; meshes for ParaView.
 fretwear.cli
     The command `fretwear`.
 """

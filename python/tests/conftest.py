@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
+from fretwear.result import Result
 from fretwear.sector import (
     Discretisation,
     FullModel,
@@ -14,9 +18,11 @@ from fretwear.sector import (
     SectorParameters,
     build_full,
     reduce_model,
+    write_model,
 )
 from fretwear.sector.assembly import Assembly
 from fretwear.sector.mesh import BLADE
+from fretwear.sector.recovery import recovery_mesh
 
 # Small enough for dense algebra on the full model; two rows per flank keep the root from rocking.
 COARSE = Discretisation(
@@ -52,3 +58,65 @@ def reduced(full: FullModel) -> ReducedModel:
 def examples() -> Path:
     """Folder of the committed sector models."""
     return Path(__file__).resolve().parents[2] / "example" / "blade_sector"
+
+
+PROGRAM = os.environ.get(
+    "FW_RUN", str(Path(__file__).resolve().parents[2] / "build" / "release" / "fw_run"))
+#: Fast enough for the flanks to carry the blade, slow enough for them to slip.
+SPEED = 460.8
+CASE = """&case title = 'Coarse sector' /
+&model source = 'hdf5' file = 'model.h5' modal_damping = 1e-3 rotation_speed = {speed} /
+&contact law = 'dlft' mu = 0.5 /
+&load harmonic_scale = 0.5 /
+&harmonics n_harmonics = 3 n_time = 64 /
+&sweep start = {start} end = {end} n_points = 40 unit = 'Hz' /
+&output observe = 'tip', 'tip_x' /
+"""
+
+
+def run(namelist: Path, target: Path, *settings: str) -> Result:
+    """Run a case; settings are for --set."""
+    options = [word for setting in settings for word in ("--set", setting)]
+    subprocess.run([PROGRAM, "-q", *options, "-o", target, namelist], check=True)
+    return Result(target)
+
+
+@pytest.fixture(scope="session")
+def coarse_case(full: FullModel, reduced: ReducedModel,
+                tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Namelist of the first peak of the coarse sector, beside its model file with a mesh."""
+    folder = tmp_path_factory.mktemp("coarse")
+    write_model(reduced, folder / "model.h5", mesh=recovery_mesh(full)[0])
+    stuck = reduced.frequencies(SPEED)[0]
+    case = folder / "case.nml"
+    case.write_text(CASE.format(speed=SPEED, start=0.997 * stuck, end=1.002 * stuck))
+    return case
+
+
+@pytest.fixture(scope="session")
+def coarse(coarse_case: Path) -> Result:
+    """Sweep through the first peak of the coarse sector, without histories."""
+    return run(coarse_case, coarse_case.with_name("coarse.h5"))
+
+
+@pytest.fixture(scope="session")
+def sampled(coarse_case: Path) -> Result:
+    """The same with histories."""
+    return run(coarse_case, coarse_case.with_name("sampled.h5"), "output%histories=true")
+
+
+@pytest.fixture(scope="session")
+def worn(coarse: Result) -> Result:
+    """The same with the datasets of a wear analysis: depths that settle, one row a point."""
+    path = coarse.path.with_name("worn.h5")
+    path.write_bytes(coarse.path.read_bytes())
+    cycles = np.concatenate(([0.0], np.geomspace(1e3, 1e9, coarse.n_points - 1)))
+    final = 1e-3 * coarse.dissipation[coarse.peak()] / coarse.dissipation.max()
+    rate = final * np.exp(-cycles[:, None] / 1e7) / 1e7
+    with h5py.File(path, "r+") as file:
+        file["wear/cycles"] = cycles
+        file["wear/depth"] = final - 1e7 * rate
+        file["wear/rate"] = rate
+        file["wear/depth"].attrs["units"] = file["wear/rate"].attrs["units"] = "mm"
+        file["wear"].attrs["steady_state"] = "reached"
+    return Result(path)

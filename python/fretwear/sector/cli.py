@@ -27,6 +27,7 @@ from .parameters import (
     SectorParameters,
     patch_grid,
 )
+from .recovery import recovery_mesh
 
 __all__ = ["main"]
 
@@ -68,7 +69,8 @@ def _run(options: argparse.Namespace) -> int:
     started = time.perf_counter()
     full = build_full(parameters)
     reduced = reduce_model(full)
-    write_model(reduced, options.output, options.title)
+    mesh = recovery_mesh(full)[0] if options.mesh else None
+    write_model(reduced, options.output, options.title, mesh)
     if options.picture:
         from .picture import draw_sector  # matplotlib only where a picture is wanted
 
@@ -89,6 +91,9 @@ def _parser() -> argparse.ArgumentParser:
                         help="contact pairs on both flanks, such as 16, 48, 768; sets the patches "
                              "of a flank to the most nearly square grid")
     parser.add_argument("--picture", metavar="PNG", help="also draw the mesh")
+    parser.add_argument("--mesh", action="store_true",
+                        help="also store the mesh and the displacement of its vertices, for "
+                             "fretwear export where the generator is not at hand")
     parser.add_argument("--title", help="title stored in the file")
     parser.add_argument("-q", "--quiet", action="store_true", help="no summary")
     parser.add_argument("--version", action="version", version=f"fretwear {__version__}")

@@ -9,13 +9,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..reduction import Bonded, reduce
+from ..reduction import Bonded, ReducedSystem, reduce
 from .assembly import Assembly
 from .contact import ContactRows, Tip, contact_rows, held_nodes, tip_rows
 from .mesh import SectorMesh, build_mesh
 from .parameters import ParameterError, SectorParameters
 
-__all__ = ["FullModel", "ReducedModel", "build_full", "generate", "reduce_model"]
+__all__ = ["FullModel", "ReducedModel", "build_full", "generate", "observed_rows", "reduce_model",
+           "reduced_system"]
 
 Floats = NDArray[np.float64]
 
@@ -154,21 +155,30 @@ def build_full(parameters: SectorParameters) -> FullModel:
                      tip.normal[free], rows, tip, bonded)
 
 
-def reduce_model(full: FullModel) -> ReducedModel:
-    """Reduce to contact coordinates, bonded modes and the attachment vector of the tip force."""
+def reduced_system(full: FullModel) -> ReducedSystem:
+    """Contact coordinates, bonded modes and the attachment vector of the tip force."""
     try:
-        system = reduce(
+        return reduce(
             full.mass, full.stiffness, full.contact, bonded=full.bonded,
             n_modes=full.parameters.discretisation.n_modes,
             loads=np.column_stack((full.tip_force, full.centrifugal)), attachments=full.tip_force)
     except InputError as error:
         raise ParameterError(f"Discretisation: {error}") from None
-    observed = np.vstack((full.tip_force, full.tip.mean[:, full.free].toarray()))
+
+
+def observed_rows(full: FullModel) -> Floats:
+    """Tip displacement normal to the chord, and in x, y and z, on the free dofs (4, n)."""
+    return np.vstack((full.tip_force, full.tip.mean[:, full.free].toarray()))
+
+
+def reduce_model(full: FullModel) -> ReducedModel:
+    """Reduce to the coordinates of `reduced_system`."""
+    system = reduced_system(full)
     rows, reduction = full.rows, system.reduction
     return ReducedModel(
         full.parameters, system.mass, system.stiffness, reduction.matrix(full.rotation),
         system.loads[:, 1], system.loads[:, 0], ["tip", "tip_x", "tip_y", "tip_z"],
-        reduction.row(observed), rows.area, rows.position, rows.frame, rows.patch)
+        reduction.row(observed_rows(full)), rows.area, rows.position, rows.frame, rows.patch)
 
 
 def generate(parameters: SectorParameters | None = None) -> ReducedModel:

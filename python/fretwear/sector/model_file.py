@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..export_mesh import RecoveryMesh, mesh_datasets
 from ..model_file import strings, write_model_file
 from .model import ReducedModel
 from .parameters import Discretisation, Geometry, Material, SectorParameters
@@ -24,7 +25,8 @@ __all__ = ["read_parameters", "write_model"]
 UNIT_SYSTEM = "mm-tonne-s-N"
 
 
-def write_model(model: ReducedModel, path: str | Path, title: str | None = None) -> None:
+def write_model(model: ReducedModel, path: str | Path, title: str | None = None,
+                mesh: RecoveryMesh | None = None) -> None:
     """Write a reduced sector as a model file.
 
     Parameters
@@ -35,10 +37,15 @@ def write_model(model: ReducedModel, path: str | Path, title: str | None = None)
         Target; an older file of that name is replaced once the new one is complete.
     title : str, optional
         Title attribute.
+    mesh : RecoveryMesh, optional
+        Written as group /mesh. Without it `fretwear export` generates the mesh again.
     """
+    datasets = _datasets(model)
+    if mesh is not None:
+        datasets.update(mesh_datasets(mesh))
     default = f"Bladed-disk sector with a dovetail root, {model.n_pairs} contact pairs"
     # The parameters are not part of the format; they make the file reproducible.
-    write_model_file(path, _datasets(model), title=title or default, unit_system=UNIT_SYSTEM,
+    write_model_file(path, datasets, title=title or default, unit_system=UNIT_SYSTEM,
                      attributes={"parameters": json.dumps(asdict(model.parameters))})
 
 

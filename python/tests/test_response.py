@@ -1,4 +1,4 @@
-"""Plots of synthetic result files with known peaks."""
+"""Frequency responses of synthetic result files with known peaks."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from fretwear.plots import (
+from fretwear import InputError
+from fretwear.plot_response import (
     friction_damping,
     half_power_damping,
-    main,
     plot_response,
     read_response,
 )
@@ -82,24 +82,43 @@ def test_observed_quantity_by_name(tmp_path: Path) -> None:
         read_response(path, "tpi")
 
 
-@pytest.mark.parametrize("contact", [True, False])
-def test_plot(tmp_path: Path, contact: bool) -> None:
+def test_the_curve_is_the_result(tmp_path: Path) -> None:
+    """Points that failed leave a gap in the curve and a cross within the picture."""
     stuck = _write(tmp_path / "stuck.h5", 1000.0, 1e-3)
-    result = _write(tmp_path / "slip.h5", 998.0, 1.6e-3, failed=700, contact=contact)
-    picture = tmp_path / "out.png"
-    plot_response(result, picture, linear=stuck)
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert picture.stat().st_size > 10_000
+    path = _write(tmp_path / "slip.h5", 998.0, 1.6e-3, failed=700)
+    response = read_response(path)
+    upper, lower = plot_response(path, linear=stuck).axes
+    lines = {line.get_label(): line for line in upper.lines}
+    curve = lines["amplitude of tip"]
+    assert np.array_equal(curve.get_xdata(), response.frequency)
+    expected = np.where(response.converged, response.amplitude, np.nan)
+    assert np.array_equal(curve.get_ydata(), expected, equal_nan=True)
+    cross = lines["not converged (1)"]
+    assert cross.get_xdata() == pytest.approx([response.frequency[700]])
+    assert cross.get_ydata()[0] <= upper.get_ylim()[1]
+    assert np.array_equal(lines["stuck (linear)"].get_ydata(), read_response(stuck).amplitude)
+    assert "shift -0.200 %" in upper.texts[0].get_text()
+    assert lower.get_xlabel() == "frequency [Hz]"
+    assert upper.get_ylabel() == "amplitude of tip [L]"
+    tops = [area.get_paths()[0].vertices[:, 1].max() for area in lower.collections]
+    keep = response.converged
+    assert tops == pytest.approx([response.fraction[keep].cumsum(axis=1)[:, k].max()
+                                  for k in range(3)])
 
 
-def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    result = str(_write(tmp_path / "slip.h5", 998.0, 1.6e-3))
-    picture = tmp_path / "out.png"
-    assert main([result, "-o", str(picture), "--observe", "other"]) == 0
-    assert picture.exists()
-    assert main([result, "-o", str(picture), "--observe", "nothing"]) == 3
-    assert "available" in capsys.readouterr().err
-    assert main([str(tmp_path / "none.h5"), "-o", str(picture)]) == 5
+def test_without_contact_there_is_one_panel(tmp_path: Path) -> None:
+    figure = plot_response(_write(tmp_path / "a.h5", 1000.0, 1e-3, contact=False))
+    assert [axes.get_xlabel() for axes in figure.axes] == ["frequency [Hz]"]
+
+
+def test_nothing_converged(tmp_path: Path) -> None:
+    path = _write(tmp_path / "a.h5", 1000.0, 1e-3)
+    with h5py.File(path, "r+") as file:
+        file["converged"][:] = 0
+    (axes,) = plot_response(path).axes
+    assert "not converged (2001)" in [line.get_label() for line in axes.lines]
+    with pytest.raises(InputError, match="no converged point"):
+        read_response(path).peak  # noqa: B018
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:

@@ -1,26 +1,32 @@
-"""Pictures of result files (format "fretwear-result").
-
-    python -m fretwear.plots result.h5 -o out.png [--linear stuck.h5] [--observe NAME]
-"""
+"""Frequency response: amplitude, stability and contact states along a sweep or a branch."""
 
 from __future__ import annotations
 
-import argparse
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
-import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-__all__ = ["Response", "friction_damping", "half_power_damping", "main", "plot_response",
-           "read_response"]
+from .errors import InputError
+from .plot_style import (
+    CURVE,
+    FAILED,
+    STATE_COLOURS,
+    UNSTABLE,
+    Floats,
+    Source,
+    as_result,
+    label,
+    new_figure,
+    tidy,
+    units_of,
+)
+from .result import STATES
 
-Floats = NDArray[np.float64]
-_STATES = (("stick", "#4c78a8"), ("slip", "#f58518"), ("open", "#b8b8b8"))
+__all__ = ["Response", "friction_damping", "half_power_damping", "plot_response",
+           "read_response"]
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,10 @@ class Response:
         Stick, slip and open fractions averaged over the pairs.
     dissipation : (n_points,) or None
         Friction loss per cycle summed over the pairs.
+    stable : (n_points,) int or None
+        1 stable, 0 unstable, -1 not known.
+    units : str
+        Of the amplitude.
     """
 
     name: str
@@ -49,45 +59,46 @@ class Response:
     converged: NDArray[np.bool_]
     fraction: Floats | None = None
     dissipation: Floats | None = None
+    stable: NDArray[np.int_] | None = None
+    units: str = "L"
+
+    @property
+    def is_branch(self) -> bool:
+        """Whether frequencies turn back, so that nothing is a function of them."""
+        step = np.diff(self.frequency)
+        return bool((step > 0).any() and (step < 0).any())
 
     @property
     def peak(self) -> int:
         """Number (from 0) of the converged point of largest amplitude."""
         valid = self.converged & np.isfinite(self.amplitude)
         if not valid.any():
-            raise ValueError(f"no converged point observes '{self.name}'")
+            raise InputError(f"no converged point observes '{self.name}'")
         return int(np.argmax(np.where(valid, self.amplitude, -np.inf)))
 
 
-def read_response(path: str | Path, observe: str | None = None) -> Response:
-    """Read the response of one observed quantity from a result file.
+def read_response(source: Source, observe: str | None = None) -> Response:
+    """Response of one observed quantity of a result.
 
     Parameters
     ----------
-    path : str or Path
-        Result file.
+    source : Result or path
+        Result of a sweep.
     observe : str, optional
         Name of the quantity; the first one without it.
     """
-    with h5py.File(path, "r") as file:
-        kind = file.attrs.get("format", b"")
-        kind = kind.decode() if isinstance(kind, bytes) else str(kind)
-        if kind.strip() != "fretwear-result":
-            raise ValueError(f"{path}: format is '{kind}', expected 'fretwear-result'")
-        for name in ("omega", "amplitude", "converged", "observed/name"):
-            if name not in file:
-                raise ValueError(f"{path}: dataset /{name} is missing (only sweeps can be plotted)")
-        names = [text.decode().strip() for text in file["observed/name"][()]]
-        wanted = names[0] if observe is None else observe
-        if wanted not in names:
-            raise ValueError(f"{path}: '{wanted}' is not observed; available: {', '.join(names)}")
-        fraction = file["contact/fraction"][()] if "contact/fraction" in file else None
-        loss = file["contact/dissipation"][()] if "contact/dissipation" in file else None
-        return Response(
-            wanted, file["omega"][()] / (2.0 * np.pi), file["amplitude"][:, names.index(wanted)],
-            file["converged"][()].astype(bool),
-            None if fraction is None else fraction.mean(axis=1),
-            None if loss is None else loss.sum(axis=1))
+    result = as_result(source)
+    for name in ("omega", "amplitude", "converged", "observed/name"):
+        if name not in result:
+            raise InputError(f"{result.path}: dataset /{name} is missing (only sweeps have a "
+                             "frequency response)")
+    column = result.index(observe)
+    fraction = result.fraction if "contact/fraction" in result else None
+    loss = result.dissipation if "contact/dissipation" in result else None
+    return Response(
+        result.observed[column], result.frequency, result.amplitude[:, column], result.converged,
+        None if fraction is None else fraction.mean(axis=1),
+        None if loss is None else loss.sum(axis=1), result.stable, units_of(result, "amplitude"))
 
 
 def half_power_damping(response: Response) -> float:
@@ -150,41 +161,44 @@ def friction_damping(response: Response, linear: Response | None = None, *,
     return float(extra) if np.isfinite(extra) else None
 
 
-def plot_response(result_path: str | Path, out_png: str | Path, linear: str | Path | None = None,
-                  *, observe: str | None = None, modal_mass: float | None = None) -> None:
-    """Plot amplitude and contact states against frequency.
+def plot_response(source: Source, observe: str | None = None, *, linear: Source | None = None,
+                  modal_mass: float | None = None) -> Figure:
+    """Amplitude, and below it the contact states, against frequency.
 
-    The upper panel shows the amplitude with the peak annotated: its shift from the stuck peak and
-    the equivalent damping ratio of friction as ``friction_damping`` defines it (half-power damping
-    of the whole peak where that cannot be evaluated). Points that did not converge are crosses.
-    The lower panel shows stick, slip and open fractions, averaged over the pairs.
+    The peak is annotated with its shift from the stuck peak and the equivalent damping ratio of
+    friction as ``friction_damping`` defines it (half-power damping of the whole peak where that
+    cannot be evaluated). Points that did not converge are crosses, unstable ones are drawn thin
+    and dashed on shaded ground. The lower panel shows stick, slip and open fractions, averaged
+    over the pairs; along a branch that folds, against the number of the point.
 
     Parameters
     ----------
-    result_path : str or Path
-        Result file of a sweep.
-    out_png : str or Path
-        Picture to write; the suffix decides on the format.
-    linear : str or Path, optional
-        Result file of the same sweep with every pair stuck, drawn dashed.
+    source : Result or path
+        Result of a sweep.
     observe : str, optional
         Observed quantity; the first of the file without it.
+    linear : Result or path, optional
+        The same sweep with every pair stuck, drawn dashed.
     modal_mass : float, optional
         See ``friction_damping``.
     """
-    response = read_response(result_path, observe)
+    response = read_response(source, observe)
     stuck = None if linear is None else read_response(linear, response.name)
-    figure = Figure(figsize=(8.0, 6.4 if response.fraction is not None else 4.4), dpi=130,
-                    layout="constrained")
-    if response.fraction is None:
-        upper = lower = figure.subplots()
+    # Failed points leave no state to show.
+    has_states = response.fraction is not None and bool(response.converged.any())
+    figure = new_figure(8.0, 6.4 if has_states else 4.4)
+    if not has_states:
+        upper = figure.subplots()
     else:
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
+        upper, lower = figure.subplots(2, 1, sharex=not response.is_branch,
+                                       height_ratios=(2.4, 1.0))
         _draw_states(lower, response)
     _draw_amplitude(upper, response, stuck)
-    _annotate_peak(upper, response, stuck, modal_mass)
-    lower.set_xlabel("frequency [Hz]")
-    figure.savefig(out_png)
+    if response.converged.any():
+        _annotate_peak(upper, response, stuck, modal_mass)
+    if not has_states or response.is_branch:
+        upper.set_xlabel("frequency [Hz]")
+    return figure
 
 
 def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> None:
@@ -193,74 +207,77 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> N
         axes.plot(stuck.frequency, np.where(stuck.converged, stuck.amplitude, np.nan), "--",
                   color="0.45", linewidth=1.3, label="stuck (linear)")
     good = np.where(response.converged, response.amplitude, np.nan)
-    axes.plot(response.frequency, good, "-", marker=".", markersize=3.5, color="#1f4e79",
-              linewidth=1.6, label="friction contact")
+    unstable = (np.zeros(len(good), dtype=bool) if response.stable is None
+                else response.stable == 0)
+    axes.plot(response.frequency, np.where(unstable, np.nan, good), "-", marker=".",
+              markersize=3.5, color=CURVE, linewidth=1.6, label=f"amplitude of {response.name}")
+    if unstable.any():
+        _draw_unstable(axes, response, good, unstable)
     bad = ~response.converged
+    largest = float(np.nanmax(good, initial=0.0))
+    if stuck is not None:
+        largest = max(largest, float(np.nanmax(stuck.amplitude[stuck.converged], initial=0.0)))
     if bad.any():
         height = np.where(np.isfinite(response.amplitude), response.amplitude, 0.0)
         # A failed point may hold anything: kept inside the picture of the valid ones.
-        height = np.clip(height, 0.0, np.nanmax(good, initial=0.0))
-        axes.plot(response.frequency[bad], height[bad], "x", color="#c0392b", markersize=6,
+        height = np.clip(height, 0.0, largest or np.inf)
+        largest = max(largest, height[bad].max())
+        axes.plot(response.frequency[bad], height[bad], "x", color=FAILED, markersize=6,
                   label=f"not converged ({bad.sum()})")
-    axes.set_ylabel(f"amplitude of {response.name}")
-    axes.set_ylim(bottom=0.0)
-    axes.grid(alpha=0.3)
+    axes.set_ylabel(label(f"amplitude of {response.name}", response.units))
+    axes.set_ylim(0.0, 1.12 * largest or None)
+    tidy(axes)
     axes.legend(frameon=False, loc="upper left")
+
+
+def _draw_unstable(axes: Axes, response: Response, good: Floats,
+                   unstable: NDArray[np.bool_]) -> None:
+    """Unstable stretches, joined to the stable points beside them, on shaded ground."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], unstable.astype(int), [0]))))
+    for k, (first, last) in enumerate(zip(edges[::2], edges[1::2])):
+        near = slice(max(first - 1, 0), last + 1)
+        f = response.frequency[first:last]
+        axes.plot(response.frequency[near], good[near], "--", color=UNSTABLE, linewidth=1.1,
+                  label="unstable" if k == 0 else None)
+        axes.axvspan(f.min(), f.max(), color=UNSTABLE, alpha=0.08, linewidth=0)
 
 
 def _annotate_peak(axes: Axes, response: Response, stuck: Response | None,
                    modal_mass: float | None) -> None:
     peak = response.peak
     f, a = response.frequency[peak], response.amplitude[peak]
-    lines = [f"peak {a:.4g} at {f:.2f} Hz"]
+    lines = [f"peak {a:.4g} {response.units} at {f:.{_digits(response.frequency)}f} Hz"]
     if stuck is not None:
         shift = 100.0 * (f / stuck.frequency[stuck.peak] - 1.0)
         lines.append(f"shift {shift:+.3f} %")
     damping = friction_damping(response, stuck, modal_mass=modal_mass)
     if damping is not None:
         lines.append(f"friction damping {100.0 * damping:.4f} %")
-    elif np.isfinite(width := half_power_damping(response)):
+    elif not response.is_branch and np.isfinite(width := half_power_damping(response)):
         lines.append(f"half-power damping {100.0 * width:.4f} %")
-    axes.plot(f, a, "o", color="#1f4e79", markersize=6)
+    axes.plot(f, a, "o", color=CURVE, markersize=6)
     axes.text(0.985, 0.97, "\n".join(lines), transform=axes.transAxes, ha="right", va="top",
               bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": "0.8"})
 
 
+def _digits(frequency: Floats) -> int:
+    """Decimals that tell the points of a sweep apart."""
+    span = float(np.ptp(frequency)) / max(len(frequency) - 1, 1)
+    return int(np.clip(1 - np.floor(np.log10(span)), 0, 8)) if span > 0.0 else 4
+
+
 def _draw_states(axes: Axes, response: Response) -> None:
     assert response.fraction is not None  # the caller made room for this panel
-    # A stack needs ascending abscissae; failed points leave no state to show.
     keep = np.flatnonzero(response.converged)
-    keep = keep[np.argsort(response.frequency[keep], kind="stable")]
-    axes.stackplot(response.frequency[keep], response.fraction[keep].T,
-                   labels=[name for name, _ in _STATES], colors=[colour for _, colour in _STATES],
+    if response.is_branch:
+        abscissa = keep + 1.0
+        axes.set_xlabel("point of the branch [1]")
+    else:
+        keep = keep[np.argsort(response.frequency[keep], kind="stable")]
+        abscissa = response.frequency[keep]
+        axes.set_xlabel("frequency [Hz]")
+    axes.stackplot(abscissa, response.fraction[keep].T, labels=STATES, colors=STATE_COLOURS,
                    alpha=0.9)
-    axes.set(ylim=(0.0, 1.0), ylabel="fraction of pairs\nand period")
+    axes.set(ylim=(0.0, 1.0), ylabel="share of pairs\nand period [1]")
     axes.margins(x=0.0)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Command line; exit status 0 done, 2 usage, 3 file not accepted, 5 input or output failed."""
-    parser = argparse.ArgumentParser(prog="python -m fretwear.plots", allow_abbrev=False,
-                                     description="Plot the frequency response of a result file.")
-    parser.add_argument("result", help="result file of a sweep")
-    parser.add_argument("-o", "--output", required=True, metavar="PNG", help="picture to write")
-    parser.add_argument("--linear", metavar="FILE", help="stuck result, drawn dashed")
-    parser.add_argument("--observe", metavar="NAME", help="observed quantity (default: the first)")
-    parser.add_argument("--modal-mass", type=float, metavar="M",
-                        help="modal mass at the observed quantity: damping from the dissipation")
-    options = parser.parse_args(arguments)
-    try:
-        plot_response(options.result, options.output, options.linear, observe=options.observe,
-                      modal_mass=options.modal_mass)
-    except ValueError as error:
-        print(f"fretwear.plots: {error}", file=sys.stderr)
-        return 3
-    except OSError as error:
-        print(f"fretwear.plots: {error}", file=sys.stderr)
-        return 5
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

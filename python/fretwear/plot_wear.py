@@ -1,0 +1,141 @@
+"""Wear: depth as maps and bars, and its evolution over the cycles."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .errors import InputError
+from .export import choose_point, pair_fields
+from .plot_flanks import plot_maps
+from .plot_style import (
+    CURVE,
+    PALETTE,
+    Source,
+    as_result,
+    label,
+    new_figure,
+    pair_name,
+    tidy,
+    units_of,
+)
+from .result import Result
+
+__all__ = ["plot_wear_bars", "plot_wear_evolution", "plot_wear_maps"]
+
+#: Curves of single pairs in the evolution: those that are worn most.
+_MOST_PAIRS = 6
+
+
+def _worn(source: Source) -> Result:
+    result = as_result(source)
+    if "wear/depth" not in result:
+        raise InputError(f"{result.path}: holds no wear; run with case%analysis = 'wear'")
+    return result
+
+
+def _when(result: Result, step: int) -> str:
+    return f"step {step + 1} of {len(result.depth)}, {result.cycles[step]:.4g} {_abscissa(result)}"
+
+
+def _abscissa(result: Result) -> str:
+    """What the steps of the scheme advance in."""
+    pseudo = "pseudo_time" in result.namelist and "scheme = 'pseudo_time'" in _group(
+        result.namelist, "wear")
+    return "pseudo-time" if pseudo else "cycles"
+
+
+def _group(namelist: str, name: str) -> str:
+    """Text of one group of a namelist."""
+    _, _, rest = namelist.partition(f"&{name}\n")
+    return rest.partition("\n/")[0]
+
+
+def plot_wear_maps(source: Source, step: int | None = None) -> Figure:
+    """Maps of depth and of depth per cycle on the flanks.
+
+    Parameters
+    ----------
+    source : Result or path
+        Result of a wear analysis, with the positions of its pairs.
+    step : int, optional
+        Wear step from 0; the last one without it.
+    """
+    result = _worn(source)
+    step = choose_point(result, None) if step is None else step
+    fields = {name: field for name, field in pair_fields(result, step).items()
+              if name.startswith("wear")}
+    return plot_maps(result, fields, f"Wear at {_when(result, step)}")
+
+
+def plot_wear_bars(source: Source, step: int | None = None) -> Figure:
+    """Wear depth of every pair as bars, one panel a patch.
+
+    Parameters
+    ----------
+    source : Result or path
+        Result of a wear analysis.
+    step : int, optional
+        Wear step from 0; the last one without it.
+    """
+    result = _worn(source)
+    step = choose_point(result, None) if step is None else step
+    depth = result.depth[step]
+    patch = (result["contact/patch"] if "contact/patch" in result
+             else np.full(len(depth), "contact"))
+    names = list(dict.fromkeys(str(name) for name in patch))
+    figure = new_figure(8.0, 2.4 * len(names) + 0.8)
+    panels = figure.subplots(len(names), 1, sharey=True, squeeze=False).ravel()
+    for k, (axes, name) in enumerate(zip(panels, names)):
+        pairs = np.flatnonzero(patch == name)
+        axes.bar(pairs + 1, depth[pairs], color=PALETTE[k % len(PALETTE)], width=0.75)
+        axes.set_title(name, fontsize=10, loc="left")
+        axes.set_xlim(pairs[0] + 0.4, pairs[-1] + 1.6)
+        axes.locator_params(axis="x", integer=True)
+        axes.ticklabel_format(axis="y", scilimits=(-3, 3), useMathText=True)
+        tidy(axes)
+    panels[-1].set_xlabel("pair [1]")
+    figure.supylabel(label("wear depth", units_of(result, "wear/depth")), fontsize=10)
+    figure.suptitle(f"Wear depth at {_when(result, step)}", fontsize=11)
+    return figure
+
+
+def plot_wear_evolution(source: Source) -> Figure:
+    """Depth, rate and amplitude over the cycles.
+
+    Parameters
+    ----------
+    source : Result or path
+        Result of a wear analysis. Curves are the pairs that are worn most; the rate is the
+        largest of all pairs. Amplitudes are drawn where the file holds one for each step.
+    """
+    result = _worn(source)
+    cycles, depth, rate = result.cycles, result.depth, result.rate
+    has_amplitude = "amplitude" in result and len(result.amplitude) == len(cycles)
+    n_panels = 3 if has_amplitude else 2
+    figure = new_figure(8.0, 2.5 * n_panels + 0.5)
+    panels = figure.subplots(n_panels, 1, sharex=True)
+    worst = np.argsort(-depth[-1], kind="stable")[:_MOST_PAIRS]
+    for k, pair in enumerate(sorted(int(pair) for pair in worst)):
+        panels[0].plot(cycles, depth[:, pair], ".-", color=PALETTE[k],
+                       label=pair_name(result, pair))
+    panels[0].set_ylabel(label("wear depth", units_of(result, "wear/depth")))
+    panels[0].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    largest = rate.max(axis=1)
+    panels[1].plot(cycles, np.where(largest > 0.0, largest, np.nan), ".-", color=CURVE)
+    if (largest > 0.0).any():
+        panels[1].set_yscale("log")
+    panels[1].set_ylabel(label("largest depth\nper cycle", units_of(result, "wear/rate")))
+    if has_amplitude:
+        panels[2].plot(cycles, result.amplitude[:, 0], ".-", color=CURVE)
+        panels[2].set_ylabel(label(f"amplitude\nof {result.observed[0]}",
+                                   units_of(result, "amplitude")))
+    panels[-1].ticklabel_format(axis="x", scilimits=(-3, 4), useMathText=True)
+    panels[0].ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
+    panels[-1].set_xlabel(f"{_abscissa(result)} [1]")
+    for axes in panels:
+        tidy(axes)
+    state = result.steady_state
+    figure.suptitle("Wear over the cycles" + (f", steady state {state}" if state else ""),
+                    fontsize=11)
+    return figure

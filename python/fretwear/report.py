@@ -1,0 +1,248 @@
+"""`fretwear report`: one self-contained HTML page of a result file."""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import io
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from .errors import InputError, OutputError
+from .export_recovery import namelist_values
+from .plot import KINDS, Choices, fitting
+from .plot_style import units_of
+from .result import Result
+
+__all__ = ["add_arguments", "main", "render_report", "write_report"]
+
+#: Rows of the table of points; of a longer result every k-th, the peak and failures are shown.
+_MOST_ROWS = 500
+
+_STYLE = """
+:root { color: #1c2733; background: #fff; font: 16px/1.5 system-ui, sans-serif; }
+body { max-width: 68rem; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.6rem; line-height: 1.25; margin: .5rem 0; overflow-wrap: anywhere; }
+h2 { font-size: 1.2rem; margin: 2rem 0 .5rem; border-bottom: 2px solid #1f4e79; }
+p.status { margin: 0; color: #46586a; overflow-wrap: anywhere; }
+p.warning { background: #fdecea; border-left: 4px solid #c0392b; padding: .5rem .8rem; }
+nav a { margin-right: 1rem; color: #1f4e79; white-space: nowrap; }
+figure { margin: 1rem 0; }
+figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
+.scroll { overflow: auto; max-height: 32rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
+th, td { padding: .2rem .8rem .2rem 0; text-align: left; border-bottom: 1px solid #dde3e9; }
+td.number, th.number { text-align: right; white-space: nowrap; }
+thead th { position: sticky; top: 0; background: #fff; }
+tr.failed td { color: #c0392b; }
+pre { overflow-x: auto; background: #f4f6f8; padding: .8rem; font-size: .85rem; }
+@media (max-width: 45rem) {
+  figure { overflow-x: auto; }
+  figure img { max-width: none; width: 44rem; }
+}
+@media print { .scroll { max-height: none; } nav { display: none; } }
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `fretwear report`."""
+    parser.add_argument("result", help="result file")
+    parser.add_argument("-o", "--output", metavar="HTML",
+                        help="page to write (default: RESULT.html in the current folder)")
+    parser.add_argument("--linear", metavar="FILE",
+                        help="result with every pair stuck, drawn dashed in the response")
+    parser.add_argument("--observe", metavar="NAME",
+                        help="observed quantity of the pictures (default: the first)")
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run `fretwear report`."""
+    result = Result(options.result)
+    target = Path(options.output or f"{result.path.stem}.html")
+    write_report(result, target, Choices(observe=options.observe, linear=options.linear))
+    print(target)
+    return 0
+
+
+def write_report(result: Result, path: str | Path, choices: Choices | None = None) -> None:
+    """Write the page of a result.
+
+    Parameters
+    ----------
+    result : Result
+        Any result file.
+    path : str or Path
+        HTML file.
+    choices : Choices, optional
+        What to draw of it.
+    """
+    path = Path(path)
+    if not path.absolute().parent.is_dir():
+        raise OutputError(f"{path}: there is no folder {path.absolute().parent}")
+    path.write_text(render_report(result, choices or Choices()), encoding="utf-8")
+
+
+def render_report(result: Result, choices: Choices) -> str:
+    """The page as text: nothing in it refers to anything outside of it."""
+    sections = [("numbers", "Numbers", _numbers(result))]
+    for name in fitting(result):
+        figure = KINDS[name].draw(result, choices)
+        sections.append((name, KINDS[name].title, _image(figure, KINDS[name].title)))
+    if result.n_points:
+        sections.append(("points", "Points", _points(result)))
+    if "wear/depth" in result:
+        sections.append(("steps", "Wear steps", _steps(result)))
+    sections.append(("input", "Input", f"<pre>{escape(result.namelist)}</pre>"))
+    links = "".join(f'<a href="#{key}">{escape(title)}</a> ' for key, title, _ in sections)
+    body = "\n".join(f'<section id="{key}"><h2>{escape(title)}</h2>\n{content}</section>'
+                     for key, title, content in sections)
+    title = escape(result.title or result.path.name)
+    return (f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+            f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
+            f"<h1>{title}</h1>\n{_status(result)}\n<nav>{links}</nav>\n{body}\n</body>\n</html>\n")
+
+
+def _status(result: Result) -> str:
+    version = result.attributes.get("fretwear_version", "")
+    text = (f'<p class="status">{escape(str(result.path.name))}: {escape(result.status)}, '
+            f"{result.elapsed:.3g} s, fretwear {escape(str(version))}</p>")
+    if result.n_points and not result.converged.all():
+        failed = np.flatnonzero(~result.converged)
+        listed = ", ".join(f"{result.frequency[k]:.6g} Hz" for k in failed[:12])
+        more = ", ..." if len(failed) > 12 else ""
+        text += (f'\n<p class="warning">{len(failed)} of {result.n_points} points did not '
+                 f"converge: {listed}{more}. Their values are the best that was found.</p>")
+    return text
+
+
+def _image(figure: Figure, title: str) -> str:
+    """Figure as an SVG that needs no font, inside of the page."""
+    buffer = io.StringIO()
+    # Fixed identifiers and no date: the same result gives the same page.
+    with matplotlib.rc_context({"svg.fonttype": "path", "svg.hashsalt": "fretwear"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    data = base64.b64encode(buffer.getvalue().encode()).decode()
+    width = round(96.0 * figure.get_figwidth())
+    return (f'<figure><img alt="{escape(title)}" width="{width}" '
+            f'src="data:image/svg+xml;base64,{data}"></figure>')
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]],
+           failed: Sequence[bool] | None = None) -> str:
+    """Table whose numbers are aligned to the right."""
+    def cell(value: object) -> str:
+        if isinstance(value, (float, np.floating)):
+            return f'<td class="number">{value:.6g}</td>'
+        if isinstance(value, (int, np.integer)):
+            return f'<td class="number">{value}</td>'
+        return f"<td>{escape(str(value))}</td>"
+
+    lines = []
+    for k, row in enumerate(rows):
+        mark = ' class="failed"' if failed is not None and failed[k] else ""
+        lines.append(f"<tr{mark}>" + "".join(map(cell, row)) + "</tr>")
+    top = "".join(f"<th>{escape(text)}</th>" for text in head)
+    return (f'<div class="scroll"><table><thead><tr>{top}</tr></thead>\n<tbody>'
+            + "\n".join(lines) + "</tbody></table></div>")
+
+
+def _numbers(result: Result) -> str:
+    """What is asked first: how the run went, peaks, contact and wear."""
+    values = namelist_values(result.namelist)
+    rows: list[tuple[str, object, str]] = [
+        ("analysis", str(values.get("case%analysis", ["?"])[0]), "")]
+    if result.n_points:
+        rows += [("converged points", f"{result.converged.sum()} of {result.n_points}", ""),
+                 ("iterations", int(result.iterations.sum()), ""),
+                 ("harmonics", result.n_harmonics, "")]
+    if result.n_pairs:
+        rows.append(("contact pairs", result.n_pairs, ""))
+    if "wear/depth" in result:
+        rows += _wear_numbers(result)
+    else:
+        rows += _peak_numbers(result)
+    return _table(("", "value", "unit"), rows)
+
+
+def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
+    rows: list[tuple[str, object, str]] = []
+    for name in result.observed if result.n_points else ():
+        try:
+            peak = result.peak(name)
+        except InputError:  # not one point converged: said at the top of the page
+            break
+        rows += [(f"peak of {name}", float(result.amplitude[peak, result.index(name)]),
+                  units_of(result, "amplitude")),
+                 (f"frequency of this peak, point {peak + 1}", float(result.frequency[peak]),
+                  "Hz")]
+        if name == result.observed[0] and "contact/fraction" in result:
+            shares = result.fraction[peak].mean(axis=0)
+            rows += [(f"pairs and period in {state}, at this peak", float(share), "1")
+                     for state, share in zip(("stick", "slip", "open"), shares)]
+            rows.append(("friction energy per cycle, at this peak",
+                         float(result.dissipation[peak].sum()),
+                         units_of(result, "contact/dissipation")))
+    return rows
+
+
+def _wear_numbers(result: Result) -> list[tuple[str, object, str]]:
+    depth, worst = result.depth[-1], int(np.argmax(result.depth[-1]))
+    return [("wear steps", len(result.depth), ""),
+            ("cycles", float(result.cycles[-1]), "1"),
+            ("steady state", result.steady_state or "?", ""),
+            (f"largest depth, pair {worst + 1}", float(depth[worst]),
+             units_of(result, "wear/depth")),
+            ("mean depth", float(depth.mean()), units_of(result, "wear/depth")),
+            ("largest depth per cycle, at the end", float(result.rate[-1].max()),
+             units_of(result, "wear/rate"))]
+
+
+def _rows_shown(result: Result) -> np.ndarray:
+    n = result.n_points
+    if n <= _MOST_ROWS:
+        return np.arange(n)
+    kept = set(range(0, n, -(-n // _MOST_ROWS))) | {n - 1} | set(np.flatnonzero(~result.converged))
+    if result.converged.any():
+        kept.add(result.peak())
+    return np.array(sorted(kept), dtype=int)
+
+
+def _points(result: Result) -> str:
+    """One row a point."""
+    units = units_of(result, "amplitude")
+    shown = _rows_shown(result)
+    head = ["point", "frequency [Hz]"]
+    columns: list[np.ndarray] = [shown + 1, result.frequency[shown]]
+    for k, name in enumerate(result.observed):
+        head.append(f"{name} [{units}]")
+        columns.append(result.amplitude[shown, k])
+    if "contact/fraction" in result:
+        head += ["stick [1]", "slip [1]", "open [1]",
+                 f"dissipation [{units_of(result, 'contact/dissipation')}]"]
+        columns += [*result.fraction[shown].mean(axis=1).T, result.dissipation[shown].sum(axis=1)]
+    if result.stable is not None:
+        head.append("stable")
+        columns.append(np.array(["no", "yes", "?"])[result.stable[shown]])
+    head += ["iterations", "residual [1]"]
+    columns += [result.iterations[shown], result.residual[shown]]
+    note = ("" if len(shown) == result.n_points else
+            f"<p>{len(shown)} of {result.n_points} points.</p>")
+    return note + _table(head, zip(*columns), list(~result.converged[shown]))
+
+
+def _steps(result: Result) -> str:
+    """One row a wear step."""
+    head = ["step", "cycles [1]", f"largest depth [{units_of(result, 'wear/depth')}]",
+            f"mean depth [{units_of(result, 'wear/depth')}]",
+            f"largest depth per cycle [{units_of(result, 'wear/rate')}]"]
+    n = len(result.depth)
+    shown = np.unique(np.linspace(0, n - 1, min(n, _MOST_ROWS)).astype(int))
+    depth, rate = result.depth[shown], result.rate[shown]
+    return _table(head, zip(shown + 1, result.cycles[shown], depth.max(axis=1),
+                            depth.mean(axis=1), rate.max(axis=1)))

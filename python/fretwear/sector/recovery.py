@@ -1,0 +1,56 @@
+"""Mesh of the sector with the displacement of its vertices in the reduced coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..export_mesh import RecoveryMesh
+from .contact import flank_facets
+from .mesh import BLADE, DISK
+from .model import FullModel, observed_rows, reduced_system
+
+__all__ = ["recovery_mesh"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Corners of scikit-fem's hexahedron in the order of VTK: round the bottom, then round the top.
+_VTK_ORDER = (7, 4, 1, 5, 6, 2, 0, 3)
+
+
+def recovery_mesh(full: FullModel) -> tuple[RecoveryMesh, Floats]:
+    """Vertices and linear hexahedra of the sector, without the middle nodes of the elements.
+
+    Returns
+    -------
+    RecoveryMesh
+        Points [mm], both flanks of every pair as facets.
+    (n_observed, n_dof) array
+        Observation matrix of the same reduction, to tell whether a model file belongs to it.
+    """
+    reduction = reduced_system(full).reduction
+    mesh = full.sector.mesh
+    n_vertices = mesh.p.shape[1]
+    # Degrees of freedom of the vertices come first in the numbering of the quadratic element.
+    basis = np.zeros((3 * n_vertices, reduction.basis.shape[1]))
+    at_vertex = full.free < 3 * n_vertices
+    basis[full.free[at_vertex]] = reduction.basis[at_vertex]
+    facets, pairs = zip(*(flank_facets(full.sector, full.parameters, body)
+                          for body in (BLADE, DISK)), strict=True)
+    corners = _cyclic(mesh.p.T, mesh.facets[:, np.concatenate(facets)].T)
+    found = RecoveryMesh(mesh.p.T.copy(), mesh.t[list(_VTK_ORDER)].T.copy(), full.sector.body,
+                         corners, np.concatenate(pairs), basis)
+    return found, reduction.row(observed_rows(full))
+
+
+def _cyclic(points: Floats, facets: Ints) -> Ints:
+    """Vertices of flat quadrilaterals (n, 4) sorted by the angle around their centre."""
+    offset = points[facets] - points[facets].mean(axis=1, keepdims=True)
+    first = offset[:, 0]
+    normal = np.cross(first, offset[:, 1])
+    second = np.cross(normal, first)
+    second *= (np.linalg.norm(first, axis=1) / np.linalg.norm(second, axis=1))[:, None]
+    angle = np.arctan2(np.einsum("nkc,nc->nk", offset, second),
+                       np.einsum("nkc,nc->nk", offset, first))
+    return np.take_along_axis(facets, np.argsort(angle, axis=1), axis=1)

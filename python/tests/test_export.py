@@ -1,0 +1,175 @@
+"""`fretwear export`: what ParaView gets is what the result and the finite elements say."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from conftest import run
+
+from fretwear import InputError
+from fretwear.cli import main
+from fretwear.export import export_mesh
+from fretwear.export_mesh import read_mesh
+from fretwear.export_recovery import recover_displacement
+from fretwear.result import Result
+from fretwear.sector import FullModel, ReducedModel, write_model
+from fretwear.sector.assembly import Assembly
+
+# Single precision of the stored basis.
+STORED = 1e-5
+
+
+def _volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Volumes of hexahedra in the order of VTK by two Gauss points a direction."""
+    local = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0],
+                      [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+    gauss = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+    volume = np.zeros(len(cells))
+    for place in np.array(np.meshgrid(gauss, gauss, gauss)).reshape(3, -1).T:
+        factor = np.where(local == 1, place, 1.0 - place)
+        sign = np.where(local == 1, 1.0, -1.0)
+        gradient = np.stack([sign[:, k] * np.delete(factor, k, axis=1).prod(axis=1)
+                             for k in range(3)], axis=1)
+        volume += np.linalg.det(np.einsum("cai,aj->cij", points[cells], gradient)) / 8.0
+    return volume
+
+
+def test_the_mesh_is_that_of_the_finite_elements(coarse: Result, full: FullModel,
+                                                 assembly: Assembly) -> None:
+    mesh = read_mesh(coarse.path.with_name("model.h5"))
+    volume = _volumes(mesh.points.astype(float), mesh.cells)
+    assert (volume > 0.0).all(), "cells are oriented"
+    assert volume == pytest.approx(assembly.weight.sum(axis=1), rel=STORED)
+    assert np.array_equal(mesh.body, full.sector.body)
+
+
+def test_facets_cover_the_flanks_twice(coarse: Result) -> None:
+    """Once on the blade, once on the disk, each with the area of its pair, without folds."""
+    mesh = read_mesh(coarse.path.with_name("model.h5"))
+    corners = mesh.points.astype(float)[mesh.facets]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0],
+                                         corners[:, 3] - corners[:, 1]), axis=1)
+    assert np.bincount(mesh.pair, area) == pytest.approx(2.0 * coarse["contact/area"], rel=STORED)
+    centre = np.array([corners[mesh.pair == k].mean(axis=(0, 1)) for k in range(8)])
+    assert centre == pytest.approx(coarse["contact/position"], abs=1e-3)
+
+
+def test_displacements_are_those_of_the_reduction(coarse: Result, full: FullModel,
+                                                  reduced: ReducedModel) -> None:
+    """The tip of the mesh moves as the observed tip does: corners against the mean of the face."""
+    mesh = read_mesh(coarse.path.with_name("model.h5"))
+    point = coarse.peak()
+    written = export_mesh(coarse, point)
+    q = recover_displacement(coarse, points=[point])[point]
+    for name, row in (("static", 0), ("cosine", 1), ("sine", 2)):
+        expected = (mesh.basis @ q[row]).reshape(-1, 3)
+        assert written.point_data[f"displacement_{name}"] == pytest.approx(expected, rel=1e-12)
+    tip = mesh.points[:, 1] > mesh.points[:, 1].max() - 1e-3
+    moved = written.point_data["displacement_sine"][tip, 0].mean()
+    observed = coarse.coefficients[point, 2, coarse.index("tip_x")]
+    # The mean over corners is not the mean over the face; the tip bends little.
+    assert moved == pytest.approx(observed, rel=0.03)
+    assert np.array_equal(mesh.basis.shape, (3 * len(mesh.points), len(reduced.mass)))
+
+
+def test_the_instant_is_where_the_tip_is_largest(coarse: Result) -> None:
+    point = coarse.peak()
+    written = export_mesh(coarse, point)
+    tip = written.points[:, 1] > written.points[:, 1].max() - 1e-3
+    largest = np.linalg.norm(written.point_data["displacement"][tip].mean(axis=0))
+    vibration = written.point_data["vibration"][tip].mean()
+    assert largest == pytest.approx(vibration, rel=0.05)
+    quarter = export_mesh(coarse, point, 90.0).point_data["displacement"]
+    data = written.point_data
+    # At 90 degrees the third harmonic of the sine turns round; it is small.
+    assert quarter == pytest.approx(data["displacement_static"] + data["displacement_sine"],
+                                    abs=0.02 * np.abs(quarter).max())
+
+
+def test_round_trip_through_the_file(coarse: Result, tmp_path: Path,
+                                     capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "out.vtu"
+    assert main(["export", str(coarse.path), str(target)]) == 0
+    assert "N/mm^2" in capsys.readouterr().out
+    point, mesh = coarse.peak(), read_mesh(coarse.path.with_name("model.h5"))
+    written = meshio.read(target)
+    assert [block.type for block in written.cells] == ["hexahedron", "quad"]
+    assert np.array_equal(written.cells[0].data, mesh.cells)
+    expected = export_mesh(coarse, point)
+    for name, values in expected.point_data.items():
+        assert np.array_equal(written.point_data[name], values), name
+    facets = {name: blocks[1] for name, blocks in written.cell_data.items()}
+    assert np.array_equal(facets["pair"], mesh.pair + 1)
+    for k, state in enumerate(("stick", "slip", "open")):
+        assert np.array_equal(facets[state], coarse.fraction[point, mesh.pair, k])
+    pressure = -coarse.force[point, 0, :, 2] / coarse["contact/area"]
+    assert np.array_equal(facets["pressure"], pressure[mesh.pair])
+    assert np.isnan(written.cell_data["slip"][0]).all()
+
+
+def test_wear(worn: Result, tmp_path: Path) -> None:
+    target = tmp_path / "worn.vtu"
+    assert main(["export", str(worn.path), str(target), "--point", "9"]) == 0
+    written = meshio.read(target)
+    pair = written.cell_data["pair"][1] - 1
+    assert np.array_equal(written.cell_data["wear_depth"][1], worn.depth[8, pair])
+    assert np.array_equal(written.cell_data["wear_rate"][1], worn.rate[8, pair])
+
+
+def test_frames(coarse: Result, tmp_path: Path) -> None:
+    assert main(["export", str(coarse.path), str(tmp_path / "a.vtu"), "--frames", "4"]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "a.pvd", *(f"a_{k:03d}.vtu" for k in range(4))]
+    assert 'timestep="0.250000" file="a_001.vtu"' in (tmp_path / "a.pvd").read_text()
+    moved = [meshio.read(tmp_path / f"a_{k:03d}.vtu").point_data["displacement"]
+             for k in (0, 2)]
+    static = export_mesh(coarse).point_data["displacement_static"]
+    # Half a period apart odd harmonics cancel; even ones are small.
+    assert 0.5 * (moved[0] + moved[1]) == pytest.approx(static, abs=0.01 * np.abs(moved[0]).max())
+
+
+def test_a_sector_without_a_mesh_is_generated_again(coarse_case: Path, reduced: ReducedModel,
+                                                    coarse: Result, tmp_path: Path) -> None:
+    write_model(reduced, tmp_path / "model.h5")
+    shutil.copy(coarse_case, tmp_path / "case.nml")
+    result = run(tmp_path / "case.nml", tmp_path / "a.h5")
+    again, stored = export_mesh(result), export_mesh(coarse)
+    for name, values in stored.point_data.items():
+        assert again.point_data[name] == pytest.approx(
+            values, abs=STORED * np.abs(values).max()), name
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda file: file.__delitem__("mesh/basis"), "holds no dataset /mesh/basis"),
+    (lambda file: file["mesh/facets"].__setitem__((0, 0), 10**6), "points that do not exist"),
+    (lambda file: (file.__delitem__("mesh"), file.attrs.__delitem__("parameters")),
+     "holds no group /mesh"),
+])
+def test_a_mesh_that_does_not_fit(change: object, message: str, coarse: Result,
+                                  tmp_path: Path) -> None:
+    model = tmp_path / "model.h5"
+    shutil.copy(coarse.path.with_name("model.h5"), model)
+    with h5py.File(model, "r+") as file:
+        change(file)  # type: ignore[operator]
+    with pytest.raises(InputError, match=message):
+        read_mesh(model)
+
+
+def test_models_without_mesh_are_refused(examples: Path, tmp_path: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    result = run(examples.parent / "coulomb" / "coulomb.nml", tmp_path / "a.h5")
+    assert main(["export", str(result.path), str(tmp_path / "a.vtu")]) == 3
+    assert "inline models have no mesh" in capsys.readouterr().err
+
+
+def test_command_line_refuses(coarse: Result, tmp_path: Path,
+                              capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(coarse.path), str(tmp_path / "none" / "a.vtu")]) == 5
+    assert main(["export", str(coarse.path), str(tmp_path / "a.vtu"), "--point", "0"]) == 3
+    assert main(["export", str(coarse.path), str(tmp_path / "a.xyz")]) == 3
+    assert "meshio" in capsys.readouterr().err

@@ -1,0 +1,270 @@
+"""Every picture shows the numbers of its result: drawn from runs of a small sector."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from conftest import run
+from matplotlib.figure import Figure
+
+from fretwear import InputError
+from fretwear.cli import main
+from fretwear.export import pair_fields, synthesis
+from fretwear.plot import (
+    KINDS,
+    Choices,
+    fitting,
+    plot_convergence,
+    plot_cycle,
+    plot_flanks,
+    plot_harmonics,
+    plot_hysteresis,
+    plot_response,
+    plot_wear_bars,
+    plot_wear_evolution,
+    plot_wear_maps,
+)
+from fretwear.plot_cycle import read_cycle
+from fretwear.plot_flanks import find_flanks
+from fretwear.result import Result
+
+# What the forces of a result, known to 1e-8, leave of a displacement of 1e-3 mm.
+RECOVERED = 1e-7
+
+
+def _maps(figure: Figure) -> list[np.ndarray]:
+    """Values of the maps of a figure, in the order drawn."""
+    return [np.asarray(axes.collections[0].get_array()) for axes in figure.axes
+            if axes.get_visible() and axes.get_label() != "<colorbar>"]
+
+
+def _labelled(figure: Figure) -> None:
+    """Every number axis says what it shows, with its unit."""
+    texts = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes if axes.get_visible()]
+    texts += [text.get_text() for text in (figure._supxlabel, figure._supylabel) if text]
+    assert all("[" in text for text in texts if text)
+    assert any(texts)
+
+
+def test_response_of_a_run(coarse: Result) -> None:
+    figure = plot_response(coarse)
+    upper, lower = figure.axes
+    assert np.array_equal(upper.lines[0].get_xdata(), coarse.frequency)
+    assert np.array_equal(upper.lines[0].get_ydata(), coarse.amplitude[:, 0])
+    assert upper.get_ylabel() == "amplitude of tip [mm]"
+    mean = coarse.fraction.mean(axis=1)
+    bottoms = [area.get_paths()[0].vertices[1:41, 1] for area in lower.collections]
+    assert bottoms[1] == pytest.approx(mean[:, 0])
+    assert plot_response(coarse, "tip_x").axes[0].get_ylabel() == "amplitude of tip_x [mm]"
+    _labelled(figure)
+
+
+def test_a_branch_with_unstable_points(examples: Path, tmp_path: Path) -> None:
+    result = run(examples.parent / "duffing" / "duffing.nml", tmp_path / "duffing.h5",
+                 "sweep%continuation=arclength", "sweep%stability=true", "sweep%end=2.5")
+    assert result.stable is not None
+    unstable = result.stable == 0
+    assert unstable.any() and (~unstable).any()
+    (axes,) = plot_response(result).axes
+    stable_line, unstable_line = axes.lines[:2]
+    shown = np.isfinite(stable_line.get_ydata())
+    assert np.array_equal(shown, ~unstable)
+    assert unstable_line.get_linestyle() == "--"
+    assert set(result.amplitude[unstable, 0]) <= set(unstable_line.get_ydata())
+    (ground,) = axes.patches
+    low, high = ground.get_x(), ground.get_x() + ground.get_width()
+    assert (low, high) == pytest.approx((result.frequency[unstable].min(),
+                                         result.frequency[unstable].max()))
+
+
+def test_cycles_from_histories_and_from_harmonics_agree(coarse: Result, sampled: Result) -> None:
+    """At a point where nothing slips the sampled force has few harmonics, too."""
+    stored, recovered = read_cycle(sampled, 0), read_cycle(coarse, 0)
+    assert stored.sampled and not recovered.sampled
+    every = np.arange(0, 257, 4)
+    assert recovered.displacement[every] == pytest.approx(stored.displacement, abs=RECOVERED)
+    assert np.array_equal(recovered.degrees[every], stored.degrees)
+    # Of the march and its first three harmonics only the stuck pairs agree.
+    stuck = sampled.fraction[0, :, 0] == 1.0
+    assert recovered.force[every][:, stuck] == pytest.approx(stored.force[:, stuck], abs=1e-4)
+
+
+def test_hysteresis_is_the_history(sampled: Result) -> None:
+    point, pair = sampled.peak(), 3
+    figure = plot_hysteresis(sampled, pairs=[pair])
+    (line,) = figure.axes[0].lines
+    displacement = sampled["history/relative_displacement"][point, :, pair]
+    c = int(np.argmax(np.ptp(displacement[:, :2], axis=0)))
+    assert np.array_equal(line.get_xdata()[:-1], displacement[:, c])
+    assert np.array_equal(line.get_ydata()[:-1], sampled["history/force"][point, :, pair, c])
+    assert line.get_xdata()[-1] == line.get_xdata()[0]
+    assert figure.axes[0].get_title() == f"pair 4, intrados, {('t1', 't2')[c]}"
+    _labelled(figure)
+
+
+def test_the_loop_encloses_the_dissipation(coarse: Result) -> None:
+    point = coarse.peak()
+    cycle = read_cycle(coarse, point)
+    work = np.trapezoid(cycle.force[..., :2], cycle.displacement[..., :2], axis=0).sum(axis=1)
+    # A trapezoidal rule over a whole period of a short Fourier sum is exact but for 1/n^2.
+    assert work == pytest.approx(coarse.dissipation[point], rel=2e-3,
+                                 abs=1e-4 * coarse.dissipation[point].max())
+
+
+def test_the_pairs_drawn_dissipate_most(coarse: Result) -> None:
+    figure = plot_hysteresis(coarse)
+    names = [axes.get_title().split(",")[0] for axes in figure.axes if axes.get_visible()]
+    order = np.argsort(-coarse.dissipation[coarse.peak()])[:6]
+    assert names == [f"pair {pair + 1}" for pair in sorted(order)]
+    with pytest.raises(InputError, match="pair 9: there are 8, counted from 1"):
+        plot_hysteresis(coarse, pairs=[8])
+
+
+def test_cycle_of_the_tip_and_of_pairs(coarse: Result) -> None:
+    point = 5
+    figure = plot_cycle(coarse, point, [0, 7])
+    upper, lower = figure.axes
+    tau = np.radians(upper.lines[0].get_xdata())
+    expected = coarse.coefficients[point, :, 0] @ synthesis(7, tau)
+    assert upper.lines[0].get_ydata() == pytest.approx(expected, rel=1e-12)
+    assert np.abs(expected).max() == pytest.approx(coarse.amplitude[point, 0], rel=1e-3)
+    assert [line.get_label().split(",")[0] for line in lower.lines] == ["pair 1", "pair 8"]
+    _labelled(figure)
+
+
+def test_a_normal_contact_shows_its_normal(examples: Path, tmp_path: Path) -> None:
+    result = run(examples.parent / "gap" / "gap.nml", tmp_path / "gap.h5", "sweep%n_points=4")
+    figure = plot_hysteresis(result)
+    assert figure.axes[0].get_title() == "pair 1, n"
+    assert np.ptp(figure.axes[0].lines[0].get_xdata()) > 0.1
+
+
+def test_harmonics(coarse: Result) -> None:
+    point = coarse.peak()
+    (axes,) = plot_harmonics(coarse).axes
+    heights = [bar.get_height() for bar in axes.patches]
+    assert heights == pytest.approx([abs(coarse.harmonic(n)[point]) for n in range(4)], rel=1e-12)
+
+
+def test_flanks_are_laid_out_by_position(coarse: Result) -> None:
+    first, second = find_flanks(coarse)
+    assert (first.name, second.name) == ("intrados", "extrados")
+    assert np.concatenate((first.pairs, second.pairs)).tolist() == list(range(8))
+    for flank in (first, second):
+        assert flank.size.prod(axis=1) == pytest.approx(coarse["contact/area"][flank.pairs])
+        position = coarse["contact/position"][flank.pairs]
+        assert flank.axes == ("z", "slope, rising in y")
+        assert flank.place[:, 0] == pytest.approx(position[:, 2])
+        # Higher on the map is further out on the disk.
+        assert (np.diff(flank.place[:, 1]) * np.diff(position[:, 1]) >= 0.0).all()
+
+
+def test_maps_hold_the_states_and_pressures(coarse: Result) -> None:
+    point = coarse.peak()
+    figure = plot_flanks(coarse)
+    maps = _maps(figure)
+    expected = [values[pairs] for values in (
+        *coarse.fraction[point].T,
+        -coarse.force[point, 0, :, 2] / coarse["contact/area"],
+        coarse.dissipation[point] / coarse["contact/area"]) for pairs in (range(4), range(4, 8))]
+    assert len(maps) == 10
+    # Panels come row by row, fields column by column.
+    for wanted in expected:
+        assert any(np.array_equal(found, wanted) for found in maps)
+    assert pair_fields(coarse, point)["pressure"][1] == "N/mm^2"
+    _labelled(figure)
+
+
+def test_wear_pictures(worn: Result) -> None:
+    last = len(worn.depth) - 1
+    maps = _maps(plot_wear_maps(worn))
+    assert np.array_equal(np.concatenate((maps[0], maps[2])), worn.depth[last])
+    bars = plot_wear_bars(worn, 7)
+    heights = [bar.get_height() for axes in bars.axes for bar in axes.patches]
+    assert np.array_equal(heights, worn.depth[7])
+    evolution = plot_wear_evolution(worn)
+    depth, rate, amplitude = evolution.axes
+    for line in depth.lines:
+        pair = int(str(line.get_label()).split(",")[0].split()[1]) - 1
+        assert np.array_equal(line.get_xdata(), worn.cycles)
+        assert np.array_equal(line.get_ydata(), worn.depth[:, pair])
+    assert rate.lines[0].get_ydata() == pytest.approx(worn.rate.max(axis=1))
+    assert np.array_equal(amplitude.lines[0].get_ydata(), worn.amplitude[:, 0])
+    assert "steady state reached" in evolution.get_suptitle()
+    for figure in (bars, evolution):
+        _labelled(figure)
+
+
+def test_convergence(coarse: Result) -> None:
+    figure = plot_convergence(coarse)
+    iterations, residual, seconds = figure.axes
+    assert np.array_equal(iterations.lines[0].get_ydata(), coarse.iterations)
+    assert np.array_equal(residual.lines[0].get_ydata(), coarse.residual)
+    assert np.array_equal(seconds.lines[0].get_ydata(), 1e3 * coarse.seconds)
+    assert [line.get_ydata()[0] for line in residual.lines if line.get_label() == "tolerance"] == [
+        1e-8]
+    _labelled(figure)
+
+
+def test_kinds_that_fit(coarse: Result, worn: Result, examples: Path, tmp_path: Path) -> None:
+    assert fitting(coarse) == ["response", "cycle", "hysteresis", "harmonics", "flanks",
+                               "convergence"]
+    assert {"wear_maps", "wear_bars", "wear_evolution"} <= set(fitting(worn))
+    point = run(examples.parent / "coulomb" / "coulomb.nml", tmp_path / "a.h5")
+    assert fitting(point) == ["cycle", "hysteresis", "harmonics", "convergence"]
+    for result in (coarse, worn, point):
+        for name in fitting(result):
+            figure = KINDS[name].draw(result, Choices())
+            assert any(axes.has_data() for axes in figure.axes), name
+
+
+def test_nothing_has_converged(coarse: Result, tmp_path: Path) -> None:
+    path = tmp_path / "failed.h5"
+    path.write_bytes(coarse.path.read_bytes())
+    with h5py.File(path, "r+") as file:
+        file["converged"][...] = False
+    result = Result(path)
+    for name in fitting(result):
+        KINDS[name].draw(result, Choices()).savefig(tmp_path / "a.svg")
+
+
+def test_without_places_there_is_no_map(coarse: Result, tmp_path: Path) -> None:
+    path = tmp_path / "placeless.h5"
+    path.write_bytes(coarse.path.read_bytes())
+    with h5py.File(path, "r+") as file:
+        del file["contact/position"]
+    assert "flanks" not in fitting(Result(path))
+    with pytest.raises(InputError, match="no /contact/position"):
+        plot_flanks(path)
+
+
+def test_command_line(coarse: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                      capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", str(coarse.path)]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"coarse_{name}.png" for name in fitting(coarse)}
+    assert main(["plot", str(coarse.path), "--kind", "hysteresis", "--pairs", "1,2", "--point",
+                 "-1", "-o", "one.svg"]) == 0
+    assert "<svg" in Path("one.svg").read_text()
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize(("options", "status", "message"), [
+    (["--kind", "respons"], 3, "must be among response, cycle"),
+    (["--point", "41"], 3, "point 41: there are 40, counted from 1"),
+    (["--pairs", "one"], 3, "must be numbers"),
+    (["--observe", "tpi"], 3, "available: tip, tip_x"),
+    (["--kind", "wear_bars"], 3, "case%analysis = 'wear'"),
+    (["--kind", "response", "-o", "a.xyz"], 3, "xyz"),
+    (["-o", "none/a.png"], 5, "there is no folder"),
+])
+def test_command_line_refuses(coarse: Result, options: list[str], status: int, message: str,
+                              tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                              capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", str(coarse.path), *options]) == status
+    assert message in capsys.readouterr().err
