@@ -9,11 +9,14 @@ module fw_forces
    use fw_correction, only: march_turn_1d
    use fw_correction, only: march_turn_2d
    use fw_correction, only: project_turn
+   use fw_correction_derivative, only: limit_derivative
    use fw_correction_derivative, only: march_derivative
    use fw_event_contact, only: event_contact_type
    use fw_event_contact, only: new_event_contact
    use fw_fourier, only: fourier_type
    use fw_lapack, only: dgemm
+   use fw_settling, only: limit_is_unique
+   use fw_settling, only: settle
    use fw_slip, only: slip_gradient
    use fw_slip, only: slip_work
    implicit none (type, external)
@@ -28,15 +31,20 @@ module fw_forces
    integer, parameter :: block_size = 8
    !> Pairs above which threads pay; with fewer, a parallel region costs more than its work.
    integer, parameter :: threads_pay_from = 24
-   !> Turns after which a march that is not periodic is given up; a random sample needed 4.
-   integer, parameter :: max_turns = 100
+   !> Turns after which the limit of a march is looked for by Newton's method. One direction needs
+   !> one; a random sample with two needed 4 at most, pairs of a blade root that creep thousands.
+   integer, parameter :: plain_turns = 4
+   !> Turns that count in the derivative of a pair that shook down after more than plain_turns.
+   integer, parameter :: shakedown_turns = 60
    !> Change of x over the last turn, as a part of the largest predicted force, above which a march
-   !> counts as not periodic. Pairs that shake down on the blade sector creep by up to 1e-5 after
-   !> 100 turns.
-   real(wp), parameter :: negligible_drift = 1.0e-4_wp
+   !> counts as not periodic.
+   real(wp), parameter :: negligible_drift = 1.0e-9_wp
    !> A march is periodic when x repeats to this part of the largest predicted force of the pair:
    !> far below the tolerance of any balance, well above round-off.
    real(wp), parameter :: periodic_tolerance = 1.0e-12_wp
+   !> Distance from the friction cone, in the same measure, that round-off leaves of a pair that
+   !> has settled on it.
+   real(wp), parameter :: touch = 1.0e-10_wp
 
    type :: forces_type
       integer :: n_pairs = 0
@@ -60,6 +68,8 @@ module fw_forces
       !> Smallest mu p - |d|, smallest p and turns needed (n_pairs).
       real(wp), allocatable :: margin(:), pressure(:)
       integer, allocatable :: turns(:)
+      !> Whether the march ends at the limit that `settle` found (n_pairs).
+      logical, allocatable :: settled(:)
       !> pair_stuck, pair_open or pair_mixed (n_pairs).
       integer, allocatable :: state(:)
       !> Transposed derivative of the force by the prediction of each pair:
@@ -110,6 +120,7 @@ contains
       allocate (self%margin(n), self%pressure(n), self%offset(n), self%scale(n), self%drift(n), &
          source=0.0_wp)
       allocate (self%turns(n), source=0)
+      allocate (self%settled(n), source=.false.)
       allocate (self%state(n), source=pair_stuck)
    end function new_forces
 
@@ -245,12 +256,12 @@ contains
    subroutine march(self, n_time, first, last)
       class(forces_type), intent(inout) :: self
       integer, intent(in) :: n_time, first, last
-      integer :: turn, i
-      real(wp) :: start(block_size, 2)
+      integer :: turn
 
       self%x(first:last, :) = self%x_start(first:last, :)
       self%margin(first:last) = huge(1.0_wp)
       self%pressure(first:last) = huge(1.0_wp)
+      self%settled(first:last) = .false.
       if (.not. self%remembers) then
          self%drift(first:last) = 0.0_wp
          call project_turn(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
@@ -259,25 +270,52 @@ contains
          return
       end if
       self%turns(first:last) = 0
-      do turn = 1, max_turns
-         start(:last - first + 1, :) = self%x(first:last, :)
-         if (self%two_directions) then
-            call march_turn_2d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
-                               self%x, self%force_time, self%margin, self%pressure)
-         else
-            call march_turn_1d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
-                               self%x, self%force_time, self%margin, self%pressure)
-         end if
-         do i = first, last
-            self%drift(i) = maxval(abs(self%x(i, :) - start(i - first + 1, :)))
-            if (self%turns(i) == 0 .and. self%drift(i) <= periodic_tolerance*self%scale(i)) then
-               self%turns(i) = turn
-            end if
-         end do
-         if (all(self%turns(first:last) > 0)) exit
+      do turn = 1, plain_turns
+         call march_turn(self, n_time, first, last, turn)
+         if (all(self%turns(first:last) > 0)) return
       end do
-      where (self%turns(first:last) == 0) self%turns(first:last) = max_turns
+      call find_limits(self, n_time, first, last)
+      call march_turn(self, n_time, first, last, plain_turns + 1)
+      where (self%turns(first:last) == 0) self%turns(first:last) = shakedown_turns
    end subroutine march
+
+   !> One turn, and which pairs repeat after it.
+   subroutine march_turn(self, n_time, first, last, turn)
+      class(forces_type), intent(inout) :: self
+      integer, intent(in) :: n_time, first, last, turn
+      real(wp) :: start(block_size, 2)
+      integer :: i
+
+      start(:last - first + 1, :) = self%x(first:last, :)
+      if (self%two_directions) then
+         call march_turn_2d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
+                            self%x, self%force_time, self%margin, self%pressure)
+      else
+         call march_turn_1d(self%n_pairs, n_time, first, last, self%mu, self%prediction_time, &
+                            self%x, self%force_time, self%margin, self%pressure)
+      end if
+      do i = first, last
+         self%drift(i) = maxval(abs(self%x(i, :) - start(i - first + 1, :)))
+         if (self%turns(i) > 0 .or. self%settled(i)) cycle
+         if (self%drift(i) <= periodic_tolerance*self%scale(i)) self%turns(i) = turn
+      end do
+   end subroutine march_turn
+
+   !> Bring the pairs that do not repeat yet to the limit of their march.
+   subroutine find_limits(self, n_time, first, last)
+      class(forces_type), intent(inout) :: self
+      integer, intent(in) :: n_time, first, last
+      real(wp) :: x(2)
+      integer :: i
+
+      do i = first, last
+         if (self%turns(i) > 0) cycle
+         x = self%x(i, :)
+         call settle(self%n_pairs, n_time, i, self%prediction_time, self%mu(i), self%scale(i), &
+                     periodic_tolerance, x, self%settled(i))
+         self%x(i, :) = x
+      end do
+   end subroutine find_limits
 
    !> Derivatives of all mixed pairs at the last evaluated prediction.
    subroutine linearize(self, fourier)
@@ -303,9 +341,7 @@ contains
          if (self%state(i) /= pair_mixed) cycle
          y = self%prediction_time(i, :, :)
          y_n = y(3, :)
-         x = self%x_start(i, :)
-         call march_derivative(fourier%n_time, nc, self%turns(i), fourier%synthesis, y, &
-                               self%mu(i), self%present(:, i), self%remembers, x, rows, dx)
+         call derive(self, fourier, i, y, x, rows, dx)
          call project(self%jacobian(:, :, i), fourier, rows, y_n, self%present(3, i))
          if (.not. self%measures_slip) cycle
          call slip_gradient(fourier%n_time, nc, fourier%synthesis, y, self%mu(i), &
@@ -314,6 +350,39 @@ contains
       !$omp end do
       !$omp end parallel
    end subroutine linearize
+
+   !> Derivative of the friction of a pair at the instants. A limit that is the only one has a
+   !> derivative of its own; any other carries that of the way to it.
+   subroutine derive(self, fourier, pair, y, x, rows, dx)
+      class(forces_type), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: pair
+      real(wp), intent(in) :: y(3, fourier%n_time)
+      !> Corrected position at the end of the period.
+      real(wp), intent(out) :: x(2)
+      real(wp), intent(inout) :: rows(fourier%n_coefficients, 3, 2, fourier%n_time)
+      real(wp), intent(inout) :: dx(fourier%n_coefficients, 3, 2)
+      real(wp) :: inverse(2, 2)
+      logical :: unique
+
+      unique = .false.
+      x = self%x(pair, :)
+      if (self%settled(pair)) then
+         call limit_is_unique(self%n_pairs, fourier%n_time, pair, self%prediction_time, &
+                              self%mu(pair), touch*self%scale(pair), x, unique, inverse)
+      end if
+      if (unique) then
+         call limit_derivative(fourier%n_time, fourier%n_coefficients, fourier%synthesis, y, &
+                               self%mu(pair), touch*self%scale(pair), self%present(:, pair), &
+                               inverse, x, rows, dx)
+      else
+         x = self%x_start(pair, :)
+         dx = 0.0_wp
+         call march_derivative(fourier%n_time, fourier%n_coefficients, self%turns(pair), &
+                               fourier%synthesis, y, self%mu(pair), 0.0_wp, self%present(:, pair), &
+                               self%remembers, x, rows, dx)
+      end if
+   end subroutine derive
 
    !> From rows at the instants to the transposed derivative between coefficients.
    subroutine project(jacobian, fourier, rows, y_n, has_normal)
@@ -348,8 +417,7 @@ contains
       always_closed = self%pressure(pair) > 0.0_wp
    end function always_closed
 
-   !> Whether the march of every pair has become periodic. With two tangential directions a pair
-   !> that shakes down creeps to its limit, slower and slower; it may still do so after max_turns.
+   !> Whether the march of every pair has become periodic.
    pure logical function all_periodic(self)
       class(forces_type), intent(in) :: self
 

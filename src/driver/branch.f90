@@ -99,6 +99,11 @@ contains
       call merge_work(branch%linear, solver%method%newton%linear)
       if (allocated(error)) return
       call observer%on_message('branch: '//branch%ending)
+      if (branch%runs_away .and. case%contact%n_pairs > 0) then
+         call observer%on_message('from this frequency on the contact no longer holds the '// &
+            'structure in place: all of it slips, and no periodic response exists without a '// &
+            'support in that direction')
+      end if
       if (.not. branch%complete) call summary%mark_incomplete()
    end subroutine run_branch
 

@@ -26,6 +26,7 @@ module fw_linalg
       procedure :: reserve => reserve_real
       procedure :: factor => factor_real
       procedure :: solve => solve_real
+      procedure :: determinant_sign
    end type lu_type
 
    !> LU factors of a complex matrix; as lu_type.
@@ -72,6 +73,20 @@ contains
 
       call dgetrs('N', self%n, 1, self%matrix, size(self%matrix, 1), self%pivot, b, size(b), info)
    end subroutine solve_real
+
+   !> Sign of the determinant of the factored matrix: -1, 1, or 0 where it is singular.
+   pure integer function determinant_sign(self)
+      class(lu_type), intent(in) :: self
+      integer :: i
+
+      determinant_sign = 1
+      do i = 1, self%n
+         if (abs(self%matrix(i, i)) <= 0.0_wp) determinant_sign = 0
+         if ((self%matrix(i, i) < 0.0_wp) .neqv. (self%pivot(i) /= i)) then
+            determinant_sign = -determinant_sign
+         end if
+      end do
+   end function determinant_sign
 
    !> Make room for order n; the caller then fills matrix(1:n, 1:n).
    pure subroutine reserve_complex(self, n)

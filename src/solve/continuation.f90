@@ -3,7 +3,9 @@
 !>
 !> Contact makes R piecewise smooth, and at a kink the branch may turn by more than a right angle:
 !> then no point lies ahead on the tangent, and Newton's method cycles between the two pieces. The
-!> tangent of the piece beyond the kink is taken, in the direction that stays in that piece.
+!> tangent of the piece beyond the kink is taken. Its direction follows from what is constant
+!> along a branch of a piecewise smooth system, the sign of det(dR/dx) dp/ds (Allgower, Georg
+!> 1990, Numerical continuation methods, on piecewise linear ones).
 !>
 !> Lengths are measured with x over its own scale and p over the length of its interval, so that
 !> a step means the same in every system of units.
@@ -11,7 +13,9 @@ module fw_continuation
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
    use fw_error, only: error_type
+   use fw_linalg, only: lu_type
    use fw_linear_step, only: linear_step_type
+   use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
    use fw_parameter_system, only: parameter_system
    use fw_solver_options, only: solver_options
@@ -65,6 +69,8 @@ module fw_continuation
       character(:), allocatable :: ending
       !> Whether it ended at a bound of the interval.
       logical :: complete = .false.
+      !> Whether it ended because x runs away while p stays.
+      logical :: runs_away = .false.
    contains
       procedure :: trace
    end type arclength_type
@@ -73,9 +79,15 @@ module fw_continuation
    integer, parameter :: max_corrections = 14, quick = 3, slow = 7
    !> Corrections without a smaller residual that end an attempt: a cycle.
    integer, parameter :: patience = 4
-   !> A turn at a kink is tried when the step has shrunk to this multiple of the first one; the
-   !> residual must be smaller by this factor on the side that the branch takes.
-   real(wp), parameter :: turn_below = 0.1_wp, turn_contrast = 0.3_wp
+   !> A turn at a kink is tried when the step has shrunk to this multiple of the first one.
+   real(wp), parameter :: turn_below = 0.1_wp
+   !> A step in p alone is tried from the first step divided by two to this power.
+   integer, parameter :: max_leap = 6
+   !> Tangents without a part in p: a fold has one, a branch that has so many in a row runs away.
+   real(wp), parameter :: constant = 1.0e-6_wp
+   integer, parameter :: max_constant = 8
+   !> Cosine of the angle between tangents below which a branch turns sharply.
+   real(wp), parameter :: sharp = 0.8_wp
    !> Steps between these multiples of the first one.
    real(wp), parameter :: largest_growth = 2.0_wp, smallest_share = 1.0e-5_wp
    !> Iterative linear solutions: the tangent needs more digits than a Newton step.
@@ -96,9 +108,10 @@ contains
       type(branch_point) :: here, next
       type(solver_report) :: report
       real(wp) :: ds
-      integer :: k
+      integer :: k, n_constant
       logical :: done
 
+      n_constant = 0
       call begin(self, system, x, here, error)
       ds = self%step
       do k = 2, self%max_points
@@ -109,6 +122,8 @@ contains
             self%ending = 'the corrector failed at the smallest step'
             return
          end if
+         call look_ahead(self, system, here, next, error)
+         if (allocated(error)) return
          if (here%t_p*next%t_p < 0.0_wp) call report_fold(self, system, here, next, ds, observer, &
             error)
          if (allocated(error)) return
@@ -125,6 +140,12 @@ contains
          if (report%iterations <= quick) ds = min(1.4_wp*ds, largest_growth*self%step)
          if (report%iterations >= slow) ds = 0.6_wp*ds
          here = next
+         n_constant = merge(n_constant + 1, 0, abs(here%t_p) <= constant*self%p_scale)
+         self%runs_away = n_constant >= max_constant
+         if (self%runs_away) then
+            self%ending = 'its points run away at a constant parameter'
+            return
+         end if
       end do
       self%ending = 'max_points was reached'
    end subroutine trace
@@ -186,37 +207,88 @@ contains
    subroutine advance(self, system, here, ds, next, report, done, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
-      type(branch_point), intent(inout) :: here
+      type(branch_point), intent(in) :: here
       real(wp), intent(inout) :: ds
       type(branch_point), intent(out) :: next
       type(solver_report), intent(out) :: report
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
+      integer :: orientation
 
       self%x_scale = max(self%x_scale, norm2(here%x))
+      orientation = 0
       do
          call correct(self, system, here, ds, next, report, error)
          if (allocated(error)) return
          done = report%converged
          if (done) return
-         if (ds < turn_below*self%step) call turn_at_kink(self, system, ds, here, error)
-         if (allocated(error)) return
+         if (ds < turn_below*self%step) then
+            call turn_at_kink(self, system, here, ds, orientation, next, report, error)
+            if (allocated(error)) return
+            done = report%converged
+            if (done) return
+         end if
+         if (ds < smallest_share*self%step) exit
          ds = 0.5_wp*ds
-         if (ds < smallest_share*self%step) return
       end do
+      call leap(self, system, here, orientation, ds, next, report, error)
+      done = report%converged
    end subroutine advance
 
-   !> Give `here` the tangent of the piece just beyond it, if the branch goes on in that piece.
-   subroutine turn_at_kink(self, system, ds, here, error)
+   !> A step in p alone, beyond a place where many pieces meet: Newton's method with its line search
+   !> from `here`, first close by, then further away.
+   subroutine leap(self, system, here, orientation, ds, next, report, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
-      real(wp), intent(in) :: ds
-      type(branch_point), intent(inout) :: here
+      type(branch_point), intent(in) :: here
+      integer, intent(inout) :: orientation
+      !> Distance of the point that was reached.
+      real(wp), intent(inout) :: ds
+      type(branch_point), intent(out) :: next
+      type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: beyond
-      real(wp) :: ahead, behind
+      type(newton_solver) :: newton
+      integer :: its_orientation, k
       logical :: done
 
+      newton%options = self%options
+      if (orientation == 0) call find_orientation(system, here, orientation, error)
+      if (allocated(error)) return
+      do k = -max_leap, 0
+         next = here
+         next%p = here%p + sign(2.0_wp**k*self%step*self%p_scale, here%t_p)
+         call system%set_parameter(next%p, error)
+         if (allocated(error)) return
+         call newton%solve(system, next%x, report)
+         if (.not. report%converged) cycle
+         call find_tangent(self, system, here, next, done)
+         if (done) call find_orientation(system, next, its_orientation, error)
+         if (allocated(error)) return
+         report%converged = done .and. its_orientation == orientation
+         ds = sqrt(inner(self, next%x - here%x, next%p - here%p, next%x - here%x, &
+                         next%p - here%p))
+         if (report%converged) exit
+      end do
+   end subroutine leap
+
+   !> Step along the tangent of the piece just beyond `here`, in the direction that keeps the
+   !> orientation of the branch.
+   subroutine turn_at_kink(self, system, here, ds, orientation, next, report, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here
+      real(wp), intent(in) :: ds
+      !> Orientation at `here`; 0 where it is not known yet.
+      integer, intent(inout) :: orientation
+      type(branch_point), intent(out) :: next
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: beyond
+      integer :: its_orientation
+      logical :: done
+
+      if (orientation == 0) call find_orientation(system, here, orientation, error)
+      if (allocated(error)) return
       beyond = here
       beyond%x = here%x + ds*here%t
       beyond%p = here%p + ds*here%t_p
@@ -224,30 +296,64 @@ contains
       if (allocated(error)) return
       call find_tangent(self, system, here, beyond, done)
       if (.not. done) return
-      call distance_from_branch(system, here, beyond, ds, ahead, error)
+      call find_orientation(system, beyond, its_orientation, error)
       if (allocated(error)) return
-      call distance_from_branch(system, here, beyond, -ds, behind, error)
-      if (allocated(error)) return
-      if (min(ahead, behind) > turn_contrast*max(ahead, behind)) return
-      here%t = sign(1.0_wp, behind - ahead)*beyond%t
-      here%t_p = sign(1.0_wp, behind - ahead)*beyond%t_p
+      if (its_orientation /= orientation) then
+         beyond%t = -beyond%t
+         beyond%t_p = -beyond%t_p
+      end if
+      beyond%x = here%x
+      beyond%p = here%p
+      call correct(self, system, beyond, ds, next, report, error)
+      if (allocated(error) .or. .not. report%converged) return
+      ! A point with the other orientation lies on the way back.
+      call find_orientation(system, next, its_orientation, error)
+      report%converged = its_orientation == orientation
    end subroutine turn_at_kink
 
-   !> Residual at a distance s from a point along the tangent of another.
-   subroutine distance_from_branch(system, here, beyond, s, residual, error)
+   !> Where the branch turns sharply, the tangent that makes the smaller angle with the last one may
+   !> be the one that leads back.
+   subroutine look_ahead(self, system, here, next, error)
+      class(arclength_type), intent(in) :: self
       class(parameter_system), intent(inout) :: system
-      type(branch_point), intent(in) :: here, beyond
-      real(wp), intent(in) :: s
-      real(wp), intent(out) :: residual
+      type(branch_point), intent(in) :: here
+      type(branch_point), intent(inout) :: next
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: r(system%n)
+      integer :: before, after
 
-      residual = huge(1.0_wp)
-      call system%set_parameter(here%p + s*beyond%t_p, error)
+      if (inner(self, here%t, here%t_p, next%t, next%t_p) > sharp) return
+      call find_orientation(system, here, before, error)
       if (allocated(error)) return
-      call system%residual(here%x + s*beyond%t, r)
-      residual = norm2(r)
-   end subroutine distance_from_branch
+      call find_orientation(system, next, after, error)
+      if (before == after) return
+      next%t = -next%t
+      next%t_p = -next%t_p
+   end subroutine look_ahead
+
+   !> Sign of det(dR/dx) dp/ds. It is the same all along a branch: det(dR/dx) changes its sign where
+   !> p turns, in a smooth fold as at a kink.
+   subroutine find_orientation(system, point, orientation, error)
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: point
+      integer, intent(out) :: orientation
+      type(error_type), allocatable, intent(out) :: error
+      type(lu_type) :: lu
+      real(wp), allocatable :: r(:)
+      logical :: singular
+      integer :: n
+
+      orientation = 0
+      call system%set_parameter(point%p, error)
+      if (allocated(error)) return
+      allocate (r(system%n))
+      call system%residual(point%x, r)
+      call system%linearize(n)
+      call lu%reserve(n)
+      call system%assemble(lu%matrix)
+      call lu%factor(singular)
+      orientation = lu%determinant_sign()
+      if (point%t_p < 0.0_wp) orientation = -orientation
+   end subroutine find_orientation
 
    !> Newton's method on R = 0 with the distance along the tangent fixed to ds.
    subroutine correct(self, system, here, ds, next, report, error)

@@ -88,3 +88,42 @@ def test_a_branch_that_turns_back_says_so(fw_run) -> None:
     assert result.returncode == 4
     with h5py.File(fw_run.directory / "branch.h5") as file:
         assert len(file["omega"]) == 5
+
+
+SECTOR = Path(__file__).parents[2] / "example" / "blade_sector" / "frf.nml"
+
+
+def _sector_branch(fw_run, speed: float, load: float, start: float, end: float):
+    return fw_run("-o", "sector.h5", "--set", f"model%rotation_speed={speed}",
+                  "--set", f"load%harmonic_scale={load}", "--set", f"sweep%start={start}",
+                  "--set", f"sweep%end={end}", "--set", "sweep%n_points=41",
+                  "--set", "sweep%continuation='arclength'", str(SECTOR))
+
+
+@pytest.mark.parametrize(("speed", "load", "start", "end"), [
+    (209.44, 0.5, 990, 1007.5), (209.44, 1.0, 990, 1004.7), (261.8, 0.5, 995, 1020),
+    (377.0, 0.5, 1005, 1025), (460.8, 0.5, 1017, 1029)])
+def test_branches_through_strong_slip(fw_run, speed, load, start, end) -> None:
+    """Pairs that slip for the first time turn the branch sharply; it goes on to the end."""
+    done = _sector_branch(fw_run, speed, load, start, end)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(fw_run.directory / "sector.h5") as file:
+        hertz = file["omega"][:] / (2 * np.pi)
+        assert file["converged"][:].all()
+    assert hertz[0] == pytest.approx(start, rel=1e-12)
+    assert hertz[-1] == pytest.approx(end, rel=1e-12)
+    # It never walks back: what it covers is little more than the interval.
+    assert np.abs(np.diff(hertz)).sum() < 1.5 * (end - start)
+
+
+@pytest.mark.parametrize(("load", "hertz"), [(0.5, 1007.95), (1.0, 1005.07)])
+def test_a_blade_that_nothing_holds(fw_run, load, hertz) -> None:
+    """All flanks slip: the static position along the slot is free, and the branch runs away."""
+    done = _sector_branch(fw_run, 209.44, load, 990, 1012)
+    assert done.returncode == 4
+    assert "no longer holds" in done.stderr
+    with h5py.File(fw_run.directory / "sector.h5") as file:
+        omega, fraction = file["omega"][:], file["contact/fraction"][:]
+    assert np.ptp(omega[-8:]) < 1e-6 * omega[-1]
+    assert omega[-1] / (2 * np.pi) == pytest.approx(hertz, abs=0.005)
+    assert (fraction[-1, :, 1] > 0).all()
