@@ -63,6 +63,8 @@ QUANTITIES: dict[str, tuple[_Quantity, bool, str, str]] = {
                        "largest wear depth at the end [L]"),
     "mean_wear_depth": (lambda r, _: float(r.depth[-1].mean()), False, "wear/depth",
                         "mean wear depth at the end [L]"),
+    "wear_volume": (lambda r, _: float(r["wear/volume"][-1].sum()), False, "wear/volume",
+                    "volume worn off all pairs at the end [L^3]"),
     "max_wear_rate": (lambda r, _: float(r.rate[-1].max()), False, "wear/rate",
                       "largest wear rate at the end [L per cycle]"),
     "cycles": (lambda r, _: float(r.cycles[-1]), False, "wear/cycles", "cycles at the end"),
@@ -102,7 +104,7 @@ def evaluate(text: str, result: Result | None) -> Value:
         return absent
     if match[2]:
         result.index(match[2])
-    if dataset != "wear/depth" and "converged" in result and not result.converged.any() \
+    if not dataset.startswith("wear/") and "converged" in result and not result.converged.any() \
             and match[1] not in ("n_points", "n_converged", "iterations", "status", "elapsed"):
         return absent
     return function(result, match[2])

@@ -17,6 +17,7 @@ from fretwear.cli import main
 from fretwear.errors import InputError
 from fretwear.importer import Dofs, FullModel, check_model, read_matrices, read_pairs
 from fretwear.importer.build import drop
+from fretwear.importer.spectrum import lowest_modes, negative_directions
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
@@ -250,6 +251,32 @@ def changed(matrix: np.ndarray, i: int, j: int, value: float) -> np.ndarray:
 ])
 def test_wrong_matrices_are_named(mass: np.ndarray, stiffness: np.ndarray, expected: str) -> None:
     assert expected in "\n".join(findings(mass, stiffness))
+
+
+def long_chain(n: int) -> tuple[sp.csr_array, sp.csr_array]:
+    """Free chain of n unit masses and springs: omega_k = 2 sin(k pi / 2n)."""
+    diagonal = np.full(n, 2.0)
+    diagonal[[0, -1]] = 1.0
+    springs = sp.diags_array([diagonal, np.full(n - 1, -1.0), np.full(n - 1, -1.0)],
+                             offsets=[0, 1, -1])
+    return sp.csr_array(sp.eye_array(n)), sp.csr_array(springs)
+
+
+@pytest.mark.parametrize("n", [300, 700])
+def test_spectrum_of_small_and_large_models(n: int) -> None:
+    """Dense and sparse algebra: rigid modes, frequencies and negative directions."""
+    mass, stiffness = long_chain(n)
+    found = lowest_modes(mass, stiffness)
+    assert found is not None
+    assert found.rigid.shape[1] == 1
+    assert np.abs(found.rigid[:, 0]) == pytest.approx(np.full(n, n**-0.5), rel=1e-6)
+    exact = 2.0 * np.sin(np.arange(1, 6) * np.pi / (2 * n)) / (2.0 * np.pi)
+    assert found.frequency[:5] == pytest.approx(exact, rel=1e-6)
+    assert found.local == pytest.approx(np.sqrt(2.0) / (2.0 * np.pi))
+    assert negative_directions(stiffness) == 0
+    softened = sp.csr_array(stiffness - 1e-3 * mass)
+    count = int((2.0 * np.sin(np.arange(n) * np.pi / (2 * n)) < np.sqrt(1e-3)).sum())
+    assert negative_directions(softened) == count > 1
 
 
 HEAD = "side_1_t1,side_1_t2,side_1_n,side_2_t1,side_2_t2,side_2_n,mu,gap,area,x,y,z\n"

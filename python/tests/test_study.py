@@ -26,6 +26,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 # Two runs solved to 1e-8 each.
 SIMILAR = 1e-6
+# The steady state is reached where the rate has fallen by 1e-6, and the rest to wear with it.
+STEADY = 1e-5
 JENKINS = (ROOT / "example" / "jenkins" / "jenkins.nml").read_text()
 HEAD = f"""case = "jenkins.nml"
 [run]
@@ -413,6 +415,44 @@ def test_committed_example(tmp_path: Path) -> None:
     assert (np.diff(best) > 0).all()
     assert peak[0, 0] == pytest.approx(peak[1, 1], rel=SIMILAR)
     assert peak[3, 1] == pytest.approx(peak[4, 2], rel=SIMILAR)
+
+
+WEAR = """&case analysis = 'wear' /
+&model n_dof = 2 mass = 1 0 0 0 stiffness = 1 0 0 10 damping = 0.1 0 0 0 /
+&contact n_pairs = 1 side_1 = 1 0 2 law = 'penalty' tangential_stiffness = 5 normal_stiffness = 50
+   mu = 0.5 gap = -0.1 area = 2 /
+&load cosine = 1 0 /
+&harmonics n_harmonics = 3 n_time = 128 /
+&sweep start = 0.9 n_points = 1 /
+&wear coefficient = 2e-4 n_cycles = 1e4 max_depth_step = 0.01 scheme = 'implicit' /
+"""
+WEAR_STUDY = """case = "wear.nml"
+[values]
+"contact%gap" = [-0.1, -0.2]
+"wear%n_cycles" = [100.0, 1e5]
+[table]
+quantities = ["max_wear_depth", "mean_wear_depth", "wear_volume", "cycles", "steady_state",
+              "last_amplitude", "max_wear_rate"]
+"""
+
+
+def test_wear(tmp_path: Path) -> None:
+    """An interference wears off: in the end the depth is the interference, and no force is left."""
+    (tmp_path / "wear.nml").write_text(WEAR)
+    (tmp_path / "study.toml").write_text(WEAR_STUDY)
+    plan = read_plan(tmp_path / "study.toml")
+    run_study(type(plan)(**{**vars(plan), "program": str(PROGRAM)}))
+    found = read_table(tmp_path / "study.h5")
+    assert found["status"].tolist() == ["ok"] * 4
+    assert found["steady_state"].tolist() == ["not reached", "reached"] * 2
+    assert found["cycles"][[0, 2]].tolist() == [100.0, 100.0]
+    depth = found["max_wear_depth"]
+    assert depth[[1, 3]] == pytest.approx([0.1, 0.2], rel=STEADY)
+    assert (depth[[0, 2]] < 0.9 * depth[[1, 3]]).all()
+    assert found["wear_volume"] == pytest.approx(2.0 * depth)
+    assert found["mean_wear_depth"] == pytest.approx(depth)
+    assert (found["last_amplitude"][[1, 3]] > found["last_amplitude"][[0, 2]]).all()
+    assert (found["max_wear_rate"][[1, 3]] < 1e-4 * found["max_wear_rate"][[0, 2]]).all()
 
 
 def test_list_of_quantities(capsys: pytest.CaptureFixture[str]) -> None:

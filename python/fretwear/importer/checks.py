@@ -245,7 +245,8 @@ def _dependent(model: FullModel, pairs: Pairs) -> Findings:
             yield Finding("error", pairs.where[two], f"a relative displacement is given {what}; "
                           "rigid contact forces would not be determined")
     if not reported and rows.shape[0] <= _LARGE:
-        rank = int(np.linalg.matrix_rank((rows @ rows.T).toarray() / np.outer(size, size)))
+        rank = int(np.linalg.matrix_rank((rows @ rows.T).toarray() / np.outer(size, size),
+                                         hermitian=True))
         if rank < rows.shape[0]:
             yield Finding("error", "pairs", f"{rows.shape[0] - rank} of {rows.shape[0]} relative "
                           "displacements are combinations of others; remove the pairs that close "
