@@ -18,6 +18,8 @@ from fretwear.errors import InputError
 from fretwear.importer import Dofs, FullModel, check_model, read_matrices, read_pairs
 from fretwear.importer.build import drop
 from fretwear.importer.spectrum import lowest_modes, negative_directions
+from fretwear.sector import FullModel as SectorModel
+from fretwear.sector import ReducedModel
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
@@ -72,6 +74,9 @@ def write_unsymmetric_hb(folder: Path) -> list[str]:
         scipy.io.hb_write(folder / f"{name}.rua", sp.csc_array(matrix))
     return [str(folder / "mass.rua"), str(folder / "stiffness.rua")]
 
+
+# K_rr loses digits by cancellation, and another kappa loses others.
+GENERATED = 1e-7
 
 FORMATS = {
     "op4 binary": lambda folder: write_op4(folder, binary=True),
@@ -188,6 +193,34 @@ def test_imported_and_reduced_models_respond_alike(tmp_path: Path) -> None:
         assert not file["contact/side_2"][()].any()
     full, reduced = (tip_amplitude(tmp_path, name) for name in ("full", "reduced"))
     assert reduced == pytest.approx(full, rel=TRUNCATION)
+
+
+def test_the_sector_arrives_as_its_generator_makes_it(
+        full: SectorModel, reduced: ReducedModel, tmp_path: Path) -> None:
+    """Matrices, patch averages and loads of the sector through files, then reduced."""
+    scipy.io.savemat(tmp_path / "full.mat", {
+        "M": full.mass, "K": full.stiffness, "G": full.rotation, "B": full.contact})
+    positions = "\n".join(",".join(map(repr, (0.5, area, *place))) for area, place in zip(
+        full.rows.area.tolist(), full.rows.position.tolist()))
+    (tmp_path / "pairs.csv").write_text("mu,area,x,y,z\n" + positions + "\n")
+    force = "\n".join(f"{k + 1},{float(full.tip_force[k])!r}"
+                      for k in np.flatnonzero(full.tip_force))
+    (tmp_path / "loads.csv").write_text(f"dof,cosine\n{force}\n")
+    n_modes = full.parameters.discretisation.n_modes
+    arguments = ["import", str(tmp_path / "full.mat"), "-q", "-o", str(tmp_path / "model.h5"),
+                 "--stiffness-rotation", f"{tmp_path}/full.mat#g", "--pairs",
+                 str(tmp_path / "pairs.csv"), "--loads", str(tmp_path / "loads.csv"),
+                 "--unit-system", "mm-tonne-s-N", "--reduce", str(n_modes)]
+    assert main([*arguments, "--contact-rows", f"{tmp_path}/full.mat#k"]) == 3
+    assert main([*arguments, "--contact-rows", f"{tmp_path}/full.mat#b"]) == 0
+    with h5py.File(tmp_path / "model.h5") as file:
+        for name in ("mass", "stiffness", "stiffness_rotation"):
+            expected = getattr(reduced, name)
+            assert file[name][()] == pytest.approx(expected, abs=GENERATED * np.abs(expected).max())
+        assert file["load/cosine"][()] == pytest.approx(
+            reduced.cosine, abs=GENERATED * np.abs(reduced.cosine).max())
+        assert file["contact/side_1"][-1].tolist() == [3 * reduced.n_pairs - 2,
+                                                       3 * reduced.n_pairs - 1, 3 * reduced.n_pairs]
 
 
 def test_pairs_by_nodes_and_normals(tmp_path: Path) -> None:

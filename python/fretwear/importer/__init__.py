@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError, OutputError
-from .build import ROLES, FullModel, Source, drop, gather, model_datasets, save
+from .build import ROLES, FullModel, Source, drop, gather, model_datasets, read_rows, save
 from .checks import Finding, check_model
 from .labels import Dofs, read_label_table
 from .matrices import FORMATS, MatrixFile, read_matrices
@@ -41,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--drop-empty", action="store_true",
                         help="leave out degrees of freedom without mass and stiffness")
     parser.add_argument("--pairs", type=Path, metavar="TABLE", help="contact pairs")
+    parser.add_argument("--contact-rows", metavar="FILE[#NAME]", type=Source.of,
+                        help="relative displacements t1, t2, n of the pairs, one after the other, "
+                             "such as averages over patches")
     parser.add_argument("--loads", type=Path, metavar="TABLE", help="loads by degree of freedom")
     parser.add_argument("--observe", action="append", default=[], metavar="NAME=DOF",
                         help="observed degree of freedom: number or node:component; repeatable")
@@ -83,6 +86,11 @@ def main(options: argparse.Namespace) -> int:
 def _read(options: argparse.Namespace) -> FullModel:
     sources = {role: getattr(options, role) for role in ROLES
                if getattr(options, role) is not None}
+    rows = None
+    if options.contact_rows is not None:
+        if options.pairs is None:
+            raise InputError("--contact-rows needs --pairs: a table with a line for each pair")
+        rows = read_rows(options.contact_rows, options.format)
     labels = None if options.labels is None else read_label_table(options.labels)
     model = gather(sources, options.files, format=options.format, mirror=options.mirror,
                    mass_factor=options.mass_factor, labels=labels)
@@ -97,5 +105,6 @@ def _read(options: argparse.Namespace) -> FullModel:
             raise InputError(f"--observe {text}: the ground does not move")
     return replace(
         model, observe=observe, title=options.title, unit_system=options.unit_system,
-        pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs),
+        pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs,
+                                                               rows),
         loads={} if options.loads is None else read_loads(options.loads, model.dofs))

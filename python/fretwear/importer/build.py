@@ -19,7 +19,8 @@ from .labels import Dofs
 from .matrices import HELD, MatrixFile, mirrored, one_triangle, read_matrices
 from .tables import LOADS, Pairs, contact_rows
 
-__all__ = ["ROLES", "FullModel", "Source", "drop", "gather", "model_datasets", "save"]
+__all__ = ["ROLES", "FullModel", "Source", "drop", "gather", "model_datasets", "read_rows",
+           "save"]
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ ROLES = {
     "mass": ("mass", "m", "mgg", "maa", "mxx", "maax", "mmat", "mass_matrix"),
     "stiffness": ("stiffness", "k", "kgg", "kaa", "kxx", "kaax", "kmat", "stif",
                   "stiffness_matrix"),
-    "damping": ("damping", "c", "b", "bgg", "baa", "bxx", "baax", "viscous_damping",
+    "damping": ("damping", "c", "bgg", "baa", "bxx", "baax", "viscous_damping",
                 "damping_matrix"),
     "stiffness_rotation": ("stiffness_rotation",),
 }
@@ -135,14 +136,19 @@ def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
                                             for note in file.notes])
 
 
+def read_rows(source: Source, format: str | None = None) -> sp.csr_array:
+    """The matrix of relative displacements of a file."""
+    return _pick(read_matrices(source.path, format), source.name, "contact_rows")
+
+
 def _pick(file: MatrixFile, name: str | None, role: str) -> sp.csr_array:
     """The matrix of that name, or the only one, or the one with a usual name."""
     names = list(file.matrices)
     if name is None:
-        usual = [known for known in ROLES[role] if known in names]
+        usual = [known for known in ROLES.get(role, ()) if known in names]
         if len(names) > 1 and not usual:
-            raise InputError(f"{file.path}: holds {', '.join(names)}; say which is the {role} "
-                             f"with {file.path}#NAME")
+            raise InputError(f"{file.path}: holds {', '.join(names)}; say which is the "
+                             f"{role.replace('_', ' ')} with {file.path}#NAME")
         name = names[0] if len(names) == 1 else usual[0]
     if name not in names:
         raise InputError(f"{file.path}: holds no matrix '{name}'; there are {', '.join(names)}")
@@ -217,8 +223,8 @@ def model_datasets(model: FullModel, n_modes: int | None) -> dict[str, NDArray[A
     observed = _observed(model)
     if n_modes is None:
         if model.pairs is not None and model.pairs.rows is not None:
-            raise InputError("pairs given by nodes and normals are no degrees of freedom of the "
-                             "matrices; reduce the model with --reduce N_MODES")
+            raise InputError("pairs given by nodes and normals, or by rows, are no degrees of "
+                             "freedom of the matrices; reduce the model with --reduce N_MODES")
         data: dict[str, NDArray[Any]] = {role: matrix.toarray()
                                          for role, matrix in symmetric.items()}
         data.update({f"load/{name}": load for name, load in model.loads.items()})

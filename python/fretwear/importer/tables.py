@@ -100,7 +100,7 @@ class _Table:
         return np.column_stack([column for column in columns if column is not None])
 
 
-def read_pairs(path: str | Path, dofs: Dofs) -> Pairs:
+def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None) -> Pairs:
     """Read contact pairs.
 
     Parameters
@@ -113,6 +113,9 @@ def read_pairs(path: str | Path, dofs: Dofs) -> Pairs:
         # are comments.
     dofs : Dofs
         Degrees of freedom of the matrices.
+    rows : (3 n_pairs, n) sparse array, optional
+        Relative displacements t1, t2, n of one pair after the other, such as averages over
+        patches; the table then names no sides.
 
     Raises
     ------
@@ -121,12 +124,14 @@ def read_pairs(path: str | Path, dofs: Dofs) -> Pairs:
     """
     table = _read_table(Path(path), [*_SIDES, *_NODES, *_NORMAL, *_TANGENT, *_POSITION, *_VALUES,
                                      "patch"])
-    if table.has(_NODES) and table.has(_NORMAL):
+    if rows is not None:
+        side_1 = _numbers_of_rows(table, dofs, rows)
+        side_2 = np.zeros_like(side_1)
+    elif table.has(_NODES) and table.has(_NORMAL):
         side_1, rows = _rows_of_nodes(table, dofs)
         side_2 = np.zeros_like(side_1)
     elif any(name in table.columns for name in _SIDES):
         side_1, side_2 = (_sides(table, dofs, side) for side in (1, 2))
-        rows = None
     else:
         raise InputError(f"{path}: names no sides; expected columns side_1_t1 ... side_2_n, or "
                          "node_1, node_2, nx, ny, nz")
@@ -213,6 +218,19 @@ def _sides(table: _Table, dofs: Dofs, side: int) -> NDArray[np.int32]:
     return np.array([[dofs.signed(line.get(name, ""), f"{where}, column {name}")
                       for name in names]
                      for line, where in zip(table.lines, table.where)], dtype=np.int32)
+
+
+def _numbers_of_rows(table: _Table, dofs: Dofs, rows: sp.csr_array) -> NDArray[np.int32]:
+    """Numbers (from 1) of given rows by pair (n_pairs, 3)."""
+    sides = [name for name in (*_SIDES, *_NODES) if name in table.columns]
+    if sides:
+        raise InputError(f"{table.path}: column {sides[0]} has no meaning beside --contact-rows")
+    shape = (3 * len(table.lines), dofs.n)
+    if rows.shape != shape:
+        raise InputError(f"--contact-rows: the matrix is {rows.shape[0]} x {rows.shape[1]}; "
+                         f"expected {shape[0]} x {shape[1]}: t1, t2 and n of {len(table.lines)} "
+                         f"pairs in {table.path.name}, for {dofs.n} degrees of freedom")
+    return np.arange(1, shape[0] + 1, dtype=np.int32).reshape(-1, 3)
 
 
 def _rows_of_nodes(table: _Table, dofs: Dofs) -> tuple[NDArray[np.int32], sp.csr_array]:
