@@ -104,3 +104,21 @@ def test_peak_ignores_points_that_failed() -> None:
     run = Run(omega, ones, np.ones(3, dtype=np.int64), np.array([True, False, True]),
               np.zeros(3, dtype=bool), np.zeros((3, 1, 1)), amplitude, ones, 1.0, 1, 1)
     assert find_peak(run) == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize(("at_7", "word"), [(1.03, "truncation"), (1.0005, "within twice")])
+def test_the_difference_is_attributed(at_7: float, word: str) -> None:
+    from integration import INSTANTS, MANY_INSTANTS, Comparison, verdict
+    from measure import Run
+
+    def integrated(amplitude: float) -> Run:
+        one = np.ones(1)
+        return Run(one, one, np.ones(1, dtype=np.int64), np.array([True]), np.array([False]),
+                   np.zeros((1, 1, 1)), np.array([[amplitude]]), one, 1.0, 1, 1)
+
+    comparison = Comparison("2500", 1011.5, {(7, INSTANTS, 1.0): at_7,
+                                             (7, MANY_INSTANTS, 1.0): at_7 + 1e-4},
+                            {1000: integrated(0.999), 2000: integrated(1.0)})
+    assert word in verdict(comparison)
+    assert comparison.difference(7) == pytest.approx(at_7 - 1.0)
+    assert math.isnan(comparison.difference(15))
