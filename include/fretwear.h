@@ -134,7 +134,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    (n_pairs, 3):          "contact/fraction" of the period in stick, slip and open
    (n_pairs):             "contact/dissipation", energy per cycle
    "history/observed", "history/force", "history/relative_displacement",
-   "floquet/multipliers", "floquet/stable": where the case asks for them. */
+   "floquet/multipliers", "floquet/stable": where the case asks for them.
+   "wear/cycles" (1), "wear/depth" and "wear/rate" (n_pairs): of the steps of a wear run. */
 int fw_size(fw_handle handle, const char *name, int point, size_t *n);
 int fw_get(fw_handle handle, const char *name, int point, size_t n, double *values);
 

@@ -16,7 +16,8 @@ module fw_point_values
       [character(29) :: 'omega', 'coefficients', 'amplitude', 'converged', 'iterations', &
        'residual', 'seconds', 'fold', 'contact/force', 'contact/fraction', &
        'contact/dissipation', 'history/observed', 'history/force', &
-       'history/relative_displacement', 'floquet/multipliers', 'floquet/stable']
+       'history/relative_displacement', 'floquet/multipliers', 'floquet/stable', &
+       'wear/cycles', 'wear/depth', 'wear/rate']
 
 contains
 
@@ -73,6 +74,12 @@ contains
                                                [size(point%multipliers), 2])), &
                              [2*size(point%multipliers)])
          end if
+      case ('wear/cycles')
+         if (allocated(point%depth)) values = [point%cycles]
+      case ('wear/depth')
+         if (allocated(point%depth)) values = point%depth
+      case ('wear/rate')
+         if (allocated(point%wear_rate)) values = point%wear_rate
       case default
          call unknown_name(name, error)
          return
@@ -80,7 +87,8 @@ contains
       if (allocated(values)) return
       call fatal_error(error, "the point holds no '"//name//"': histories need "// &
                        'output%histories = .true., contact values contact pairs and '// &
-                       'output%contact = .true., Floquet multipliers sweep%stability = .true.', &
+                       'output%contact = .true., Floquet multipliers sweep%stability = '// &
+                       ".true., wear case%analysis = 'wear'", &
                        status_usage)
    end subroutine get_point_values
 

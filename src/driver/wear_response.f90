@@ -87,9 +87,10 @@ contains
          march%stepper = new_wear_stepper(case%wear, solver%method%newton)
          call march%run(system, state, recorder, error)
       else
-         march%ending = why_no_vibration(balance, solver)
+         march%ending = 'the vibration of the unworn joint did not converge: nothing was worn'
          call writer%add_point(point, error)
          call summary%add(point)
+         call observer%on_point(1, 0, point)
       end if
       call observer%on_end()
       if (.not. allocated(error)) then
@@ -105,9 +106,9 @@ contains
       call recorder%rows%close()
    end subroutine run_wear
 
-   function cycles_units(case) result(units)
+   pure function cycles_units(case) result(units)
       type(case_type), intent(in) :: case
-      character(:), allocatable :: units
+      character(merge(21, 6, case%wear%scheme == wear_pseudo_time)) :: units
 
       units = 'cycles'
       if (case%wear%scheme == wear_pseudo_time) units = 'pseudo-time in cycles'
@@ -137,15 +138,6 @@ contains
       state%residual = point%residual
    end subroutine first_state
 
-   !> In words, why there is no vibration to start from.
-   function why_no_vibration(system, solver) result(reason)
-      type(hbm_system), intent(inout) :: system
-      type(point_solver), intent(inout) :: solver
-      character(:), allocatable :: reason
-
-      reason = 'the vibration of the unworn joint did not converge: nothing was worn'
-   end function why_no_vibration
-
    !> A state of the march becomes a row of the result.
    subroutine take(self, system, state, iterations, go_on, error)
       class(wear_recorder), intent(inout) :: self
@@ -158,9 +150,12 @@ contains
       integer(int64) :: clock, rate
       integer :: n
 
-      go_on = .true.
+      go_on = .false.
       n = system%n_vibration()
       point%omega = system%structure%omega
+      point%cycles = state%cycles
+      point%depth = state%x(n + 1:)
+      point%wear_rate = state%rate
       point%iterations = iterations
       point%residual = state%residual
       point%converged = state%residual <= self%case%solver%tolerance .and. &

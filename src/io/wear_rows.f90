@@ -1,4 +1,6 @@
 !> The datasets of group /wear of a result file: one row per accepted step, the start included.
+!> Nothing is written where there is no file. HDF5 serves one thread at a time: every procedure
+!> waits for its turn.
 module fw_wear_rows
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
@@ -25,19 +27,32 @@ module fw_wear_rows
       integer, allocatable, private :: patch_of(:)
       integer, private :: n_patches = 1
    contains
-      procedure :: create
+      procedure :: create => create_datasets
       procedure :: append => append_row
       procedure :: state_outcome
-      procedure :: close
+      procedure :: close => close_datasets
    end type wear_row_set
 
 contains
+
+   subroutine create_datasets(self, file, contact, cycles_units, error)
+      class(wear_row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(contact_type), intent(in) :: contact
+      !> 'cycles', or what stands for them.
+      character(*), intent(in) :: cycles_units
+      type(error_type), allocatable, intent(out) :: error
+
+      if (file%id < 0) return
+      !$omp critical (fretwear_io)
+      call create(self, file, contact, cycles_units, error)
+      !$omp end critical (fretwear_io)
+   end subroutine create_datasets
 
    subroutine create(self, file, contact, cycles_units, error)
       class(wear_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       type(contact_type), intent(in) :: contact
-      !> 'cycles', or what stands for them.
       character(*), intent(in) :: cycles_units
       type(error_type), allocatable, intent(out) :: error
       integer, parameter :: scalar(0) = [integer ::]
@@ -108,14 +123,17 @@ contains
       real(wp) :: volume(self%n_patches)
       integer :: k
 
+      if (.not. self%list(d_cycles)%is_created()) return
       do k = 1, self%n_patches
          volume(k) = sum(self%area*depth, mask=self%patch_of == k)
       end do
+      !$omp critical (fretwear_io)
       call self%list(d_cycles)%append(file, cycles, error)
       if (.not. allocated(error)) call self%list(d_depth)%append(file, depth, error)
       if (.not. allocated(error)) call self%list(d_rate)%append(file, rate, error)
       if (.not. allocated(error)) call self%list(d_energy)%append(file, energy, error)
       if (.not. allocated(error)) call self%list(d_volume)%append(file, volume, error)
+      !$omp end critical (fretwear_io)
    end subroutine append_row
 
    !> Whether a steady state was reached, on the group and at the root of the file.
@@ -129,19 +147,23 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. self%list(d_cycles)%is_created()) return
+      !$omp critical (fretwear_io)
       call write_attribute(file, '/wear', 'steady_state', steady_state, error)
       if (.not. allocated(error)) call write_attribute(file, '/wear', 'ending', ending, error)
       if (.not. allocated(error)) call write_attribute(file, '/', 'steady_state', steady_state, &
                                                        error)
+      !$omp end critical (fretwear_io)
    end subroutine state_outcome
 
-   subroutine close(self)
+   subroutine close_datasets(self)
       class(wear_row_set), intent(inout) :: self
       integer :: i
 
+      !$omp critical (fretwear_io)
       do i = 1, n_datasets
          call self%list(i)%close()
       end do
-   end subroutine close
+      !$omp end critical (fretwear_io)
+   end subroutine close_datasets
 
 end module fw_wear_rows

@@ -4,7 +4,7 @@
  *    threads sector_16.h5 directory
  *
  * The cases differ in what they use: model files and result files (HDF5), long transforms (FFTW),
- * MINPACK, KINSOL, CVODE, steps of their own and wrong input. */
+ * MINPACK, KINSOL, CVODE, wear, steps of their own and wrong input. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,12 +12,18 @@
 
 #include <fretwear.h>
 
-enum { n_cases = 8, n_rounds = 3, most_values = 200000 };
+enum { n_cases = 9, n_rounds = 3, most_values = 200000 };
+
+/* Cases that are run as a whole always: steps write no file and wear nothing. */
+static int only_whole(int number)
+{
+   return number == 6 || number == 7;
+}
 
 static const char *model_path, *directory;
 
 /* Keys of a case, on top of those of all; the last two are refused. */
-static const char *const keys[n_cases][4][2] = {
+static const char *const keys[n_cases][5][2] = {
    {{"solver%kind", "newton"}},
    {{"harmonics%n_harmonics", "40"}, {"harmonics%n_time", "1024"}, {"sweep%n_points", "2"}},
    {{"solver%kind", "kinsol"}},
@@ -25,6 +31,8 @@ static const char *const keys[n_cases][4][2] = {
    {{"solver%kind", "pseudo_time"}, {"pseudo_time%scheme", "bdf"}, {"sweep%n_points", "2"}},
    {{"contact%mu", "0.3"}, {"harmonics%n_harmonics", "5"}},
    {{"contact%mu", "0.7"}, {"output%file", "result.h5"}},
+   {{"case%analysis", "wear"}, {"wear%coefficient", "1e-9"}, {"wear%max_depth_step", "1e-4"},
+    {"wear%max_steps", "3"}, {"sweep%start", "1023"}},
    {{"contact%mu", "-1"}, {"solver%tolerence", "1e-9"}},
 };
 
@@ -39,13 +47,13 @@ struct task {
 static void collect(fw_handle handle, struct task *task)
 {
    static const char *const names[] = {"omega", "coefficients", "amplitude", "residual",
-      "contact/force", "contact/fraction", "contact/dissipation"};
+      "contact/force", "contact/fraction", "contact/dissipation", "wear/depth", "wear/cycles"};
    int n_points;
 
    task->n_values = 0;
    if (fw_count(handle, "points", &n_points) != FW_OK) exit(11);
    for (int k = 0; k < n_points; k++)
-      for (int i = 0; i < 7; i++) {
+      for (int i = 0; i < (task->number == 7 ? 9 : 7); i++) {
          size_t n;
          if (fw_size(handle, names[i], k, &n) != FW_OK) exit(12);
          if (task->n_values + n > most_values) exit(13);
@@ -73,7 +81,7 @@ static void *run(void *argument)
    fw_set(handle, "sweep%start", "1017");
    fw_set(handle, "sweep%end", "1029");
    fw_set(handle, "sweep%n_points", "13");
-   for (int i = 0; i < 4 && keys[task->number][i][0]; i++) {
+   for (int i = 0; i < 5 && keys[task->number][i][0]; i++) {
       const char *value = keys[task->number][i][1];
       if (!strcmp(keys[task->number][i][0], "output%file")) {
          snprintf(path, sizeof path, "%s/%s", directory, value);
@@ -130,13 +138,13 @@ int main(int argc, char **argv)
       run(&alone[i]);
       printf("case %d: status %d, %d values\n", i, alone[i].status, alone[i].n_values);
       if (i == n_cases - 1) continue;
-      together[i].steps = i != 6; /* steps write no file */
+      together[i].steps = !only_whole(i);
       run(&together[i]);
       failures += differs(&alone[i], &together[i], "in steps");
    }
    for (int round = 0; round < n_rounds; round++) {
       for (int i = 0; i < n_cases; i++) {
-         together[i].steps = (round + i) % 2 && i != 6;
+         together[i].steps = (round + i) % 2 && !only_whole(i);
          together[i].n_values = 0;
          if (pthread_create(&threads[i], NULL, run, &together[i])) return 19;
       }
