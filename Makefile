@@ -64,7 +64,10 @@ test: build ## every test; the last line counts the cases
 
 lint: build/deps.stamp ## type checker and linter of the Python code
 	@$(PYTHON) -m mypy
-	@$(PYTHON) -m ruff check python conftest.py bench
+	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench
+
+wheel: build/deps.stamp ## the package in a fresh environment, used as the README says
+	@tools/check_install.sh build/wheel
 
 bench: build ## error against run time, written to docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py speed
@@ -82,4 +85,4 @@ bench-full: build ## every part of docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py all
 
 clean: ## remove everything built but the Python environment
-	rm -rf $(BUILD) build/debug $(RUN)
+	rm -rf $(BUILD) build/debug build/wheel $(RUN)

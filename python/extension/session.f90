@@ -21,11 +21,11 @@ module fw_python_session
    implicit none (type, external)
    private
 
-   public :: session_type, new_session, session_of, control_size
+   public :: session_type, new_session, session_of
 
    !> Places in the array through which Python and a run see each other: Python sets the first to
    !> stop the run; the run counts its points in the second, of those in the third (0: not known).
-   integer, parameter :: control_stop = 1, control_done = 2, control_total = 3, control_size = 3
+   integer, parameter :: control_stop = 1, control_done = 2, control_total = 3
 
    type :: session_type
       !> The model of the calling program, where it gives one.

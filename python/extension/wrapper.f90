@@ -14,7 +14,6 @@ module fw_python
    use fw_model, only: model_type
    use fw_python_operators, only: build_condensation
    use fw_python_operators, only: unpack_jacobian
-   use fw_python_session, only: control_size
    use fw_python_session, only: new_session
    use fw_python_session, only: session_of
    use fw_python_session, only: session_type
