@@ -68,7 +68,10 @@ def _has(*names: str) -> Callable[[Result], bool]:
 
 def _has_cycle(result: Result) -> bool:
     """Whether the period of the pairs is stored or can be recovered."""
-    if "contact/force" not in result or "wear/depth" in result:
+    if "contact/force" not in result:
+        return False
+    # A wear analysis has one row of both for each of its steps.
+    if "wear/depth" in result and len(result.depth) != result.n_points:
         return False
     try:
         return "history/force" in result or model_path(result) is None or (

@@ -39,16 +39,9 @@ def _when(result: Result, step: int) -> str:
 
 
 def _abscissa(result: Result) -> str:
-    """What the steps of the scheme advance in."""
-    pseudo = "pseudo_time" in result.namelist and "scheme = 'pseudo_time'" in _group(
-        result.namelist, "wear")
-    return "pseudo-time" if pseudo else "cycles"
-
-
-def _group(namelist: str, name: str) -> str:
-    """Text of one group of a namelist."""
-    _, _, rest = namelist.partition(f"&{name}\n")
-    return rest.partition("\n/")[0]
+    """What the steps of the scheme advance in: cycles, or what stands for them."""
+    units = result.units("wear/cycles")
+    return "cycles" if units in ("", "1") else units
 
 
 def plot_wear_maps(source: Source, step: int | None = None) -> Figure:
@@ -122,17 +115,25 @@ def plot_wear_evolution(source: Source) -> Figure:
     panels[0].set_ylabel(label("wear depth", units_of(result, "wear/depth")))
     panels[0].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     largest = rate.max(axis=1)
-    panels[1].plot(cycles, np.where(largest > 0.0, largest, np.nan), ".-", color=CURVE)
-    if (largest > 0.0).any():
+    wears = bool((largest > 0.0).any())
+    # A joint that sticks has a rate of exactly zero, which has no place on a logarithmic axis.
+    shown = np.where(largest > 0.0, largest, np.nan) if wears else largest
+    panels[1].plot(cycles, shown, ".-", color=CURVE)
+    if wears:
         panels[1].set_yscale("log")
     panels[1].set_ylabel(label("largest depth\nper cycle", units_of(result, "wear/rate")))
     if has_amplitude:
         panels[2].plot(cycles, result.amplitude[:, 0], ".-", color=CURVE)
         panels[2].set_ylabel(label(f"amplitude\nof {result.observed[0]}",
                                    units_of(result, "amplitude")))
-    panels[-1].ticklabel_format(axis="x", scilimits=(-3, 4), useMathText=True)
+    positive = cycles[cycles > 0.0]
+    if positive.size and positive[-1] > 100.0 * positive[0]:
+        # The rate falls over decades of cycles; the start, at zero, stays in the picture.
+        panels[-1].set_xscale("symlog", linthresh=positive[0])
+    else:
+        panels[-1].ticklabel_format(axis="x", scilimits=(-3, 4), useMathText=True)
     panels[0].ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
-    panels[-1].set_xlabel(f"{_abscissa(result)} [1]")
+    panels[-1].set_xlabel(label(_abscissa(result), "1"))
     for axes in panels:
         tidy(axes)
     state = result.steady_state

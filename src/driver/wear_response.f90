@@ -71,7 +71,8 @@ contains
       recorder%writer => writer
       recorder%summary => summary
       call system_clock(recorder%clock)
-      call recorder%rows%create(writer%file, case%contact, cycles_units(case), error)
+      call recorder%rows%create(writer%file, case%contact, case%model%unit_system, &
+                                cycles_units(case), error)
       if (.not. allocated(error)) call recorder%rows%state_outcome(writer%file, &
          steady_words(steady_not_reached), 'incomplete', error)
       if (allocated(error)) return

@@ -53,7 +53,9 @@ module fw_result_labels
                  'relative displacement t1, t2, n over one period'), &
       label_type('/wear/cycles', '1', 'step', 'cycles of vibration'), &
       label_type('/wear/depth', '<length>', 'step pair', 'wear depth'), &
-      label_type('/wear/rate', '<length>', 'step pair', 'wear depth per cycle')]
+      label_type('/wear/rate', '<length>', 'step pair', 'wear depth per cycle'), &
+      label_type('/wear/energy', '<energy>', 'step pair', 'accumulated friction energy'), &
+      label_type('/wear/volume', '<volume>', 'step patch', 'worn volume of the patch')]
 
 contains
 
@@ -80,8 +82,8 @@ contains
       if (len(units) > 0) call write_attribute(file, name, 'units', units, error)
    end subroutine label_dataset
 
-   !> The unit of a quantity: '<length>', '<area>', '<force>' or '<energy>' of the unit system,
-   !> '' where that is not known; anything else is a unit already.
+   !> The unit of a quantity: '<length>', '<area>', '<volume>', '<force>' or '<energy>' of the
+   !> unit system, '' where that is not known; anything else is a unit already.
    function unit_of(quantity, unit_system) result(unit)
       character(*), intent(in) :: quantity
       character(:), allocatable, intent(in) :: unit_system
@@ -100,6 +102,8 @@ contains
          unit = words(length)%text
       case ('<area>')
          unit = words(length)%text//'^2'
+      case ('<volume>')
+         unit = words(length)%text//'^3'
       case ('<force>')
          unit = words(force)%text
       case ('<energy>')

@@ -10,6 +10,7 @@ module fw_wear_rows
    use fw_hdf5, only: write_attribute
    use fw_hdf5, only: write_text
    use fw_kinds, only: wp
+   use fw_result_labels, only: label_dataset
    use fw_text_list, only: append
    use fw_text, only: string_type
    implicit none (type, external)
@@ -35,24 +36,28 @@ module fw_wear_rows
 
 contains
 
-   subroutine create_datasets(self, file, contact, cycles_units, error)
+   subroutine create_datasets(self, file, contact, unit_system, cycles_units, error)
       class(wear_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       type(contact_type), intent(in) :: contact
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
       !> 'cycles', or what stands for them.
       character(*), intent(in) :: cycles_units
       type(error_type), allocatable, intent(out) :: error
 
       if (file%id < 0) return
       !$omp critical (fretwear_io)
-      call create(self, file, contact, cycles_units, error)
+      call create(self, file, contact, unit_system, cycles_units, error)
       !$omp end critical (fretwear_io)
    end subroutine create_datasets
 
-   subroutine create(self, file, contact, cycles_units, error)
+   subroutine create(self, file, contact, unit_system, cycles_units, error)
       class(wear_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       type(contact_type), intent(in) :: contact
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
       character(*), intent(in) :: cycles_units
       type(error_type), allocatable, intent(out) :: error
       integer, parameter :: scalar(0) = [integer ::]
@@ -75,20 +80,13 @@ contains
       if (allocated(error)) return
       call write_text(file, '/wear/patch', patches, error)
       if (allocated(error)) return
-      call describe('/wear/cycles', cycles_units)
-      call describe('/wear/depth', 'length')
-      call describe('/wear/rate', 'length / cycle')
-      call describe('/wear/energy', 'force * length')
-      call describe('/wear/volume', 'length**3')
-
-   contains
-
-      subroutine describe(name, units)
-         character(*), intent(in) :: name, units
-
-         if (.not. allocated(error)) call write_attribute(file, name, 'units', units, error)
-      end subroutine describe
-
+      call label_dataset(file, '/wear/cycles', unit_system, error)
+      if (.not. allocated(error)) &
+         call write_attribute(file, '/wear/cycles', 'units', cycles_units, error)
+      if (.not. allocated(error)) call label_dataset(file, '/wear/depth', unit_system, error)
+      if (.not. allocated(error)) call label_dataset(file, '/wear/rate', unit_system, error)
+      if (.not. allocated(error)) call label_dataset(file, '/wear/energy', unit_system, error)
+      if (.not. allocated(error)) call label_dataset(file, '/wear/volume', unit_system, error)
    end subroutine create
 
    !> Patches in the order of their first pair; without names all pairs form one.
