@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.util
 import sys
 from collections.abc import Sequence
 
@@ -53,8 +52,6 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     wanted = next((word for word in words if not word.startswith("-")), None)
     for name, (module_name, purpose) in COMMANDS.items():
-        if importlib.util.find_spec(f"fretwear.{module_name}") is None:
-            continue
         command = commands.add_parser(name, help=purpose, description=purpose.capitalize() + ".",
                                       allow_abbrev=False)
         if name == wanted:

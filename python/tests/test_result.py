@@ -13,7 +13,7 @@ import pytest
 
 import fretwear
 from fretwear import InputError, OutputError
-from fretwear.cli import main
+from fretwear.cli import COMMANDS, main
 from fretwear.result import Result
 
 CASE = Path(__file__).resolve().parents[2] / "example" / "jenkins" / "jenkins.nml"
@@ -104,3 +104,18 @@ def test_the_command_names_its_version_and_refuses_what_it_does_not_know(
         main(["plto"])
     assert ended.value.code == 2
     assert "plto" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_subcommand_explains_itself(command: str,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.startswith(f"usage: fretwear {command}")
+
+
+def test_a_file_that_cannot_be_read_is_a_message_and_a_status(
+        capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["plot", str(tmp_path / "none.h5")]) == OutputError.exit_status
+    assert capsys.readouterr().err.startswith("fretwear plot: error: ")
