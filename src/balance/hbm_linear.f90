@@ -39,13 +39,13 @@ contains
       if (self%rigid .and. self%reduced) then
          do i = 1, self%contact%n_pairs
             do c = 1, 3
-               if (self%joint%row(c, i) == 0 .or. self%contact%state(i) == pair_open) cycle
+               if (self%joint%row(c, i) == 0 .or. self%contact%linear_state(i) == pair_open) cycle
                j = self%coordinate_of(c, i)
                ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
                if (c < 3 .and. self%velocity_level) cycle
-               pinned(j) = self%contact%state(i) == pair_stuck .or. &
+               pinned(j) = self%contact%linear_state(i) == pair_stuck .or. &
                            (c == 3 .and. self%pins_normals .and. self%contact%always_closed(i))
-               wanted(j) = self%contact%state(i) == pair_mixed
+               wanted(j) = self%contact%linear_state(i) == pair_mixed
             end do
          end do
       end if
@@ -179,14 +179,14 @@ contains
       call to_real(self%fourier, m, self%complex_out, dr)
       if (.not. self%rigid) return
       do i = 1, self%contact%n_pairs
-         if (self%contact%state(i) == pair_open) cycle
+         if (self%contact%linear_state(i) == pair_open) cycle
          self%pair_in(:, i) = 0.0_wp
          do c = 1, 3
             if (self%joint%row(c, i) == 0) cycle
             self%pair_in((c - 1)*nc + 1:c*nc, i) = -dr(self%coordinate_of(c, i), :)
          end do
          self%pair_out(:, i) = self%pair_in(:, i)
-         if (self%contact%state(i) == pair_mixed) then
+         if (self%contact%linear_state(i) == pair_mixed) then
             call dgemv('T', 3*nc, 3*nc, 1.0_wp, self%contact%jacobian(1, 1, i), 3*nc, &
                        self%pair_in(1, i), 1, 0.0_wp, self%pair_out(1, i), 1)
          end if
@@ -311,9 +311,9 @@ contains
       !$omp parallel do default(none) shared(self, n_rows, vector, spread_out, n) private(i) &
       !$omp schedule(static) if(n_rows > threads_pay_from)
       do i = 1, self%contact%n_pairs
-         if (self%contact%state(i) == pair_open) cycle
+         if (self%contact%linear_state(i) == pair_open) cycle
          call gather_inputs(self, i, n_rows, vector, spread_out, self%pair_in(:, i))
-         if (self%contact%state(i) == pair_mixed) then
+         if (self%contact%linear_state(i) == pair_mixed) then
             call dgemv('T', n, n, 1.0_wp, self%contact%jacobian(1, 1, i), n, self%pair_in(1, i), &
                1, &
                        0.0_wp, self%pair_out(1, i), 1)
@@ -348,7 +348,8 @@ contains
             end do
             if (.not. self%rigid) cycle
             if (c < 3 .and. self%velocity_level) then
-               call differentiate_inputs(self, self%contact%state(pair) == pair_stuck, inputs(:, c))
+               call differentiate_inputs(self, self%contact%linear_state(pair) == pair_stuck, &
+                                         inputs(:, c))
             end if
             place = self%place(r%coordinate(r%first(row)))
             if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
@@ -385,7 +386,7 @@ contains
       nc = self%fourier%n_coefficients
       associate (r => self%joint%relative)
          do i = 1, self%contact%n_pairs
-            if (self%contact%state(i) == pair_open) cycle
+            if (self%contact%linear_state(i) == pair_open) cycle
             do c = 1, 3
                row = self%joint%row(c, i)
                if (row == 0) cycle
@@ -469,12 +470,12 @@ contains
       k = self%fourier%column(h)
       nc = self%fourier%n_coefficients
       do i = 1, self%contact%n_pairs
-         if (self%contact%state(i) == pair_open) cycle
+         if (self%contact%linear_state(i) == pair_open) cycle
          do c_out = 1, 3
             if (self%joint%row(c_out, i) == 0) cycle
             do c_in = 1, 3
                if (self%joint%row(c_in, i) == 0) cycle
-               if (self%contact%state(i) == pair_mixed) then
+               if (self%contact%linear_state(i) == pair_mixed) then
                   mean = mean_block(self%contact%jacobian(:, :, i), self%fourier%harmonic(h), &
                                     (c_in - 1)*nc + k, (c_out - 1)*nc + k)
                else
@@ -499,7 +500,7 @@ contains
       n = self%fourier%harmonic(h)
       factor = one
       if (self%velocity_level .and. c_in < 3) factor = cmplx(0.0_wp, n, wp)
-      if (n == 0 .and. self%contact%state(pair) == pair_stuck) factor = one
+      if (n == 0 .and. self%contact%linear_state(pair) == pair_stuck) factor = one
       associate (r => self%joint%relative, row => self%joint%row, na => self%n_active)
          do e = r%first(row(c_out, pair)), r%first(row(c_out, pair) + 1) - 1
             p_out = self%place(r%coordinate(e))

@@ -72,6 +72,9 @@ module fw_forces
       logical, allocatable :: settled(:)
       !> pair_stuck, pair_open or pair_mixed (n_pairs).
       integer, allocatable :: state(:)
+      !> The states at which `linearize` was called last: a derivative may be kept while the forces
+      !> move on.
+      integer, allocatable :: linear_state(:)
       !> Transposed derivative of the force by the prediction of each pair:
       !> (coefficient, component) of the input, then of the output, pair.
       real(wp), allocatable :: jacobian(:, :, :)
@@ -121,7 +124,7 @@ contains
          source=0.0_wp)
       allocate (self%turns(n), source=0)
       allocate (self%settled(n), source=.false.)
-      allocate (self%state(n), source=pair_stuck)
+      allocate (self%state(n), self%linear_state(n), source=pair_stuck)
    end function new_forces
 
    !> Contact forces from the predicted ones.
@@ -325,6 +328,7 @@ contains
       real(wp) :: x(2)
       integer :: i, nc
 
+      self%linear_state = self%state
       if (.not. any(self%state == pair_mixed)) return
       nc = fourier%n_coefficients
       if (.not. allocated(self%jacobian)) allocate (self%jacobian(3*nc, 3*nc, self%n_pairs))

@@ -85,7 +85,8 @@ contains
          call new_wear_system(balance, case%contact, case%wear%coefficient, &
                               case%wear%law == wear_energy, system)
          call first_state(system, solver%x, point, state)
-         march%stepper = new_wear_stepper(case%wear, solver%method%newton)
+         march%stepper = new_wear_stepper(case%wear, case%pseudo_time%scheme, &
+                                           solver%method%newton)
          call march%run(system, state, recorder, error)
       else
          march%ending = 'the vibration of the unworn joint did not converge: nothing was worn'

@@ -33,10 +33,10 @@ module fw_wear_march
    !> Halvings of a step in a row after which the march gives up.
    integer, parameter :: max_halvings = 40
    !> Limits of the change of the step from one to the next, and its safety factor.
-   real(wp), parameter :: largest_growth = 4.0_wp, smallest_shrink = 0.2_wp, safety = 0.9_wp
+   real(wp), parameter :: largest_growth = 8.0_wp, smallest_shrink = 0.2_wp, safety = 0.9_wp
    !> Growth of the first step, where only the error is controlled, as a part of the elastic
    !> compression of the pairs.
-   real(wp), parameter :: first_growth = 1.0e-2_wp
+   real(wp), parameter :: first_growth = 2.0e-2_wp
    !> Change of the rates, as a part of the largest, that counts as none; a pair bears and wears
    !> above these parts of the largest pressure and rate.
    real(wp), parameter :: unchanged = 1.0e-2_wp, bears = 1.0e-6_wp, wears = 1.0e-3_wp

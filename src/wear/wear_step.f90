@@ -5,6 +5,9 @@ module fw_wear_step
    use fw_kinds, only: wp
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
+   use fw_solver_options, only: scheme_rosenbrock
+   use fw_wear_rosenbrock, only: rosenbrock_order
+   use fw_wear_rosenbrock, only: rosenbrock_step
    use fw_wear_options, only: wear_explicit
    use fw_wear_options, only: wear_options
    use fw_wear_options, only: wear_pseudo_time
@@ -36,6 +39,8 @@ module fw_wear_step
 
    type :: wear_stepper
       integer :: scheme = wear_explicit
+      !> Scheme of the pseudo-time.
+      integer :: pseudo_scheme = scheme_rosenbrock
       integer :: order = 1
       type(newton_solver) :: newton
       !> Largest depth that a step may add, which pseudo-time enforces [length].
@@ -59,8 +64,10 @@ module fw_wear_step
 contains
 
    !> The stepper of a case; the Newton solver brings its options.
-   function new_wear_stepper(options, newton) result(self)
+   function new_wear_stepper(options, pseudo_scheme, newton) result(self)
       type(wear_options), intent(in) :: options
+      !> Scheme of the pseudo-time (fw_solver_options).
+      integer, intent(in) :: pseudo_scheme
       type(newton_solver), intent(in) :: newton
       type(wear_stepper) :: self
 
@@ -69,7 +76,10 @@ contains
       self%controls_error = options%controls_error()
       self%order = options%order
       if (self%order == 0) self%order = automatic_order(options)
-      if (options%scheme == wear_pseudo_time) self%order = 1
+      self%pseudo_scheme = pseudo_scheme
+      if (options%scheme == wear_pseudo_time) then
+         self%order = merge(rosenbrock_order, 1, pseudo_scheme == scheme_rosenbrock)
+      end if
       self%tableau = new_tableau(self%order)
       if (options%max_depth_step > 0.0_wp) self%max_depth_step = options%max_depth_step
    end function new_wear_stepper
@@ -97,7 +107,11 @@ contains
       case (wear_explicit)
          call explicit_step(self, system, before, cycles, after, report)
       case (wear_pseudo_time)
-         call linear_step(self, system, before, cycles, after, report)
+         if (self%pseudo_scheme == scheme_rosenbrock) then
+            call high_order_step(self, system, before, cycles, after, report)
+         else
+            call linear_step(self, system, before, cycles, after, report)
+         end if
       case default
          call implicit_step(self, system, before, cycles, after, report)
       end select
@@ -217,5 +231,28 @@ contains
       after%rate = system%rate
       after%residual = norm
    end subroutine linear_step
+
+   !> Rosenbrock's method; the depths of a step that overshoots are its error estimate's business.
+   subroutine high_order_step(self, system, before, cycles, after, report)
+      type(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      real(wp), intent(in) :: cycles
+      type(wear_state), intent(out) :: after
+      type(wear_step_report), intent(inout) :: report
+      logical :: done
+      integer :: n
+
+      n = system%n_vibration()
+      if (.not. allocated(self%r)) allocate (self%r(system%n), self%step(system%n))
+      allocate (after%x(system%n))
+      call rosenbrock_step(system, self%newton%linear, linear_tolerance, before%x, cycles, &
+                           after%x, report%error, report%iterations, done)
+      if (.not. done) return
+      call system%residual(after%x, self%r)
+      after%rate = system%rate
+      after%residual = norm2(self%r(:n))/system%reference
+      report%converged = after%residual <= largest_lag
+   end subroutine high_order_step
 
 end module fw_wear_step

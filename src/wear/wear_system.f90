@@ -49,6 +49,7 @@ module fw_wear_system
       procedure :: hold_depths
       procedure :: free_depths
       procedure :: update_rate
+      procedure :: force_of_depth
       procedure :: mean_pressure
       procedure :: compression
       procedure :: feels_depth
@@ -129,6 +130,15 @@ contains
       self%rate = self%factor*self%contact%slip
    end subroutine update_rate
 
+   !> Depths in the units in which residuals count them [force].
+   pure function force_of_depth(self, depth) result(force)
+      class(wear_system), intent(in) :: self
+      real(wp), intent(in) :: depth(:)
+      real(wp) :: force(size(depth))
+
+      force = self%weight*depth
+   end function force_of_depth
+
    !> Mean compressive force of every pair at the last point [force].
    pure function mean_pressure(self) result(pressure)
       class(wear_system), intent(in) :: self
@@ -175,7 +185,7 @@ contains
       call self%hbm_system%linearize(self%n_balance)
       self%n_wearing = 0
       do i = 1, self%contact%n_pairs
-         if (self%contact%state(i) /= pair_mixed) cycle
+         if (self%contact%linear_state(i) /= pair_mixed) cycle
          self%n_wearing = self%n_wearing + 1
          self%wearing(self%n_wearing) = i
       end do
@@ -214,7 +224,7 @@ contains
       associate (rel => self%joint%relative)
          do i = 1, self%contact%n_pairs
             row = self%joint%row(3, i)
-            if (row == 0 .or. self%contact%state(i) /= pair_stuck) cycle
+            if (row == 0 .or. self%contact%linear_state(i) /= pair_stuck) cycle
             do e = rel%first(row), rel%first(row + 1) - 1
                associate (entry => self%adjusted(rel%coordinate(e)))
                   entry = entry - rel%coefficient(e)*self%stiffness(i, 3)/self%weight(i)*r(n + i)
