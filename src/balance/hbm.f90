@@ -169,7 +169,8 @@ contains
       allocate (self%preconditioner(nh))
    end subroutine new_hbm
 
-   !> eps of the order of the local static stiffness, one for both tangential directions (the
+   !> eps of the order of the local static stiffness (that of another direction where a coordinate
+   !> has none: any value above zero serves), one for both tangential directions (the
    !> friction law is isotropic) and one for the normal. Directions that nothing moves do not
    !> count, whether they are left out or not.
    subroutine set_stiffness(self, contact)
@@ -190,6 +191,9 @@ contains
             counts = self%joint%row(1:2, i) > 0 .and. .not. self%joint%idle(1:2, i)
             if (.not. any(counts)) counts = self%joint%row(1:2, i) > 0
             stiffness(1:2) = sum(stiffness(1:2), mask=counts)/real(max(1, count(counts)), wp)
+            if (maxval(stiffness) <= 0.0_wp) stiffness = largest_stiffness(self)
+            where (stiffness <= 0.0_wp .and. self%joint%row(:, i) > 0) stiffness &
+               = maxval(stiffness)
             self%stiffness(i, :) = contact%penalty_scale*stiffness
          else
             if (any(self%joint%row(1:2, i) > 0)) self%stiffness(i, 1:2) &
@@ -198,6 +202,18 @@ contains
          end if
       end do
    end subroutine set_stiffness
+
+   !> Largest static stiffness of all coordinates, or 1.
+   real(wp) function largest_stiffness(self) result(stiffness)
+      type(hbm_system), intent(in) :: self
+      integer :: j
+
+      stiffness = 0.0_wp
+      do j = 1, self%structure%n_coordinates
+         stiffness = max(stiffness, local_stiffness(self, j))
+      end do
+      if (stiffness <= 0.0_wp) stiffness = 1.0_wp
+   end function largest_stiffness
 
    !> Static stiffness of a coordinate, or the dynamic one where nothing holds it statically.
    real(wp) function local_stiffness(self, coordinate) result(stiffness)

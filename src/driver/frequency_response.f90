@@ -4,6 +4,7 @@ module fw_frequency_response
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
    use fw_branch, only: run_branch
+   use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
    use fw_hbm, only: hbm_system
    use fw_observer, only: observer_type
@@ -31,6 +32,7 @@ contains
       type(hbm_system), target :: system
       type(point_solver) :: solver
       type(point_type) :: point
+      character(:), allocatable :: reason
       integer :: k, n_points
 
       call build_system(case, system, error)
@@ -63,6 +65,9 @@ contains
       call observer%on_end()
       call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
       if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
+      if (allocated(error) .or. summary%n_converged > 0 .or. observer%stop_requested) return
+      call explain_failure(system, solver%method, reason)
+      call observer%on_message('not converged: '//reason)
    end subroutine run_frequency_response
 
    !> One point of a sweep, starting from what the solver knows of the points before it.

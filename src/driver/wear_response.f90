@@ -2,8 +2,8 @@
 module fw_wear_response
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
+   use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
-   use fw_guess, only: held_without_friction
    use fw_hbm, only: hbm_system
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
@@ -15,7 +15,6 @@ module fw_wear_response
    use fw_result, only: result_writer
    use fw_solution, only: is_lasting
    use fw_summary, only: summary_type
-   use fw_text, only: to_text
    use fw_wear_march, only: steady_not_reached
    use fw_wear_march, only: steady_words
    use fw_wear_march, only: wear_march
@@ -63,6 +62,7 @@ contains
       type(wear_march) :: march
       type(wear_state) :: state
       type(error_type), allocatable :: row_error
+      character(:), allocatable :: reason
 
       call build_system(case, balance, error)
       if (allocated(error)) return
@@ -88,8 +88,14 @@ contains
          march%stepper = new_wear_stepper(case%wear, case%pseudo_time%scheme, &
                                            solver%method%newton)
          call march%run(system, state, recorder, error)
+         if (march%gave_up .and. .not. allocated(error)) then
+            balance%depth = state%x(system%n_vibration() + 1:)
+            call explain_failure(balance, solver%method, reason)
+            march%ending = march%ending//': '//reason
+         end if
       else
-         march%ending = 'the vibration of the unworn joint did not converge: nothing was worn'
+         call explain_failure(balance, solver%method, reason)
+         march%ending = 'nothing was worn: '//reason
          call writer%add_point(point, error)
          call summary%add(point)
          call observer%on_point(1, 0, point)

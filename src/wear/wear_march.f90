@@ -31,7 +31,7 @@ module fw_wear_march
    integer, parameter :: steady_reached = 1, steady_not_reached = 2, steady_gross_slip = 3
 
    !> Halvings of a step in a row after which the march gives up.
-   integer, parameter :: max_halvings = 40
+   integer, parameter :: max_halvings = 20
    !> Limits of the change of the step from one to the next, and its safety factor.
    real(wp), parameter :: largest_growth = 8.0_wp, smallest_shrink = 0.2_wp, safety = 0.9_wp
    !> Growth of the first step, where only the error is controlled, as a part of the elastic
@@ -70,6 +70,8 @@ module fw_wear_march
       integer :: n_rejected = 0
       !> All that was asked for has been covered: a steady state, the cycles, or gross slip.
       logical :: complete = .false.
+      !> No step was short enough to converge.
+      logical :: gave_up = .false.
       !> How the march ended.
       character(:), allocatable :: ending
       !> Step that the error allows next (0: not known yet).
@@ -161,7 +163,7 @@ contains
       self%checked_depth = depth
       self%checked_rate = state%rate
       if (changed) return
-      if (system%feels_depth() .and. depth < system%compression()) return
+      if (depth < system%compression()) return
       pressure = system%mean_pressure()
       found = all(state%rate >= wears*maxval(state%rate) .or. pressure <= bears*maxval(pressure))
    end function in_gross_slip
@@ -186,7 +188,8 @@ contains
          if (report%converged) call confirm(self, system, after, report, iterations)
          if (.not. report%converged) then
             halvings = halvings + 1
-            if (halvings > max_halvings) then
+            self%gave_up = halvings > max_halvings
+            if (self%gave_up) then
                self%ending = 'no step from cycle '//to_text(state%cycles)// &
                              ' on converges, down to '//to_text(cycles)//' cycles'
                return
@@ -237,7 +240,7 @@ contains
       cycles = self%next_cycles
       if (cycles <= 0.0_wp) then
          cycles = huge(1.0_wp)
-         if (self%options%controls_error()) cycles = first_growth*system%compression()/rate
+         if (self%options%controls_error()) cycles = first_growth*system%depth_scale()/rate
       end if
       if (self%options%max_depth_step > 0.0_wp) then
          cycles = min(cycles, self%options%max_depth_step/rate)

@@ -52,7 +52,7 @@ module fw_wear_system
       procedure :: force_of_depth
       procedure :: mean_pressure
       procedure :: compression
-      procedure :: feels_depth
+      procedure :: depth_scale
       procedure :: residual
       procedure :: linearize
       procedure :: reduce
@@ -145,24 +145,35 @@ contains
       real(wp) :: pressure(self%contact%n_pairs)
 
       pressure = self%normal_load
-      if (self%feels_depth()) pressure = merge(-self%contact%force(:, 3, 1), pressure, &
+      if (any(self%joint%row(3, :) > 0)) pressure = merge(-self%contact%force(:, 3, 1), pressure, &
                                                self%joint%row(3, :) > 0)
    end function mean_pressure
 
    !> Largest elastic compression of a pair at the last point: the depth that would unload it
-   !> alone [length].
+   !> alone [length]. Pairs pressed by dead loads do not count; zero where all are.
    pure real(wp) function compression(self)
       class(wear_system), intent(in) :: self
+      real(wp) :: pressure(self%contact%n_pairs), stiffness
+      integer :: i
 
-      compression = maxval(self%mean_pressure()/self%weight)
+      compression = 0.0_wp
+      pressure = self%mean_pressure()
+      do i = 1, self%contact%n_pairs
+         if (self%joint%row(3, i) == 0) cycle
+         stiffness = self%stiffness(i, 3)
+         if (self%rigid) stiffness = self%structure%static_stiffness(self%coordinate_of(3, i))
+         if (stiffness > 0.0_wp) compression = max(compression, pressure(i)/stiffness)
+      end do
    end function compression
 
-   !> Whether the depth acts on the forces: normal loads may all be constant.
-   pure logical function feels_depth(self)
+   !> Depth with which steps may start [length]: the compression, or the slide of a pair under a
+   !> dead load.
+   pure real(wp) function depth_scale(self)
       class(wear_system), intent(in) :: self
 
-      feels_depth = any(self%joint%row(3, :) > 0)
-   end function feels_depth
+      depth_scale = self%compression()
+      if (depth_scale <= 0.0_wp) depth_scale = maxval(self%mean_pressure()/self%weight)
+   end function depth_scale
 
    subroutine residual(self, x, r)
       class(wear_system), intent(inout) :: self

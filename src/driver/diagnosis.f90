@@ -1,0 +1,81 @@
+!> Why a joint has no periodic vibration, where none was found: in words that say what to change.
+module fw_diagnosis
+   use fw_error, only: error_type
+   use fw_guess, only: held_without_friction
+   use fw_guess, only: stuck_guess
+   use fw_hbm, only: hbm_system
+   use fw_kinds, only: wp
+   use fw_newton, only: solver_report
+   use fw_solution, only: solution_method
+   implicit none (type, external)
+   private
+
+   public :: explain_failure
+
+   !> Halvings of the interval in which the largest share of the load is looked for that converges.
+   integer, parameter :: n_halvings = 6
+
+contains
+
+   !> Solve the static position, then for the largest share of the vibratory load that has a
+   !> periodic solution, at the frequency and depths of the system.
+   subroutine explain_failure(system, method, reason)
+      type(hbm_system), intent(inout), target :: system
+      type(solution_method), intent(inout) :: method
+      character(:), allocatable, intent(out) :: reason
+      real(wp) :: x(system%n), lower, upper
+      character(8) :: percent
+      logical :: done
+      integer :: k
+
+      call stuck_guess(system, x)
+      call solve_share(system, method, 0.0_wp, x, done)
+      if (.not. done) then
+         reason = 'the joint cannot carry its static load: no position at rest was found; it '// &
+                  'needs more preload, friction or support, or a smaller static load'
+      else
+         lower = 0.0_wp
+         upper = 1.0_wp
+         do k = 1, n_halvings
+            call solve_share(system, method, 0.5_wp*(lower + upper), x, done)
+            if (done) then
+               lower = 0.5_wp*(lower + upper)
+            else
+               upper = 0.5_wp*(lower + upper)
+            end if
+         end do
+         write (percent, '(f6.1, a)') 100.0_wp*lower, ' %'
+         reason = 'above '//trim(adjustl(percent))//' of the vibratory load no periodic '// &
+                  'vibration was found'
+         if (.not. held_without_friction(system)) then
+            reason = 'the joint cannot carry its static load while it slides, for only '// &
+                     'friction holds it: '//reason//'; it needs more preload, friction or support'
+         end if
+      end if
+      call solve_share(system, method, 1.0_wp, x, done, only_set=.true.)
+   end subroutine explain_failure
+
+   !> Solve under a share of the vibratory load, from x, which stays where that fails.
+   subroutine solve_share(system, method, share, x, done, only_set)
+      type(hbm_system), intent(inout), target :: system
+      type(solution_method), intent(inout) :: method
+      real(wp), intent(in) :: share
+      real(wp), intent(inout), contiguous :: x(:)
+      logical, intent(out) :: done
+      !> Bring the system to the share and leave it there.
+      logical, intent(in), optional :: only_set
+      type(error_type), allocatable :: error
+      type(solver_report) :: report
+      real(wp) :: trial(size(x))
+
+      system%load_share = share
+      call system%set_frequency(system%structure%omega, error)
+      done = .not. allocated(error)
+      if (.not. done .or. present(only_set)) return
+      trial = x
+      call method%solve(system, trial, report)
+      done = report%converged
+      if (done) x = trial
+   end subroutine solve_share
+
+end module fw_diagnosis
