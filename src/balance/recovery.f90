@@ -83,7 +83,7 @@ contains
       n_pairs = system%contact%n_pairs
       all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
       allocate (force(n_pairs, 3, all_harmonics%n_coefficients))
-      call system%contact%coefficients(all_harmonics, force)
+      call system%contact%coefficients(system%fourier, all_harmonics, force)
       allocate (point%force(3, n_pairs, all_harmonics%n_coefficients))
       do c = 1, 3
          do i = 1, n_pairs

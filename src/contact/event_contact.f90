@@ -1,9 +1,10 @@
 !> Event-resolved contact forces of all pairs: from the coefficients of the predicted forces to
-!> those of the contact forces, and their derivative, without any sampling error. The instants of
-!> the transform only serve to isolate the events, for which four for each wave of the highest
-!> harmonic are enough.
+!> those of the contact forces, and their derivative. With one tangential direction there is no
+!> sampling error: the instants of the transform only isolate the events, for which four for each
+!> wave of the highest harmonic are enough. With two they are the steps of slip.
 module fw_event_contact
    use fw_event_pair, only: event_pair_type
+   use fw_event_planar, only: planar_pair_type
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
@@ -18,14 +19,23 @@ module fw_event_contact
 
    type :: event_contact_type
       integer :: n_pairs = 0
+      !> Pairs with at most one tangential direction, and those with two (n_pairs); each pair has
+      !> room in one of them.
       type(event_pair_type), allocatable :: pair(:)
+      type(planar_pair_type), allocatable :: planar(:)
+      logical, allocatable :: is_planar(:)
       !> Component of the one tangential direction of each pair, 0 where there is none.
       integer, allocatable :: direction(:)
+      !> Whether a pair bears throughout, or never; whether it ever slips or opens; change of the
+      !> position over the last turn (n_pairs).
+      logical, allocatable :: closed(:), open(:), moved(:)
+      real(wp), allocatable :: drift(:)
       !> Whether a normal dof exists (n_pairs).
       logical, allocatable :: has_normal(:)
       !> Coefficients (n_coefficients, 6, n_pairs) of P, P', P'', N, N', N'' and their samples.
       real(wp), allocatable, private :: batch(:, :, :), samples(:, :, :)
-      !> Coefficients of the contact forces (n_coefficients, tangential and normal, n_pairs).
+      !> Coefficients of the contact forces of pairs with one direction (n_coefficients, tangential
+      !> and normal, n_pairs).
       real(wp), allocatable, private :: out(:, :, :)
    contains
       procedure :: evaluate
@@ -52,10 +62,21 @@ contains
       integer :: i
 
       self%n_pairs = size(mu)
-      allocate (self%pair(self%n_pairs))
+      allocate (self%pair(self%n_pairs), self%planar(self%n_pairs))
+      allocate (self%closed(self%n_pairs), self%open(self%n_pairs), self%moved(self%n_pairs), &
+                source=.false.)
+      allocate (self%drift(self%n_pairs), source=0.0_wp)
+      self%is_planar = present(1, :) .and. present(2, :)
       self%direction = findloc(present(1:2, :), .true., dim=1)
       self%has_normal = present(3, :)
       do i = 1, self%n_pairs
+         if (self%is_planar(i)) then
+            call self%planar(i)%reserve(maxval(fourier%harmonic), fourier%n_time, &
+                                        fourier%n_coefficients)
+            self%planar(i)%mu = mu(i)
+            self%planar(i)%remembers = remembers
+            cycle
+         end if
          call self%pair(i)%reserve(maxval(fourier%harmonic), fourier%n_time, fourier%n_coefficients)
          self%pair(i)%curves%mu = mu(i)
          self%pair(i)%rubs = self%direction(i) > 0
@@ -78,17 +99,29 @@ contains
       real(wp), intent(inout) :: x(:, :)
       !> Coefficients of the contact forces (n_pairs, 3, n_coefficients).
       real(wp), intent(inout) :: force(:, :, :)
-      integer :: i
+      integer :: c, i
 
       call fill_batch(self, fourier, prediction)
       call dgemm('T', 'N', fourier%n_time, 6*self%n_pairs, fourier%n_coefficients, 1.0_wp, &
                  fourier%synthesis, fourier%n_coefficients, self%batch, fourier%n_coefficients, &
                  0.0_wp, self%samples, fourier%n_time)
-      !$omp parallel do default(none) shared(self, fourier, offset, x_start, force, x) private(i) &
-      !$omp schedule(dynamic) if(self%n_pairs > threads_pay_from)
+      !$omp parallel do default(none) private(c, i) schedule(dynamic) &
+      !$omp shared(self, fourier, prediction, offset, x_start, force, x) &
+      !$omp if(self%n_pairs > threads_pay_from)
       do i = 1, self%n_pairs
+         if (self%is_planar(i)) then
+            call evaluate_planar(self, i, fourier, prediction(i, :, :), offset(i), x_start(i, :))
+            do c = 1, 3
+               force(i, c, :) = self%planar(i)%force(:, c)
+            end do
+            x(i, :) = self%planar(i)%z_end
+            cycle
+         end if
          call evaluate_pair(self%pair(i), fourier, self%batch(:, :, i), self%samples(:, :, i), &
                             offset(i), x_start(i, max(1, self%direction(i))))
+         self%closed(i) = self%pair(i)%path%closed
+         self%open(i) = self%pair(i)%path%open
+         self%moved(i) = self%pair(i)%path%moved
          call collect(self%pair(i), fourier, self%out(:, :, i))
          force(i, :, :) = 0.0_wp
          x(i, :) = x_start(i, :)
@@ -156,6 +189,38 @@ contains
       call pair%follow(x_start)
    end subroutine evaluate_pair
 
+   !> A pair with two tangential directions.
+   subroutine evaluate_planar(self, i, fourier, prediction, offset, x_start)
+      type(event_contact_type), intent(inout) :: self
+      integer, intent(in) :: i
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: prediction(:, :), offset, x_start(:)
+      real(wp) :: start(2)
+      integer :: h, k, n
+
+      associate (pair => self%planar(i))
+         do h = 1, fourier%n_retained
+            n = fourier%harmonic(h)
+            k = fourier%column(h)
+            pair%tangential(n, 1, :) = prediction(1:2, k)
+            pair%normal(n, 1) = -prediction(3, k)
+            if (n == 0) cycle
+            pair%tangential(n, 2, :) = prediction(1:2, k + 1)
+            pair%normal(n, 2) = -prediction(3, k + 1)
+         end do
+         if (.not. fourier%has_constant()) pair%normal(0, 1) = 0.0_wp
+         pair%normal(0, 1) = pair%normal(0, 1) - offset
+         pair%values = self%samples(:, 4, i) - offset
+         pair%slopes = self%samples(:, 5, i)
+         start = x_start
+         call pair%follow(fourier, start)
+         self%closed(i) = pair%closed
+         self%open(i) = pair%open
+         self%moved(i) = pair%moved
+         self%drift(i) = pair%drift
+      end associate
+   end subroutine evaluate_planar
+
    !> Coefficients of the forces of a pair: projected exactly, or fitted at the instants of the
    !> collocation.
    subroutine collect(pair, fourier, force)
@@ -183,23 +248,31 @@ contains
 
    !> Transposed derivatives of pairs at the last evaluation: (coefficient, component) of the input,
    !> then of the output, pair.
-   subroutine linearize(self, fourier, wanted, jacobian)
+   subroutine linearize(self, fourier, wanted, x_start, jacobian)
       class(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
       !> Pairs to differentiate (n_pairs).
       logical, intent(in) :: wanted(:)
+      !> As in the evaluation (n_pairs, 2).
+      real(wp), intent(in) :: x_start(:, :)
       real(wp), intent(inout) :: jacobian(:, :, :)
       real(wp), allocatable :: block(:, :, :)
+      real(wp) :: start(2)
       integer :: i, nc, t, n
 
       nc = fourier%n_coefficients
       n = 2*nc
-      !$omp parallel default(none) shared(self, fourier, wanted, jacobian, nc, n) &
-      !$omp private(block, i, t) if(self%n_pairs > threads_pay_from)
+      !$omp parallel default(none) shared(self, fourier, wanted, x_start, jacobian, nc, n) &
+      !$omp private(block, start, i, t) if(self%n_pairs > threads_pay_from)
       allocate (block(nc, nc, 3))
       !$omp do schedule(dynamic)
       do i = 1, self%n_pairs
          if (.not. wanted(i)) cycle
+         if (self%is_planar(i)) then
+            start = x_start(i, :)
+            call self%planar(i)%derivative(fourier, start, jacobian(:, :, i))
+            cycle
+         end if
          jacobian(:, :, i) = 0.0_wp
          if (fourier%projects) then
             call self%pair(i)%derivative(fourier%n_retained, fourier%harmonic, fourier%column, &
@@ -239,16 +312,23 @@ contains
    end subroutine collocate
 
    !> Coefficients of the contact forces on any set of harmonics (n_pairs, 3, n_coefficients).
-   subroutine coefficients(self, fourier, force)
+   subroutine coefficients(self, fourier, computed, force)
       class(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
+      !> Harmonics of the last evaluation.
+      integer, intent(in) :: computed(:)
       real(wp), intent(inout) :: force(:, :, :)
-      real(wp) :: out(fourier%n_coefficients, 2)
+      real(wp) :: out(fourier%n_coefficients, 3)
       integer :: i, n
 
       force = 0.0_wp
       out = 0.0_wp
       do i = 1, self%n_pairs
+         if (self%is_planar(i)) then
+            call self%planar(i)%coefficients(fourier, computed, out)
+            force(i, :, :) = transpose(out)
+            cycle
+         end if
          ! Harmonics beyond those of the prediction are even ones, which symmetry makes vanish.
          n = count(fourier%harmonic <= self%pair(i)%curves%degree)
          call self%pair(i)%force(n, fourier%harmonic, fourier%column, out(:, 1), &
@@ -267,6 +347,11 @@ contains
 
       force = 0.0_wp
       do i = 1, self%n_pairs
+         if (self%is_planar(i)) then
+            force(i, 1:2, :) = self%planar(i)%on_grid
+            force(i, 3, :) = min(-self%planar(i)%values, 0.0_wp)
+            cycle
+         end if
          call self%pair(i)%values_at(size(force, 3), out(:, 1), out(:, 2))
          if (self%direction(i) > 0) force(i, self%direction(i), :) = out(:, 1)
          force(i, 3, :) = out(:, 2)
@@ -280,7 +365,11 @@ contains
       integer :: i
 
       do i = 1, self%n_pairs
-         path(i) = self%pair(i)%friction_path()
+         if (self%is_planar(i)) then
+            path(i) = self%planar(i)%friction_path
+         else
+            path(i) = self%pair(i)%friction_path()
+         end if
       end do
    end subroutine friction_path
 
@@ -291,7 +380,11 @@ contains
       integer :: i
 
       do i = 1, self%n_pairs
-         share(:, i) = self%pair(i)%shares()
+         if (self%is_planar(i)) then
+            share(:, i) = self%planar(i)%share
+         else
+            share(:, i) = self%pair(i)%shares()
+         end if
       end do
    end subroutine fractions
 

@@ -173,19 +173,22 @@ contains
    subroutine evaluate_events(self, fourier)
       type(forces_type), intent(inout) :: self
       type(fourier_type), intent(inout) :: fourier
-      integer :: i
+      integer :: i, k
 
       call self%events%evaluate(fourier, self%prediction, self%offset, self%x_start, self%force, &
                                 self%x)
       self%turns = 1
+      self%drift = self%events%drift
+      self%scale = 0.0_wp
+      do k = 1, fourier%n_coefficients
+         self%scale = self%scale + abs(self%prediction(:, 1, k)) + abs(self%prediction(:, 2, k))
+      end do
       do i = 1, self%n_pairs
-         associate (path => self%events%pair(i)%path)
-            self%pressure(i) = merge(1.0_wp, 0.0_wp, path%closed)
-            self%margin(i) = merge(-1.0_wp, 0.0_wp, path%moved)
-            self%state(i) = pair_mixed
-            if (path%open) self%state(i) = pair_open
-            if (path%closed .and. .not. path%moved) self%state(i) = pair_stuck
-         end associate
+         self%pressure(i) = merge(1.0_wp, 0.0_wp, self%events%closed(i))
+         self%margin(i) = merge(-1.0_wp, 0.0_wp, self%events%moved(i))
+         self%state(i) = pair_mixed
+         if (self%events%open(i)) self%state(i) = pair_open
+         if (self%events%closed(i) .and. .not. self%events%moved(i)) self%state(i) = pair_stuck
       end do
       if (self%measures_slip) call self%friction_path(self%slip)
    end subroutine evaluate_events
@@ -199,13 +202,15 @@ contains
 
    !> Coefficients of the contact forces on another set of harmonics over the same instants
    !> (n_pairs, 3, n_coefficients).
-   subroutine coefficients(self, fourier, force)
+   subroutine coefficients(self, computed, fourier, force)
       class(forces_type), intent(inout) :: self
+      !> Harmonics of the last evaluation, and those wanted.
+      type(fourier_type), intent(in) :: computed
       type(fourier_type), intent(inout) :: fourier
       real(wp), intent(inout) :: force(:, :, :)
 
       if (allocated(self%events)) then
-         call self%events%coefficients(fourier, force)
+         call self%events%coefficients(fourier, computed%harmonic, force)
       else
          call fourier%to_coefficients(3*self%n_pairs, self%force_time, force)
       end if
@@ -333,7 +338,7 @@ contains
       nc = fourier%n_coefficients
       if (.not. allocated(self%jacobian)) allocate (self%jacobian(3*nc, 3*nc, self%n_pairs))
       if (allocated(self%events)) then
-         call self%events%linearize(fourier, self%state == pair_mixed, self%jacobian)
+         call self%events%linearize(fourier, self%state == pair_mixed, self%x_start, self%jacobian)
          return
       end if
       !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i) &

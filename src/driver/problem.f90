@@ -34,7 +34,7 @@ module fw_problem
    integer, parameter :: instants_friction = 16, instants_separation = 32
    integer, parameter :: fewest_instants = 64
    !> Instants at least where the events decide and instants only isolate them.
-   integer, parameter :: fewest_for_events = 8
+   integer, parameter :: fewest_for_events = 8, fewest_for_planar = 32
 
 contains
 
@@ -57,12 +57,6 @@ contains
       if (allocated(error)) return
       call choose_harmonics(case, joint, fourier, error)
       if (allocated(error)) return
-      if (case%harmonics%sampling == sampling_events .and. &
-          any(joint%row(1, :) > 0 .and. joint%row(2, :) > 0)) then
-         call fatal_error(error, "&harmonics sampling = 'events' takes pairs with one "// &
-                          "tangential direction that moves: use 'uniform'", status_input)
-         return
-      end if
       range = case%sweep%start
       if (case%analysis == analysis_frf) then
          range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
@@ -156,7 +150,7 @@ contains
       n_time = 2*h + 2
       if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
       if (case%harmonics%sampling == sampling_events) then
-         n_time = max(n_time, least_events(case))
+         n_time = max(n_time, least_events(case, any(all(joint%row(1:2, :) > 0, dim=1))))
       else if (case%contact%n_pairs > 0) then
          n_time = max(n_time, fewest_instants, instants_friction*h)
          if (any(joint%row(3, :) > 0)) n_time = max(n_time, instants_separation*h)
@@ -164,12 +158,16 @@ contains
       n_time = n_time + modulo(n_time, 2)
    end function automatic_n_time
 
-   !> Instants that isolate the events: twice the 2H+1 of a collocation, which then lie evenly.
-   pure integer function least_events(case) result(n_time)
+   !> Instants that isolate the events, twice the 2H+1 of a collocation, which then lie evenly; or
+   !> cells of the quadrature over slip in two directions, four times as many.
+   pure integer function least_events(case, planar) result(n_time)
       type(case_type), intent(in) :: case
+      !> Whether a pair has two tangential directions.
+      logical, intent(in) :: planar
       integer :: n_points
 
       n_time = max(fewest_for_events, 2*(2*case%harmonics%n_harmonics + 1))
+      if (planar) n_time = max(fewest_for_planar, 4*(2*case%harmonics%n_harmonics + 1))
       n_points = case%harmonics%n_collocation
       if (case%harmonics%method /= method_tcm_least_squares .or. n_points == 0) return
       n_time = n_points*((n_time + n_points - 1)/n_points)

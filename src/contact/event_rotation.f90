@@ -1,0 +1,172 @@
+!> The direction of slip in the plane. A pair that slips has T = R (cos phi, sin phi), R = mu N, and
+!> R phi' = P'.n with n = (-sin phi, cos phi). Up to its length the half-angle vector
+!> v = (cos phi/2, sin phi/2) obeys the linear equation
+!>
+!>   v' = A v,   A = 1/2 [[a_x, a_y], [a_y, -a_x]],   a = P'/R,
+!>
+!> whose exponential is closed (A is traceless, so that A**2 is a multiple of the identity). A step
+!> takes Magnus' series of fourth order at the two Gauss points (Iserles and Norsett 1999):
+!>
+!>   v_1 = exp(Omega) v_0,   Omega = h/2 (A_1 + A_2) - sqrt(3)/12 h**2 [A_1, A_2].
+!>
+!> Where a pair lands, R = 0 and a is infinite, but phi is smooth: there it is a quadratic that
+!> satisfies the equation at the Gauss points.
+module fw_event_rotation
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: gauss_point, rotate, rotation_derivative, direction_of, half_angle
+   public :: arc_type, new_arc
+
+   !> Places of the two Gauss points in a step.
+   real(wp), parameter :: gauss_point(2) = [0.5_wp - sqrt(3.0_wp)/6.0_wp, &
+                                            0.5_wp + sqrt(3.0_wp)/6.0_wp]
+   !> Factor of h**2 (a_2 x a_1) in the antisymmetric part of Omega.
+   real(wp), parameter :: commutator = sqrt(3.0_wp)/24.0_wp
+   integer, parameter :: newton_steps = 20
+
+   !> phi = phi_0 + slope s + curvature s**2 behind a landing.
+   type :: arc_type
+      real(wp) :: slope = 0.0_wp, curvature = 0.0_wp
+      !> Matrix of the two conditions by slope and curvature, inverted.
+      real(wp) :: inverse(2, 2) = 0.0_wp
+   end type arc_type
+
+contains
+
+   !> Unit vector of the angle whose half v holds.
+   pure function direction_of(v) result(t)
+      real(wp), intent(in) :: v(2)
+      real(wp) :: t(2)
+
+      t(1) = (v(1) - v(2))*(v(1) + v(2))
+      t(2) = 2.0_wp*v(1)*v(2)
+   end function direction_of
+
+   !> Half-angle vector of the direction of d.
+   pure function half_angle(d) result(v)
+      real(wp), intent(in) :: d(2)
+      real(wp) :: v(2)
+      real(wp) :: phi
+
+      phi = 0.5_wp*atan2(d(2), d(1))
+      v = [cos(phi), sin(phi)]
+   end function half_angle
+
+   !> Omega = [[p, q + r], [q - r, -p]] of a step.
+   pure subroutine exponent(h, a_1, a_2, p, q, r)
+      real(wp), intent(in) :: h, a_1(2), a_2(2)
+      real(wp), intent(out) :: p, q, r
+
+      p = 0.25_wp*h*(a_1(1) + a_2(1))
+      q = 0.25_wp*h*(a_1(2) + a_2(2))
+      r = commutator*h**2*(a_2(1)*a_1(2) - a_2(2)*a_1(1))
+   end subroutine exponent
+
+   !> exp(Omega) = cosh (1 + ratio Omega): ratio = tanh(s)/s, s**2 = p**2 + q**2 - r**2, its
+   !> derivative by s**2, and 1/cosh**2.
+   pure subroutine hyperbolic(square, ratio, slope, decay)
+      real(wp), intent(in) :: square
+      real(wp), intent(out) :: ratio, slope, decay
+      !> Below this the series are exact to round-off.
+      real(wp), parameter :: small = 1.0e-3_wp
+      !> tanh(s)/s in powers of s**2.
+      real(wp), parameter :: c(0:5) = [1.0_wp, -1.0_wp/3.0_wp, 2.0_wp/15.0_wp, -17.0_wp/315.0_wp, &
+                                       62.0_wp/2835.0_wp, -1382.0_wp/155925.0_wp]
+      real(wp) :: s, t
+      integer :: k
+
+      if (abs(square) < small) then
+         ratio = c(5)
+         slope = 5.0_wp*c(5)
+         do k = 4, 0, -1
+            ratio = c(k) + square*ratio
+            if (k > 0) slope = real(k, wp)*c(k) + square*slope
+         end do
+         decay = 1.0_wp - square*ratio**2
+         return
+      end if
+      s = sqrt(abs(square))
+      if (square > 0.0_wp) then
+         t = tanh(s)
+         decay = 1.0_wp - t**2
+      else
+         t = tan(s)
+         decay = 1.0_wp + t**2
+      end if
+      ratio = t/s
+      slope = (decay - ratio)/(2.0_wp*square)
+   end subroutine hyperbolic
+
+   !> Half-angle vector after a step (of length 1).
+   pure function rotate(h, a_1, a_2, v) result(after)
+      !> Length of the step, P'/R at its Gauss points, and the vector before it.
+      real(wp), intent(in) :: h, a_1(2), a_2(2), v(2)
+      real(wp) :: after(2)
+      real(wp) :: p, q, r, ratio, slope, decay
+
+      call exponent(h, a_1, a_2, p, q, r)
+      call hyperbolic(p**2 + q**2 - r**2, ratio, slope, decay)
+      after = [v(1) + ratio*(p*v(1) + (q + r)*v(2)), v(2) + ratio*((q - r)*v(1) - p*v(2))]
+      after = after/norm2(after)
+   end function rotate
+
+   !> Derivatives of phi after a step by phi before it and by a at the Gauss points.
+   pure subroutine rotation_derivative(h, a_1, a_2, v, gain, by_a_1, by_a_2)
+      real(wp), intent(in) :: h, a_1(2), a_2(2), v(2)
+      real(wp), intent(out) :: gain, by_a_1(2), by_a_2(2)
+      real(wp) :: p, q, r, ratio, slope, decay, m(2), after(2), by(3), square
+
+      call exponent(h, a_1, a_2, p, q, r)
+      call hyperbolic(p**2 + q**2 - r**2, ratio, slope, decay)
+      m = [p*v(1) + (q + r)*v(2), (q - r)*v(1) - p*v(2)]
+      after = v + ratio*m
+      square = dot_product(after, after)
+      ! The determinant of the exponential is 1.
+      gain = decay/square
+      by(1) = cross(after, 2.0_wp*slope*p*m + ratio*[v(1), -v(2)])
+      by(2) = cross(after, 2.0_wp*slope*q*m + ratio*[v(2), v(1)])
+      by(3) = cross(after, -2.0_wp*slope*r*m + ratio*[v(2), -v(1)])
+      by = 2.0_wp*by/square
+      by_a_1 = 0.25_wp*h*by(1:2) + commutator*h**2*by(3)*[-a_2(2), a_2(1)]
+      by_a_2 = 0.25_wp*h*by(1:2) + commutator*h**2*by(3)*[a_1(2), -a_1(1)]
+   end subroutine rotation_derivative
+
+   pure real(wp) function cross(a, b)
+      real(wp), intent(in) :: a(2), b(2)
+
+      cross = a(1)*b(2) - a(2)*b(1)
+   end function cross
+
+   !> The quadratic behind a landing, over a step of length h in the direction v at its start.
+   pure function new_arc(h, v, p_slope, radius, slope) result(arc)
+      !> P' (2, Gauss point), R (Gauss point), and phi' at the landing.
+      real(wp), intent(in) :: h, v(2), p_slope(2, 2), radius(2), slope
+      type(arc_type) :: arc
+      real(wp) :: f(2), j(2, 2), t(2), s, determinant, change(2), phi, angle
+      integer :: i, k
+
+      arc%slope = slope
+      phi = 2.0_wp*atan2(v(2), v(1))
+      do k = 1, newton_steps
+         do i = 1, 2
+            s = gauss_point(i)*h
+            angle = phi + arc%slope*s + arc%curvature*s**2
+            t = [cos(angle), sin(angle)]
+            f(i) = radius(i)*(arc%slope + 2.0_wp*arc%curvature*s) - cross(t, p_slope(:, i))
+            j(i, 1) = radius(i) + s*dot_product(t, p_slope(:, i))
+            j(i, 2) = 2.0_wp*radius(i)*s + s**2*dot_product(t, p_slope(:, i))
+         end do
+         determinant = j(1, 1)*j(2, 2) - j(1, 2)*j(2, 1)
+         if (abs(determinant) <= 0.0_wp) return
+         arc%inverse(1, :) = [j(2, 2), -j(1, 2)]/determinant
+         arc%inverse(2, :) = [-j(2, 1), j(1, 1)]/determinant
+         change = arc%inverse(:, 1)*f(1) + arc%inverse(:, 2)*f(2)
+         arc%slope = arc%slope - change(1)
+         arc%curvature = arc%curvature - change(2)
+         if (maxval(abs(change)*[h, h**2]) <= 1.0e-14_wp) return
+      end do
+   end function new_arc
+
+end module fw_event_rotation
