@@ -18,7 +18,8 @@ program events
    call random_init(.true., .true.)
    call random_number(numbers)
    numbers = 2.0_wp*numbers - 1.0_wp
-   write (output_unit, '(a)') 'directions,n_harmonics,sampling,n_time,evaluate_us,linearize_us,error'
+   write (output_unit, '(a)') 'directions,n_harmonics,sampling,n_time,'// &
+      'evaluate_us,linearize_us,error'
    do d = 1, 2
       do h = 1, size(harmonics)
          call compare(d, harmonics(h))
