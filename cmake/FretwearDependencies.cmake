@@ -20,6 +20,6 @@ find_dependency(OpenMP COMPONENTS Fortran)
 find_dependency(FFTW3)
 find_dependency(MINPACK)
 find_dependency(HDF5 COMPONENTS Fortran)
-set(fretwear_sundials fcvode farkode fkinsol
+set(fretwear_sundials fcvode farkode fida fkinsol
   fnvecserial fsunmatrixdense fsunlinsoldense fsunlinsolspgmr)
 find_dependency(SUNDIALSFortran COMPONENTS ${fretwear_sundials})

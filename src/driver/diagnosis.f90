@@ -36,6 +36,11 @@ contains
       else
          lower = 0.0_wp
          upper = 1.0_wp
+         call solve_share(system, method, upper, x, done)
+         if (done) then
+            reason = 'the vibration itself converges from its position at rest'
+            return
+         end if
          do k = 1, n_halvings
             call solve_share(system, method, 0.5_wp*(lower + upper), x, done)
             if (done) then

@@ -55,11 +55,11 @@ contains
       type(summary_type), intent(inout), target :: summary
       type(error_type), allocatable, intent(out) :: error
       type(hbm_system), target :: balance
-      type(wear_system) :: system
+      type(wear_system), target :: system
       type(point_solver) :: solver
       type(point_type) :: point
       type(wear_recorder), target :: recorder
-      type(wear_march) :: march
+      type(wear_march), target :: march
       type(wear_state) :: state
       type(error_type), allocatable :: row_error
       character(:), allocatable :: reason

@@ -12,7 +12,8 @@ module fw_available
    use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
                                  solver_pseudo_time, continuation_words, &
                                 continuation_natural, continuation_arclength
-   use fw_wear_options, only: wear_explicit
+   use fw_solver_options, only: scheme_runge_kutta
+   use fw_wear_options, only: wear_explicit, wear_pseudo_time
    implicit none (type, external)
    private
 
@@ -66,6 +67,13 @@ contains
       !> The derivative of the sliding path is known for sampled forces.
       subroutine check_wear()
          if (allocated(error) .or. case%analysis /= analysis_wear) return
+         if (case%wear%scheme == wear_pseudo_time .and. &
+             case%pseudo_time%scheme == scheme_runge_kutta) then
+            call fatal_error(error, "pseudo_time%scheme = 'runge_kutta' does not step wear, "// &
+                             "which is stiff: use 'implicit_euler', 'rosenbrock' or 'bdf'", &
+                             status_input)
+            return
+         end if
          if (case%harmonics%sampling == sampling_uniform) return
          if (case%wear%scheme == wear_explicit) return
          call fatal_error(error, "wear%scheme = 'implicit' and 'pseudo_time' need "// &

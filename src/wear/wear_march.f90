@@ -11,7 +11,9 @@
 module fw_wear_march
    use fw_kinds, only: wp
    use fw_error, only: error_type
+   use fw_solver_options, only: scheme_bdf
    use fw_text, only: to_text
+   use fw_wear_bdf, only: bdf_integrator
    use fw_wear_options, only: wear_explicit
    use fw_wear_options, only: wear_options
    use fw_wear_options, only: wear_pseudo_time
@@ -80,6 +82,7 @@ module fw_wear_march
       real(wp) :: largest_rate = 0.0_wp
       real(wp) :: checked_depth = 0.0_wp
       real(wp), allocatable :: checked_rate(:)
+      type(bdf_integrator), private :: bdf
    contains
       procedure :: run
    end type wear_march
@@ -88,8 +91,8 @@ contains
 
    !> March from a settled state (residual, rates known); the last state is left in it.
    subroutine run(self, system, state, observer, error)
-      class(wear_march), intent(inout) :: self
-      type(wear_system), intent(inout) :: system
+      class(wear_march), intent(inout), target :: self
+      type(wear_system), intent(inout), target :: system
       type(wear_state), intent(inout) :: state
       class(wear_observer), intent(inout) :: observer
       type(error_type), allocatable, intent(out) :: error
@@ -100,17 +103,23 @@ contains
       iterations = 0
       do
          call observer%take(system, state, iterations, go_on, error)
-         if (allocated(error)) return
+         if (allocated(error)) exit
          call judge(self, system, state)
          if (allocated(self%ending)) exit
          if (.not. go_on) then
             self%ending = 'stopped by its observer'
             exit
          end if
-         call one_step(self, system, state, after, iterations)
+         if (self%options%scheme == wear_pseudo_time .and. &
+             self%stepper%pseudo_scheme == scheme_bdf) then
+            call one_bdf_step(self, system, state, after, iterations)
+         else
+            call one_step(self, system, state, after, iterations)
+         end if
          if (allocated(self%ending)) exit
          state = after
       end do
+      call self%bdf%finish()
    end subroutine run
 
    !> Whether the march ends at this state, and why.
@@ -210,6 +219,34 @@ contains
       if (.not. self%options%controls_error()) self%next_cycles = largest_growth*cycles
       self%n_steps = self%n_steps + 1
    end subroutine one_step
+
+   !> One step of the differential-algebraic system: its integrator chooses length and order.
+   subroutine one_bdf_step(self, system, state, after, iterations)
+      type(wear_march), intent(inout), target :: self
+      type(wear_system), intent(inout), target :: system
+      type(wear_state), intent(in) :: state
+      type(wear_state), intent(out) :: after
+      integer, intent(out) :: iterations
+      type(wear_step_report) :: report
+      real(wp) :: scale
+
+      if (.not. self%bdf%is_started()) then
+         scale = first_growth*system%depth_scale()
+         call self%bdf%start(system, self%stepper%newton%linear, state%x, state%rate, &
+                             state%cycles, scale/maxval(state%rate), self%options%n_cycles, &
+                             self%options%tolerance(), scale, report%converged)
+      end if
+      allocate (after%x(size(state%x)))
+      call self%bdf%advance(after%x, after%cycles, iterations, report%converged)
+      if (report%converged) then
+         call self%stepper%evaluate(system, after)
+         call confirm(self, system, after, report, iterations)
+      end if
+      self%gave_up = .not. report%converged
+      if (self%gave_up) self%ending = 'no step from cycle '//to_text(state%cycles)// &
+                                      ' on converges: lower wear%error_tolerance'
+      self%n_steps = self%n_steps + 1
+   end subroutine one_bdf_step
 
    !> Pseudo-time steps leave a residual: a state that looks like the last has to be in equilibrium.
    subroutine confirm(self, system, after, report, iterations)

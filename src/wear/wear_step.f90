@@ -51,6 +51,7 @@ module fw_wear_step
       real(wp), allocatable, private :: r(:), step(:)
    contains
       procedure :: advance
+      procedure :: evaluate
       procedure :: settle
    end type wear_stepper
 
@@ -241,18 +242,25 @@ contains
       type(wear_state), intent(out) :: after
       type(wear_step_report), intent(inout) :: report
       logical :: done
-      integer :: n
 
-      n = system%n_vibration()
-      if (.not. allocated(self%r)) allocate (self%r(system%n), self%step(system%n))
       allocate (after%x(system%n))
       call rosenbrock_step(system, self%newton%linear, linear_tolerance, before%x, cycles, &
                            after%x, report%error, report%iterations, done)
       if (.not. done) return
-      call system%residual(after%x, self%r)
-      after%rate = system%rate
-      after%residual = norm2(self%r(:n))/system%reference
+      call self%evaluate(system, after)
       report%converged = after%residual <= largest_lag
    end subroutine high_order_step
+
+   !> Rates and residual of the vibration at a state.
+   subroutine evaluate(self, system, state)
+      class(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(inout) :: state
+
+      if (.not. allocated(self%r)) allocate (self%r(system%n), self%step(system%n))
+      call system%residual(state%x, self%r)
+      state%rate = system%rate
+      state%residual = norm2(self%r(:system%n_vibration()))/system%reference
+   end subroutine evaluate
 
 end module fw_wear_step

@@ -1,0 +1,292 @@
+!> Vibration and wear depth as a differential-algebraic system over the cycles N,
+!>
+!>   0 = R(q, w),   0 = w' - rate(q, w),
+!>
+!> by backward differentiation formulas of variable order and step: IDA (SUNDIALS; Hindmarsh et al.
+!> 2005) with SPGMR, whose preconditioner is the linear solution of the coupled system: one Krylov
+!> iteration mostly does, and the derivative is kept while it serves. Errors are controlled for the
+!> depths; the vibration follows them.
+module fw_wear_bdf
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use, intrinsic :: iso_c_binding, only: c_associated
+   use, intrinsic :: iso_c_binding, only: c_double
+   use, intrinsic :: iso_c_binding, only: c_f_pointer
+   use, intrinsic :: iso_c_binding, only: c_funloc
+   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use, intrinsic :: iso_c_binding, only: c_long
+   use, intrinsic :: iso_c_binding, only: c_null_ptr
+   use, intrinsic :: iso_c_binding, only: c_ptr
+   use fida_mod, only: fidacreate
+   use fida_mod, only: fidafree
+   use fida_mod, only: fidagetnumprecsolves
+   use fida_mod, only: fidainit
+   use fida_mod, only: fidaseterrhandlerfn
+   use fida_mod, only: fidasetid
+   use fida_mod, only: fidasetinitstep
+   use fida_mod, only: fidasetpreconditioner
+   use fida_mod, only: fidasetstoptime
+   use fida_mod, only: fidasetsuppressalg
+   use fida_mod, only: fidasetuserdata
+   use fida_mod, only: fidasolve
+   use fida_mod, only: fidawftolerances
+   use fida_mod, only: ida_one_step
+   use fsundials_linearsolver_mod, only: fsunlinsolfree
+   use fsundials_linearsolver_mod, only: sun_prec_left
+   use fsundials_linearsolver_mod, only: sunlinearsolver
+   use fsundials_nvector_mod, only: n_vector
+   use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr
+   use fw_kinds, only: wp
+   use fw_linear_step, only: linear_step_type
+   use fw_sundials, only: callback_fatal
+   use fw_sundials, only: callback_ok
+   use fw_sundials, only: callback_smaller
+   use fw_sundials, only: close_context
+   use fw_sundials, only: ignore_message
+   use fw_sundials, only: open_context
+   use fw_sundials, only: release
+   use fw_sundials, only: values
+   use fw_sundials, only: wrap
+   use fw_wear_system, only: wear_system
+   implicit none (type, external)
+   private
+
+   public :: bdf_integrator
+
+   !> What the callbacks need.
+   type :: bdf_state
+      type(wear_system), pointer :: system => null()
+      type(linear_step_type), pointer :: linear => null()
+      !> Error of a step, as a part of the largest depth; depth below which that stops falling.
+      real(wp) :: tolerance = 0.0_wp, least_depth = 0.0_wp
+      real(wp), allocatable :: r(:), step(:)
+   end type bdf_state
+
+   !> An integration from one state; not to be copied while it runs.
+   type :: bdf_integrator
+      type(bdf_state), pointer, private :: state => null()
+      type(c_ptr), private :: context = c_null_ptr, memory = c_null_ptr
+      type(n_vector), pointer, private :: y => null(), slope => null(), kind_of => null()
+      type(sunlinearsolver), pointer, private :: spgmr => null()
+      real(wp), pointer, contiguous, private :: y_values(:) => null(), slope_values(:) => null(), &
+                                                kind_values(:) => null()
+      !> Linear solutions so far.
+      integer :: n_solved = 0
+   contains
+      procedure :: is_started
+      procedure :: start
+      procedure :: advance
+      procedure :: finish
+   end type bdf_integrator
+
+   integer(c_int), parameter :: krylov_length = 5
+   !> Relative residual of the linear solutions.
+   real(wp), parameter :: linear_tolerance = 1.0e-3_wp
+
+   !> The Fortran interface of this function cannot say that there is no matrix: it takes an
+   !> object where C takes a null pointer. This is the function behind that interface.
+   interface
+      integer(c_int) function set_linear_solver(memory, solver, matrix) &
+         bind(c, name='_wrap_FIDASetLinearSolver')
+         import :: c_int, c_ptr
+         type(c_ptr), value :: memory, solver, matrix
+      end function set_linear_solver
+   end interface
+
+contains
+
+   logical function is_started(self)
+      class(bdf_integrator), intent(in) :: self
+
+      is_started = c_associated(self%memory)
+   end function is_started
+
+   !> Begin at x, where the depths grow by `rate`.
+   subroutine start(self, system, linear, x, rate, cycles, first_step, n_cycles, tolerance, &
+                    least_depth, done)
+      class(bdf_integrator), intent(inout) :: self
+      type(wear_system), intent(in), target :: system
+      type(linear_step_type), intent(in), target :: linear
+      real(wp), intent(in) :: x(:), rate(:)
+      !> Cycles now, those of the first step, and where the integration has to end.
+      real(wp), intent(in) :: cycles, first_step, n_cycles
+      !> See bdf_state.
+      real(wp), intent(in) :: tolerance, least_depth
+      logical, intent(out) :: done
+      integer :: n
+
+      n = system%n_vibration()
+      allocate (self%state)
+      allocate (self%y_values(size(x)), self%slope_values(size(x)), self%kind_values(size(x)))
+      allocate (self%state%r(size(x)), self%state%step(size(x)))
+      self%state%system => system
+      self%state%linear => linear
+      self%state%tolerance = tolerance
+      self%state%least_depth = least_depth
+      self%y_values = x
+      self%slope_values = 0.0_wp
+      self%slope_values(n + 1:) = rate
+      self%kind_values = 0.0_wp
+      self%kind_values(n + 1:) = 1.0_wp
+      call open_context(self%context, done)
+      if (.not. done) return
+      self%y => wrap(self%y_values, self%context)
+      self%slope => wrap(self%slope_values, self%context)
+      self%kind_of => wrap(self%kind_values, self%context)
+      self%memory = fidacreate(self%context)
+      done = c_associated(self%memory) .and. associated(self%y) .and. associated(self%slope) &
+             .and. associated(self%kind_of)
+      if (.not. done) return
+      self%spgmr => fsunlinsol_spgmr(self%y, sun_prec_left, krylov_length, self%context)
+      done = associated(self%spgmr)
+      if (done) call configure(self, cycles, first_step, n_cycles, done)
+   end subroutine start
+
+   subroutine configure(self, cycles, first_step, n_cycles, done)
+      class(bdf_integrator), intent(inout) :: self
+      real(wp), intent(in) :: cycles, first_step, n_cycles
+      logical, intent(out) :: done
+      integer(c_int) :: status(9)
+
+      status = 0
+      associate (memory => self%memory)
+         status(1) = fidaseterrhandlerfn(memory, c_funloc(ignore_message), c_null_ptr)
+         status(2) = fidainit(memory, c_funloc(evaluate), cycles, self%y, self%slope)
+         status(3) = fidasetuserdata(memory, c_loc(self%state))
+         status(4) = fidawftolerances(memory, c_funloc(weigh))
+         status(5) = fidasetid(memory, self%kind_of)
+         status(6) = fidasetsuppressalg(memory, 1_c_int)
+         status(7) = set_linear_solver(memory, c_loc(self%spgmr), c_null_ptr)
+         status(8) = fidasetpreconditioner(memory, c_funloc(set_up), c_funloc(precondition))
+         status(9) = fidasetinitstep(memory, first_step)
+         if (n_cycles < huge(1.0_wp)) status(9) = max(status(9), fidasetstoptime(memory, n_cycles))
+      end associate
+      done = all(status == 0)
+   end subroutine configure
+
+   !> One step of the length and order that the error allows.
+   subroutine advance(self, x, cycles, n_solved, done)
+      class(bdf_integrator), intent(inout) :: self
+      real(wp), intent(out) :: x(:)
+      real(wp), intent(out) :: cycles
+      !> Linear solutions of this step.
+      integer, intent(out) :: n_solved
+      logical, intent(out) :: done
+      real(c_double) :: reached(1)
+      integer(c_long) :: solved(1)
+      integer(c_int) :: status
+
+      status = fidasolve(self%memory, huge(1.0_wp), reached, self%y, self%slope, ida_one_step)
+      done = status >= 0
+      x = self%y_values
+      cycles = reached(1)
+      status = fidagetnumprecsolves(self%memory, solved)
+      n_solved = int(solved(1)) - self%n_solved
+      self%n_solved = int(solved(1))
+   end subroutine advance
+
+   subroutine finish(self)
+      class(bdf_integrator), intent(inout) :: self
+      integer(c_int) :: status
+
+      if (c_associated(self%memory)) call fidafree(self%memory)
+      self%memory = c_null_ptr
+      if (associated(self%spgmr)) status = fsunlinsolfree(self%spgmr)
+      nullify (self%spgmr)
+      call release(self%y)
+      call release(self%slope)
+      call release(self%kind_of)
+      call close_context(self%context)
+      if (associated(self%state)) deallocate (self%state)
+      if (associated(self%y_values)) deallocate (self%y_values, self%slope_values, self%kind_values)
+      self%n_solved = 0
+   end subroutine finish
+
+   !> Callback: weights of errors; the vibration has to be as accurate as the depths, relative to
+   !> its largest unknown.
+   integer(c_int) function weigh(y, weight, data) bind(c, name='') result(status)
+      type(n_vector), intent(inout) :: y, weight
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: x(:), w(:)
+      integer :: n
+
+      call c_f_pointer(data, state)
+      n = state%system%n_vibration()
+      x => values(y, state%system%n)
+      w => values(weight, state%system%n)
+      w(:n) = 1.0_wp/(state%tolerance*max(maxval(abs(x(:n))), tiny(1.0_wp)))
+      w(n + 1:) = 1.0_wp/(state%tolerance*max(maxval(abs(x(n + 1:))), state%least_depth))
+      status = callback_ok
+   end function weigh
+
+   !> Callback: residual of the system.
+   integer(c_int) function evaluate(cycles, y, slope, residual, data) bind(c, name='') &
+      result(status)
+      real(c_double), value :: cycles
+      type(n_vector), intent(inout) :: y, slope, residual
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: x(:), dx(:), f(:)
+      integer :: n
+
+      associate (cycles => cycles)
+      end associate
+      call c_f_pointer(data, state)
+      n = state%system%n_vibration()
+      x => values(y, state%system%n)
+      dx => values(slope, state%system%n)
+      f => values(residual, state%system%n)
+      call state%system%residual(x, f)
+      f(n + 1:) = state%system%force_of_depth(dx(n + 1:) - state%system%rate)
+      status = callback_ok
+      if (.not. ieee_is_finite(norm2(f))) status = callback_smaller
+   end function evaluate
+
+   !> Callback: derivative of the coupled system; an implicit step of 1/factor cycles has it.
+   integer(c_int) function set_up(cycles, y, slope, residual, factor, data) bind(c, name='') &
+      result(status)
+      real(c_double), value :: cycles, factor
+      type(n_vector), intent(inout) :: y, slope, residual
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: x(:)
+      logical :: done
+
+      associate (cycles => cycles, slope => slope, residual => residual)
+      end associate
+      call c_f_pointer(data, state)
+      x => values(y, state%system%n)
+      call state%system%begin_step(x(state%system%n_vibration() + 1:), 1.0_wp/factor)
+      call state%system%residual(x, state%r)
+      call state%linear%prepare(state%system, done)
+      status = merge(callback_ok, callback_smaller, done)
+   end function set_up
+
+   !> Callback: solve with that derivative.
+   integer(c_int) function precondition(cycles, y, slope, residual, right, solution, factor, &
+                                        accuracy, data) bind(c, name='') result(status)
+      real(c_double), value :: cycles, factor, accuracy
+      type(n_vector), intent(inout) :: y, slope, residual, right, solution
+      type(c_ptr), value :: data
+      type(bdf_state), pointer :: state
+      real(wp), pointer, contiguous :: z(:)
+      integer :: n
+      logical :: done
+
+      associate (cycles => cycles, factor => factor, accuracy => accuracy, y => y, &
+                 slope => slope, residual => residual)
+      end associate
+      call c_f_pointer(data, state)
+      n = state%system%n_vibration()
+      z => values(solution, state%system%n)
+      state%r = -values(right, state%system%n)
+      ! Its equations of the depths are those of the step, 1/factor times these.
+      state%r(n + 1:) = state%system%cycles*state%r(n + 1:)
+      call state%linear%solve_prepared(state%system, state%r, linear_tolerance, state%step, done)
+      z = state%step
+      status = merge(callback_ok, callback_smaller, done)
+      if (.not. ieee_is_finite(norm2(z))) status = callback_fatal
+   end function precondition
+
+end module fw_wear_bdf
