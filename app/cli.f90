@@ -13,6 +13,8 @@ module fw_cli
    type :: cli_options
       !> Path of the namelist.
       character(:), allocatable :: input
+      !> Absolute path of the result to be continued.
+      character(:), allocatable :: restart
       !> `group%key=value` each, in the order given.
       type(string_type), allocatable :: overrides(:)
       logical :: check = .false.
@@ -103,7 +105,7 @@ contains
       equals = index(name, '=')
       if (equals > 0) name = name(:equals - 1)
       select case (name)
-      case ('--set', '--output')
+      case ('--set', '--output', '--restart')
          if (equals > 0) then
             call take_value(name, arguments(i)%text(equals + 1:), options, error)
          else
@@ -166,6 +168,12 @@ contains
       override = value
       if (len_trim(value) == 0) then
          call fatal_error(error, name//' lacks its value'//hint, status_usage)
+      else if (name == '--restart') then
+         if (allocated(options%restart)) call fatal_error(error, 'one result can be continued '// &
+                                                 'at a time: --restart is given twice'//hint, &
+                                                          status_usage)
+         options%restart = resolve_path(value, '')
+         return
       else if (name /= '--set') then
          override = 'output%file='//quoted_text(resolve_path(value, ''))
       end if
@@ -207,6 +215,7 @@ contains
       text = ''
       if (index(name, '--') == 1) then
          text = nearest_word(name, [string_type('--set'), string_type('--output'), &
+                                    string_type('--restart'), &
                                     string_type('--check'), string_type('--quiet'), &
                                     string_type('--verbose'), string_type('--help'), &
                                     string_type('--version')])

@@ -21,6 +21,8 @@ contains
          '                         one holds; words need no quotes', &
          '  -o FILE                result file (default: name of the namelist with .h5,', &
          '                         beside it)', &
+         '  --restart FILE         go on with the wear run of this result file, also of one that', &
+         '                         was killed (FILE.part)', &
          '  --check                validate, print the effective input, run nothing', &
          '  -q                     errors only', &
          '  -v                     iterations and residual of every point', &

@@ -59,6 +59,7 @@ contains
       call read_case(options%input, options%overrides, case, error)
       call threads%leave()
       if (allocated(error)) return
+      if (allocated(options%restart)) case%restart = options%restart
       if (options%check) then
          call check_case(case, error)
          if (allocated(error)) return

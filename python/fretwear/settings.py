@@ -47,6 +47,8 @@ class Contact(TypedDict, total=False):
     side_2: ArrayLike
     mu: ArrayLike
     gap: ArrayLike  # [length]
+    worn: str
+    worn_step: int
     area: ArrayLike  # [length^2]
     normal_load: ArrayLike  # [force]
     tangential_stiffness: ArrayLike  # [force/length]
@@ -135,6 +137,8 @@ class Wear(TypedDict, total=False):
     error_tolerance: float
     steady_tolerance: float
     max_steps: int
+    check_steps: bool
+    follow_resonance: bool
 
 
 class Time(TypedDict, total=False):

@@ -154,6 +154,7 @@ contains
          allocate (self%gap(0), self%normal_load(0))
       end if
       allocate (self%depth(contact%n_pairs), source=0.0_wp)
+      if (allocated(contact%depth)) self%depth = contact%depth
       if (springs%n_springs > 0) then
          self%springs = new_springs(springs%coefficient, springs%power, fourier)
       else

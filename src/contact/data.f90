@@ -30,6 +30,9 @@ module fw_contact_data
       real(wp), allocatable :: mu(:)
       !> Initial gap, negative for an interference [length] (n_pairs).
       real(wp), allocatable :: gap(:)
+      !> Wear depth that the joint starts with, on top of the gap [length] (n_pairs); none where it
+      !> is not allocated.
+      real(wp), allocatable :: depth(:)
       !> Area of the pair [length**2] (n_pairs).
       real(wp), allocatable :: area(:)
       !> Constant compressive force of pairs without a normal dof [force] (n_pairs).

@@ -3,6 +3,7 @@ module fw_problem
    use fw_kinds, only: wp
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
+   use fw_case, only: analysis_wear
    use fw_condensation, only: condensation_type
    use fw_condensation, only: new_condensation
    use fw_error, only: error_type
@@ -24,6 +25,7 @@ module fw_problem
    use fw_joint, only: new_joint
    use fw_solver_options, only: sweep_options
    use fw_text, only: to_text
+   use fw_wear_options, only: follow_range
    implicit none (type, external)
    private
 
@@ -60,6 +62,9 @@ contains
       range = case%sweep%start
       if (case%analysis == analysis_frf) then
          range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
+      end if
+      if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
+         range = follow_range*range
       end if
       call new_condensation(case%model, joint%relative, fourier%harmonic, range, structure, &
          error, keep_all)

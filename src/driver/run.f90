@@ -15,6 +15,8 @@ module fw_run
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
    use fw_problem, only: build_system
+   use fw_restart_file, only: read_restart
+   use fw_restart_file, only: restart_type
    use fw_result, only: result_writer
    use fw_summary, only: summary_type
    use fw_summary, only: new_summary
@@ -34,8 +36,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(hbm_system) :: system
       type(thread_scope) :: threads
+      type(restart_type) :: restart
 
       call check_available(case, error)
+      if (allocated(error)) return
+      if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
       call threads%enter(case%threads)
       call build_system(case, system, error)
@@ -56,11 +61,14 @@ contains
       type(summary_type) :: summary
       type(thread_scope) :: threads
       type(error_type), allocatable :: close_error
+      type(restart_type) :: restart
       integer(int64) :: clock, clock_end, rate
       real(wp) :: elapsed
 
       call system_clock(clock, rate)
       call check_available(case, error)
+      if (allocated(error)) return
+      if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
       observer%stop_requested = .false.
       if (is_wanted(write_file)) call writer%open(case, error)
@@ -71,7 +79,7 @@ contains
       case (analysis_time)
          call run_time_response(case, observer, writer, summary, error)
       case (analysis_wear)
-         call run_wear(case, observer, writer, summary, error)
+         call run_wear(case, restart, observer, writer, summary, error)
       case default
          call run_frequency_response(case, observer, writer, summary, error)
       end select

@@ -35,6 +35,8 @@ module fw_summary
       procedure :: describe_work
       procedure :: note_fallback
       procedure :: describe_wear
+      procedure :: note_restart
+      procedure :: note_profile_change
       procedure :: lines
    end type summary_type
 
@@ -135,6 +137,29 @@ contains
                    line('largest depth', trim(adjustl(text))//' cycles'), &
                    line('wear steps', to_text(n_steps)//', '//to_text(n_rejected)//' repeated')]
    end subroutine describe_wear
+
+   !> The run that was continued.
+   subroutine note_restart(self, n_steps, path)
+      class(summary_type), intent(inout) :: self
+      !> Steps taken over, the start included.
+      integer, intent(in) :: n_steps
+      character(*), intent(in) :: path
+
+      self%work = [self%work, line('continued', 'after '//to_text(n_steps)//' rows of '//path)]
+   end subroutine note_restart
+
+   !> What steps of half the size change.
+   subroutine note_profile_change(self, change, n_steps)
+      class(summary_type), intent(inout) :: self
+      !> Of the final depths, as a part of the largest.
+      real(wp), intent(in) :: change
+      integer, intent(in) :: n_steps
+      character(16) :: text
+
+      write (text, '(es9.2)') change
+      self%work = [self%work, line('steps halved', 'profile moves by '//trim(adjustl(text))// &
+                                   ' of the largest depth ('//to_text(n_steps)//' steps)')]
+   end subroutine note_profile_change
 
    !> The table (seconds: elapsed time).
    function lines(self, seconds) result(table)

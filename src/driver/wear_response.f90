@@ -12,6 +12,10 @@ module fw_wear_response
    use fw_problem, only: build_system
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
+   use fw_hdf5, only: hdf5_file
+   use fw_resonance, only: resonance_type
+   use fw_restart_file, only: restart_type
+   use fw_restart_rows, only: restart_row_set
    use fw_result, only: result_writer
    use fw_solution, only: is_lasting
    use fw_summary, only: summary_type
@@ -31,6 +35,12 @@ module fw_wear_response
 
    public :: run_wear
 
+   !> Watches nothing: the march is repeated for its end alone.
+   type, extends(wear_observer) :: silent_observer
+   contains
+      procedure :: take => pass_by
+   end type silent_observer
+
    !> Turns the states of a march into rows of the result.
    type, extends(wear_observer) :: wear_recorder
       type(case_type), pointer :: case => null()
@@ -38,6 +48,7 @@ module fw_wear_response
       type(result_writer), pointer :: writer => null()
       type(summary_type), pointer :: summary => null()
       type(wear_row_set) :: rows
+      type(restart_row_set) :: restart_rows
       integer :: n_rows = 0
       integer(int64) :: clock = 0_int64
    contains
@@ -48,8 +59,10 @@ contains
 
    !> The vibration of the unworn joint, then the march; every accepted step is written as soon as
    !> it is known.
-   subroutine run_wear(case, observer, writer, summary, error)
+   subroutine run_wear(case, restart, observer, writer, summary, error)
       type(case_type), intent(in), target :: case
+      !> The run to be continued; without steps where there is none.
+      type(restart_type), intent(in) :: restart
       class(observer_type), intent(inout), target :: observer
       type(result_writer), intent(inout), target :: writer
       type(summary_type), intent(inout), target :: summary
@@ -60,9 +73,10 @@ contains
       type(point_type) :: point
       type(wear_recorder), target :: recorder
       type(wear_march), target :: march
-      type(wear_state) :: state
+      type(wear_state) :: state, first
       type(error_type), allocatable :: row_error
       character(:), allocatable :: reason
+      real(wp) :: first_omega
 
       call build_system(case, balance, error)
       if (allocated(error)) return
@@ -87,7 +101,18 @@ contains
          call first_state(system, solver%x, point, state)
          march%stepper = new_wear_stepper(case%wear, case%pseudo_time%scheme, &
                                            solver%method%newton)
-         call march%run(system, state, recorder, error)
+         march%resonance = resonance_type(n_harmonics=case%harmonics%n_harmonics, &
+                                          first=case%sweep%start)
+         if (case%wear%follow_resonance) &
+            call march%resonance%follow(march%stepper, system, state, point%iterations, error)
+         first = state
+         first_omega = system%structure%omega
+         if (.not. allocated(error)) call recorder%restart_rows%create(writer%file, case%contact, &
+                                                               system%n_vibration(), error)
+         if (.not. allocated(error) .and. restart%n_rows > 0) &
+            call resume(restart, recorder, system, march, state, error)
+         if (.not. allocated(error)) &
+            call march%run(system, state, recorder, error, resumed=restart%n_rows > 0)
          if (march%gave_up .and. .not. allocated(error)) then
             balance%depth = state%x(system%n_vibration() + 1:)
             call explain_failure(balance, solver%method, reason)
@@ -107,12 +132,129 @@ contains
          call summary%describe_work(balance, march%stepper%newton%linear, case%solver%kind)
          call summary%describe_wear(trim(steady_words(march%steady)), march%n_steps, &
                                     march%n_rejected, state%cycles, depth_of(system, state))
+         if (restart%n_rows > 0) call summary%note_restart(restart%n_rows, restart%path)
          call recorder%rows%state_outcome(writer%file, trim(steady_words(march%steady)), &
                                           march%ending, row_error)
          if (allocated(row_error)) call move_alloc(row_error, error)
       end if
+      if (.not. allocated(error) .and. case%wear%check_steps .and. point%converged) &
+         call compare_halved(recorder, system, march, first, first_omega, state, error)
       call recorder%rows%close()
+      call recorder%restart_rows%close()
    end subroutine run_wear
+
+   !> Take over the steps of an earlier run, and stand where it stood after the last of them.
+   subroutine resume(restart, recorder, system, march, state, error)
+      type(restart_type), intent(in) :: restart
+      type(wear_recorder), intent(inout) :: recorder
+      type(wear_system), intent(inout) :: system
+      type(wear_march), intent(inout) :: march
+      !> First state of the case, replaced.
+      type(wear_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: r(:)
+      integer :: i
+
+      call restart%check_first(state, error)
+      if (allocated(error)) return
+      call copy_rows(restart, recorder, error)
+      if (allocated(error)) return
+      do i = 1, restart%n_rows
+         call count_point(recorder, restart%points(i))
+      end do
+      recorder%n_rows = restart%n_rows
+      call restart%give_control(march)
+      state = restart%state
+      call system%set_frequency(restart%omega, error)
+      if (allocated(error)) return
+      ! The forces that the next step starts from.
+      allocate (r(system%n))
+      call system%begin_step(state%x(system%n_vibration() + 1:), 0.0_wp)
+      call system%residual(state%x, r)
+   end subroutine resume
+
+   !> The rows of the earlier run become the first of this result.
+   subroutine copy_rows(restart, recorder, error)
+      type(restart_type), intent(in) :: restart
+      type(wear_recorder), intent(inout) :: recorder
+      type(error_type), allocatable, intent(out) :: error
+      type(hdf5_file) :: source
+      type(error_type), allocatable :: ignored
+
+      if (recorder%writer%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call source%open_read(restart%path, error)
+      !$omp end critical (fretwear_io)
+      associate (file => recorder%writer%file, n => restart%n_rows)
+         if (.not. allocated(error)) call recorder%rows%copy(file, source, n, error)
+         if (.not. allocated(error)) call recorder%restart_rows%copy(file, source, n, error)
+         if (.not. allocated(error)) call recorder%writer%copy_points(source, n, error)
+      end associate
+      !$omp critical (fretwear_io)
+      call source%close(ignored)
+      !$omp end critical (fretwear_io)
+   end subroutine copy_rows
+
+   !> The same march with steps of half the size: how far its profile is from that at the end.
+   subroutine compare_halved(recorder, system, march, first, first_omega, state, error)
+      type(wear_recorder), intent(inout) :: recorder
+      type(wear_system), intent(inout), target :: system
+      type(wear_march), intent(in) :: march
+      type(wear_state), intent(in) :: first
+      real(wp), intent(in) :: first_omega
+      !> At the end of the march.
+      type(wear_state), intent(in) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(wear_march), target :: halved
+      type(silent_observer) :: silent
+      type(wear_state) :: end_state
+      real(wp), allocatable :: r(:)
+      real(wp) :: change
+      integer :: n
+
+      if (.not. march%complete) then
+         call recorder%observer%on_message('check_steps: left out, because the run did not '// &
+                                           'come to its end')
+         return
+      end if
+      n = system%n_vibration()
+      halved%options = recorder%case%wear
+      call halved%options%halve_steps(march%stepper%order)
+      halved%stepper = new_wear_stepper(halved%options, march%stepper%pseudo_scheme, &
+                                        march%stepper%newton)
+      halved%resonance = resonance_type(n_harmonics=march%resonance%n_harmonics, &
+                                        first=march%resonance%first)
+      end_state = first
+      call system%set_frequency(first_omega, error)
+      if (allocated(error)) return
+      allocate (r(system%n))
+      call system%begin_step(end_state%x(n + 1:), 0.0_wp)
+      call system%residual(end_state%x, r)
+      call halved%run(system, end_state, silent, error)
+      if (allocated(error)) return
+      if (.not. halved%complete .or. halved%steady /= march%steady) then
+         call recorder%observer%on_message('check_steps: steps of half the size end otherwise: '// &
+                                           halved%ending)
+      end if
+      if (.not. halved%complete) return
+      change = maxval(abs(end_state%x(n + 1:) - state%x(n + 1:)))
+      if (change > 0.0_wp) change = change/max(maxval(state%x(n + 1:)), tiny(1.0_wp))
+      call recorder%summary%note_profile_change(change, halved%n_steps)
+      call recorder%rows%state_halved(recorder%writer%file, end_state%x(n + 1:), change, &
+                                      recorder%case%model%unit_system, error)
+   end subroutine compare_halved
+
+   subroutine pass_by(self, march, system, state, iterations, go_on, error)
+      class(silent_observer), intent(inout) :: self
+      class(wear_march), intent(in) :: march
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: state
+      integer, intent(in) :: iterations
+      logical, intent(out) :: go_on
+      type(error_type), allocatable, intent(out) :: error
+
+      go_on = .true.
+   end subroutine pass_by
 
    pure function cycles_units(case) result(units)
       type(case_type), intent(in) :: case
@@ -138,17 +280,18 @@ contains
       type(wear_state), intent(out) :: state
       real(wp), allocatable :: r(:)
 
-      state%x = [x, spread(0.0_wp, 1, system%contact%n_pairs)]
+      state%x = [x, system%depth]
       allocate (r(system%n))
-      call system%begin_step(system%base, 0.0_wp)
+      call system%begin_step(system%depth, 0.0_wp)
       call system%residual(state%x, r)
       state%rate = system%rate
       state%residual = point%residual
    end subroutine first_state
 
    !> A state of the march becomes a row of the result.
-   subroutine take(self, system, state, iterations, go_on, error)
+   subroutine take(self, march, system, state, iterations, go_on, error)
       class(wear_recorder), intent(inout) :: self
+      class(wear_march), intent(in) :: march
       type(wear_system), intent(inout) :: system
       type(wear_state), intent(in) :: state
       integer, intent(in) :: iterations
@@ -179,26 +322,37 @@ contains
       self%clock = clock
       call self%rows%append(self%writer%file, state%cycles, state%x(n + 1:), state%rate, &
                             friction_energy(self%case, state%x(n + 1:)), error)
+      if (.not. allocated(error)) call self%restart_rows%append(self%writer%file, march, &
+                                                   state%x(:n), point%converged, error)
       if (allocated(error)) return
       call self%writer%add_point(point, error)
       if (allocated(error)) return
       self%n_rows = self%n_rows + 1
+      call count_point(self, point)
+      call self%observer%on_point(self%n_rows, 0, point)
+      go_on = .not. self%observer%stop_requested
+   end subroutine take
+
+   !> States on the way of pseudo-time need not be in equilibrium.
+   subroutine count_point(self, point)
+      class(wear_recorder), intent(inout) :: self
+      type(point_type), intent(in) :: point
+
       if (self%case%wear%scheme == wear_pseudo_time .and. .not. point%converged) then
          call self%summary%add_transient(point)
       else
          call self%summary%add(point)
       end if
-      call self%observer%on_point(self%n_rows, 0, point)
-      go_on = .not. self%observer%stop_requested
-   end subroutine take
+   end subroutine count_point
 
-   !> Friction energy that the worn depth stands for: both laws wear in proportion to it.
+   !> Friction energy that the depth worn by this run stands for: both laws wear in proportion
+   !> to it.
    pure function friction_energy(case, depth) result(energy)
       type(case_type), intent(in) :: case
       real(wp), intent(in) :: depth(:)
       real(wp) :: energy(size(depth))
 
-      energy = case%contact%area*depth/case%wear%coefficient
+      energy = case%contact%area*(depth - case%contact%depth)/case%wear%coefficient
       if (case%wear%law /= wear_energy) energy = case%contact%mu*energy
    end function friction_energy
 

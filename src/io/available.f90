@@ -12,12 +12,13 @@ module fw_available
    use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
                                  solver_pseudo_time, continuation_words, &
                                 continuation_natural, continuation_arclength
+   use fw_solver_options, only: scheme_bdf
    use fw_solver_options, only: scheme_runge_kutta
    use fw_wear_options, only: wear_explicit, wear_pseudo_time
    implicit none (type, external)
    private
 
-   public :: check_available
+   public :: check_available, has_history
 
 contains
 
@@ -67,6 +68,12 @@ contains
       !> The derivative of the sliding path is known for sampled forces.
       subroutine check_wear()
          if (allocated(error) .or. case%analysis /= analysis_wear) return
+         if (has_history(case) .and. case%wear%follow_resonance) then
+            call fatal_error(error, "wear%follow_resonance = .true. does not go with "// &
+                             "pseudo_time%scheme = 'bdf', which builds on earlier steps: use "// &
+                             "'rosenbrock', or wear%scheme = 'implicit'", status_input)
+            return
+         end if
          if (case%wear%scheme == wear_pseudo_time .and. &
              case%pseudo_time%scheme == scheme_runge_kutta) then
             call fatal_error(error, "pseudo_time%scheme = 'runge_kutta' does not step wear, "// &
@@ -108,5 +115,13 @@ contains
       end subroutine check_off
 
    end subroutine check_available
+
+   !> Whether the steps of a wear run build on earlier ones.
+   pure logical function has_history(case)
+      type(case_type), intent(in) :: case
+
+      has_history = case%wear%scheme == wear_pseudo_time .and. &
+                    case%pseudo_time%scheme == scheme_bdf
+   end function has_history
 
 end module fw_available

@@ -49,6 +49,9 @@ module fw_case
       character(:), allocatable :: namelist
       !> Absolute paths of the files it was read from: no result replaces them.
       type(string_type), allocatable :: inputs(:)
+      !> Result file of a wear run that is to be continued; not allocated to start anew. No key of
+      !> the namelist.
+      character(:), allocatable :: restart
    end type case_type
 
 end module fw_case

@@ -9,8 +9,10 @@ module fw_hdf5_append
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
    use, intrinsic :: ieee_arithmetic, only: ieee_value
    use fw_error, only: error_type
+   use fw_hdf5_dataset, only: get_shape
    use fw_hdf5_file, only: hdf5_file
    use fw_hdf5_file, only: dataset_failure
+   use fw_hdf5_file, only: shape_text
    use fw_hdf5_write, only: new_dataset
    use fw_kinds, only: wp
    use fw_text, only: to_text
@@ -19,6 +21,8 @@ module fw_hdf5_append
    use hdf5, only: size_t
    use hdf5, only: h5dclose_f
    use hdf5, only: h5dget_space_f
+   use hdf5, only: h5dopen_f
+   use hdf5, only: h5dread_f
    use hdf5, only: h5dset_extent_f
    use hdf5, only: h5dwrite_f
    use hdf5, only: h5kind_to_type
@@ -60,6 +64,7 @@ module fw_hdf5_append
       procedure :: create
       procedure :: is_created
       procedure :: skip
+      procedure :: copy_rows
       procedure :: close
       !> `call dataset%append(file, values, error)`: one row, of exactly the shape created.
       generic :: append => append_real_0, append_real_1, append_real_2, append_real_3, &
@@ -122,6 +127,73 @@ contains
 
       if (n > 0) call self%grow(file, n, error)
    end subroutine skip
+
+   !> Append the first n rows of the dataset of the same name in another file, bit by bit; nothing
+   !> where this one was never created.
+   subroutine copy_rows(self, file, source, n, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file, source
+      integer, intent(in) :: n
+      type(error_type), allocatable, intent(out) :: error
+      integer(hsize_t), allocatable :: dims(:)
+      integer(hid_t) :: id
+      integer :: rank, status, i
+
+      if (self%id < 0) return
+      call get_shape(source, self%name, dims, error)
+      if (allocated(error)) return
+      rank = size(self%row)
+      if (size(dims) /= rank) then
+         call dataset_failure(source, self%name, 'has shape '//shape_text(dims)//', expected '// &
+                              to_text(rank)//' dimensions', error)
+      else if (any(dims(:rank - 1) /= self%row(:rank - 1)) .or. dims(rank) < n) then
+         call dataset_failure(source, self%name, 'has shape '//shape_text(dims)//', expected '// &
+                              'at least '//shape_text([self%row(:rank - 1), int(n, hsize_t)]), &
+                              error)
+      end if
+      if (allocated(error)) return
+      call h5dopen_f(source%id, self%name, id, status)
+      do i = 1, n
+         call copy_row(self, file, source, id, i, error)
+         if (allocated(error)) exit
+      end do
+      call h5dclose_f(id, status)
+   end subroutine copy_rows
+
+   subroutine copy_row(self, file, source, id, i, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file, source
+      !> The dataset in the source.
+      integer(hid_t), intent(in) :: id
+      integer, intent(in) :: i
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int8_t), allocatable, target :: buffer(:)
+      type(c_ptr) :: address
+      integer(hid_t) :: memory, space
+      integer(hsize_t) :: start(size(self%row))
+      integer(size_t) :: bytes
+      integer :: rank, status, ignored
+
+      rank = size(self%row)
+      call h5tget_size_f(self%type_id, bytes, status)
+      allocate (buffer(max(1_size_t, bytes*int(product(self%row), size_t))), source=0_c_int8_t)
+      address = c_loc(buffer)
+      if (product(self%row) > 0) then
+         start = 0
+         start(rank) = i - 1
+         call h5dget_space_f(id, space, status)
+         call h5sselect_hyperslab_f(space, h5s_select_set_f, start, self%row, status)
+         call h5screate_simple_f(rank, self%row, memory, status)
+         call h5dread_f(id, self%type_id, address, status, memory, space)
+         call h5sclose_f(memory, ignored)
+         call h5sclose_f(space, ignored)
+         if (status < 0) then
+            call dataset_failure(source, self%name, 'cannot be read (damaged file?)', error)
+            return
+         end if
+      end if
+      call self%append_raw(file, int(self%row(:rank - 1)), self%type_id, c_loc(buffer), error)
+   end subroutine copy_row
 
    !> Release the handles; harmless where nothing was created.
    subroutine close(self)

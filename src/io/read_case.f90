@@ -10,6 +10,7 @@ module fw_read_case
    use fw_read_options, only: read_case_group, read_harmonics, read_sweep, read_solver, &
                               read_pseudo_time, read_wear, read_time
    use fw_read_output, only: read_output, read_observed
+   use fw_read_worn, only: read_worn
    use fw_reader, only: reader_type, new_reader
    use fw_reader_text, only: printable
    use fw_text, only: string_type
@@ -88,14 +89,14 @@ contains
       call check_available(case, error)
    end subroutine read_groups
 
-   !> The files that the case was read from.
+   !> The files that the case was read from, after those that are listed already.
    subroutine list_inputs(path, raw, inputs)
       character(*), intent(in) :: path
       type(file_model_type), intent(in) :: raw
-      type(string_type), allocatable, intent(out) :: inputs(:)
+      type(string_type), allocatable, intent(inout) :: inputs(:)
       integer :: i
 
-      allocate (inputs(0))
+      if (.not. allocated(inputs)) allocate (inputs(0))
       call append(inputs, resolve_path(path, ''))
       if (.not. allocated(raw%files)) return
       do i = 1, size(raw%files)
@@ -113,6 +114,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(file_model_type), intent(in), optional :: memory_model
       type(model_options) :: options
+      character(:), allocatable :: worn
       integer :: n_dof
 
       call read_model(reader, directory_of(path), options, raw, error, memory_model)
@@ -120,6 +122,12 @@ contains
       n_dof = 0
       if (allocated(raw%stiffness)) n_dof = size(raw%stiffness, 1)
       call read_contact(reader, n_dof, raw, case%analysis == analysis_wear, case%contact)
+      call read_worn(reader, directory_of(path), case%contact, worn, error)
+      if (allocated(error)) return
+      if (allocated(worn)) then
+         allocate (case%inputs(0))
+         call append(case%inputs, worn)
+      end if
       call read_springs(reader, n_dof, case%springs)
       call read_loads(reader, options, raw)
       call finish_model(reader, options, raw, case%model, error)

@@ -149,6 +149,8 @@ contains
       call reader%get('wear', 'error_tolerance', options%error_tolerance, least=0.0_wp)
       call reader%get('wear', 'steady_tolerance', options%steady_tolerance, above=0.0_wp)
       call reader%get('wear', 'max_steps', options%max_steps, least=1)
+      call reader%get('wear', 'check_steps', options%check_steps)
+      call reader%get('wear', 'follow_resonance', options%follow_resonance)
    end subroutine read_wear
 
    !> Group &time.

@@ -45,6 +45,7 @@ module fw_result
    contains
       procedure :: open
       procedure :: add_point
+      procedure :: copy_points
       procedure :: flush
       procedure :: close
       procedure :: discard
@@ -98,6 +99,19 @@ contains
       call append_point(self, point, error)
       !$omp end critical (fretwear_io)
    end subroutine add_point
+
+   !> Begin with the first n points of an earlier result of the same case.
+   subroutine copy_points(self, source, n, error)
+      class(result_writer), intent(inout) :: self
+      type(hdf5_file), intent(in) :: source
+      integer, intent(in) :: n
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call self%rows%copy(self%file, source, n, error)
+      !$omp end critical (fretwear_io)
+   end subroutine copy_points
 
    subroutine append_point(self, point, error)
       class(result_writer), intent(inout) :: self

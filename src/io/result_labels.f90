@@ -53,6 +53,8 @@ module fw_result_labels
                  'relative displacement t1, t2, n over one period'), &
       label_type('/wear/cycles', '1', 'step', 'cycles of vibration'), &
       label_type('/wear/depth', '<length>', 'step pair', 'wear depth'), &
+      label_type('/wear/depth_halved', '<length>', 'pair', &
+                 'final wear depth with steps of half the size'), &
       label_type('/wear/rate', '<length>', 'step pair', 'wear depth per cycle'), &
       label_type('/wear/energy', '<energy>', 'step pair', 'accumulated friction energy'), &
       label_type('/wear/volume', '<volume>', 'step patch', 'worn volume of the patch')]

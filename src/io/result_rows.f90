@@ -7,11 +7,13 @@ module fw_result_rows
    use fw_hdf5, only: growing_integer
    use fw_hdf5, only: growing_logical
    use fw_hdf5, only: growing_real
+   use fw_hdf5, only: get_shape
    use fw_hdf5, only: hdf5_file
    use fw_kinds, only: wp
    use fw_point, only: point_type
    use fw_result_labels, only: label_dataset
    use fw_solver_options, only: continuation_arclength
+   use hdf5, only: hsize_t
    implicit none (type, external)
    private
 
@@ -32,6 +34,7 @@ module fw_result_rows
    contains
       procedure :: create
       procedure :: append
+      procedure :: copy
       procedure :: close
       procedure, private :: new, new_late, append_contact, append_histories
    end type row_set
@@ -113,6 +116,32 @@ contains
       if (.not. allocated(error)) call self%append_contact(file, point, error)
       if (.not. allocated(error)) call self%append_histories(file, point, error)
    end subroutine append
+
+   !> Begin with the first n rows of another result of the same sizes.
+   subroutine copy(self, file, source, n, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file, source
+      integer, intent(in) :: n
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: late(3) = [d_observed, d_force_history, d_slip_history]
+      character(*), parameter :: late_name(3) = [character(30) :: '/history/observed', &
+         '/history/force', '/history/relative_displacement']
+      integer(hsize_t), allocatable :: dims(:)
+      integer :: i
+
+      do i = 1, size(late)
+         if (.not. source%exists(trim(late_name(i)))) cycle
+         call get_shape(source, trim(late_name(i)), dims, error)
+         if (allocated(error)) return
+         call self%new(file, late(i), trim(late_name(i)), int(dims(:size(dims) - 1)), error)
+         if (allocated(error)) return
+      end do
+      do i = 1, n_datasets
+         call self%list(i)%copy_rows(file, source, n, error)
+         if (allocated(error)) return
+      end do
+      self%n_rows = n
+   end subroutine copy
 
    subroutine close(self)
       class(row_set), intent(inout) :: self

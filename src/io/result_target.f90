@@ -18,7 +18,7 @@ module fw_result_target
    implicit none (type, external)
    private
 
-   public :: find_target, check_replaceable, result_format
+   public :: find_target, check_replaceable, is_result, result_format
 
    !> Attribute `format` of every result file.
    character(*), parameter :: result_format = 'fretwear-result'
@@ -63,7 +63,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: ignored
       type(hdf5_file) :: file
-      character(:), allocatable :: format
       integer(i8) :: length
       logical :: found
 
@@ -81,18 +80,28 @@ contains
          return
       end if
       call file%open_read(path, ignored)
-      format = ''
+      found = .false.
       if (.not. allocated(ignored)) then
-         if (has_attribute(file, '/', 'format')) &
-            call read_attribute(file, '/', 'format', format, ignored)
-         if (.not. allocated(format)) format = ''
+         found = is_result(file)
          call file%close(ignored)
       end if
-      if (format == result_format) return
+      if (found) return
       call fatal_error(error, path//': cannot be written: it exists and is no sound result '// &
                        'file, or one that is open for writing: only an earlier result is '// &
                        'replaced; remove it, or '//remedy, status_io)
    end subroutine check_replaceable
+
+   !> Whether an open file says that it is a result.
+   logical function is_result(file)
+      type(hdf5_file), intent(in) :: file
+      type(error_type), allocatable :: ignored
+      character(:), allocatable :: format
+
+      is_result = .false.
+      if (.not. has_attribute(file, '/', 'format')) return
+      call read_attribute(file, '/', 'format', format, ignored)
+      if (allocated(format)) is_result = format == result_format
+   end function is_result
 
    !> Refuse a file that the run reads, under whatever name.
    subroutine refuse_inputs(path, target, inputs, error)

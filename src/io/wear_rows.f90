@@ -8,6 +8,7 @@ module fw_wear_rows
    use fw_hdf5, only: growing_real
    use fw_hdf5, only: hdf5_file
    use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: write_dataset
    use fw_hdf5, only: write_text
    use fw_kinds, only: wp
    use fw_result_labels, only: label_dataset
@@ -30,7 +31,9 @@ module fw_wear_rows
    contains
       procedure :: create => create_datasets
       procedure :: append => append_row
+      procedure :: copy
       procedure :: state_outcome
+      procedure :: state_halved
       procedure :: close => close_datasets
    end type wear_row_set
 
@@ -133,6 +136,45 @@ contains
       if (.not. allocated(error)) call self%list(d_volume)%append(file, volume, error)
       !$omp end critical (fretwear_io)
    end subroutine append_row
+
+   !> Begin with the first n rows of an earlier result of the same case.
+   subroutine copy(self, file, source, n, error)
+      class(wear_row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file, source
+      integer, intent(in) :: n
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      !$omp critical (fretwear_io)
+      do i = 1, n_datasets
+         call self%list(i)%copy_rows(file, source, n, error)
+         if (allocated(error)) exit
+      end do
+      !$omp end critical (fretwear_io)
+   end subroutine copy
+
+   !> The profile that the same run has with steps of half the size, and how far it is from this
+   !> one.
+   subroutine state_halved(self, file, depth, change, unit_system, error)
+      class(wear_row_set), intent(in) :: self
+      type(hdf5_file), intent(in) :: file
+      !> (n_pairs) [length].
+      real(wp), intent(in) :: depth(:)
+      !> Largest difference, as a part of the largest depth.
+      real(wp), intent(in) :: change
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. self%list(d_cycles)%is_created()) return
+      !$omp critical (fretwear_io)
+      call write_dataset(file, '/wear/depth_halved', depth, error)
+      if (.not. allocated(error)) &
+         call label_dataset(file, '/wear/depth_halved', unit_system, error)
+      if (.not. allocated(error)) call write_attribute(file, '/wear', 'profile_change', change, &
+                                                       error)
+      !$omp end critical (fretwear_io)
+   end subroutine state_halved
 
    !> Whether a steady state was reached, on the group and at the root of the file.
    subroutine state_outcome(self, file, steady_state, ending, error)

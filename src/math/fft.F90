@@ -19,6 +19,7 @@ module fw_fft
       type(c_ptr) :: backward = c_null_ptr
    contains
       procedure :: plan
+      procedure :: renew
       procedure :: synthesise
       procedure :: analyse
       final :: destroy
@@ -47,6 +48,17 @@ contains
                                              FFTW_ESTIMATE)
       !$omp end critical (fretwear_fftw)
    end subroutine plan
+
+   !> Give a copy plans of its own: those that came with it stay with the original.
+   subroutine renew(self)
+      class(fft_type), intent(inout) :: self
+
+      self%forward = c_null_ptr
+      self%backward = c_null_ptr
+      if (allocated(self%values)) deallocate (self%values)
+      if (allocated(self%spectrum)) deallocate (self%spectrum)
+      if (self%n_rows > 0) call self%plan(self%n_rows, self%n_time)
+   end subroutine renew
 
    !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.
    subroutine synthesise(self, harmonic, column, coefficients, values)

@@ -39,6 +39,7 @@ module fw_fourier
       procedure :: differentiate
       procedure :: has_constant
       procedure :: prepare_fft
+      procedure :: renew_fft
       procedure :: collocate
    end type fourier_type
 
@@ -110,6 +111,13 @@ contains
       allocate (self%fft)
       call self%fft%plan(n_rows, self%n_time)
    end subroutine prepare_fft
+
+   !> Make a copy that is to live beside its original independent of it.
+   subroutine renew_fft(self)
+      class(fourier_type), intent(inout) :: self
+
+      if (allocated(self%fft)) call self%fft%renew()
+   end subroutine renew_fft
 
    !> Replace the analysis by collocation: coefficients that fit the values at n_points of the
    !> instants, exactly where n_points = n_coefficients, else in the sense of least squares.

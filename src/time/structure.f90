@@ -95,6 +95,7 @@ contains
       if (contact%n_pairs == 0) return
       self%mu = contact%mu
       self%gap = contact%gap
+      if (allocated(contact%depth)) self%gap = self%gap + contact%depth
       self%normal_load = merge(contact%normal_load, 0.0_wp, &
                                contact%side_1(3, :) == 0 .and. contact%side_2(3, :) == 0)
       do i = 1, contact%n_pairs

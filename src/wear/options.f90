@@ -5,6 +5,7 @@ module fw_wear_options
    private
 
    public :: wear_options
+   public :: follow_range
    public :: wear_scheme_words, wear_explicit, wear_implicit, wear_pseudo_time
    public :: wear_law_words, wear_archard, wear_energy
 
@@ -34,10 +35,18 @@ module fw_wear_options
       !> A joint is steady when its largest rate has fallen to this part of the first.
       real(wp) :: steady_tolerance = 1.0e-6_wp
       integer :: max_steps = 1000
+      !> Run a second time with steps of half the size, to see how far the profile moves.
+      logical :: check_steps = .false.
+      !> Keep the excitation at the resonance of the first observed quantity.
+      logical :: follow_resonance = .false.
    contains
       procedure :: controls_error
       procedure :: tolerance
+      procedure :: halve_steps
    end type wear_options
+
+   !> How far the resonance is followed, as parts of the first frequency.
+   real(wp), parameter :: follow_range(2) = [0.5_wp, 1.5_wp]
 
    real(wp), parameter :: default_error_tolerance = 1.0e-3_wp
 
@@ -56,5 +65,22 @@ contains
       tolerance = self%error_tolerance
       if (tolerance <= 0.0_wp) tolerance = default_error_tolerance
    end function tolerance
+
+   !> Ask for steps of half the size. The estimate of the error grows with the power of the step
+   !> that the control of the steps takes it to have.
+   pure subroutine halve_steps(self, order)
+      class(wear_options), intent(inout) :: self
+      !> Order of the scheme.
+      integer, intent(in) :: order
+      integer, parameter :: most_steps = 100000000
+      integer :: exponent
+
+      exponent = max(2, order)
+      if (self%scheme == wear_explicit) exponent = 2
+      if (self%controls_error()) self%error_tolerance = self%tolerance()/2.0_wp**exponent
+      self%max_depth_step = 0.5_wp*self%max_depth_step
+      ! Room for them, with some for what halving rejects.
+      if (self%max_steps <= most_steps) self%max_steps = 4*self%max_steps
+   end subroutine halve_steps
 
 end module fw_wear_options

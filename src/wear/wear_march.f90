@@ -10,6 +10,7 @@
 !> doubled and exceeds the elastic compression of the pairs: then nothing will stop it.
 module fw_wear_march
    use fw_kinds, only: wp
+   use fw_resonance, only: resonance_type
    use fw_error, only: error_type
    use fw_solver_options, only: scheme_bdf
    use fw_text, only: to_text
@@ -49,23 +50,10 @@ module fw_wear_march
       procedure(state_callback), deferred :: take
    end type wear_observer
 
-   abstract interface
-      subroutine state_callback(self, system, state, iterations, go_on, error)
-         import :: wear_observer, wear_system, wear_state, error_type
-         class(wear_observer), intent(inout) :: self
-         !> Evaluated at the state.
-         type(wear_system), intent(inout) :: system
-         type(wear_state), intent(in) :: state
-         integer, intent(in) :: iterations
-         !> False ends the march.
-         logical, intent(out) :: go_on
-         type(error_type), allocatable, intent(out) :: error
-      end subroutine state_callback
-   end interface
-
    type :: wear_march
       type(wear_options) :: options
       type(wear_stepper) :: stepper
+      type(resonance_type) :: resonance
       !> Outcome.
       integer :: steady = steady_not_reached
       integer :: n_steps = 0
@@ -87,23 +75,45 @@ module fw_wear_march
       procedure :: run
    end type wear_march
 
+   abstract interface
+      subroutine state_callback(self, march, system, state, iterations, go_on, error)
+         import :: wear_observer, wear_march, wear_system, wear_state, error_type
+         class(wear_observer), intent(inout) :: self
+         !> Where it stands: what it needs besides the state to go on.
+         class(wear_march), intent(in) :: march
+         !> Evaluated at the state.
+         type(wear_system), intent(inout) :: system
+         type(wear_state), intent(in) :: state
+         integer, intent(in) :: iterations
+         !> False ends the march.
+         logical, intent(out) :: go_on
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine state_callback
+   end interface
+
 contains
 
    !> March from a settled state (residual, rates known); the last state is left in it.
-   subroutine run(self, system, state, observer, error)
+   subroutine run(self, system, state, observer, error, resumed)
       class(wear_march), intent(inout), target :: self
       type(wear_system), intent(inout), target :: system
       type(wear_state), intent(inout) :: state
       class(wear_observer), intent(inout) :: observer
       type(error_type), allocatable, intent(out) :: error
+      !> The observer has taken this state before (default: no).
+      logical, intent(in), optional :: resumed
       type(wear_state) :: after
       integer :: iterations
-      logical :: go_on
+      logical :: go_on, is_taken
 
       iterations = 0
+      go_on = .true.
+      is_taken = .false.
+      if (present(resumed)) is_taken = resumed
       do
-         call observer%take(system, state, iterations, go_on, error)
+         if (.not. is_taken) call observer%take(self, system, state, iterations, go_on, error)
          if (allocated(error)) exit
+         is_taken = .false.
          call judge(self, system, state)
          if (allocated(self%ending)) exit
          if (.not. go_on) then
@@ -118,6 +128,9 @@ contains
          end if
          if (allocated(self%ending)) exit
          state = after
+         if (.not. self%options%follow_resonance) cycle
+         call self%resonance%follow(self%stepper, system, state, iterations, error)
+         if (allocated(error)) exit
       end do
       call self%bdf%finish()
    end subroutine run

@@ -76,6 +76,7 @@ contains
       real(wp) :: tangential(contact%n_pairs)
 
       self%hbm_system = balance
+      call self%fourier%renew_fft()
       call self%free_depths()
       call self%contact%measure_slip(self%fourier%n_coefficients)
       tangential = maxval(self%stiffness(:, 1:2), dim=2)

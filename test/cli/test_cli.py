@@ -14,7 +14,8 @@ def test_version(fw_run):
 def test_help_names_every_option_and_group(fw_run, option):
     done = fw_run(option)
     assert done.returncode == 0 and done.stderr == ""
-    for word in ["--set", "-o", "--check", "-q", "-v", "--version", "&contact", "Exit status"]:
+    for word in ["--set", "-o", "--restart", "--check", "-q", "-v", "--version", "&contact",
+                 "Exit status"]:
         assert word in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 88
 

@@ -29,6 +29,10 @@ NUMBERS = {
     "gap/gap.nml": [("amplitude", 1.15, 0, 1.332770444, 5e-6)],
     "separation/separation.nml": [("amplitude", 0.9, 0, 2.240312606, 5e-6),
                                   ("contact/dissipation", 0.9, 0, 2.830244154, 2e-5)],
+    "wear/two_pairs.nml": [("wear/depth", None, 0, 0.2, 1e-5),
+                           ("wear/depth", None, 1, 0.0, 0.0)],
+    "wear/oscillator.nml": [("wear/depth", None, 0, 0.294758, 2e-6),
+                            ("omega", None, Ellipsis, 0.996488, 1e-6)],
     "blade_sector/frf.nml": [("amplitude", None, 0, 0.8830621, 1e-6)],
     "blade_sector/frf_stuck.nml": [("amplitude", None, 0, 1.6722078, 1e-6)],
     "blade_sector/frf_48.nml": [("amplitude", None, 0, 0.9286232, 1e-6)],
@@ -65,7 +69,7 @@ def test_number(results, name):
         assert file["converged"][()].all()
         omega = file["omega"][()]
         for dataset, at, column, number, tolerance in NUMBERS[name]:
-            values = file[dataset][:, column]
+            values = file[dataset][()] if column is Ellipsis else file[dataset][:, column]
             k = np.argmax(values) if at is None else np.argmin(np.abs(omega - at))
             assert at is None or omega[k] == pytest.approx(at, rel=1e-12)
             assert values[k] == pytest.approx(number, rel=tolerance)

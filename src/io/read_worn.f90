@@ -1,0 +1,113 @@
+!> Key `worn` of &contact: the wear depth that an earlier result ends with, at which the joint of
+!> this case starts.
+module fw_read_worn
+   use fw_contact_data, only: contact_type
+   use fw_error, only: error_type
+   use fw_error, only: status_io
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: read_dataset
+   use fw_kinds, only: wp
+   use fw_paths, only: resolve_path
+   use fw_reader, only: reader_type
+   use fw_result_target, only: is_result
+   use fw_text, only: to_text
+   use fw_values, only: quoted_text
+   implicit none (type, external)
+   private
+
+   public :: read_worn
+
+contains
+
+   !> Keys `worn` and `worn_step`. The depth of every pair is allocated on leaving, zero where
+   !> nothing is worn.
+   subroutine read_worn(reader, directory, contact, path, error)
+      type(reader_type), intent(inout) :: reader
+      !> Of the namelist; relative files start there.
+      character(*), intent(in) :: directory
+      !> Its number of pairs is known.
+      type(contact_type), intent(inout) :: contact
+      !> The result that was read, not allocated where there is none.
+      character(:), allocatable, intent(out) :: path
+      !> status_io where the file cannot be read at all; anything else is refused by the reader.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: depth(:, :)
+      integer :: step
+
+      step = 0
+      call reader%get('contact', 'worn', path)
+      call reader%get('contact', 'worn_step', step, least=0)
+      allocate (contact%depth(contact%n_pairs), source=0.0_wp)
+      if (.not. allocated(path)) then
+         if (step > 0) call reader%refuse('contact', 'worn_step', '= '//to_text(step)// &
+                                          ': is a row of the result that worn names: give worn')
+         return
+      end if
+      path = resolve_path(path, directory)
+      call reader%amend('contact', 'worn', quoted_text(path))
+      call read_depths(reader, path, depth, error)
+      if (allocated(error) .or. reader%failed()) return
+      call check_depths(reader, path, step, depth, contact%n_pairs)
+      if (reader%failed()) return
+      if (step == 0) step = size(depth, 2)
+      contact%depth = depth(:, step)
+   end subroutine read_worn
+
+   !> Every row of /wear/depth (n_pairs, n_steps).
+   subroutine read_depths(reader, path, depth, error)
+      type(reader_type), intent(inout) :: reader
+      character(*), intent(in) :: path
+      real(wp), allocatable, intent(out) :: depth(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: failure, ignored
+      type(hdf5_file) :: file
+
+      call file%open_read(path, failure)
+      if (allocated(failure)) then
+         if (failure%status == status_io) then
+            failure%message = reader%place_of('contact', 'worn')//': '//failure%message
+            call move_alloc(failure, error)
+         else
+            call reader%refuse('contact', 'worn', failure%message)
+         end if
+         return
+      end if
+      if (.not. is_result(file)) then
+         call reader%refuse('contact', 'worn', path//': is no result file of fw_run: name one '// &
+                            "of analysis = 'wear'")
+      else if (.not. file%exists('/wear/depth')) then
+         call reader%refuse('contact', 'worn', path//': is a result without wear: name one of '// &
+                            "analysis = 'wear'")
+      else
+         call read_dataset(file, '/wear/depth', depth, failure)
+         if (allocated(failure)) call reader%refuse('contact', 'worn', failure%message)
+      end if
+      call file%close(ignored)
+   end subroutine read_depths
+
+   subroutine check_depths(reader, path, step, depth, n_pairs)
+      type(reader_type), intent(inout) :: reader
+      character(*), intent(in) :: path
+      integer, intent(in) :: step
+      real(wp), intent(in) :: depth(:, :)
+      integer, intent(in) :: n_pairs
+      integer :: last
+
+      last = size(depth, 2)
+      if (size(depth, 1) /= n_pairs) then
+         call reader%refuse('contact', 'worn', path//': holds the depths of '// &
+                            to_text(size(depth, 1))//' pairs: this case has '// &
+                            to_text(n_pairs)//'; name the result of the same joint')
+      else if (last == 0) then
+         call reader%refuse('contact', 'worn', path//': holds no step yet')
+      else if (step > last) then
+         call reader%refuse('contact', 'worn_step', '= '//to_text(step)//': '//path//' has '// &
+                            to_text(last)//' steps; 0 takes the last')
+      else if (.not. all(abs(depth(:, merge(step, last, step > 0))) <= huge(1.0_wp))) then
+         call reader%refuse('contact', 'worn', path//': that step holds depths that are not '// &
+                            'finite (a run that was killed while it wrote?): choose an '// &
+                            'earlier one with worn_step')
+      end if
+   end subroutine check_depths
+
+end module fw_read_worn

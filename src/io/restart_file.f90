@@ -1,0 +1,278 @@
+!> An interrupted wear run as its result file tells it, read to be continued.
+module fw_restart_file
+   use fw_available, only: has_history
+   use fw_case, only: analysis_wear
+   use fw_case, only: analysis_words
+   use fw_case, only: case_type
+   use fw_case_difference, only: find_difference
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_error, only: status_usage
+   use fw_hdf5, only: get_shape
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: read_attribute
+   use fw_hdf5, only: read_dataset
+   use fw_kinds, only: wp
+   use fw_point, only: point_type
+   use fw_restart_rows, only: c_checked_depth
+   use fw_restart_rows, only: c_converged
+   use fw_restart_rows, only: c_largest_rate
+   use fw_restart_rows, only: c_next_cycles
+   use fw_restart_rows, only: c_rejected
+   use fw_restart_rows, only: c_spacing
+   use fw_restart_rows, only: c_steps
+   use fw_restart_rows, only: n_controls
+   use fw_restart_rows, only: pair_constants
+   use fw_restart_rows, only: pair_keys
+   use fw_result_target, only: is_result
+   use fw_text, only: to_text
+   use fw_values, only: number_text
+   use fw_wear_march, only: wear_march
+   use fw_wear_step, only: wear_state
+   use hdf5, only: hsize_t
+   implicit none (type, external)
+   private
+
+   public :: restart_type, read_restart
+
+   !> Keys in which a case may differ from the run that it continues. What matters of the files is
+   !> compared by itself.
+   character(*), parameter :: free_keys(*) = [character(18) :: 'case%title', 'case%threads', &
+      'model%file', 'contact%worn', 'contact%worn_step', 'wear%n_cycles', 'wear%max_steps', &
+      'wear%check_steps', 'output%file']
+
+   !> The datasets that grow by a row a step; a killed run may have some a row longer than others.
+   character(*), parameter :: row_names(*) = [character(29) :: '/omega', '/coefficients', &
+      '/amplitude', '/converged', '/iterations', '/residual', '/seconds', '/wear/cycles', &
+      '/wear/depth', '/wear/rate', '/wear/energy', '/wear/volume', '/restart/vibration', &
+      '/restart/checked_rate', '/restart/control']
+
+   !> Model matrices and loads count as the same where they give the same first vibration, within
+   !> what the round-off of another processor or thread count may change.
+   real(wp), parameter :: same_vibration = 1.0e-6_wp
+
+   type :: restart_type
+      character(:), allocatable :: path
+      !> Steps that the file holds.
+      integer :: n_rows = 0
+      !> What is known of these steps without the contact.
+      type(point_type), allocatable :: points(:)
+      !> State after the last step, frequency included, and the control of the march.
+      type(wear_state) :: state
+      real(wp) :: omega = 0.0_wp
+      real(wp), allocatable :: control(:), checked_rate(:)
+      !> Unknowns and rates of the first state.
+      type(wear_state) :: first
+   contains
+      procedure :: check_first
+      procedure :: give_control
+   end type restart_type
+
+contains
+
+   !> Read what a case needs to go on from the last step of a file.
+   subroutine read_restart(path, case, self, error)
+      character(*), intent(in) :: path
+      type(case_type), intent(in) :: case
+      type(restart_type), intent(out) :: self
+      !> status_io where the file cannot be read, status_input where it is not that of a wear run
+      !> of this case.
+      type(error_type), allocatable, intent(out) :: error
+      type(hdf5_file) :: file
+      type(error_type), allocatable :: ignored
+
+      if (case%analysis /= analysis_wear) then
+         call fatal_error(error, "--restart continues a run of analysis = 'wear', but this "// &
+                          "case has analysis = '"//trim(analysis_words(case%analysis))//"'", &
+                          status_usage)
+         return
+      end if
+      if (has_history(case)) then
+         call fatal_error(error, "--restart does not go with pseudo_time%scheme = 'bdf', whose "// &
+                          'steps build on earlier ones: &contact worn starts anew from the '// &
+                          'depths', status_usage)
+         return
+      end if
+      self%path = path
+      !$omp critical (fretwear_io)
+      call file%open_read(path, error)
+      if (.not. allocated(error)) call check_kind(file, error)
+      if (.not. allocated(error)) call check_case(file, case, error)
+      if (.not. allocated(error)) call count_rows(file, self%n_rows, error)
+      if (.not. allocated(error)) call read_rows(file, case%contact%n_pairs, self, error)
+      call file%close(ignored)
+      !$omp end critical (fretwear_io)
+   end subroutine read_restart
+
+   subroutine check_kind(file, error)
+      type(hdf5_file), intent(in) :: file
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. is_result(file)) then
+         call fatal_error(error, file%path//': is no result file of fw_run: --restart takes '// &
+                          'the result of a wear run', status_input)
+      else if (.not. file%exists('/wear/depth')) then
+         call fatal_error(error, file%path//": is not the result of analysis = 'wear': there "// &
+                          'is nothing to be continued', status_input)
+      else if (.not. file%exists('/restart/control')) then
+         call fatal_error(error, file%path//': holds no group /restart, so its run cannot be '// &
+                          'continued; &contact worn starts another from its depths', status_input)
+      end if
+   end subroutine check_kind
+
+   !> Refuse to go on with anything that would change the numbers.
+   subroutine check_case(file, case, error)
+      type(hdf5_file), intent(in) :: file
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: namelist, there, here
+      real(wp), allocatable :: constants(:, :), own(:, :)
+      integer :: i, k
+
+      call read_attribute(file, '/', 'namelist', namelist, error)
+      if (allocated(error)) return
+      call find_difference(namelist, case%namelist, free_keys, there, here, error)
+      if (allocated(error)) return
+      if (len(there) > 0) then
+         call fatal_error(error, file%path//': its run had '//there//', this case has '//here// &
+                          ': only wear%n_cycles, wear%max_steps and the name of the result may '// &
+                          'change; take the value back, or start anew', status_input)
+         return
+      end if
+      call read_dataset(file, '/restart/pairs', constants, error)
+      if (allocated(error)) return
+      own = pair_constants(case%contact)
+      if (any(shape(constants) /= shape(own))) then
+         call fatal_error(error, file%path//': its run had '//to_text(size(constants, 1))// &
+                          ' contact pairs, this case has '//to_text(size(own, 1)), status_input)
+         return
+      end if
+      do k = 1, size(own, 2)
+         i = findloc(abs(own(:, k) - constants(:, k)) > 0.0_wp, .true., 1)
+         if (i == 0) cycle
+         call fatal_error(error, file%path//': its run had contact%'//trim(pair_keys(k))//'('// &
+                          to_text(i)//') = '//number_text(constants(i, k))//', this case has '// &
+                          number_text(own(i, k))//': has the model file changed?', status_input)
+         return
+      end do
+   end subroutine check_case
+
+   !> Steps that every dataset holds.
+   subroutine count_rows(file, n_rows, error)
+      type(hdf5_file), intent(in) :: file
+      integer, intent(out) :: n_rows
+      type(error_type), allocatable, intent(out) :: error
+      integer(hsize_t), allocatable :: dims(:)
+      integer :: i
+
+      n_rows = huge(1)
+      do i = 1, size(row_names)
+         call get_shape(file, trim(row_names(i)), dims, error)
+         if (allocated(error)) return
+         n_rows = min(n_rows, int(dims(size(dims))))
+      end do
+      if (n_rows > 0) return
+      call fatal_error(error, file%path//': no step was saved before the run ended: start anew', &
+                       status_input)
+   end subroutine count_rows
+
+   subroutine read_rows(file, n_pairs, self, error)
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: n_pairs
+      type(restart_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: cycles(:), residual(:), omega(:)
+      real(wp), allocatable :: vibration(:, :), depth(:, :), rate(:, :), checked(:, :)
+      real(wp), allocatable :: control(:, :)
+      integer :: n
+
+      call read_dataset(file, '/wear/cycles', cycles, error)
+      if (.not. allocated(error)) call read_dataset(file, '/residual', residual, error)
+      if (.not. allocated(error)) call read_dataset(file, '/omega', omega, error)
+      if (.not. allocated(error)) call read_dataset(file, '/restart/vibration', vibration, error)
+      if (.not. allocated(error)) call read_dataset(file, '/wear/depth', depth, error)
+      if (.not. allocated(error)) call read_dataset(file, '/wear/rate', rate, error)
+      if (.not. allocated(error)) call read_dataset(file, '/restart/checked_rate', checked, error)
+      if (.not. allocated(error)) call read_dataset(file, '/restart/control', control, error)
+      if (allocated(error)) return
+      if (size(depth, 1) /= n_pairs .or. size(rate, 1) /= n_pairs .or. &
+          size(checked, 1) /= n_pairs .or. size(control, 1) /= n_controls) then
+         call fatal_error(error, file%path//': its datasets do not fit each other (damaged, or '// &
+                          'of another version?)', status_input)
+         return
+      end if
+      n = self%n_rows
+      self%omega = omega(n)
+      self%state%cycles = cycles(n)
+      self%state%residual = residual(n)
+      self%state%x = [vibration(:, n), depth(:, n)]
+      self%state%rate = rate(:, n)
+      self%control = control(:, n)
+      ! Not looked for yet: no rates.
+      if (all(abs(checked(:, n)) <= huge(1.0_wp))) self%checked_rate = checked(:, n)
+      self%first%x = [vibration(:, 1), depth(:, 1)]
+      self%first%rate = rate(:, 1)
+      if (.not. all(abs(self%state%x) <= huge(1.0_wp))) then
+         call fatal_error(error, file%path//': its last step is not complete (damaged file?)', &
+                          status_input)
+         return
+      end if
+      call read_points(file, omega, residual, control(c_converged, :), self%points, error)
+   end subroutine read_rows
+
+   subroutine read_points(file, omega, residual, converged, points, error)
+      type(hdf5_file), intent(in) :: file
+      real(wp), intent(in) :: omega(:), residual(:), converged(:)
+      type(point_type), allocatable, intent(out) :: points(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: amplitude(:, :)
+      integer, allocatable :: iterations(:)
+      integer :: i
+
+      call read_dataset(file, '/amplitude', amplitude, error)
+      if (.not. allocated(error)) call read_dataset(file, '/iterations', iterations, error)
+      if (allocated(error)) return
+      allocate (points(min(size(converged), size(omega), size(iterations), size(amplitude, 2))))
+      do i = 1, size(points)
+         points(i)%omega = omega(i)
+         points(i)%residual = residual(i)
+         points(i)%amplitude = amplitude(:, i)
+         points(i)%iterations = iterations(i)
+         points(i)%converged = converged(i) > 0.0_wp
+      end do
+   end subroutine read_points
+
+   !> Refuse to go on where the unworn joint of the case is not that of the file.
+   subroutine check_first(self, state, error)
+      class(restart_type), intent(in) :: self
+      !> First state of the case.
+      type(wear_state), intent(in) :: state
+      type(error_type), allocatable, intent(out) :: error
+      logical :: agrees
+
+      agrees = size(state%x) == size(self%first%x)
+      if (agrees) agrees = norm2(state%x - self%first%x) <= same_vibration*norm2(self%first%x)
+      if (agrees) agrees = norm2(state%rate - self%first%rate) <= &
+                           same_vibration*norm2(self%first%rate)
+      if (agrees) return
+      call fatal_error(error, self%path//': its joint vibrates otherwise than that of this '// &
+                       'case before any wear: the matrices or loads of &model have changed; start '// &
+                       'anew, or use &contact worn to go on from its depths', status_input)
+   end subroutine check_first
+
+   !> Set a march to where it stood after the last step.
+   subroutine give_control(self, march)
+      class(restart_type), intent(in) :: self
+      type(wear_march), intent(inout) :: march
+
+      march%next_cycles = self%control(c_next_cycles)
+      march%largest_rate = self%control(c_largest_rate)
+      march%checked_depth = self%control(c_checked_depth)
+      march%resonance%spacing = self%control(c_spacing)
+      march%n_steps = nint(self%control(c_steps))
+      march%n_rejected = nint(self%control(c_rejected))
+      if (allocated(self%checked_rate)) march%checked_rate = self%checked_rate
+   end subroutine give_control
+
+end module fw_restart_file

@@ -1,0 +1,196 @@
+"""A wear run that was interrupted and continued gives the numbers of one that was not."""
+import os
+import shutil
+import signal
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+from wear_cases import PROGRAM, merged, oscillator, prescribed_slip, read, result, run, \
+    shared_load, write_namelist
+
+# What depends on the clock or on the name of the run.
+CLOCK = {"seconds", "attributes"}
+
+
+def assert_same(found, expected):
+    """Bit by bit."""
+    assert set(found) == set(expected)
+    for name in set(expected) - CLOCK - {"wear"}:
+        assert found[name].dtype == expected[name].dtype, name
+        if expected[name].dtype == object:
+            assert found[name].tolist() == expected[name].tolist(), name
+        else:
+            assert found[name].tobytes() == expected[name].tobytes(), name
+    assert found["wear"] == expected["wear"]
+    for name in ("status", "steady_state"):
+        assert found["attributes"][name] == expected["attributes"][name]
+
+
+CASES = {
+    "implicit": shared_load(scheme="implicit", error_tolerance=1e-4, n_cycles=300.0),
+    "explicit": shared_load(scheme="explicit", error_tolerance=1e-4, n_cycles=100.0),
+    "fixed depth steps": shared_load(scheme="implicit", max_depth_step=0.004),
+    "pseudo-time": shared_load(scheme="pseudo_time", max_depth_step=0.004),
+    "following": oscillator(7, error_tolerance=1e-3, n_cycles=100.0, follow_resonance=True),
+    "carried memory": merged(shared_load(error_tolerance=1e-4, n_cycles=300.0),
+                             {"contact": {"memory": "carried"}}),
+    "histories": merged(prescribed_slip(error_tolerance=1e-4, n_cycles=300.0),
+                        {"output": {"histories": True}}),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_same_numbers(tmp_path, name):
+    groups = CASES[name]
+    whole = result(tmp_path, groups, name="whole")
+    steps = len(whole["omega"]) - 1
+    assert steps > 8
+    for stop in (1, 7):
+        part = merged(groups, {"wear": {"max_steps": stop}, "output": {}})
+        # The steps of pseudo-time are brought to equilibrium at the end of a run: cut behind it.
+        keep = stop if name == "pseudo-time" else stop + 1
+        run(tmp_path, part, name="part", status=4)
+        cut_behind(tmp_path / "part.h5", keep)
+        again = result(tmp_path, groups, "--restart", "part.h5", name="again")
+        assert_same(again, whole)
+
+
+def cut_behind(path, n_rows):
+    """Shorten every dataset that grows, as a kill between two steps leaves them."""
+    with h5py.File(path, "r+") as file:
+        def shorten(_, item):
+            if isinstance(item, h5py.Dataset) and item.maxshape[:1] == (None,):
+                item.resize(n_rows, axis=0)
+        file.visititems(shorten)
+
+
+def test_killed_run(tmp_path):
+    """kill -9 while steps are being taken; the rest starts from what is left of the file."""
+    groups = oscillator(25, error_tolerance=1e-5, n_cycles=50.0)
+    whole = result(tmp_path, groups, name="whole")
+    write_namelist(tmp_path / "case.nml", groups)
+    with subprocess.Popen([PROGRAM, "-v", "case.nml"], cwd=tmp_path, stderr=subprocess.PIPE,
+                          stdout=subprocess.DEVNULL, text=True,
+                          env={**os.environ, "OMP_WAIT_POLICY": "passive"}) as process:
+        for line in process.stderr:
+            if line.startswith("point 8"):
+                break
+        process.send_signal(signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    assert not (tmp_path / "case.h5").exists()
+    left = read(tmp_path / "case.h5.part")
+    assert left["attributes"]["status"] == "incomplete"
+    assert 1 <= len(left["omega"]) < len(whole["omega"])
+    assert_same(result(tmp_path, groups, "--restart", "case.h5.part"), whole)
+    assert (tmp_path / "case.h5.part").exists(), "what a killed run left is never touched"
+
+
+def test_restart_may_be_the_result(tmp_path):
+    groups = CASES["implicit"]
+    whole = result(tmp_path, groups, name="whole")
+    run(tmp_path, merged(groups, {"wear": {"max_steps": 5}}), status=4)
+    assert_same(result(tmp_path, groups, "--restart", "case.h5"), whole)
+    # What has come to its end stays as it is.
+    assert_same(result(tmp_path, groups, "--restart", "case.h5"), whole)
+
+
+def test_more_cycles(tmp_path):
+    """A run that is complete goes on to more cycles; its rows stay."""
+    groups = prescribed_slip(error_tolerance=1e-5, n_cycles=50.0)
+    first = result(tmp_path, groups)
+    more = result(tmp_path, merged(groups, {"wear": {"n_cycles": 100.0}}), "--restart", "case.h5",
+                  name="more")
+    n = len(first["omega"])
+    assert more["wear/depth"][:n].tobytes() == first["wear/depth"].tobytes()
+    assert more["wear/cycles"][-1] == 100.0
+    assert more["wear/depth"][-1, 0] == pytest.approx(0.07080764345495623, rel=1e-5)
+
+
+def test_check_steps_after_a_restart(tmp_path):
+    groups = merged(CASES["implicit"], {"wear": {"check_steps": True}})
+    whole = result(tmp_path, groups, name="whole")
+    run(tmp_path, merged(groups, {"wear": {"max_steps": 5}}), status=4)
+    again = result(tmp_path, groups, "--restart", "case.h5")
+    assert again["wear"]["profile_change"] == whole["wear"]["profile_change"] > 0.0
+    assert_same(again, whole)
+
+
+@pytest.fixture
+def stopped(tmp_path):
+    groups = CASES["implicit"]
+    run(tmp_path, merged(groups, {"wear": {"max_steps": 3}}), name="old", status=4)
+
+    def refused(changes, *arguments, file="old.h5", status=3):
+        message = run(tmp_path, merged(groups, changes), "--restart", file, *arguments,
+                      status=status).stderr
+        assert not list(tmp_path.glob("case.h5*"))
+        return message
+    refused.folder = tmp_path
+    return refused
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"wear": {"scheme": "explicit"}}, ["wear%scheme = 'implicit'", "'explicit'"]),
+    ({"wear": {"error_tolerance": 1e-3}}, ["wear%error_tolerance = 1e-4", "0.001"]),
+    ({"contact": {"mu": 0.4}}, ["contact%mu", "0.4"]),
+    ({"sweep": {"start": 1.5}}, ["sweep%start", "1.5"]),
+    ({"harmonics": {"n_harmonics": 2}}, ["harmonics%n_harmonics"]),
+    ({"solver": {"tolerance": 1e-9}}, ["solver%tolerance"]),
+    ({"load": {"static": [0.0, 0.0, 0.0, 0.0, -3.0]}}, ["load%static"]),
+])
+def test_other_case_is_refused(stopped, changes, words):
+    message = stopped(changes)
+    assert "old.h5" in message
+    for word in words:
+        assert word in message
+
+
+def test_check_refuses_too(stopped):
+    assert "wear%scheme" in stopped({"wear": {"scheme": "explicit"}}, "--check")
+    assert stopped({}, "--check", status=0) == ""
+
+
+def test_other_analysis_is_refused(stopped):
+    assert "analysis = 'point'" in stopped({"case": {"analysis": "point"}}, status=2)
+
+
+def test_files_that_are_no_restart(stopped):
+    folder = stopped.folder
+    assert "none.h5: no such file" in stopped({}, file="none.h5", status=5)
+    (folder / "text.h5").write_text("no result")
+    assert "text.h5" in stopped({}, file="text.h5")
+    with h5py.File(folder / "model.h5", "w") as file:
+        file.attrs["format"] = "fretwear-model"
+    assert "is no result file" in stopped({}, file="model.h5")
+    point = {**CASES["implicit"], "case": {"analysis": "point"}}
+    run(folder, point, name="point")
+    assert "is not the result of analysis = 'wear'" in stopped({}, file="point.h5")
+    shutil.copy(folder / "old.h5", folder / "bare.h5")
+    with h5py.File(folder / "bare.h5", "r+") as file:
+        del file["restart"]
+    assert "holds no group /restart" in stopped({}, file="bare.h5")
+    cut_behind(folder / "old.h5", 0)
+    assert "no step was saved" in stopped({})
+
+
+def test_changed_model_file_is_refused(tmp_path):
+    """Matrices are not in the namelist: the first vibration tells."""
+    groups = CASES["implicit"]
+
+    def write_model(factor):
+        with h5py.File(tmp_path / "model.h5", "w") as file:
+            file.attrs.update(format="fretwear-model", format_version=1)
+            n = groups["model"]["n_dof"]
+            file["mass"] = np.zeros((n, n))
+            file["stiffness"] = factor * np.reshape(groups["model"]["stiffness"], (n, n))
+
+    from_file = {**groups, "model": {"source": "hdf5", "file": "model.h5"}}
+    write_model(1.0)
+    run(tmp_path, merged(from_file, {"wear": {"max_steps": 3}}), name="old", status=4)
+    write_model(1.01)
+    assert "&model have changed" in run(tmp_path, from_file, "--restart", "old.h5",
+                                        status=3).stderr
+    write_model(1.0)
+    run(tmp_path, from_file, "--restart", "old.h5")
