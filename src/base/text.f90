@@ -45,7 +45,7 @@ contains
 
    pure function logical_to_text(flag) result(text)
       logical, intent(in) :: flag
-      character(merge(6, 7, flag)) :: text
+      character(7 - count([flag])) :: text
 
       text = merge('.true. ', '.false.', flag)
    end function logical_to_text

@@ -258,7 +258,7 @@ contains
 
    pure function cycles_units(case) result(units)
       type(case_type), intent(in) :: case
-      character(merge(21, 6, case%wear%scheme == wear_pseudo_time)) :: units
+      character(6 + 15*count([case%wear%scheme == wear_pseudo_time])) :: units
 
       units = 'cycles'
       if (case%wear%scheme == wear_pseudo_time) units = 'pseudo-time in cycles'
