@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help deps build debug run test lint clean
+.PHONY: help deps build debug run test lint docs clean
 .PHONY: bench bench-solvers bench-paper bench-time bench-full
 
 BUILD := build/release
@@ -64,7 +64,10 @@ test: build ## every test; the last line counts the cases
 
 lint: build/deps.stamp ## type checker and linter of the Python code
 	@$(PYTHON) -m mypy
-	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench
+	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs/api
+
+docs: build/deps.stamp ## reference of library and Python package, in build/docs
+	@$(PYTHON) tools/build_docs.py build/docs
 
 wheel: build/deps.stamp ## the package in a fresh environment, used as the README says
 	@tools/check_install.sh build/wheel
@@ -85,4 +88,4 @@ bench-full: build ## every part of docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py all
 
 clean: ## remove everything built but the Python environment
-	rm -rf $(BUILD) build/debug build/wheel $(RUN)
+	rm -rf $(BUILD) build/debug build/docs build/wheel $(RUN)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Build the reference of the library (FORD) and of the Python package (Sphinx), without the network.
+"""Build the reference of the library (FORD) and of the Python package (Sphinx), offline.
 
     tools/build_docs.py OUTPUT_DIRECTORY [fortran] [python]
 
