@@ -64,7 +64,7 @@ test: build ## every test; the last line counts the cases
 
 lint: build/deps.stamp ## type checker and linter of the Python code
 	@$(PYTHON) -m mypy
-	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs/api
+	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs
 
 docs: build/deps.stamp ## reference of library and Python package, in build/docs
 	@$(PYTHON) tools/build_docs.py build/docs
