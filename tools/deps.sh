@@ -97,6 +97,7 @@ if ! { [ -x "$venv/bin/python" ] && has_modules "$venv/bin/python"; }; then
    if has_modules python3; then
       python3 -m venv --system-site-packages --without-pip "$venv"
    else
+      echo "deps: Python packages into $venv, for pictures and tests (some minutes)" >&2
       python3 -m venv "$venv"
       if ! "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
          "${python_packages[@]}"; then
