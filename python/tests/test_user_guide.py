@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import typing
 from pathlib import Path
 
 import pytest
+
+from fretwear import settings
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("FW_RUN", str(ROOT / "build" / "release" / "fw_run"))
@@ -117,8 +120,8 @@ def test_every_key_says_what_it_means() -> None:
 
 def test_units_stand_where_the_settings_of_the_package_have_them() -> None:
     rows = table_rows()
-    settings = (ROOT / "python" / "fretwear" / "settings.py").read_text()
-    keys = re.findall(r"^    (\w+): .*# \[.*\]$", settings, re.MULTILINE)
+    source = (ROOT / "python" / "fretwear" / "settings.py").read_text()
+    keys = re.findall(r"^    (\w+): .*# \[.*\]$", source, re.MULTILINE)
     assert len(keys) > 8
     for key in keys:
         found = [cells for name, cells in rows.items() if name.endswith("%" + key)]
@@ -147,3 +150,10 @@ def anchors(page: Path) -> set[str]:
     """Anchors of the headings of a page, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_the_settings_of_the_package_are_the_keys_of_the_reader() -> None:
+    groups = typing.get_type_hints(settings.Groups)
+    keys = {f"{'model' if group == 'structure' else group}%{key}"
+            for group, kind in groups.items() for key in kind.__annotations__}
+    assert keys == read_keys()
