@@ -35,6 +35,7 @@ _DIMENSIONS: dict[str, tuple[str, ...]] = {
     "iterations": ("point",),
     "residual": ("point",),
     "seconds": ("point",),
+    "served_by": ("point",),
     "fold": ("point",),
     "floquet/stable": ("point",),
     "contact/force": ("point", "coefficient", "pair", "direction"),
@@ -221,6 +222,17 @@ class Result:
     def converged(self) -> NDArray[np.bool_]:
         """Which points converged (n_points)."""
         return self["converged"].astype(bool)
+
+    @property
+    def served_by(self) -> list[str]:
+        """What gave the solution of each point: 'newton', 'other guess', 'pseudo-time', 'smaller
+        steps', 'raised load', 'free guess', 'powell', 'kinsol' or 'arclength'; 'none' where the
+        point did not converge. Of sweeps and single points (n_points).
+        """
+        codes = self["served_by"]
+        with self.open() as file:
+            names = [_text(name) for name in file["served_by"].attrs["names"]]
+        return [names[int(code)] for code in codes]
 
     @property
     def iterations(self) -> NDArray[np.int_]:

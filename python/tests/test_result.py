@@ -119,3 +119,9 @@ def test_a_file_that_cannot_be_read_is_a_message_and_a_status(
         capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["plot", str(tmp_path / "none.h5")]) == OutputError.exit_status
     assert capsys.readouterr().err.startswith("fretwear plot: error: ")
+
+
+def test_served_by_names_what_gave_the_points(coarse: Result) -> None:
+    assert len(coarse.served_by) == coarse.n_points
+    assert set(coarse.served_by) <= {"newton", "other guess", "pseudo-time", "smaller steps"}
+    assert coarse.served_by[0] == "newton"

@@ -10,7 +10,17 @@ import pytest
 import scipy.linalg as la
 
 from fretwear.reduction import bonded_basis
-from fretwear.sector import Discretisation, FullModel, Geometry, ReducedModel, patch_grid
+from fretwear.sector import (
+    Discretisation,
+    FullModel,
+    Geometry,
+    ReducedModel,
+    Retention,
+    SectorParameters,
+    build_full,
+    patch_grid,
+    reduce_model,
+)
 from fretwear.sector.assembly import Assembly
 from fretwear.sector.contact import held_nodes
 from fretwear.sector.mesh import BLADE
@@ -233,3 +243,26 @@ def test_geometry_that_cannot_be_built_is_refused(name: str, value: float) -> No
 def test_whole_patches_of_elements() -> None:
     discretisation = Discretisation(axial_patches=4, slope_patches=2)
     assert (discretisation.n_axial, discretisation.n_slope) == (8, 4)
+
+
+def test_the_lock_holds_the_blade_along_its_slot(full: FullModel, reduced: ReducedModel) -> None:
+    """The axial translation of the blade meets the stiffness of the lock; the bonded frequencies
+    hardly know of it."""
+    lock = 100.0
+    parameters = SectorParameters(discretisation=full.parameters.discretisation,
+                                  retention=Retention(lock))
+    locked = reduce_model(build_full(parameters))
+    n = 3 * reduced.n_pairs
+    axial = (reduced.frame @ np.array([0.0, 0.0, 1.0])).ravel()
+    # In series with blade and disk, which are some thousand times as stiff.
+    assert axial @ locked.stiffness[:n, :n] @ axial == pytest.approx(lock, rel=1e-3)
+    across = (reduced.frame @ np.array([1.0, 0.0, 0.0])).ravel()
+    assert abs(across @ locked.stiffness[:n, :n] @ across) < 1e-3 * lock
+    assert locked.frequencies()[:5] == pytest.approx(reduced.frequencies()[:5], rel=1e-4)
+    assert locked.frequencies(state="frictionless")[0] > reduced.frequencies(
+        state="frictionless")[0]
+
+
+def test_a_negative_lock_is_refused() -> None:
+    with pytest.raises(ValueError, match="Retention: retention = -1.0"):
+        Retention(-1.0)

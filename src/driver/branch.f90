@@ -14,6 +14,7 @@ module fw_branch
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_point, only: point_type
+   use fw_point, only: served_by_arclength
    use fw_point_solver, only: point_solver
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
@@ -140,6 +141,7 @@ contains
       call self%system%residual(coefficients, self%r)
       point%omega = p
       point%converged = report%converged .and. is_lasting(self%system)
+      if (point%converged) point%served_by = served_by_arclength
       point%iterations = report%iterations
       point%residual = report%residual
       point%fold = fold

@@ -1,5 +1,5 @@
-!> One solution point: warm start, other guesses, intermediate frequencies or loads, then what is
-!> reported.
+!> One solution point: warm start, other guesses, pseudo-time, intermediate frequencies or loads;
+!> then what is reported, and which of these served.
 module fw_point_solver
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
@@ -11,11 +11,22 @@ module fw_point_solver
    use fw_hbm, only: hbm_system
    use fw_newton, only: solver_report
    use fw_point, only: point_type
+   use fw_point, only: served_by_free_guess
+   use fw_point, only: served_by_kinsol
+   use fw_point, only: served_by_newton
+   use fw_point, only: served_by_none
+   use fw_point, only: served_by_other_guess
+   use fw_point, only: served_by_powell
+   use fw_point, only: served_by_pseudo_time
+   use fw_point, only: served_by_raised_load
+   use fw_point, only: served_by_smaller_steps
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_solution, only: find_stability
    use fw_solution, only: solution_method
    use fw_solver_options, only: pseudo_time_options
+   use fw_solver_options, only: solver_kinsol
+   use fw_solver_options, only: solver_powell
    use fw_solver_options, only: solver_pseudo_time
    implicit none (type, external)
    private
@@ -27,6 +38,9 @@ module fw_point_solver
    !> Steps of the pseudo-time fallback, and failures in a row after which it is left alone: a
    !> joint that cannot carry its load has no solution to flow to.
    integer, parameter :: fallback_steps = 60, max_flow_failures = 2
+   !> Points that fail in a row after which a sweep spends less on a point: it has gone where no
+   !> solution exists, or where none is found in this way.
+   integer, parameter :: max_point_failures = 2
    !> First and smallest step of the load on the way to a first solution.
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
@@ -44,6 +58,10 @@ module fw_point_solver
       !> Points that the pseudo-time fallback has saved.
       integer :: n_by_flow = 0
       integer :: flow_failures = 0
+      !> Points without a solution since the last one with it.
+      integer :: point_failures = 0
+      !> What gave the present solution.
+      integer :: served_by = served_by_none
    contains
       procedure :: start
       procedure :: solve
@@ -76,6 +94,8 @@ contains
       self%best_residual = huge(1.0_wp)
       call reach(self, case, system, omega, report, point%iterations, error)
       if (allocated(error)) return
+      self%point_failures = merge(0, self%point_failures + 1, report%converged)
+      if (report%converged) point%served_by = self%served_by
       if (.not. report%converged .and. self%best_residual < huge(1.0_wp)) then
          self%x = self%best
          report%residual = self%best_residual
@@ -101,9 +121,9 @@ contains
       point%seconds = real(clock_end - clock, wp)/real(rate, wp)
    end subroutine solve
 
-   !> Newton from the best guesses known. Where all fail: from the last point on the sweep by
-   !> halves, or to the first point by raising the load; then by pseudo-time; and at last from the
-   !> solution without contact, which may lie on another branch.
+   !> Newton from the best guesses known. Where all fail: pseudo-time; then from the last point on
+   !> the sweep by halves, or to the first point by raising the load; and at last from the solution
+   !> without contact, which may lie on another branch.
    subroutine reach(self, case, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -117,13 +137,26 @@ contains
          call by_flow(self, case, case%pseudo_time, system, omega, report, iterations, error)
          return
       end if
-      call approach(self, system, omega, 0, report, iterations, error)
+      call from_guesses(self, system, omega, report, iterations, error)
       if (allocated(error)) return
       if (report%converged .or. .not. case%solver%fallback) return
-      if (self%n_converged == 0) then
-         call raise_load(self, system, omega, report, iterations, error)
+      if (self%point_failures < max_point_failures) then
+         call by_other_ways(self, case, system, omega, report, iterations, error)
          if (allocated(error) .or. report%converged) return
       end if
+      call from_free_guess(self, system, omega, report, iterations)
+   end subroutine reach
+
+   !> Ways that cost many solutions: pseudo-time, then smaller steps of the frequency or the load.
+   subroutine by_other_ways(self, case, system, omega, report, iterations, error)
+      class(point_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(hbm_system), intent(inout), target :: system
+      real(wp), intent(in) :: omega
+      type(solver_report), intent(out) :: report
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+
       if (self%flow_failures < max_flow_failures) then
          call by_flow(self, case, pseudo_time_options(max_steps=fallback_steps), system, omega, &
                       report, iterations, error)
@@ -132,8 +165,14 @@ contains
          if (report%converged) self%n_by_flow = self%n_by_flow + 1
          if (report%converged) return
       end if
-      call from_free_guess(self, system, omega, report, iterations)
-   end subroutine reach
+      if (self%n_converged == 0) then
+         call raise_load(self, system, omega, report, iterations, error)
+         if (report%converged) self%served_by = served_by_raised_load
+      else
+         call approach(self, system, omega, 1, report, iterations, error)
+         if (report%converged) self%served_by = served_by_smaller_steps
+      end if
+   end subroutine by_other_ways
 
    !> The last resort.
    subroutine from_free_guess(self, system, omega, report, iterations)
@@ -149,6 +188,7 @@ contains
       iterations = iterations + last_report%iterations
       if (.not. last_report%converged) return
       report = last_report
+      self%served_by = served_by_free_guess
       call remember(self, omega)
    end subroutine from_free_guess
 
@@ -174,6 +214,7 @@ contains
       if (allocated(error)) return
       iterations = iterations + report%iterations
       if (report%converged) then
+         self%served_by = served_by_pseudo_time
          call remember(self, omega)
       else
          call note_best(self, report)
@@ -223,12 +264,11 @@ contains
       end if
    end subroutine raise_load
 
-   !> Newton from the guesses; where they fail, first go half of the way from the last point.
-   recursive subroutine approach(self, system, omega, depth, report, iterations, error)
+   !> Newton from the guesses at a frequency.
+   subroutine from_guesses(self, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(hbm_system), intent(inout), target :: system
       real(wp), intent(in) :: omega
-      integer, intent(in) :: depth
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
@@ -236,17 +276,36 @@ contains
       call system%set_frequency(omega, error)
       if (allocated(error)) return
       call try_guesses(self, system, omega, report, iterations)
-      if (report%converged) then
-         call remember(self, omega)
-         return
+      if (report%converged) call remember(self, omega)
+   end subroutine from_guesses
+
+   !> First half of the way from the last point, which may take halves of its own, then the rest.
+   recursive subroutine approach(self, system, omega, depth, report, iterations, error)
+      class(point_solver), intent(inout) :: self
+      type(hbm_system), intent(inout), target :: system
+      real(wp), intent(in) :: omega
+      !> Halvings on the way here, this one included.
+      integer, intent(in) :: depth
+      type(solver_report), intent(out) :: report
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: middle
+
+      middle = 0.5_wp*(self%omega_last + omega)
+      call from_guesses(self, system, middle, report, iterations, error)
+      if (allocated(error)) return
+      if (.not. report%converged .and. depth < max_halvings) then
+         call approach(self, system, middle, depth + 1, report, iterations, error)
+         if (allocated(error)) return
       end if
-      if (depth == max_halvings .or. self%n_converged == 0) return
-      if (.not. self%method%newton%options%fallback) return
-      call approach(self, system, 0.5_wp*(self%omega_last + omega), depth + 1, report, &
-         iterations, error)
-      if (allocated(error)) return
-      if (report%converged) call approach(self, system, omega, depth + 1, report, iterations, error)
-      if (allocated(error)) return
+      if (report%converged) then
+         call from_guesses(self, system, omega, report, iterations, error)
+         if (allocated(error)) return
+         if (.not. report%converged .and. depth < max_halvings) then
+            call approach(self, system, omega, depth + 1, report, iterations, error)
+            if (allocated(error)) return
+         end if
+      end if
       if (.not. report%converged) call system%set_frequency(omega, error)
    end subroutine approach
 
@@ -277,7 +336,24 @@ contains
          iterations = iterations + report%iterations
          if (report%converged .or. .not. self%method%newton%options%fallback) exit
       end do
+      if (.not. report%converged) return
+      self%served_by = served_by_other_guess
+      if (guess == first) self%served_by = first_choice(self%method%kind)
    end subroutine try_guesses
+
+   !> The solver that the case asks for.
+   pure integer function first_choice(kind)
+      integer, intent(in) :: kind
+
+      select case (kind)
+      case (solver_powell)
+         first_choice = served_by_powell
+      case (solver_kinsol)
+         first_choice = served_by_kinsol
+      case default
+         first_choice = served_by_newton
+      end select
+   end function first_choice
 
    !> One solution from the guess in x; the best that fails at the point itself is noted.
    subroutine attempt(self, system, report)

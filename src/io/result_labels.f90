@@ -29,6 +29,7 @@ module fw_result_labels
       label_type('/amplitude', '<length>', 'point observed', &
                  'largest magnitude over the period'), &
       label_type('/converged', '', 'point', 'whether the point converged'), &
+      label_type('/served_by', '', 'point', 'what gave the solution, an index into names'), &
       label_type('/iterations', '1', 'point', 'iterations of the solver'), &
       label_type('/residual', '1', 'point', 'residual over vibratory load'), &
       label_type('/seconds', 's', 'point', 'time spent on the point'), &

@@ -1,6 +1,7 @@
 !> The datasets of a result file with one row per solution point.
 module fw_result_rows
    use fw_case, only: analysis_frf
+   use fw_case, only: analysis_point
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_hdf5, only: growing_dataset
@@ -9,10 +10,13 @@ module fw_result_rows
    use fw_hdf5, only: growing_real
    use fw_hdf5, only: get_shape
    use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: write_attribute
    use fw_kinds, only: wp
    use fw_point, only: point_type
+   use fw_point, only: served_words
    use fw_result_labels, only: label_dataset
    use fw_solver_options, only: continuation_arclength
+   use fw_text, only: string_type
    use hdf5, only: hsize_t
    implicit none (type, external)
    private
@@ -24,8 +28,8 @@ module fw_result_rows
                          d_iterations = 5, d_residual = 6, d_seconds = 7, d_force = 8, &
                          d_fraction = 9, d_dissipation = 10, d_observed = 11, &
                          d_force_history = 12, d_slip_history = 13, d_fold = 14, &
-                         d_stable = 15, d_multipliers = 16
-   integer, parameter :: n_datasets = 16
+                         d_stable = 15, d_multipliers = 16, d_served_by = 17
+   integer, parameter :: n_datasets = 17
 
    type :: row_set
       integer, private :: n_rows = 0, n_coefficients = 1, expected = 1
@@ -69,6 +73,10 @@ contains
       if (allocated(error)) return
       call self%new(file, d_seconds, '/seconds', scalar, error)
       if (allocated(error)) return
+      if (case%analysis == analysis_frf .or. case%analysis == analysis_point) then
+         call create_served_by(self, file, error)
+         if (allocated(error)) return
+      end if
       if (case%sweep%continuation == continuation_arclength) then
          call self%new(file, d_fold, '/fold', scalar, error, kind_of=growing_logical)
       end if
@@ -111,6 +119,10 @@ contains
       if (allocated(error)) return
       call self%list(d_seconds)%append(file, point%seconds, error)
       if (allocated(error)) return
+      if (self%list(d_served_by)%is_created()) then
+         call self%list(d_served_by)%append(file, point%served_by, error)
+         if (allocated(error)) return
+      end if
       if (self%list(d_fold)%is_created()) call self%list(d_fold)%append(file, point%fold, error)
       if (.not. allocated(error)) call append_stability(self, file, point, error)
       if (.not. allocated(error)) call self%append_contact(file, point, error)
@@ -151,6 +163,24 @@ contains
          call self%list(i)%close()
       end do
    end subroutine close
+
+   !> Codes of what gave the solutions, with the words for them as the attribute `names`.
+   subroutine create_served_by(self, file, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: name = '/served_by'
+      integer, parameter :: scalar(0) = [integer ::]
+      type(string_type) :: words(size(served_words))
+      integer :: i
+
+      call self%new(file, d_served_by, name, scalar, error, kind_of=growing_integer)
+      if (allocated(error)) return
+      do i = 1, size(words)
+         words(i)%text = trim(served_words(i - 1))
+      end do
+      call write_attribute(file, name, 'names', words, error)
+   end subroutine create_served_by
 
    subroutine new(self, file, i, name, row_shape, error, kind_of)
       class(row_set), intent(inout) :: self

@@ -71,6 +71,8 @@ module fw_continuation
       logical :: complete = .false.
       !> Whether it ended because x runs away while p stays.
       logical :: runs_away = .false.
+      !> Whether the orientation is looked at; without, the smaller angle between tangents decides.
+      logical :: oriented = .true.
    contains
       procedure :: trace
    end type arclength_type
@@ -88,6 +90,9 @@ module fw_continuation
    integer, parameter :: max_constant = 8
    !> Cosine of the angle between tangents below which a branch turns sharply.
    real(wp), parameter :: sharp = 0.8_wp
+   !> Unknowns up to which the orientation is looked at: it takes the LU factors of the whole
+   !> derivative, which beyond cost more than the points of the branch.
+   integer, parameter :: orientation_up_to = 1000
    !> Steps between these multiples of the first one.
    real(wp), parameter :: largest_growth = 2.0_wp, smallest_share = 1.0e-5_wp
    !> Iterative linear solutions: the tangent needs more digits than a Newton step.
@@ -112,6 +117,7 @@ contains
       logical :: done
 
       n_constant = 0
+      self%oriented = system%n <= orientation_up_to
       call begin(self, system, x, here, error)
       ds = self%step
       do k = 2, self%max_points
@@ -122,8 +128,6 @@ contains
             self%ending = 'the corrector failed at the smallest step'
             return
          end if
-         call look_ahead(self, system, here, next, error)
-         if (allocated(error)) return
          if (here%t_p*next%t_p < 0.0_wp) call report_fold(self, system, here, next, ds, observer, &
             error)
          if (allocated(error)) return
@@ -221,8 +225,9 @@ contains
          call correct(self, system, here, ds, next, report, error)
          if (allocated(error)) return
          done = report%converged
-         if (done) return
-         if (ds < turn_below*self%step) then
+         if (done) call look_ahead(self, system, here, ds, orientation, next, done, error)
+         if (allocated(error) .or. done) return
+         if (ds < turn_below*self%step .and. self%oriented) then
             call turn_at_kink(self, system, here, ds, orientation, next, report, error)
             if (allocated(error)) return
             done = report%converged
@@ -235,8 +240,9 @@ contains
       done = report%converged
    end subroutine advance
 
-   !> A step in p alone, beyond a place where many pieces meet: Newton's method with its line search
-   !> from `here`, first close by, then further away.
+   !> A step in p alone, beyond a place where many pieces meet or where the derivative has no bound
+   !> (a pair whose slip of a period vanishes): Newton's method with its line search from `here`,
+   !> first close by, then further away; ahead, then on the other side, where the branch may turn.
    subroutine leap(self, system, here, orientation, ds, next, report, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
@@ -247,29 +253,53 @@ contains
       type(branch_point), intent(out) :: next
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
+      integer :: k, side
+
+      do side = 1, merge(-1, 1, self%oriented), -2
+         do k = -max_leap, 0
+            call leap_to(self, system, here, side*sign(2.0_wp**k*self%step*self%p_scale, &
+               here%t_p), orientation, next, report, error)
+            if (allocated(error)) return
+            if (report%converged) exit
+         end do
+         if (report%converged) exit
+      end do
+      if (report%converged) ds = sqrt(inner(self, next%x - here%x, next%p - here%p, &
+         next%x - here%x, next%p - here%p))
+   end subroutine leap
+
+   !> The point at p + dp, if the branch goes on there in the direction of dp.
+   subroutine leap_to(self, system, here, dp, orientation, next, report, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here
+      real(wp), intent(in) :: dp
+      integer, intent(inout) :: orientation
+      type(branch_point), intent(out) :: next
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
       type(newton_solver) :: newton
-      integer :: its_orientation, k
+      integer :: its_orientation
       logical :: done
 
       newton%options = self%options
+      next = here
+      next%p = here%p + dp
+      call system%set_parameter(next%p, error)
+      if (allocated(error)) return
+      call newton%solve(system, next%x, report)
+      if (.not. report%converged) return
+      call find_tangent(self, system, here, next, done)
+      report%converged = done
+      if (.not. done) return
+      ! Beyond a sharp turn the angle with the last tangent says nothing.
+      if (next%t_p*dp < 0.0_wp) call reverse(next)
+      if (.not. self%oriented) return
       if (orientation == 0) call find_orientation(system, here, orientation, error)
       if (allocated(error)) return
-      do k = -max_leap, 0
-         next = here
-         next%p = here%p + sign(2.0_wp**k*self%step*self%p_scale, here%t_p)
-         call system%set_parameter(next%p, error)
-         if (allocated(error)) return
-         call newton%solve(system, next%x, report)
-         if (.not. report%converged) cycle
-         call find_tangent(self, system, here, next, done)
-         if (done) call find_orientation(system, next, its_orientation, error)
-         if (allocated(error)) return
-         report%converged = done .and. its_orientation == orientation
-         ds = sqrt(inner(self, next%x - here%x, next%p - here%p, next%x - here%x, &
-                         next%p - here%p))
-         if (report%converged) exit
-      end do
-   end subroutine leap
+      call find_orientation(system, next, its_orientation, error)
+      report%converged = its_orientation == orientation
+   end subroutine leap_to
 
    !> Step along the tangent of the piece just beyond `here`, in the direction that keeps the
    !> orientation of the branch.
@@ -298,10 +328,7 @@ contains
       if (.not. done) return
       call find_orientation(system, beyond, its_orientation, error)
       if (allocated(error)) return
-      if (its_orientation /= orientation) then
-         beyond%t = -beyond%t
-         beyond%t_p = -beyond%t_p
-      end if
+      if (its_orientation /= orientation) call reverse(beyond)
       beyond%x = here%x
       beyond%p = here%p
       call correct(self, system, beyond, ds, next, report, error)
@@ -311,24 +338,43 @@ contains
       report%converged = its_orientation == orientation
    end subroutine turn_at_kink
 
-   !> Where the branch turns sharply, the tangent that makes the smaller angle with the last one may
-   !> be the one that leads back.
-   subroutine look_ahead(self, system, here, next, error)
+   !> A point with the other orientation: where the branch turns sharply, the tangent that makes the
+   !> smaller angle with the last one leads back, and is reversed. Where it does not turn, the step
+   !> may have gone across to another part of the branch, and a smaller one is asked for; what is
+   !> left then is a bifurcation, beyond which a branch has the other orientation.
+   subroutine look_ahead(self, system, here, ds, orientation, next, done, error)
       class(arclength_type), intent(in) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here
+      real(wp), intent(in) :: ds
+      !> Orientation at `here`; 0 where it is not known yet.
+      integer, intent(inout) :: orientation
       type(branch_point), intent(inout) :: next
+      !> Whether the step counts.
+      logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
-      integer :: before, after
+      integer :: its_orientation
 
-      if (inner(self, here%t, here%t_p, next%t, next%t_p) > sharp) return
-      call find_orientation(system, here, before, error)
+      done = .true.
+      if (.not. self%oriented) return
+      if (orientation == 0) call find_orientation(system, here, orientation, error)
       if (allocated(error)) return
-      call find_orientation(system, next, after, error)
-      if (before == after) return
-      next%t = -next%t
-      next%t_p = -next%t_p
+      call find_orientation(system, next, its_orientation, error)
+      if (allocated(error) .or. its_orientation == orientation) return
+      if (inner(self, here%t, here%t_p, next%t, next%t_p) > sharp) then
+         done = ds < turn_below*self%step
+      else
+         call reverse(next)
+      end if
    end subroutine look_ahead
+
+   !> Turn the tangent round.
+   pure subroutine reverse(point)
+      type(branch_point), intent(inout) :: point
+
+      point%t = -point%t
+      point%t_p = -point%t_p
+   end subroutine reverse
 
    !> Sign of det(dR/dx) dp/ds. It is the same all along a branch: det(dR/dx) changes its sign where
    !> p turns, in a smooth fold as at a kink.

@@ -127,3 +127,18 @@ def test_a_blade_that_nothing_holds(fw_run, load, hertz) -> None:
     assert np.ptp(omega[-8:]) < 1e-6 * omega[-1]
     assert omega[-1] / (2 * np.pi) == pytest.approx(hertz, abs=0.005)
     assert (fraction[-1, :, 1] > 0).all()
+
+
+@pytest.mark.parametrize("n_points", [37, 41])
+def test_the_lock_carries_the_branch_on(fw_run, n_points) -> None:
+    """The same with an axial lock, 1 N: on to the end, whatever the first step."""
+    case = SECTOR.with_name("frf_2000rpm.nml")
+    done = fw_run("-o", "locked.h5", "--set", f"sweep%n_points={n_points}", case)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(fw_run.directory / "locked.h5") as file:
+        hertz = file["omega"][:] / (2 * np.pi)
+        assert file["converged"][:].all()
+        amplitude = file["amplitude"][:, 0]
+    assert hertz[-1] == pytest.approx(1012, rel=1e-12)
+    # The peak of the natural sweep, which takes other steps; between points of 0.55 Hz.
+    assert amplitude.max() == pytest.approx(0.3811, abs=2e-4)

@@ -11,6 +11,7 @@ from .parameters import (
     Geometry,
     Material,
     ParameterError,
+    Retention,
     SectorParameters,
     patch_grid,
 )
@@ -22,6 +23,7 @@ __all__ = [
     "Material",
     "ParameterError",
     "ReducedModel",
+    "Retention",
     "SectorParameters",
     "build_full",
     "generate",

@@ -24,6 +24,7 @@ from .parameters import (
     Geometry,
     Material,
     ParameterError,
+    Retention,
     SectorParameters,
     patch_grid,
 )
@@ -31,7 +32,7 @@ from .recovery import recovery_mesh
 
 __all__ = ["main"]
 
-_GROUPS: tuple[type, ...] = (Geometry, Material, Discretisation)
+_GROUPS: tuple[type, ...] = (Geometry, Material, Retention, Discretisation)
 _USAGE, _BAD_PARAMETER, _NOT_WRITTEN = 2, 3, 5
 _RPM = math.pi / 30.0
 
@@ -119,7 +120,8 @@ def _parameters(options: argparse.Namespace) -> SectorParameters:
                                  "--slope-patches")
         patches["axial_patches"], patches["slope_patches"] = patch_grid(options.pairs)
     return SectorParameters(Geometry(**given[Geometry]), Material(**given[Material]),
-                            Discretisation(**given[Discretisation]))
+                            Discretisation(**given[Discretisation]),
+                            Retention(**given[Retention]))
 
 
 def _summary(full: FullModel, reduced: ReducedModel, path: str, seconds: float) -> None:

@@ -18,7 +18,7 @@ from .mesh import BLADE, DISK, SectorMesh
 from .parameters import Geometry, SectorParameters
 
 __all__ = ["FLANKS", "ContactRows", "Tip", "boundary_facets", "contact_rows", "flank_facets",
-           "flank_frame", "held_nodes", "tip_rows"]
+           "flank_frame", "held_nodes", "retention_row", "tip_rows"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -137,6 +137,21 @@ def held_nodes(nodes: Floats, geometry: Geometry) -> NDArray[np.bool_]:
     # The inner face is faceted: its chords lie inside the arc by their sagitta at most.
     inner = np.hypot(nodes[0], y) < geometry.inner_radius + _ON_SURFACE
     return cut | inner
+
+
+def retention_row(sector: SectorMesh, geometry: Geometry) -> sp.csr_array:
+    """Axial displacement of the root relative to the disk, (1, 3 n_nodes).
+
+    The mean over the bottom of the root minus the mean over the bottom of the slot: where a lock
+    plate sits.
+    """
+    axial = np.array([[0.0, 0.0, 1.0]])
+    means = []
+    for body, radius in ((BLADE, geometry.root_radius), (DISK, geometry.slot_radius)):
+        facets, centre = boundary_facets(sector, body)
+        facets = facets[np.abs(centre[:, 1] - radius) < _ON_SURFACE]
+        means.append(facet_means(sector.mesh, facets, np.zeros(len(facets), dtype=np.int64), 1))
+    return sp.csr_array(sp.kron(means[0].rows - means[1].rows, axial))
 
 
 def tip_rows(sector: SectorMesh, geometry: Geometry) -> Tip:

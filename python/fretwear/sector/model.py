@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..reduction import Bonded, ReducedSystem, reduce
 from .assembly import Assembly
-from .contact import ContactRows, Tip, contact_rows, held_nodes, tip_rows
+from .contact import ContactRows, Tip, contact_rows, held_nodes, retention_row, tip_rows
 from .mesh import SectorMesh, build_mesh
 from .parameters import ParameterError, SectorParameters
 
@@ -32,7 +32,8 @@ class FullModel:
     free : (n,) int
         Numbers 3 * node + component of the free degrees of freedom.
     mass, stiffness, rotation : (n, n) sparse
-        [tonne], [N/mm] and [N/mm per (rad/s)^2]; rotation is stress stiffening by the centrifugal
+        [tonne], [N/mm] and [N/mm per (rad/s)^2]; the stiffness has that of the axial lock in it,
+        where there is one; rotation is stress stiffening by the centrifugal
         stress of the bonded structure plus spin softening. Gyroscopic terms are left out: the
         motion of a stiff blade is nearly normal to the plane in which they act.
     contact : (3 n_pairs, n) sparse
@@ -141,6 +142,9 @@ def build_full(parameters: SectorParameters) -> FullModel:
 
     scalar_mass = assembly.scalar_mass()
     stiffness, contact = restrict(assembly.stiffness()), sp.csr_array(rows.matrix[:, free])
+    if parameters.retention.retention > 0.0:
+        lock = sp.csr_array(retention_row(sector, parameters.geometry)[:, free])
+        stiffness = sp.csr_array(stiffness + parameters.retention.retention * (lock.T @ lock))
     # The stiffness of an elastic half-space under a patch is of this order.
     kappa = parameters.material.young * np.sqrt(rows.area.mean())
     bonded = Bonded(stiffness, contact, kappa)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..export_mesh import RecoveryMesh, mesh_datasets
 from ..model_file import strings, write_model_file
 from .model import ReducedModel
-from .parameters import Discretisation, Geometry, Material, SectorParameters
+from .parameters import Discretisation, Geometry, Material, Retention, SectorParameters
 
 __all__ = ["read_parameters", "write_model"]
 
@@ -44,6 +44,8 @@ def write_model(model: ReducedModel, path: str | Path, title: str | None = None,
     if mesh is not None:
         datasets.update(mesh_datasets(mesh))
     default = f"Bladed-disk sector with a dovetail root, {model.n_pairs} contact pairs"
+    if model.parameters.retention.retention > 0.0:
+        default += f", axial lock of {model.parameters.retention.retention:g} N/mm"
     # The parameters are not part of the format; they make the file reproducible.
     write_model_file(path, datasets, title=title or default, unit_system=UNIT_SYSTEM,
                      attributes={"parameters": json.dumps(asdict(model.parameters))})
@@ -57,7 +59,9 @@ def read_parameters(path: str | Path) -> SectorParameters:
                              "fretwear.sector")
         groups = json.loads(bytes(file.attrs["parameters"]))
     return SectorParameters(Geometry(**groups["geometry"]), Material(**groups["material"]),
-                            Discretisation(**groups["discretisation"]))
+                            Discretisation(**groups["discretisation"]),
+                            # Files of a blade without a lock may not have this group.
+                            Retention(**groups.get("retention", {})))
 
 
 def _datasets(model: ReducedModel) -> dict[str, NDArray[Any]]:

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-__all__ = ["Discretisation", "Geometry", "Material", "ParameterError", "SectorParameters",
-           "patch_grid"]
+__all__ = ["Discretisation", "Geometry", "Material", "ParameterError", "Retention",
+           "SectorParameters", "patch_grid"]
 
 
 class ParameterError(ValueError):
@@ -162,6 +162,24 @@ class Material:
 
 
 @dataclass(frozen=True)
+class Retention:
+    """Axial lock of the blade in its slot.
+
+    The flanks hold a blade along its slot by friction alone. Real blades have a lock plate or a
+    retention ring as well: here one spring between root and disk, on the difference of the mean
+    axial displacements of the bottom of the root and of the bottom of the slot.
+    """
+
+    retention: float = _par(0.0, "axial stiffness of the lock between root and disk [N/mm]; 0: no "
+                                 "lock, the blade is held by its contact alone")
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, may_be_negative=("retention",))
+        _require(self.retention >= 0, "Retention", "retention", self.retention,
+                 "a stiffness of at least 0")
+
+
+@dataclass(frozen=True)
 class Discretisation:
     """Contact patches per flank, elements per block and number of modes."""
 
@@ -209,6 +227,7 @@ class SectorParameters:
     geometry: Geometry = field(default_factory=Geometry)
     material: Material = field(default_factory=Material)
     discretisation: Discretisation = field(default_factory=Discretisation)
+    retention: Retention = field(default_factory=Retention)
 
 
 def patch_grid(n_pairs: int) -> tuple[int, int]:
