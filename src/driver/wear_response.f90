@@ -1,6 +1,7 @@
 !> Analysis 'wear': the joint wears over the cycles at the first frequency of the sweep.
 module fw_wear_response
    use, intrinsic :: iso_fortran_env, only: int64
+   use fw_available, only: is_linear_euler
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
@@ -34,6 +35,10 @@ module fw_wear_response
    private
 
    public :: run_wear
+
+   !> Largest growth of the depth in a step where the scheme estimates no error and the case names
+   !> none, as a part of the depth scale.
+   real(wp), parameter :: depth_step = 5.0e-2_wp
 
    !> Watches nothing: the march is repeated for its end alone.
    type, extends(wear_observer) :: silent_observer
@@ -99,7 +104,9 @@ contains
          call new_wear_system(balance, case%contact, case%wear%coefficient, &
                               case%wear%law == wear_energy, system)
          call first_state(system, solver%x, point, state)
-         march%stepper = new_wear_stepper(case%wear, case%pseudo_time%scheme, &
+         if (needs_depth_step(case)) &
+            march%options%max_depth_step = depth_step*system%depth_scale()
+         march%stepper = new_wear_stepper(march%options, case%pseudo_time%scheme, &
                                            solver%method%newton)
          march%resonance = resonance_type(n_harmonics=case%harmonics%n_harmonics, &
                                           first=case%sweep%start)
@@ -218,7 +225,7 @@ contains
          return
       end if
       n = system%n_vibration()
-      halved%options = recorder%case%wear
+      halved%options = march%options
       call halved%options%halve_steps(march%stepper%order)
       halved%stepper = new_wear_stepper(halved%options, march%stepper%pseudo_scheme, &
                                         march%stepper%newton)
@@ -255,6 +262,13 @@ contains
 
       go_on = .true.
    end subroutine pass_by
+
+   !> Whether nothing in the case tells the size of the steps.
+   pure logical function needs_depth_step(case)
+      type(case_type), intent(in) :: case
+
+      needs_depth_step = is_linear_euler(case) .and. case%wear%max_depth_step <= 0.0_wp
+   end function needs_depth_step
 
    pure function cycles_units(case) result(units)
       type(case_type), intent(in) :: case

@@ -8,17 +8,20 @@ module fw_available
    use fw_harmonics_options, only: method_words, method_hbm, method_tcm, &
                                    method_tcm_least_squares, method_hdhb, &
                                    sampling_words, sampling_uniform, sampling_events
+   use fw_text, only: to_text
+   use fw_kinds, only: wp
    use fw_solver_options, only: jacobian_words, jacobian_analytic
    use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
                                  solver_pseudo_time, continuation_words, &
                                 continuation_natural, continuation_arclength
    use fw_solver_options, only: scheme_bdf
+   use fw_solver_options, only: scheme_implicit_euler
    use fw_solver_options, only: scheme_runge_kutta
    use fw_wear_options, only: wear_explicit, wear_pseudo_time
    implicit none (type, external)
    private
 
-   public :: check_available, has_history
+   public :: check_available, has_history, is_linear_euler
 
 contains
 
@@ -68,6 +71,14 @@ contains
       !> The derivative of the sliding path is known for sampled forces.
       subroutine check_wear()
          if (allocated(error) .or. case%analysis /= analysis_wear) return
+         if (case%contact%n_pairs == 0) then
+            call fatal_error(error, "case%analysis = 'wear' needs contact pairs, and there are "// &
+                             "none: give group &contact, or take a model file with contact", &
+                             status_input)
+            return
+         end if
+         call check_order()
+         if (allocated(error)) return
          if (has_history(case) .and. case%wear%follow_resonance) then
             call fatal_error(error, "wear%follow_resonance = .true. does not go with "// &
                              "pseudo_time%scheme = 'bdf', which builds on earlier steps: use "// &
@@ -87,6 +98,24 @@ contains
                           "harmonics%sampling = 'uniform': use that, or scheme = 'explicit'", &
                           status_input)
       end subroutine check_wear
+
+      !> What sets the steps has to be something that the scheme has.
+      subroutine check_order()
+         if (case%wear%scheme == wear_explicit .and. case%wear%order > 2) then
+            call fatal_error(error, 'wear%order = '//to_text(case%wear%order)// &
+                             ": scheme = 'explicit' has orders 1 and 2, 'implicit' 1 to 4", &
+                             status_input)
+         else if (case%wear%scheme == wear_pseudo_time .and. case%wear%order > 0) then
+            call fatal_error(error, 'wear%order = '//to_text(case%wear%order)// &
+                             ": with scheme = 'pseudo_time' pseudo_time%scheme sets the order; "// &
+                             'leave wear%order out', status_input)
+         else if (is_linear_euler(case) .and. case%wear%error_tolerance > 0.0_wp) then
+            call fatal_error(error, 'wear%error_tolerance does not go with '// &
+                             "pseudo_time%scheme = 'implicit_euler', which estimates no error: "// &
+                             "give wear%max_depth_step, or use 'rosenbrock' or 'bdf'", &
+                             status_input)
+         end if
+      end subroutine check_order
 
       !> Rigid contact has no derivative in the state from which a multiplier could be computed.
       subroutine check_stability()
@@ -115,6 +144,14 @@ contains
       end subroutine check_off
 
    end subroutine check_available
+
+   !> Whether wear steps are linearly implicit Euler steps in pseudo-time.
+   pure logical function is_linear_euler(case)
+      type(case_type), intent(in) :: case
+
+      is_linear_euler = case%wear%scheme == wear_pseudo_time .and. &
+                        case%pseudo_time%scheme == scheme_implicit_euler
+   end function is_linear_euler
 
    !> Whether the steps of a wear run build on earlier ones.
    pure logical function has_history(case)

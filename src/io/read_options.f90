@@ -147,7 +147,8 @@ contains
       call reader%get('wear', 'n_cycles', options%n_cycles, above=0.0_wp, most=most_cycles)
       call reader%get('wear', 'max_depth_step', options%max_depth_step, least=0.0_wp)
       call reader%get('wear', 'error_tolerance', options%error_tolerance, least=0.0_wp)
-      call reader%get('wear', 'steady_tolerance', options%steady_tolerance, above=0.0_wp)
+      call reader%get('wear', 'steady_tolerance', options%steady_tolerance, above=0.0_wp, &
+                      below=1.0_wp)
       call reader%get('wear', 'max_steps', options%max_steps, least=1)
       call reader%get('wear', 'check_steps', options%check_steps)
       call reader%get('wear', 'follow_resonance', options%follow_resonance)

@@ -24,6 +24,7 @@ module fw_wear_bdf
    use fida_mod, only: fidaseterrhandlerfn
    use fida_mod, only: fidasetid
    use fida_mod, only: fidasetinitstep
+   use fida_mod, only: fidasetmaxstep
    use fida_mod, only: fidasetpreconditioner
    use fida_mod, only: fidasetstoptime
    use fida_mod, only: fidasetsuppressalg
@@ -57,6 +58,8 @@ module fw_wear_bdf
    type :: bdf_state
       type(wear_system), pointer :: system => null()
       type(linear_step_type), pointer :: linear => null()
+      !> Whether `linear` holds the derivative that was prepared last: others use it too.
+      logical :: prepared = .false.
       !> Error of a step, as a part of the largest depth; depth below which that stops falling.
       real(wp) :: tolerance = 0.0_wp, least_depth = 0.0_wp
       real(wp), allocatable :: r(:), step(:)
@@ -75,6 +78,8 @@ module fw_wear_bdf
    contains
       procedure :: is_started
       procedure :: start
+      procedure :: limit_step
+      procedure :: forget_derivative
       procedure :: advance
       procedure :: finish
    end type bdf_integrator
@@ -164,6 +169,22 @@ contains
       done = all(status == 0)
    end subroutine configure
 
+   !> Make no step longer than this from the next one on that is not planned yet.
+   subroutine limit_step(self, cycles, done)
+      class(bdf_integrator), intent(inout) :: self
+      real(wp), intent(in) :: cycles
+      logical, intent(out) :: done
+
+      done = fidasetmaxstep(self%memory, cycles) == 0
+   end subroutine limit_step
+
+   !> The linear problem has served another system in between: prepare it again when it is needed.
+   subroutine forget_derivative(self)
+      class(bdf_integrator), intent(inout) :: self
+
+      if (associated(self%state)) self%state%prepared = .false.
+   end subroutine forget_derivative
+
    !> One step of the length and order that the error allows.
    subroutine advance(self, x, cycles, n_solved, done)
       class(bdf_integrator), intent(inout) :: self
@@ -250,18 +271,26 @@ contains
       type(n_vector), intent(inout) :: y, slope, residual
       type(c_ptr), value :: data
       type(bdf_state), pointer :: state
-      real(wp), pointer, contiguous :: x(:)
       logical :: done
 
       associate (cycles => cycles, slope => slope, residual => residual)
       end associate
       call c_f_pointer(data, state)
-      x => values(y, state%system%n)
+      call prepare(state, values(y, state%system%n), factor, done)
+      status = merge(callback_ok, callback_smaller, done)
+   end function set_up
+
+   subroutine prepare(state, x, factor, done)
+      type(bdf_state), intent(inout) :: state
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(in) :: factor
+      logical, intent(out) :: done
+
       call state%system%begin_step(x(state%system%n_vibration() + 1:), 1.0_wp/factor)
       call state%system%residual(x, state%r)
       call state%linear%prepare(state%system, done)
-      status = merge(callback_ok, callback_smaller, done)
-   end function set_up
+      state%prepared = done
+   end subroutine prepare
 
    !> Callback: solve with that derivative.
    integer(c_int) function precondition(cycles, y, slope, residual, right, solution, factor, &
@@ -274,10 +303,14 @@ contains
       integer :: n
       logical :: done
 
-      associate (cycles => cycles, factor => factor, accuracy => accuracy, y => y, &
-                 slope => slope, residual => residual)
+      associate (cycles => cycles, accuracy => accuracy, slope => slope, residual => residual)
       end associate
       call c_f_pointer(data, state)
+      status = callback_smaller
+      if (.not. state%prepared) then
+         call prepare(state, values(y, state%system%n), factor, done)
+         if (.not. done) return
+      end if
       n = state%system%n_vibration()
       z => values(solution, state%system%n)
       state%r = -values(right, state%system%n)

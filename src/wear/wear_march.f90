@@ -35,6 +35,8 @@ module fw_wear_march
 
    !> Halvings of a step in a row after which the march gives up.
    integer, parameter :: max_halvings = 20
+   !> The same for steps in a row that miss the tolerance: far more than a smooth rate takes.
+   integer, parameter :: max_inaccurate = 40
    !> Limits of the change of the step from one to the next, and its safety factor.
    real(wp), parameter :: largest_growth = 8.0_wp, smallest_shrink = 0.2_wp, safety = 0.9_wp
    !> Growth of the first step, where only the error is controlled, as a part of the elastic
@@ -149,6 +151,8 @@ contains
          self%complete = .true.
          if (self%n_steps == 0) then
             self%ending = 'no pair slips under pressure: nothing wears'
+            if (maxval(system%contact%slip) > 0.0_wp) &
+               self%ending = 'no pair has friction: by energy nothing wears'
          else
             self%ending = 'steady state after '//to_text(self%n_steps)//' steps'
          end if
@@ -199,13 +203,16 @@ contains
       integer, intent(out) :: iterations
       type(wear_step_report) :: report
       real(wp) :: cycles, error
-      integer :: halvings
+      type(wear_state) :: before
+      integer :: halvings, n_inaccurate
 
+      before = state
       iterations = 0
       halvings = 0
+      n_inaccurate = 0
       cycles = next_step(self, system, state)
       do
-         call self%stepper%advance(system, state, cycles, after, report)
+         call self%stepper%advance(system, before, cycles, after, report)
          iterations = iterations + report%iterations
          if (report%converged) call confirm(self, system, after, report, iterations)
          if (.not. report%converged) then
@@ -216,6 +223,7 @@ contains
                              ' on converges, down to '//to_text(cycles)//' cycles'
                return
             end if
+            if (halvings == 1) call catch_up(self, system, before, iterations)
             self%n_rejected = self%n_rejected + 1
             cycles = 0.5_wp*cycles
             self%next_cycles = cycles
@@ -226,6 +234,14 @@ contains
                  max(maxval(after%x(system%n_vibration() + 1:)), tiny(1.0_wp))
          call adapt(self, cycles, error)
          if (error <= self%options%tolerance()) exit
+         n_inaccurate = n_inaccurate + 1
+         self%gave_up = n_inaccurate > max_inaccurate
+         if (self%gave_up) then
+            self%ending = 'no step from cycle '//to_text(state%cycles)//' on is as accurate as '// &
+                          'wear%error_tolerance = '//to_text(self%options%tolerance())// &
+                          ', down to '//to_text(cycles)//' cycles: raise it'
+            return
+         end if
          self%n_rejected = self%n_rejected + 1
          cycles = self%next_cycles
       end do
@@ -241,23 +257,36 @@ contains
       type(wear_state), intent(out) :: after
       integer, intent(out) :: iterations
       type(wear_step_report) :: report
-      real(wp) :: scale
+      real(wp) :: scale, largest
+      integer :: n
 
+      report%converged = .true.
+      largest = huge(1.0_wp)
+      if (self%options%max_depth_step > 0.0_wp) largest = self%options%max_depth_step
       if (.not. self%bdf%is_started()) then
          scale = first_growth*system%depth_scale()
          call self%bdf%start(system, self%stepper%newton%linear, state%x, state%rate, &
-                             state%cycles, scale/maxval(state%rate), self%options%n_cycles, &
-                             self%options%tolerance(), scale, report%converged)
+                             state%cycles, min(scale, largest)/maxval(state%rate), &
+                             self%options%n_cycles, self%options%tolerance(), scale, &
+                             report%converged)
       end if
+      iterations = 0
       allocate (after%x(size(state%x)))
-      call self%bdf%advance(after%x, after%cycles, iterations, report%converged)
+      if (report%converged .and. self%options%max_depth_step > 0.0_wp) &
+         call self%bdf%limit_step(largest/maxval(state%rate), report%converged)
+      if (report%converged) &
+         call self%bdf%advance(after%x, after%cycles, iterations, report%converged)
       if (report%converged) then
+         ! Within its tolerance the integrator may take a little wear back; a joint does not.
+         n = system%n_vibration()
+         after%x(n + 1:) = max(after%x(n + 1:), state%x(n + 1:))
          call self%stepper%evaluate(system, after)
          call confirm(self, system, after, report, iterations)
       end if
       self%gave_up = .not. report%converged
       if (self%gave_up) self%ending = 'no step from cycle '//to_text(state%cycles)// &
-                                      ' on converges: lower wear%error_tolerance'
+                                      ' on converges with wear%error_tolerance = '// &
+                                      to_text(self%options%tolerance())//': try another'
       self%n_steps = self%n_steps + 1
    end subroutine one_bdf_step
 
@@ -275,9 +304,27 @@ contains
           after%cycles < self%options%n_cycles .and. &
           self%n_steps + 1 < self%options%max_steps) return
       call self%stepper%settle(system, after, solution)
+      call self%bdf%forget_derivative()
       iterations = iterations + solution%iterations
       report%converged = solution%converged
    end subroutine confirm
+
+   !> The vibration of a pseudo-time step may lag behind its depths; where no step from there
+   !> converges, steps have to start from equilibrium.
+   subroutine catch_up(self, system, state, iterations)
+      type(wear_march), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(inout) :: state
+      integer, intent(inout) :: iterations
+      type(wear_state) :: settled
+      type(solver_report) :: solution
+
+      if (self%options%scheme /= wear_pseudo_time) return
+      settled = state
+      call self%stepper%settle(system, settled, solution)
+      iterations = iterations + solution%iterations
+      if (solution%converged) state = settled
+   end subroutine catch_up
 
    !> Cycles of the next step.
    real(wp) function next_step(self, system, state) result(cycles)

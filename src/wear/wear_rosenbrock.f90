@@ -69,6 +69,8 @@ contains
          n_solved = n_solved + 1
       end do
       x_after = x + matmul(u, weight)
+      ! Within its error a step may take a little wear back; a joint does not.
+      x_after(n + 1:) = max(x_after(n + 1:), x(n + 1:))
       error = u(n + 1:, n_stages)
       done = done .and. all(ieee_is_finite(x_after))
    end subroutine rosenbrock_step
