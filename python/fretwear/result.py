@@ -37,6 +37,7 @@ _DIMENSIONS: dict[str, tuple[str, ...]] = {
     "seconds": ("point",),
     "served_by": ("point",),
     "fold": ("point",),
+    "harmonics": ("point",),
     "floquet/stable": ("point",),
     "contact/force": ("point", "coefficient", "pair", "direction"),
     "contact/fraction": ("point", "pair", "state"),

@@ -30,6 +30,8 @@ module fw_point
       logical :: converged = .false.
       !> What gave the solution.
       integer :: served_by = served_by_none
+      !> Harmonics of the balance; 0 where it is that of the case.
+      integer :: n_harmonics = 0
       !> The branch turns here.
       logical :: fold = .false.
       !> Floquet multipliers, only when asked for (n_multipliers), and whether all lie in the unit

@@ -47,27 +47,43 @@ contains
          n_harmonics, point)
    end subroutine recover_point
 
-   !> Carry a solution between the condensed and the whole system of a case: the relative
-   !> coordinates are the first of both; internal modes that only the target keeps start at zero.
+   !> Carry a solution between systems of one case, condensed or whole, with more or fewer
+   !> harmonics: the relative coordinates are the first of all; harmonics and internal modes that
+   !> only the target has start at zero.
    pure subroutine carry_solution(source, x, target, y)
       type(hbm_system), intent(in) :: source, target
       real(wp), intent(in) :: x(:)
       real(wp), intent(out) :: y(:)
-      integer :: i, j, k, m_source, m_target, n_relative
+      integer :: h, j, c
 
-      m_source = source%structure%n_coordinates
-      m_target = target%structure%n_coordinates
-      n_relative = source%joint%relative%n_coordinates
       y = 0.0_wp
-      do k = 0, source%fourier%n_coefficients - 1
-         y(k*m_target + 1:k*m_target + n_relative) = x(k*m_source + 1:k*m_source + n_relative)
-         do i = 1, size(source%structure%basis%kept)
-            j = findloc(target%structure%basis%kept, source%structure%basis%kept(i), dim=1)
-            if (j == 0) cycle
-            y(k*m_target + n_relative + j) = x(k*m_source + n_relative + i)
+      do h = 1, target%fourier%n_retained
+         j = findloc(source%fourier%harmonic, target%fourier%harmonic(h), dim=1)
+         if (j == 0) cycle
+         do c = 0, merge(0, 1, target%fourier%harmonic(h) == 0)
+            call carry_coefficient(source, x, source%fourier%column(j) + c, target, &
+                                   target%fourier%column(h) + c, y)
          end do
       end do
    end subroutine carry_solution
+
+   !> The coordinates of one coefficient.
+   pure subroutine carry_coefficient(source, x, from, target, to, y)
+      type(hbm_system), intent(in) :: source, target
+      real(wp), intent(in) :: x(:)
+      integer, intent(in) :: from, to
+      real(wp), intent(inout) :: y(:)
+      integer :: i, j, first_x, first_y, n_relative
+
+      n_relative = source%joint%relative%n_coordinates
+      first_x = (from - 1)*source%structure%n_coordinates
+      first_y = (to - 1)*target%structure%n_coordinates
+      y(first_y + 1:first_y + n_relative) = x(first_x + 1:first_x + n_relative)
+      do i = 1, size(source%structure%basis%kept)
+         j = findloc(target%structure%basis%kept, source%structure%basis%kept(i), dim=1)
+         if (j > 0) y(first_y + n_relative + j) = x(first_x + n_relative + i)
+      end do
+   end subroutine carry_coefficient
 
    !> Forces, shares of stick, slip and open, and friction energy per cycle, at the point where the
    !> system was evaluated last.

@@ -3,6 +3,7 @@ module fw_frequency_response
    use fw_kinds, only: wp
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
+   use fw_adaptive, only: adaptive_solver
    use fw_branch, only: run_branch
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
@@ -29,6 +30,21 @@ contains
       type(result_writer), intent(inout), target :: writer
       type(summary_type), intent(inout), target :: summary
       type(error_type), allocatable, intent(out) :: error
+
+      if (case%harmonics%adaptive) then
+         call sweep_adaptively(case, observer, writer, summary, error)
+      else
+         call sweep(case, observer, writer, summary, error)
+      end if
+   end subroutine run_frequency_response
+
+   !> With the harmonics of the case, at given frequencies or along the branch.
+   subroutine sweep(case, observer, writer, summary, error)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(result_writer), intent(inout), target :: writer
+      type(summary_type), intent(inout), target :: summary
+      type(error_type), allocatable, intent(out) :: error
       type(hbm_system), target :: system
       type(point_solver) :: solver
       type(point_type) :: point
@@ -46,21 +62,14 @@ contains
          call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
          return
       end if
-      n_points = 1
-      if (case%analysis == analysis_frf) n_points = case%sweep%n_points
+      n_points = point_count(case)
       call observer%on_start(case%title, n_points)
       do k = 1, n_points
          call solve_frequency(case, system, solver, sweep_frequency(case%sweep, k, n_points), &
                               observer, point, error)
-         if (allocated(error)) exit
-         call writer%add_point(point, error)
-         if (allocated(error)) exit
-         call summary%add(point)
-         call observer%on_point(k, n_points, point)
-         if (observer%stop_requested .and. k < n_points) then
-            call summary%mark_incomplete()
-            exit
-         end if
+         if (.not. allocated(error)) call publish(k, n_points, point, observer, writer, summary, &
+                                                  error)
+         if (allocated(error) .or. summary%incomplete) exit
       end do
       call observer%on_end()
       call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
@@ -68,7 +77,59 @@ contains
       if (allocated(error) .or. summary%n_converged > 0 .or. observer%stop_requested) return
       call explain_failure(system, solver%method, reason)
       call observer%on_message('not converged: '//reason)
-   end subroutine run_frequency_response
+   end subroutine sweep
+
+   !> With as many harmonics as each point needs, up to those of the case.
+   subroutine sweep_adaptively(case, observer, writer, summary, error)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(result_writer), intent(inout), target :: writer
+      type(summary_type), intent(inout), target :: summary
+      type(error_type), allocatable, intent(out) :: error
+      type(adaptive_solver) :: solver
+      type(point_type) :: point
+      integer :: k, n_points
+
+      call solver%start(case, error)
+      if (allocated(error)) return
+      n_points = point_count(case)
+      call observer%on_start(case%title, n_points)
+      do k = 1, n_points
+         call solver%solve(case, sweep_frequency(case%sweep, k, n_points), point, error)
+         if (.not. allocated(error)) call publish(k, n_points, point, observer, writer, summary, &
+                                                  error)
+         if (allocated(error) .or. summary%incomplete) exit
+      end do
+      call observer%on_end()
+      associate (level => solver%level(solver%current))
+         call summary%describe_work(level%system, level%solver%method%newton%linear, &
+                                    case%solver%kind)
+      end associate
+      call summary%describe_harmonics(solver%n_short, case%harmonics%adaptive_tolerance)
+   end subroutine sweep_adaptively
+
+   pure integer function point_count(case)
+      type(case_type), intent(in) :: case
+
+      point_count = 1
+      if (case%analysis == analysis_frf) point_count = case%sweep%n_points
+   end function point_count
+
+   !> A point becomes a row of the result; the observer may end the sweep.
+   subroutine publish(k, n_points, point, observer, writer, summary, error)
+      integer, intent(in) :: k, n_points
+      type(point_type), intent(in) :: point
+      class(observer_type), intent(inout) :: observer
+      type(result_writer), intent(inout) :: writer
+      type(summary_type), intent(inout) :: summary
+      type(error_type), allocatable, intent(out) :: error
+
+      call writer%add_point(point, error)
+      if (allocated(error)) return
+      call summary%add(point)
+      call observer%on_point(k, n_points, point)
+      if (observer%stop_requested .and. k < n_points) call summary%mark_incomplete()
+   end subroutine publish
 
    !> One point of a sweep, starting from what the solver knows of the points before it.
    subroutine solve_frequency(case, system, solver, omega, observer, point, error)

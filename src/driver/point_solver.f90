@@ -65,6 +65,7 @@ module fw_point_solver
    contains
       procedure :: start
       procedure :: solve
+      procedure :: know
    end type point_solver
 
 contains
@@ -375,11 +376,24 @@ contains
       self%best = self%x
    end subroutine note_best
 
+   !> Take a solution from elsewhere, such as one with other harmonics, for the last known one.
+   subroutine know(self, x, omega)
+      class(point_solver), intent(inout) :: self
+      real(wp), intent(in) :: x(:), omega
+
+      self%last = x
+      self%omega_last = omega
+      self%n_converged = 1
+   end subroutine know
+
    subroutine remember(self, omega)
       class(point_solver), intent(inout) :: self
       real(wp), intent(in) :: omega
 
-      if (abs(omega - self%omega_last) <= 0.0_wp) return
+      if (abs(omega - self%omega_last) <= 0.0_wp) then
+         self%last = self%x
+         return
+      end if
       self%before = self%last
       self%omega_before = self%omega_last
       self%last = self%x

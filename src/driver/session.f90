@@ -236,10 +236,11 @@ contains
       call self%prepare(error)
       if (allocated(error)) return
       if (all(self%case%analysis /= [analysis_frf, analysis_point]) .or. &
-          self%case%sweep%continuation /= continuation_natural) then
+          self%case%sweep%continuation /= continuation_natural .or. &
+          self%case%harmonics%adaptive) then
          call fatal_error(error, 'steps go through frequencies of harmonic balance: '// &
-                          "case%analysis must be 'frf' or 'point' and sweep%continuation "// &
-                          "'natural'; run the case as a whole instead", status_usage)
+                          "case%analysis must be 'frf' or 'point', sweep%continuation "// &
+                          "'natural' and harmonics%adaptive .false.; run the case as a whole instead", status_usage)
          return
       end if
       call forget_system(self)

@@ -2,6 +2,8 @@
 module fw_solution
    use fw_kinds, only: wp
    use fw_case, only: case_type
+   use fw_difference_system, only: difference_system
+   use fw_difference_system, only: new_difference_system
    use fw_error, only: error_type
    use fw_flow, only: flow_system
    use fw_flow, only: new_flow
@@ -24,6 +26,7 @@ module fw_solution
    use fw_solver_options, only: pseudo_time_options
    use fw_stability, only: floquet_multipliers
    use fw_stability, only: is_stable
+   use fw_solver_options, only: jacobian_difference
    use fw_solver_options, only: solver_kinsol
    use fw_solver_options, only: solver_powell
    implicit none (type, external)
@@ -110,7 +113,26 @@ contains
       if (system%contact%all_open()) is_lasting = is_lasting .and. held_without_contact(system)
    end function is_lasting
 
+   !> With the derivative that the case asks for.
    subroutine solve_system(self, system, x, report)
+      class(solution_method), intent(inout) :: self
+      class(parameter_system), intent(inout), target :: system
+      real(wp), intent(inout), contiguous :: x(:)
+      type(solver_report), intent(out) :: report
+      type(difference_system), target :: by_differences
+      logical :: reduced
+
+      if (self%newton%options%jacobian /= jacobian_difference) then
+         call solve_with(self, system, x, report)
+         return
+      end if
+      reduced = system%reduced
+      by_differences = new_difference_system(system)
+      call solve_with(self, by_differences, x, report)
+      system%reduced = reduced
+   end subroutine solve_system
+
+   subroutine solve_with(self, system, x, report)
       class(solution_method), intent(inout) :: self
       class(parameter_system), intent(inout), target :: system
       real(wp), intent(inout), contiguous :: x(:)
@@ -124,7 +146,7 @@ contains
       case default
          call self%newton%solve(system, x, report)
       end select
-   end subroutine solve_system
+   end subroutine solve_with
 
    !> Integrate in pseudo-time on the whole structure, at the frequency and from the guess of the
    !> condensed one.

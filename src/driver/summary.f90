@@ -22,6 +22,8 @@ module fw_summary
       integer :: n_points = 0
       integer :: n_converged = 0
       integer :: iterations = 0
+      !> Fewest and most harmonics of a point, where they adapt.
+      integer :: harmonics(2) = [huge(0), 0]
       !> The run ended before it had covered what was asked for.
       logical :: incomplete = .false.
       type(string_type), allocatable :: name(:)
@@ -34,6 +36,7 @@ module fw_summary
       procedure :: mark_incomplete
       procedure :: describe_work
       procedure :: note_fallback
+      procedure :: describe_harmonics
       procedure :: describe_wear
       procedure :: note_restart
       procedure :: note_profile_change
@@ -59,6 +62,8 @@ contains
 
       self%n_points = self%n_points + 1
       self%iterations = self%iterations + point%iterations
+      self%harmonics = [min(self%harmonics(1), point%n_harmonics), &
+                        max(self%harmonics(2), point%n_harmonics)]
       if (.not. point%converged) return
       self%n_converged = self%n_converged + 1
       do i = 1, size(self%peak)
@@ -122,6 +127,23 @@ contains
 
       self%work = [self%work, line('fallback', 'pseudo-time served '//to_text(n_points)//' points')]
    end subroutine note_fallback
+
+   !> How many harmonics the points took.
+   subroutine describe_harmonics(self, n_short, tolerance)
+      class(summary_type), intent(inout) :: self
+      !> Points that left out more than the tolerance with the most harmonics allowed.
+      integer, intent(in) :: n_short
+      real(wp), intent(in) :: tolerance
+      character(10) :: text
+
+      self%work = [self%work, line('harmonics', to_text(self%harmonics(1))//' to '// &
+                                   to_text(self%harmonics(2)))]
+      if (n_short == 0) return
+      write (text, '(es8.1)') tolerance
+      self%work = [self%work, line('', 'too few at '//to_text(n_short)//' points, which leave '// &
+                                   'out more than '//trim(adjustl(text))//' of the force: '// &
+                                   'raise harmonics%n_harmonics')]
+   end subroutine describe_harmonics
 
    !> What became of the wear.
    subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth)

@@ -10,7 +10,7 @@ module fw_available
                                    sampling_words, sampling_uniform, sampling_events
    use fw_text, only: to_text
    use fw_kinds, only: wp
-   use fw_solver_options, only: jacobian_words, jacobian_analytic
+   use fw_solver_options, only: jacobian_analytic
    use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
                                  solver_pseudo_time, continuation_words, &
                                 continuation_natural, continuation_arclength
@@ -40,11 +40,11 @@ contains
                  [sampling_uniform, sampling_events])
       call check('solver%kind', solver_words, case%solver%kind, &
                  [solver_newton, solver_powell, solver_kinsol, solver_pseudo_time])
-      call check('solver%jacobian', jacobian_words, case%solver%jacobian, [jacobian_analytic])
       call check('sweep%continuation', continuation_words, case%sweep%continuation, &
                  [continuation_natural, continuation_arclength])
+      call check_jacobian()
       call check_memory()
-      call check_off('harmonics%adaptive', case%harmonics%adaptive)
+      call check_adaptive()
       call check_stability()
       call check_wear()
 
@@ -125,6 +125,17 @@ contains
                           "contact pairs): rigid contact has no Floquet multipliers", status_input)
       end subroutine check_stability
 
+      !> Differences serve the solution of a point at given depths; the rest takes the derivative
+      !> apart.
+      subroutine check_jacobian()
+         if (allocated(error) .or. case%solver%jacobian == jacobian_analytic) return
+         if (case%solver%kind /= solver_pseudo_time .and. case%analysis /= analysis_wear .and. &
+             case%sweep%continuation == continuation_natural) return
+         call fatal_error(error, "solver%jacobian = 'difference' goes with natural sweeps and "// &
+                          "points by 'newton', 'powell' or 'kinsol': use 'analytic'", &
+                          status_input)
+      end subroutine check_jacobian
+
       !> A branch turns back on itself: there is no one last point to carry the memory from.
       subroutine check_memory()
          if (allocated(error) .or. case%contact%memory /= memory_carried) return
@@ -134,14 +145,18 @@ contains
                           "= 'arclength': use 'assembly'", status_input)
       end subroutine check_memory
 
-      subroutine check_off(name, is_on)
-         character(*), intent(in) :: name
-         logical, intent(in) :: is_on
-
-         if (allocated(error) .or. .not. is_on) return
-         call fatal_error(error, name//' = .true. is not available in this version: use .false.', &
-                          status_input)
-      end subroutine check_off
+      !> Harmonics change from point to point of a natural sweep; a history has one length.
+      subroutine check_adaptive()
+         if (allocated(error) .or. .not. case%harmonics%adaptive) return
+         if (all(case%analysis /= [analysis_frf, analysis_point]) .or. &
+             case%sweep%continuation /= continuation_natural) then
+            call fatal_error(error, 'harmonics%adaptive = .true. goes with natural sweeps and '// &
+                             'points: use .false.', status_input)
+         else if (case%output%histories .and. case%harmonics%n_time == 0) then
+            call fatal_error(error, 'harmonics%adaptive = .true. with output%histories needs '// &
+                             'a given harmonics%n_time', status_input)
+         end if
+      end subroutine check_adaptive
 
    end subroutine check_available
 

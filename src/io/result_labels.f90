@@ -34,6 +34,7 @@ module fw_result_labels
       label_type('/residual', '1', 'point', 'residual over vibratory load'), &
       label_type('/seconds', 's', 'point', 'time spent on the point'), &
       label_type('/fold', '', 'point', 'whether the branch turns here'), &
+      label_type('/harmonics', '1', 'point', 'harmonics of the balance'), &
       label_type('/floquet/stable', '', 'point', '1 stable, 0 unstable, -1 not known'), &
       label_type('/floquet/multipliers', '1', 'point multiplier part', &
                  'Floquet multipliers, real and imaginary part'), &

@@ -28,8 +28,8 @@ module fw_result_rows
                          d_iterations = 5, d_residual = 6, d_seconds = 7, d_force = 8, &
                          d_fraction = 9, d_dissipation = 10, d_observed = 11, &
                          d_force_history = 12, d_slip_history = 13, d_fold = 14, &
-                         d_stable = 15, d_multipliers = 16, d_served_by = 17
-   integer, parameter :: n_datasets = 17
+                         d_stable = 15, d_multipliers = 16, d_served_by = 17, d_harmonics = 18
+   integer, parameter :: n_datasets = 18
 
    type :: row_set
       integer, private :: n_rows = 0, n_coefficients = 1, expected = 1
@@ -80,6 +80,9 @@ contains
       if (case%sweep%continuation == continuation_arclength) then
          call self%new(file, d_fold, '/fold', scalar, error, kind_of=growing_logical)
       end if
+      if (.not. allocated(error) .and. case%harmonics%adaptive) then
+         call self%new(file, d_harmonics, '/harmonics', scalar, error, kind_of=growing_integer)
+      end if
       if (.not. allocated(error) .and. case%sweep%stability) then
          call self%new(file, d_stable, '/floquet/stable', scalar, error, kind_of=growing_integer)
       end if
@@ -124,6 +127,9 @@ contains
          if (allocated(error)) return
       end if
       if (self%list(d_fold)%is_created()) call self%list(d_fold)%append(file, point%fold, error)
+      if (allocated(error)) return
+      if (self%list(d_harmonics)%is_created()) call self%list(d_harmonics)%append(file, &
+         point%n_harmonics, error)
       if (.not. allocated(error)) call append_stability(self, file, point, error)
       if (.not. allocated(error)) call self%append_contact(file, point, error)
       if (.not. allocated(error)) call self%append_histories(file, point, error)

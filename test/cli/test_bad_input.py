@@ -172,8 +172,7 @@ def test_a_branch_needs_two_ends(fw_run):
 
 
 @pytest.mark.parametrize("override, instead", [
-    ("solver%jacobian=difference", "'analytic'"),
-    ("harmonics%adaptive=.true.", ".false."), ("sweep%stability=.true.", "'penalty'")])
+    ("sweep%stability=.true.", "'penalty'")])
 def test_what_is_not_available_yet(fw_run, override, instead):
     message = fw_run.refused("--set", override, "case.nml")
     assert override.split("=")[0] in message and instead in message

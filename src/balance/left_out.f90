@@ -1,0 +1,58 @@
+!> What a balance leaves out: the part of the nonlinear forces in harmonics above its own.
+module fw_left_out
+   use fw_fourier, only: fourier_type
+   use fw_fourier, only: new_fourier
+   use fw_hbm, only: hbm_system
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: force_left_out
+
+contains
+
+   !> Root mean square of the contact and spring forces in harmonics above n_harmonics, as a part of
+   !> that of their vibratory harmonics, or of the vibratory load where that is larger, at the point
+   !> that was evaluated last.
+   function force_left_out(system, n_harmonics) result(share)
+      type(hbm_system), intent(inout) :: system
+      integer, intent(in) :: n_harmonics
+      real(wp) :: share
+      type(fourier_type) :: kept
+      real(wp) :: all_power, kept_power
+      integer :: n_time
+
+      n_time = system%fourier%n_time
+      kept = new_fourier(min(n_harmonics, (n_time - 1)/2), n_time)
+      all_power = 0.0_wp
+      kept_power = 0.0_wp
+      if (system%contact%n_pairs > 0) then
+         call system%contact%sample()
+         call add_power(kept, 3*system%contact%n_pairs, n_time, system%contact%force_time, &
+                        all_power, kept_power)
+      end if
+      if (system%springs%n_springs > 0) then
+         call add_power(kept, system%springs%n_springs, n_time, system%springs%force_time, &
+                        all_power, kept_power)
+      end if
+      share = 0.0_wp
+      if (all_power > kept_power) then
+         share = sqrt((all_power - kept_power)/max(all_power, 0.5_wp*system%reference**2))
+      end if
+   end function force_left_out
+
+   !> Add the vibratory power of rows of values, and its part in the harmonics of `kept`.
+   subroutine add_power(kept, n_rows, n_time, values, all_power, kept_power)
+      type(fourier_type), intent(inout) :: kept
+      integer, intent(in) :: n_rows, n_time
+      real(wp), intent(in) :: values(n_rows, n_time)
+      real(wp), intent(inout) :: all_power, kept_power
+      real(wp) :: coefficients(n_rows, kept%n_coefficients), vibratory(n_rows, n_time)
+
+      vibratory = values - spread(sum(values, dim=2)/real(n_time, wp), 2, n_time)
+      call kept%to_coefficients(n_rows, vibratory, coefficients)
+      all_power = all_power + sum(vibratory**2)/real(n_time, wp)
+      kept_power = kept_power + 0.5_wp*sum(coefficients(:, 2:)**2)
+   end subroutine add_power
+
+end module fw_left_out

@@ -1,0 +1,165 @@
+!> A system whose derivative comes from differences of its residual: to check an analytic one, or
+!> to do without. Only the preconditioner stays the system's own.
+module fw_difference_system
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_parameter_system, only: parameter_system
+   implicit none (type, external)
+   private
+
+   public :: difference_system, new_difference_system
+
+   !> Step relative to the unknowns: the root of the unit round-off.
+   real(wp), parameter :: relative_step = 1.0e-8_wp
+
+   type, extends(parameter_system) :: difference_system
+      class(parameter_system), pointer, private :: inner => null()
+      !> The last point and its residual.
+      real(wp), allocatable, private :: x(:), r(:), trial(:), ahead(:)
+   contains
+      procedure :: set_parameter
+      procedure :: parameter_derivative
+      procedure :: residual
+      procedure :: linearize
+      procedure :: reduce
+      procedure :: expand
+      procedure :: apply
+      procedure :: build_preconditioner
+      procedure :: precondition
+      procedure :: assemble
+   end type difference_system
+
+contains
+
+   function new_difference_system(inner) result(self)
+      class(parameter_system), intent(inout), target :: inner
+      type(difference_system) :: self
+
+      self%inner => inner
+      self%n = inner%n
+      self%reference = inner%reference
+      inner%reduced = .false.
+      self%reduced = .false.
+      allocate (self%x(inner%n), self%r(inner%n), self%trial(inner%n), self%ahead(inner%n), &
+         source=0.0_wp)
+   end function new_difference_system
+
+   subroutine set_parameter(self, parameter, error)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(in) :: parameter
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%inner%set_parameter(parameter, error)
+   end subroutine set_parameter
+
+   !> That of the system itself, which is smooth.
+   subroutine parameter_derivative(self, x, dr)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: dr(:)
+      integer :: n
+
+      call self%inner%residual(x, self%ahead)
+      call self%inner%linearize(n)
+      call self%inner%parameter_derivative(x, dr)
+   end subroutine parameter_derivative
+
+   subroutine residual(self, x, r)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: r(:)
+
+      call self%inner%residual(x, r)
+      self%reference = self%inner%reference
+      self%x = x
+      self%r = r
+   end subroutine residual
+
+   subroutine linearize(self, n_linear)
+      class(difference_system), intent(inout) :: self
+      integer, intent(out) :: n_linear
+
+      n_linear = self%n
+   end subroutine linearize
+
+   subroutine reduce(self, r, rhs)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: r(:)
+      real(wp), intent(out), contiguous :: rhs(:)
+
+      associate (self => self)
+      end associate
+      rhs = -r
+   end subroutine reduce
+
+   subroutine expand(self, r, solution, step)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: r(:), solution(:)
+      real(wp), intent(out), contiguous :: step(:)
+
+      associate (self => self, r => r)
+      end associate
+      step = solution
+   end subroutine expand
+
+   subroutine apply(self, vector, product)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: vector(:)
+      real(wp), intent(out), contiguous :: product(:)
+      real(wp) :: length
+
+      product = 0.0_wp
+      length = maxval(abs(vector))
+      if (length <= 0.0_wp) return
+      call difference(self, vector, step_size(self)/length, product)
+   end subroutine apply
+
+   !> product = (R(x + h vector) - R(x))/h.
+   subroutine difference(self, vector, h, product)
+      type(difference_system), intent(inout) :: self
+      real(wp), intent(in) :: vector(:), h
+      real(wp), intent(out) :: product(:)
+
+      self%trial = self%x + h*vector
+      call self%inner%residual(self%trial, self%ahead)
+      product = (self%ahead - self%r)/h
+   end subroutine difference
+
+   !> Unknowns are of one kind: one step for all, relative to the largest, does not drown the small
+   !> ones of a piecewise smooth system in round-off.
+   pure real(wp) function step_size(self)
+      class(difference_system), intent(in) :: self
+
+      step_size = relative_step*max(maxval(abs(self%x)), tiny(1.0_wp)/relative_step**2)
+   end function step_size
+
+   subroutine build_preconditioner(self)
+      class(difference_system), intent(inout) :: self
+      integer :: n
+
+      call self%inner%residual(self%x, self%ahead)
+      call self%inner%linearize(n)
+      call self%inner%build_preconditioner()
+   end subroutine build_preconditioner
+
+   subroutine precondition(self, vector)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: vector(:)
+
+      call self%inner%precondition(vector)
+   end subroutine precondition
+
+   subroutine assemble(self, matrix)
+      class(difference_system), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: matrix(:, :)
+      real(wp) :: unit(self%n)
+      integer :: j
+
+      do j = 1, self%n
+         unit = 0.0_wp
+         unit(j) = 1.0_wp
+         call difference(self, unit, step_size(self), matrix(:self%n, j))
+      end do
+   end subroutine assemble
+
+end module fw_difference_system
