@@ -150,8 +150,8 @@ contains
             if (self%relative%independent(self%row(c, i))) cycle
             call fatal_error(error, '&contact pair '//to_text(i)//', '//trim(component(c))// &
                              ': its relative displacement follows from that of earlier pairs, '// &
-                             'so rigid contact forces are not determined; remove the pair or use '// &
-                             'law = ''penalty''', status_input)
+                             'so rigid contact forces are not determined; remove the pair or '// &
+                             'use law = ''penalty''', status_input)
             return
          end do
       end do

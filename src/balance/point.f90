@@ -49,7 +49,7 @@ module fw_point
       real(wp), allocatable :: fraction(:, :)
       !> Friction energy per cycle (n_pairs) [force * length].
       real(wp), allocatable :: dissipation(:)
-      !> Of a step of wear: cycles so far, depth [length] and depth per cycle of the pairs (n_pairs).
+      !> Of a step of wear: cycles so far, depth [length] and depth per cycle (n_pairs).
       real(wp) :: cycles = 0.0_wp
       real(wp), allocatable :: depth(:), wear_rate(:)
       !> Observed quantities over one period, only when asked for (n_time, n_observed).

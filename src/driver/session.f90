@@ -240,7 +240,8 @@ contains
           self%case%harmonics%adaptive) then
          call fatal_error(error, 'steps go through frequencies of harmonic balance: '// &
                           "case%analysis must be 'frf' or 'point', sweep%continuation "// &
-                          "'natural' and harmonics%adaptive .false.; run the case as a whole instead", status_usage)
+                          "'natural' and harmonics%adaptive .false.; run the case as a whole "// &
+                          'instead', status_usage)
          return
       end if
       call forget_system(self)

@@ -121,8 +121,8 @@ contains
       subroutine check_stability()
          if (allocated(error) .or. .not. case%sweep%stability) return
          if (case%contact%n_pairs == 0 .or. case%contact%law == law_penalty) return
-         call fatal_error(error, "sweep%stability = .true. needs contact%law = 'penalty' (or no "// &
-                          "contact pairs): rigid contact has no Floquet multipliers", status_input)
+         call fatal_error(error, "sweep%stability = .true. needs contact%law = 'penalty' (or "// &
+                          "no contact pairs): rigid contact has no Floquet multipliers", status_input)
       end subroutine check_stability
 
       !> Differences serve the solution of a point at given depths; the rest takes the derivative

@@ -64,7 +64,8 @@ contains
             x_after = x + matmul(u, a(i, :))
             call system%residual(x_after, r)
          end if
-         r(n + 1:) = -gamma*system%force_of_depth(cycles*system%rate + matmul(u(n + 1:, :), c(i, :)))
+         r(n + 1:) = -gamma*system%force_of_depth(cycles*system%rate + &
+                                                  matmul(u(n + 1:, :), c(i, :)))
          call linear%solve_prepared(system, r, tolerance, u(:, i), done)
          n_solved = n_solved + 1
       end do
