@@ -76,7 +76,6 @@ def with_model(fw_run):
     ("mu = 0.3", "mu = 0.3 tangential_stiffness = 1",
      ["tangential_stiffness belongs to law = 'penalty'"]),
     ("mu = 0.3", "mu = 0.3 0.4 0.5", ["&contact mu has 3 values", "must be 1"]),
-    ("n_time = 64", "n_time = 64 adaptive = T", ["harmonics%adaptive", "not available", ".false."]),
 ])
 def test_wrong_namelist(fw_run, old, new, expected):
     fw_run.edit(old, new)
