@@ -8,6 +8,10 @@
 !> depths; the vibration follows them.
 module fw_wear_bdf
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
+   use, intrinsic :: ieee_exceptions, only: ieee_set_flag
+   use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode
+   use, intrinsic :: ieee_exceptions, only: ieee_usual
    use, intrinsic :: iso_c_binding, only: c_associated
    use, intrinsic :: iso_c_binding, only: c_double
    use, intrinsic :: iso_c_binding, only: c_f_pointer
@@ -195,9 +199,16 @@ contains
       logical, intent(out) :: done
       real(c_double) :: reached(1)
       integer(c_long) :: solved(1)
+      logical :: halting(size(ieee_usual))
       integer(c_int) :: status
 
+      ! A power within IDA may overflow, after which it goes on all the same: a host program that
+      ! traps overflow must not end here.
+      call ieee_get_halting_mode(ieee_usual, halting)
+      call ieee_set_halting_mode(ieee_usual, .false.)
       status = fidasolve(self%memory, huge(1.0_wp), reached, self%y, self%slope, ida_one_step)
+      call ieee_set_flag(ieee_usual, .false.)
+      call ieee_set_halting_mode(ieee_usual, halting)
       done = status >= 0
       x = self%y_values
       cycles = reached(1)
