@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint docs clean
-.PHONY: bench bench-solvers bench-paper bench-time bench-full
+.PHONY: bench bench-solvers bench-paper bench-time bench-full paper
 
 BUILD := build/release
 RUN := build/run
@@ -86,6 +86,9 @@ bench-time: build ## harmonic balance against integration in time
 
 bench-full: build ## every part of docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py all
+
+paper: build ## figures and tables of the paper on the sector, in docs/paper
+	PYTHONPATH=python $(PYTHON) bench/gallery.py
 
 clean: ## remove everything built but the Python environment
 	rm -rf $(BUILD) build/debug build/docs build/wheel $(RUN)

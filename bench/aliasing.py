@@ -13,7 +13,7 @@ from layout import COLOURS, table
 from measure import Bench, Floats, Groups, Run
 from paper import HARMONICS, INSTANTS, first_bending
 
-__all__ = ["Aliasing", "measure_aliasing", "write_aliasing"]
+__all__ = ["Aliasing", "draw_cycles", "measure_aliasing", "measure_cycles", "write_aliasing"]
 
 #: Curves of the relative displacement over a cycle: method and H.
 CYCLES = (("hbm", 7), ("hdhb", 7), ("hdhb", 17), ("hbm", 17))
@@ -39,14 +39,20 @@ def measure_aliasing(bench: Bench) -> Aliasing:
     reference = sweeps["hbm", max(h for _, h in sweeps)]
     peak = float(reference.omega[np.argmax(np.where(reference.converged,
                                                     reference.amplitude[:, 0], 0.0))])
+    return Aliasing(sweeps, *measure_cycles(bench, peak))
+
+
+def measure_cycles(bench: Bench, omega: float) -> tuple[dict[tuple[str, int], Floats], int]:
+    """The tangential displacement of the pair that moves most at a frequency [rad/s]: its
+    coefficients by method and H, and its number."""
     pair, cycles = 0, {}
     for method, n_harmonics in CYCLES[:1] if bench.quick else CYCLES:
-        run = bench.run(at_peak(method, n_harmonics, peak))
+        run = bench.run(at_peak(method, n_harmonics, omega))
         if not cycles:
             vibration = np.linalg.norm(run.coefficients[-1, 1:, :], axis=0)
             pair = int(np.argmax(vibration))
         cycles[method, n_harmonics] = run.coefficients[-1, :, pair]
-    return Aliasing(sweeps, cycles, pair)
+    return cycles, pair
 
 
 def sector(method: str, n_harmonics: int) -> Groups:
@@ -67,7 +73,7 @@ def at_peak(method: str, n_harmonics: int, omega: float) -> Groups:
 def write_aliasing(images: Path, data: Aliasing) -> str:
     """Draw the pictures; the text of the part."""
     draw_sweeps(images / "benchmark_aliasing.png", data.sweeps)
-    draw_cycles(images / "benchmark_cycle.png", data)
+    draw_cycles(images / "benchmark_cycle.png", data.cycles)
     harmonics = sorted({h for _, h in data.sweeps})
     best = peak(data.sweeps["hbm", harmonics[-1]])
     rows = []
@@ -129,12 +135,12 @@ def draw_sweeps(path: Path, sweeps: dict[tuple[str, int], Run]) -> None:
     figure.savefig(path)
 
 
-def draw_cycles(path: Path, data: Aliasing) -> None:
+def draw_cycles(path: Path, cycles: dict[tuple[str, int], Floats]) -> None:
     """Displacement of a pair over a cycle."""
     figure = Figure(figsize=(6.6, 4.2), dpi=130, layout="constrained")
     axes = figure.subplots()
     turn = np.linspace(0.0, 1.0, 401)
-    for ((method, h), coefficients), colour, style in zip(data.cycles.items(), COLOURS,
+    for ((method, h), coefficients), colour, style in zip(cycles.items(), COLOURS,
                                                           ("-", "--", "-.", ":")):
         axes.plot(turn, 1e3 * series(coefficients, turn), style, color=colour,
                   label=f"{method.upper()}, H = {h}")

@@ -7,6 +7,7 @@ leaves the others as they are.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from layout import table
@@ -26,13 +27,14 @@ repeated runs, in one thread unless it is said otherwise, without reading the in
 ratios."""
 
 
-def update_document(path: Path, part: str, text: str, machine: dict[str, str]) -> None:
+def update_document(path: Path, part: str, text: str, machine: dict[str, str],
+                    order: Sequence[str] = ORDER, head: str = HEAD) -> None:
     """Replace one part (a Markdown section) of the document, or make the document with it."""
     old = path.read_text(encoding="utf-8") if path.exists() else ""
-    parts = {name: body for name in ORDER if (body := find_part(old, name)) is not None}
+    parts = {name: body for name in order if (body := find_part(old, name)) is not None}
     parts[part] = with_origin(text, machine)
-    lines = [HEAD, "", *table(["", ""], ((key, machine[key]) for key in COMMON if key in machine))]
-    for name in ORDER:
+    lines = [head, "", *table(["", ""], ((key, machine[key]) for key in COMMON if key in machine))]
+    for name in order:
         if name in parts:
             lines += ["", begin(name), "", parts[name], "", end(name)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

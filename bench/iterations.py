@@ -12,7 +12,7 @@ from measure import Bench, Run
 from paper import INSTANTS, first_bending
 from solvers import Solver
 
-__all__ = ["measure_iterations", "write_iterations"]
+__all__ = ["draw_iterations", "iterations_table", "measure_iterations", "write_iterations"]
 
 N_HARMONICS = 3
 SHOWN = (Solver("newton"), Solver("powell"), Solver("kinsol"),
@@ -33,10 +33,7 @@ def measure_iterations(bench: Bench) -> dict[Solver, Run]:
 
 def write_iterations(images: Path, runs: dict[Solver, Run]) -> str:
     """Draw the picture; the text of the part."""
-    draw(images / "benchmark_iterations.png", runs)
-    rows = [(solver.name, f"{int(run.converged.sum())} of {len(run.converged)}",
-             int(run.iterations.sum()), int(run.iterations[run.converged].max(initial=0)),
-             milliseconds(float(np.median(run.seconds)))) for solver, run in runs.items()]
+    draw_iterations(images / "benchmark_iterations.png", runs)
     return "\n".join([
         "## Iterations against frequency", "",
         f"The 50 frequencies of the table before, H = {N_HARMONICS}, {INSTANTS} instants, each "
@@ -44,11 +41,20 @@ def write_iterations(images: Path, runs: dict[Solver, Run]) -> str:
         "extrapolation of the last two), `fallback = .false.`. Iterations are linear solutions; "
         "Powell's are exact derivatives, between which it updates. Points that did "
         "not converge are crosses at the iterations that were spent.", "",
-        *table(["solver", "converged", "iterations", "most at a point", "median time [ms/point]"],
-               rows), "", "![Iterations against frequency](images/benchmark_iterations.png)"])
+        *iterations_table(runs), "",
+        "![Iterations against frequency](images/benchmark_iterations.png)"])
 
 
-def draw(path: Path, runs: dict[Solver, Run]) -> None:
+def iterations_table(runs: dict[Solver, Run]) -> list[str]:
+    """Lines of the table: iterations and times of every solver."""
+    rows = [(solver.name, f"{int(run.converged.sum())} of {len(run.converged)}",
+             int(run.iterations.sum()), int(run.iterations[run.converged].max(initial=0)),
+             milliseconds(float(np.median(run.seconds)))) for solver, run in runs.items()]
+    return table(["solver", "converged", "iterations", "most at a point",
+                  "median time [ms/point]"], rows)
+
+
+def draw_iterations(path: Path, runs: dict[Solver, Run]) -> None:
     """Iterations above the response."""
     figure = Figure(figsize=(7.4, 6.0), dpi=130, layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))

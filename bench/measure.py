@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import re
+import resource
 import statistics
 import subprocess
 import time
@@ -91,16 +92,23 @@ class Bench:
 
         `wait` is OMP_WAIT_POLICY: whether idle threads spin ("active") or sleep ("passive").
         """
-        namelist, result = self.folder / "case.nml", self.folder / "case.h5"
+        result = self.folder / "case.h5"
+        return read_run(result, self.execute(groups, result, threads, wait)[0])
+
+    def execute(self, groups: Groups, result: Path, threads: int = 1,
+                wait: str | None = None) -> tuple[str, float]:
+        """Run a case into a result file: what fw_run printed, and its processor time [s]."""
+        namelist = result.with_suffix(".nml")
         write_namelist(namelist, groups)
         environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
         if wait:
             environment["OMP_WAIT_POLICY"] = wait
+        before = processor_time()
         done = subprocess.run([self.program, "-o", result, namelist], env=environment,
                               capture_output=True, text=True, check=False)
         if done.returncode not in (0, 4):
             raise RuntimeError(f"fw_run ended with {done.returncode}:\n{done.stderr}")
-        return read_run(result, done.stdout)
+        return done.stdout, processor_time() - before
 
     def repeat(self, groups: Groups, value: Callable[[Run], float], threads: int = 1,
                most: int = 5, budget: float = 5.0, wait: str | None = None) -> tuple[float, Run]:
@@ -111,6 +119,12 @@ class Bench:
             values.append(value(run))
             if self.quick or len(values) == most or time.perf_counter() - start > budget:
                 return statistics.median(values), run
+
+
+def processor_time() -> float:
+    """Of all programs that this one has started and that have ended [s]."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def read_run(path: Path, summary: str) -> Run:
