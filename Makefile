@@ -8,6 +8,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint docs clean
 .PHONY: bench bench-solvers bench-paper bench-time bench-full paper
+.PHONY: stress long
 
 BUILD := build/release
 RUN := build/run
@@ -71,6 +72,12 @@ docs: build/deps.stamp ## reference of library and Python package, in build/docs
 
 wheel: build/deps.stamp ## the package in a fresh environment, used as the README says
 	@tools/check_install.sh build/wheel
+
+stress: build ## every case to its extremes, written to docs/robustness.md
+	$(PYTHON) test/stress/stress.py -o docs/robustness.md
+
+long: build ## memory and time of long runs, written to docs/robustness.md
+	$(PYTHON) test/stress/long_runs.py -o docs/robustness.md
 
 bench: build ## error against run time, written to docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py speed

@@ -86,7 +86,9 @@ contains
    end subroutine carry_coefficient
 
    !> Forces, shares of stick, slip and open, and friction energy per cycle, at the point where the
-   !> system was evaluated last.
+   !> system was evaluated last. The forces of retained harmonics are those that balance the
+   !> equations, which need not be the projection of their histories (collocation); even harmonics
+   !> that are left out hold the normal load.
    subroutine recover_contact(system, x, n_harmonics, point)
       type(hbm_system), intent(inout) :: system
       real(wp), intent(in), contiguous :: x(:)
@@ -94,12 +96,19 @@ contains
       type(point_type), intent(inout) :: point
       type(fourier_type) :: all_harmonics
       real(wp), allocatable :: force(:, :, :)
-      integer :: n_pairs, i, c
+      integer :: n_pairs, c, h, i, k, n
 
       n_pairs = system%contact%n_pairs
       all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
       allocate (force(n_pairs, 3, all_harmonics%n_coefficients))
       call system%contact%coefficients(system%fourier, all_harmonics, force)
+      do h = 1, system%fourier%n_retained
+         n = system%fourier%harmonic(h)
+         do k = 0, merge(0, 1, n == 0)
+            force(:, :, max(1, 2*n) + k) = &
+               system%contact%force(:, :, system%fourier%column(h) + k)
+         end do
+      end do
       allocate (point%force(3, n_pairs, all_harmonics%n_coefficients))
       do c = 1, 3
          do i = 1, n_pairs

@@ -28,6 +28,11 @@ contains
       logical :: done
       integer :: k
 
+      if (method%unbounded) then
+         reason = 'the vibration grows without bound: the excitation meets a mode that neither '// &
+                  'damping nor contact limits; give it damping or shift the frequency'
+         return
+      end if
       call stuck_guess(system, x)
       call solve_share(system, method, 0.0_wp, x, done)
       if (.not. done) then
@@ -38,7 +43,8 @@ contains
          upper = 1.0_wp
          call solve_share(system, method, upper, x, done)
          if (done) then
-            reason = 'the vibration itself converges from its position at rest'
+            reason = 'the vibration itself converges from its position at rest; try smaller '// &
+                     'steps, or another solver%kind or scheme'
             return
          end if
          do k = 1, n_halvings
@@ -55,6 +61,9 @@ contains
          if (.not. held_without_friction(system)) then
             reason = 'the joint cannot carry its static load while it slides, for only '// &
                      'friction holds it: '//reason//'; it needs more preload, friction or support'
+         else
+            reason = reason//'; try another penalty_scale (0.3 or 3), more n_time, or a sweep '// &
+                     'that starts where the response is small; an undamped resonance needs damping'
          end if
       end if
       call solve_share(system, method, 1.0_wp, x, done, only_set=.true.)

@@ -74,8 +74,11 @@ contains
       call observer%on_end()
       call summary%describe_work(system, solver%method%newton%linear, case%solver%kind)
       if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
-      if (allocated(error) .or. summary%n_converged > 0 .or. observer%stop_requested) return
-      call explain_failure(system, solver%method, reason)
+      if (allocated(error) .or. observer%stop_requested) return
+      if (summary%n_converged == summary%n_points) return
+      reason = 'try a finer sweep, the other direction, another penalty_scale (0.3 or 3) or '// &
+               'more n_time for the points above'
+      if (summary%n_converged == 0) call explain_failure(system, solver%method, reason)
       call observer%on_message('not converged: '//reason)
    end subroutine sweep
 

@@ -23,6 +23,7 @@ module fw_solution
    use fw_pseudo_time, only: pseudo_report
    use fw_pseudo_time, only: pseudo_time_solver
    use fw_recovery, only: carry_solution
+   use fw_unbounded, only: is_lost_in_round_off
    use fw_solver_options, only: pseudo_time_options
    use fw_stability, only: floquet_multipliers
    use fw_stability, only: is_stable
@@ -44,6 +45,8 @@ module fw_solution
       logical :: in_time = .false.
       !> The balance with nothing condensed, made when a flow is first needed.
       type(hbm_system), allocatable :: whole
+      !> A solution was refused because it grows without bound.
+      logical :: unbounded = .false.
       !> Why the last pseudo-time solution failed.
       character(:), allocatable :: message
    contains
@@ -66,8 +69,8 @@ contains
    end subroutine start
 
    !> From the guess in the coefficients x. What does not count as converged: forces whose march
-   !> is not periodic, and a position with every pair open of a structure that its contact alone
-   !> holds, which is no equilibrium that lasts.
+   !> is not periodic, amplitudes without bound, and a position with every pair open of a
+   !> structure that its contact alone holds, which is no equilibrium that lasts.
    subroutine solve(self, system, x, report)
       class(solution_method), intent(inout) :: self
       type(hbm_system), intent(inout), target :: system
@@ -87,7 +90,7 @@ contains
       else
          call solve_system(self, system, x, report)
       end if
-      if (report%converged) report%converged = is_lasting(system)
+      if (report%converged) call refuse_unreal(self, system, x, report)
    end subroutine solve
 
    !> Floquet multipliers of the solution x at the frequency of the system.
@@ -186,7 +189,20 @@ contains
       if (allocated(self%message)) deallocate (self%message)
       if (.not. outcome%converged) self%message = outcome%message
       call carry_solution(self%whole, whole_x, system, x)
-      if (report%converged) report%converged = is_lasting(self%whole)
+      if (report%converged) call refuse_unreal(self, self%whole, whole_x, report)
    end subroutine solve_by_flow
+
+   !> Take `converged` back from what solves the equations and is no vibration.
+   subroutine refuse_unreal(self, system, x, report)
+      class(solution_method), intent(inout) :: self
+      type(hbm_system), intent(in) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      type(solver_report), intent(inout) :: report
+      logical :: lost
+
+      lost = is_lost_in_round_off(system, x)
+      self%unbounded = self%unbounded .or. lost
+      report%converged = is_lasting(system) .and. .not. lost
+   end subroutine refuse_unreal
 
 end module fw_solution

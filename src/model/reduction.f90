@@ -179,6 +179,8 @@ contains
       end do
    end function undamped_resonances
 
+   !> Kept modes are scaled to a largest displacement of 1: their equations are forces then, as those
+   !> of the relative coordinates are, and the norm of a residual means the same in all units.
    subroutine move_to_coordinates(keep, t_q, t_i, self)
       logical, intent(in) :: keep(:)
       real(wp), intent(inout), allocatable :: t_q(:, :), t_i(:, :)
@@ -192,7 +194,9 @@ contains
       m = size(t_q, 2)
       allocate (wider(size(t_q, 1), m + size(kept)))
       wider(:, :m) = t_q
-      wider(:, m + 1:) = t_i(:, kept)
+      do j = 1, size(kept)
+         wider(:, m + j) = t_i(:, kept(j))/maxval(abs(t_i(:, kept(j))))
+      end do
       t_q = wider
       t_i = t_i(:, others)
       self%k_i = self%k_i(others)

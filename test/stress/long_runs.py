@@ -1,0 +1,105 @@
+"""Long runs: memory stays flat, and a point late in a run costs what an early one does.
+
+    long_runs.py [--points 10000] [--steps 5000] [-o docs/robustness.md]
+
+Memory is the resident set of the process, read while it runs; the cost of a point is what the
+result file says. Ends with status 1 where one of them grows.
+"""
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import stress_cases as cases
+import stress_run as runs
+from stress_models import interface
+
+BEGIN, END = "<!-- long runs: begin -->", "<!-- long runs: end -->"
+# Growth that counts: of memory between the first tenth and the end [MB], and of the median time.
+MEMORY_GROWTH, TIME_GROWTH = 1.0, 1.5
+
+
+def sweep(n_points):
+    """A joint that slips and sticks again, swept across its first modes."""
+    return cases.make("long", "sweep", interface(2, preload=1.0), omegas=(0.2, 1.8, n_points))
+
+
+def wear(n_steps):
+    """A joint that wears by small steps."""
+    case = cases.make("long", "wear", interface(2, preload=3.0),
+                      wear={"scheme": "implicit", "coefficient": 1e-6, "max_depth_step": 1e-5,
+                            "max_steps": n_steps, "steady_tolerance": 1e-12})
+    case.groups["case"]["analysis"] = "wear"
+    return case
+
+
+def resident(pid):
+    """Resident set of a process [MB]; None where it has ended."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return None
+    line = [line for line in status.splitlines() if line.startswith("VmRSS")]
+    return int(line[0].split()[1]) / 1024 if line else None
+
+
+def measure(case):
+    """Points, resident sets (time, MB), seconds of every point."""
+    with tempfile.TemporaryDirectory(prefix="fw_long_") as name:
+        folder = Path(name)
+        runs.write_case(case, folder)
+        process = subprocess.Popen([runs.FW_RUN, "-q", str(folder / "case.nml")],
+                                   env=runs.ENVIRONMENT)
+        memory = []
+        while process.poll() is None:
+            size = resident(process.pid)
+            if size is not None:
+                memory.append(size)
+            time.sleep(0.02)
+        if process.returncode not in (0, 4):
+            raise RuntimeError(f"{case.title}: status {process.returncode}")
+        with h5py.File(folder / "case.h5") as file:
+            return memory, file["seconds"][()], file["converged"][()].astype(bool)
+
+
+def judge(name, case):
+    """A row of the table, and whether anything grows."""
+    memory, seconds, converged = measure(case)
+    tenth = max(1, len(seconds) // 10)
+    early = memory[len(memory) // 10]
+    first, last = np.median(seconds[tenth:2 * tenth]), np.median(seconds[-tenth:])
+    grows = memory[-1] - early > MEMORY_GROWTH or last > TIME_GROWTH * first
+    return (f"| {name} | {len(seconds)} | {converged.sum()} | {early:.1f} | {memory[-1]:.1f} | "
+            f"{1e3 * first:.2f} | {1e3 * last:.2f} |", grows)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--points", type=int, default=10000)
+    parser.add_argument("--steps", type=int, default=5000)
+    parser.add_argument("-o", "--output", type=Path, help="document whose table is replaced")
+    arguments = parser.parse_args()
+    lines = ["| run | points | converged | MB after a tenth | MB at the end | ms a point, second "
+             "tenth | ms a point, last tenth |", "|---" * 7 + "|"]
+    bad = False
+    for name, case in (("sweep", sweep(arguments.points)), ("wear", wear(arguments.steps))):
+        line, grows = judge(name, case)
+        lines.append(line)
+        print(line, flush=True)
+        bad = bad or grows
+    if arguments.output:
+        text = arguments.output.read_text()
+        before, rest = text.split(BEGIN)
+        arguments.output.write_text(
+            before + "\n".join([BEGIN, *lines, END]) + rest.split(END)[1])
+    return int(bad)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
