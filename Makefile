@@ -7,6 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint docs clean
+.PHONY: fuzz
 .PHONY: bench bench-solvers bench-paper bench-time bench-full paper
 .PHONY: stress long
 
@@ -97,5 +98,15 @@ bench-full: build ## every part of docs/benchmarks.md
 paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) bench/gallery.py
 
+# Goes on where it was stopped; a changed program starts anew.
+N ?= 100000
+FUZZ := build/fuzz
+fuzz: build ## N hostile inputs (100000), written to docs/robustness/inputs.md
+	@mkdir -p $(FUZZ)
+	@if [ $(BUILD)/fw_run -nt $(FUZZ)/fuzz.json ]; then rm -f $(FUZZ)/fuzz.json; fi
+	OMP_NUM_THREADS=1 $(PYTHON) test/robustness/fuzz.py --build $(BUILD) -n $(N) --jobs 2 \
+	   --state $(FUZZ)
+	$(PYTHON) test/robustness/fuzz_report.py $(FUZZ)/fuzz.json
+
 clean: ## remove everything built but the Python environment
-	rm -rf $(BUILD) build/debug build/docs build/wheel $(RUN)
+	rm -rf $(BUILD) build/debug build/docs build/wheel $(RUN) $(FUZZ)

@@ -5,6 +5,7 @@ program fw_run_program
    use fw_cli, only: cli_options, get_arguments, parse_arguments
    use fw_error, only: error_type, status_ok
    use fw_help, only: write_help
+   use fw_interrupt, only: catch_interrupts
    use fw_outcome, only: outcome_type
    use fw_progress, only: progress_type, new_progress
    use fw_read_case, only: read_case
@@ -56,7 +57,7 @@ contains
 
       ! Damping and checks of a model must not depend on the threads of the BLAS either.
       call threads%enter(0)
-      call read_case(options%input, options%overrides, case, error)
+      call read_case(options%input, options%overrides, case, error, tries_files=.true.)
       call threads%leave()
       if (allocated(error)) return
       if (allocated(options%restart)) case%restart = options%restart
@@ -67,6 +68,7 @@ contains
          return
       end if
       progress = new_progress(options%quiet, options%verbose)
+      call catch_interrupts()
       call run_case(case, progress, outcome, error)
       if (allocated(error)) return
       status = outcome%status

@@ -2,6 +2,7 @@
 module fw_progress
    use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit
+   use fw_interrupt, only: was_interrupted
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
@@ -72,6 +73,7 @@ contains
       type(point_type), intent(in) :: point
       logical :: is_due
 
+      if (was_interrupted()) self%stop_requested = .true.
       if (self%quiet) return
       ! A point that failed is worth a line wherever it is shown.
       is_due = self%verbose .or. .not. point%converged

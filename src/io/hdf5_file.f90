@@ -8,6 +8,7 @@ module fw_hdf5_file
    use fw_error, only: fatal_error
    use fw_error, only: status_input
    use fw_error, only: status_io
+   use hdf5, only: h5dont_atexit_f
    use hdf5, only: hid_t
    use hdf5, only: hsize_t
    use hdf5, only: h5open_f
@@ -173,6 +174,9 @@ contains
       logical :: started
       integer :: status
 
+      ! Every file is closed here. What HDF5 would do at the end of the program crashes where a file
+      ! could not be closed because the disk is full. It has to be told before its first call.
+      call h5dont_atexit_f(status)
       ! The predefined types are valid handles if and only if the library runs; starting it a
       ! second time would leak a set of them.
       call h5iis_valid_f(h5t_native_double, started, status)

@@ -178,6 +178,7 @@ contains
       do
          read (self%unit, '(a)', iostat=status) text
          if (status == iostat_end) then
+            if (allocated(words)) deallocate (words) ! of a blank line
             allocate (words(0))
             return
          end if

@@ -7,7 +7,7 @@ module fw_paths
    private
 
    public :: read_text_file, resolve_path, directory_of, stem_of, check_writable
-   public :: real_path, follow_links, is_directory
+   public :: real_path, follow_links, is_directory, is_locked, machine_name
 
    !> The longest path that the system takes.
    integer, parameter :: longest = 4096
@@ -15,6 +15,42 @@ module fw_paths
    integer, parameter :: most_links = 40
 
    interface
+      function c_fopen(path, mode) bind(c, name='fopen') result(stream)
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*), mode(*)
+         type(c_ptr) :: stream
+      end function c_fopen
+
+      function c_fclose(stream) bind(c, name='fclose') result(status)
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: stream
+         integer(c_int) :: status
+      end function c_fclose
+
+      function c_fileno(stream) bind(c, name='fileno') result(descriptor)
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: stream
+         integer(c_int) :: descriptor
+      end function c_fileno
+
+      function c_flock(descriptor, operation) bind(c, name='flock') result(status)
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor, operation
+         integer(c_int) :: status
+      end function c_flock
+
+      function c_gethostname(buffer, size) bind(c, name='gethostname') result(status)
+         import :: c_int, c_ptr, c_size_t
+         implicit none (type, external)
+         type(c_ptr), value :: buffer
+         integer(c_size_t), value :: size
+         integer(c_int) :: status
+      end function c_gethostname
+
       function c_getcwd(buffer, size) bind(c, name='getcwd') result(pointer)
          import :: c_ptr, c_size_t
          implicit none (type, external)
@@ -162,6 +198,31 @@ contains
          target = resolve_path(from_buffer(buffer), directory_of(target))
       end do
    end subroutine follow_links
+
+   !> Whether somebody, this process included, holds a lock (flock) on a file.
+   logical function is_locked(path)
+      character(*), intent(in) :: path
+      integer(c_int), parameter :: exclusive_without_waiting = 6
+      type(c_ptr) :: stream
+      integer(c_int) :: status
+
+      is_locked = .false.
+      stream = c_fopen(path//c_null_char, 'r'//c_null_char)
+      if (.not. c_associated(stream)) return
+      is_locked = c_flock(c_fileno(stream), exclusive_without_waiting) /= 0
+      status = c_fclose(stream)
+   end function is_locked
+
+   !> '' where the system does not tell.
+   function machine_name() result(name)
+      character(:), allocatable :: name
+      character(kind=c_char), target :: buffer(longest)
+
+      name = ''
+      buffer = c_null_char
+      if (c_gethostname(c_loc(buffer), size(buffer, kind=c_size_t)) == 0) &
+         name = from_buffer(buffer)
+   end function machine_name
 
    logical function is_directory(path)
       character(*), intent(in) :: path

@@ -24,22 +24,26 @@ module fw_read_case
 contains
 
    !> Read a case from a namelist file.
-   subroutine read_case(path, overrides, case, error)
+   subroutine read_case(path, overrides, case, error, tries_files)
       character(*), intent(in) :: path
       !> `group%key=value` each, as after --set.
       type(string_type), intent(in) :: overrides(:)
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
+      !> Try model files in a process of their own first (default: no).
+      logical, intent(in), optional :: tries_files
       character(:), allocatable :: text
 
       call read_text_file(path, text, error)
-      if (.not. allocated(error)) call read_case_text(text, path, overrides, case, error)
+      if (allocated(error)) return
+      call read_case_text(text, path, overrides, case, error, tries_files=tries_files)
    end subroutine read_case
 
    !> Read a case from namelist text. The handling of texts serves one thread at a time (gfortran
    !> keeps the lengths of texts that functions return in static memory), and so does HDF5: every
    !> reading waits for its turn.
-   subroutine read_case_text(text, path, overrides, case, error, memory_model, origin)
+   subroutine read_case_text(text, path, overrides, case, error, memory_model, origin, &
+                             tries_files)
       character(*), intent(in) :: text
       !> Path for messages, for relative files and for the default name of the result file.
       character(*), intent(in) :: path
@@ -50,26 +54,30 @@ contains
       type(file_model_type), intent(in), optional :: memory_model
       !> What messages put before an override (default: '--set').
       character(*), intent(in), optional :: origin
+      !> As of read_case.
+      logical, intent(in), optional :: tries_files
 
       !$omp critical (fretwear_io)
-      call read_groups(text, path, overrides, case, error, memory_model, origin)
+      call read_groups(text, path, overrides, case, error, memory_model, origin, tries_files)
       if (allocated(error)) error%message = printable(error%message)
       !$omp end critical (fretwear_io)
    end subroutine read_case_text
 
    !> The same, with messages that may hold any byte of the text.
-   subroutine read_groups(text, path, overrides, case, error, memory_model, origin)
+   subroutine read_groups(text, path, overrides, case, error, memory_model, origin, tries_files)
       character(*), intent(in) :: text, path
       type(string_type), intent(in) :: overrides(:)
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
       type(file_model_type), intent(in), optional :: memory_model
       character(*), intent(in), optional :: origin
+      logical, intent(in), optional :: tries_files
       type(reader_type) :: reader
       type(file_model_type) :: raw
 
       call new_reader(reader, text, path, overrides, error, origin)
       if (allocated(error)) return
+      if (present(tries_files)) reader%tries_files = tries_files
       call read_case_group(reader, case)
       call read_structure(reader, path, case, raw, error, memory_model)
       if (allocated(error)) return

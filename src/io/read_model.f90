@@ -11,6 +11,7 @@ module fw_read_model
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
    use fw_text, only: to_text
+   use fw_trial, only: try_model_hdf5
    use fw_values, only: quoted_text
    implicit none (type, external)
    private
@@ -112,7 +113,9 @@ contains
 
       call reader%amend('model', 'file', quoted_text(resolve_path(options%file, directory)))
       if (options%source == source_hdf5) then
-         call read_model_hdf5(in_directory(options%file, directory), raw, error)
+         if (reader%tries_files) call try_model_hdf5(in_directory(options%file, directory), error)
+         if (.not. allocated(error)) &
+            call read_model_hdf5(in_directory(options%file, directory), raw, error)
       else
          call read_matrix_market_model(in_directory(options%file, directory), raw, error)
       end if

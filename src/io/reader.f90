@@ -34,10 +34,11 @@ module fw_reader
    character(*), parameter :: real_kind = 'a finite real'
 
    type :: reader_type
-      private
-      type(namelist_type) :: input
-      type(record_list) :: records
-      type(string_type), allocatable :: problems(:)
+      !> Model files are tried in a process of their own first: for programs of one thread.
+      logical :: tries_files = .false.
+      type(namelist_type), private :: input
+      type(record_list), private :: records
+      type(string_type), allocatable, private :: problems(:)
    contains
       !> One value: real, integer, logical or text.
       generic :: get => get_real, get_integer, get_logical, get_text

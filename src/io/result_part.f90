@@ -1,6 +1,11 @@
 !> Files that appear under their name only when they are complete: written as '<name>.part' and
-!> renamed. An occupied '.part' (another run at work, or the remains of a killed one) is never
-!> touched: the next free of '<name>.part.<process>', '<name>.part.<process>.2', ... is taken.
+!> renamed. Where that is occupied, by another run at work or by the remains of a killed one, the
+!> next free of '<name>.part.2', '<name>.part.3', ... is taken.
+!>
+!> Remains are kept until a later run has published its result under the same name, because they
+!> hold points that nothing else has; then they go. A run at work is told from a killed one by the
+!> lock that HDF5 holds on an open file, so a part says on which machine its lock works: nothing
+!> else is removed.
 module fw_result_part
    use, intrinsic :: iso_c_binding, only: c_char
    use, intrinsic :: iso_c_binding, only: c_int
@@ -8,7 +13,12 @@ module fw_result_part
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_io
+   use fw_hdf5, only: has_attribute
    use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: read_attribute
+   use fw_hdf5, only: write_attribute
+   use fw_paths, only: is_locked
+   use fw_paths, only: machine_name
    use fw_result_target, only: check_replaceable
    use fw_result_target, only: find_target
    use fw_text, only: string_type
@@ -18,8 +28,11 @@ module fw_result_part
 
    public :: create_part, publish_part, delete_part
 
-   !> One process rarely writes the same result more often than this at a time.
-   integer, parameter :: most_tries = 100
+   !> As many parts of one result are told apart.
+   integer, parameter :: most_parts = 100
+
+   !> Attribute of a part: the machine on which its lock can be seen.
+   character(*), parameter :: lock_attribute = 'locked_on'
 
    interface
       function c_rename(old, new) bind(c, name='rename') result(status)
@@ -36,11 +49,6 @@ module fw_result_part
          integer(c_int) :: status
       end function c_unlink
 
-      function c_getpid() bind(c, name='getpid') result(process)
-         import :: c_int
-         implicit none (type, external)
-         integer(c_int) :: process
-      end function c_getpid
    end interface
 
 contains
@@ -62,15 +70,17 @@ contains
 
       call find_target(path, target, error, inputs)
       if (allocated(error)) return
-      do i = 0, most_tries
-         part = target//'.part'
-         if (i > 0) part = part//'.'//to_text(int(c_getpid()))
-         if (i > 1) part = part//'.'//to_text(i)
+      do i = 1, most_parts
+         part = part_name(target, i)
          inquire (file=part, exist=occupied)
          if (occupied) cycle
          ! Exclusive: of two runs that find the name free only one gets it.
          call file%create(part, error, exclusive=.true.)
-         if (.not. allocated(error)) return
+         if (.not. allocated(error)) then
+            if (is_locked(part)) call write_attribute(file, '/', lock_attribute, &
+                                                      machine_name(), error)
+            return
+         end if
          inquire (file=part, exist=occupied)
          if (.not. occupied) return
       end do
@@ -87,12 +97,55 @@ contains
       call check_replaceable(path, error)
       if (allocated(error)) then
          error%message = error%message//'; the result is complete in '//part
-         return
+      else if (c_rename(part//c_null_char, path//c_null_char) /= 0) then
+         call fatal_error(error, path//': cannot be replaced; the result is complete in '// &
+                          part, status_io)
+      else
+         call delete_remains(path)
       end if
-      if (c_rename(part//c_null_char, path//c_null_char) == 0) return
-      call fatal_error(error, path//': cannot be replaced; the result is complete in '//part, &
-                       status_io)
    end subroutine publish_part
+
+   !> Remove what killed runs have left beside a result that is complete now.
+   subroutine delete_remains(path)
+      character(*), intent(in) :: path
+      character(:), allocatable :: part
+      logical :: occupied
+      integer :: i
+
+      do i = 1, most_parts
+         part = part_name(path, i)
+         inquire (file=part, exist=occupied)
+         if (.not. occupied) cycle
+         if (is_locked(part)) cycle
+         if (was_locked_here(part)) call delete_part(part)
+      end do
+   end subroutine delete_remains
+
+   !> Whether a file without a lock is the part of a run that had one on this machine.
+   logical function was_locked_here(part)
+      character(*), intent(in) :: part
+      type(error_type), allocatable :: error
+      type(hdf5_file) :: file
+      character(:), allocatable :: machine
+
+      was_locked_here = .false.
+      call file%open_read(part, error)
+      if (allocated(error)) return
+      if (has_attribute(file, '/', lock_attribute)) then
+         call read_attribute(file, '/', lock_attribute, machine, error)
+         if (.not. allocated(error)) was_locked_here = machine == machine_name()
+      end if
+      call file%close(error)
+   end function was_locked_here
+
+   pure function part_name(target, i) result(part)
+      character(*), intent(in) :: target
+      integer, intent(in) :: i
+      character(:), allocatable :: part
+
+      part = target//'.part'
+      if (i > 1) part = part//'.'//to_text(i)
+   end function part_name
 
    !> Remove a closed temporary file.
    subroutine delete_part(part)

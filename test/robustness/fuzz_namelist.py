@@ -1,0 +1,150 @@
+"""Mutations of namelists that know groups, keys and values, and some that know nothing."""
+import re
+
+from fuzz_bases import namelists
+
+#: Keys of every group, from what the program itself shows; names that belong nowhere come on top.
+KEYS = {
+    "case": ["title", "analysis", "threads"],
+    "model": ["source", "file", "n_dof", "mass", "stiffness", "damping", "rayleigh_mass",
+              "rayleigh_stiffness", "modal_damping", "rotation_speed"],
+    "contact": ["n_pairs", "law", "side_1", "side_2", "mu", "gap", "area", "normal_load",
+                "tangential_stiffness", "normal_stiffness", "penalty_scale", "memory"],
+    "spring": ["n_springs", "side_1", "side_2", "coefficient", "power"],
+    "load": ["static", "cosine", "sine", "static_scale", "harmonic_scale"],
+    "harmonics": ["method", "n_harmonics", "n_time", "n_collocation", "filter_harmonics", "parity",
+                  "sampling", "adaptive", "adaptive_tolerance"],
+    "sweep": ["start", "end", "n_points", "unit", "continuation", "max_points", "stability"],
+    "solver": ["kind", "linear", "jacobian", "tolerance", "max_iterations", "fallback", "skips"],
+    "pseudo_time": ["flow", "scheme", "step", "cfl", "max_steps"],
+    "time": ["n_periods", "steps_per_period"],
+    "wear": ["scheme", "coefficient", "n_cycles", "max_depth_step", "error_tolerance",
+             "steady_tolerance", "max_steps"],
+    "output": ["file", "observe", "histories", "contact"],
+}
+
+NUMBERS = ["0", "-1", "1", "2", "3", "7", "1e-300", "1e300", "1e308", "4.9e-324", "1e400", "-1e400",
+           "nan", "inf", "-inf", "NaN", "+Infinity", "2147483647", "2147483648", "-2147483648",
+           "9223372036854775808", "100000", "1000000", "10000", "99999999999999999999", "1.5", "1d3",
+           "1.e", ".", "-", "1e", "0x10", "1_8", "(1,2)", "1e-9999", "0.1 0.2", "1,,2", "3*1",
+           "2*", "100000000*0", "2147483648*1", "0*1", "-1*1", "1*1*1", "1:3", "t", ".true."]
+WORDS = ["''", "'", '"', "'x'", '"x"', "'a''b'", "x", "'frf'", "'point'", "'time'", "'wear'",
+         "'hdf5'", "'matrix_market'", "'memory'", "'inline'", "'dlft'", "'dlft_velocity'",
+         "'penalty'", "'tcm'", "'tcm_least_squares'", "'hdhb'", "'events'", "'odd'", "'all'",
+         "'Hz'", "'arclength'", "'powell'", "'kinsol'", "'pseudo_time'", "'krylov'", "'lu'",
+         "'difference'", "'bdf'", "'rosenbrock'", "'runge_kutta'", "'identity'", "'carried'",
+         "'preconditioned'", "'explicit'", "'/'", "'&model'", "'..'", "'/'", "'/dev/null'",
+         "'" + "x" * 5000 + "'", "'\xe9\u4e2d'", "'\x01'", ".true.", ".false.", ".t.", ".maybe."]
+PIECES = ["'", '"', "/", "&", "=", "(", ")", ",", "*", "!", "\n", "\r\n", "9", "-", "%", ":", "x",
+          "\t", "\0", "\x1a", "\x7f", "\xe9", "\u2028", "&end\n", "$", ";", "/\n/\n", "&model\n",
+          "!" + "z" * 20000 + "\n", " " * 20000, "(1)", "(2:3)", "(0)", "(-1)", "(99999999999)",
+          "(:)", "(1,1)", "%x"]
+
+KEY = re.compile(r"\b\w{1,40}[ \t]{0,20}=") # linear: some inputs have very long words
+BASES = namelists()
+
+
+def value(rng):
+    """A value of any kind, sometimes a list."""
+    pool = NUMBERS if rng.random() < 0.6 else WORDS
+    n = 1 if rng.random() < 0.8 else rng.choice([2, 3, 4, 9, 100])
+    return rng.choice([" ", ", "]).join(rng.choice(pool) for _ in range(n))
+
+
+def entries(text):
+    """Start of every key, start and end of its value: to the next key, or the end of the line."""
+    found = list(KEY.finditer(text))
+    for match, following in zip(found, [*found[1:], None]):
+        stop = len(text) if following is None else following.start()
+        line = text.find("\n", match.end())
+        yield match.start(), match.end(), min(stop, line) if line >= 0 else stop
+
+
+def replace_value(rng, text):
+    found = list(entries(text))
+    if not found:
+        return text
+    _, first, last = rng.choice(found)
+    ending = "/" if text[first:last].rstrip().endswith("/") else ""
+    return f"{text[:first]} {value(rng)} {ending}{text[last:]}"
+
+
+def swap_values(rng, text):
+    found = list(entries(text))
+    if len(found) < 2:
+        return text
+    (_, a, b), (_, c, d) = sorted(rng.sample(found, 2))
+    return text[:a] + text[c:d] + text[b:c] + text[a:b] + text[d:]
+
+
+def add_key(rng, text):
+    """A key in its own group, in a foreign one, twice, with an index, or misspelt."""
+    group = rng.choice(list(KEYS))
+    key = rng.choice(KEYS[group])
+    if rng.random() < 0.2:
+        key = rng.choice([key + "x", key[:-1], key.upper(), key + rng.choice(PIECES)])
+    if rng.random() < 0.3:
+        group = rng.choice([*KEYS, "nothing", ""])
+    entry = f" {key} = {value(rng)} "
+    at = re.search(rf"&{group}\b", text) if group else None
+    if at:
+        return text[:at.end()] + entry + text[at.end():]
+    return text + f"&{group}{entry}/\n"
+
+
+def remove_key(rng, text):
+    found = list(entries(text))
+    if not found:
+        return text
+    first, _, last = rng.choice(found)
+    return text[:first] + text[last:]
+
+
+def change_groups(rng, text):
+    groups = re.findall(r"&\w+[^&]*", text)
+    if not groups:
+        return text
+    kind = rng.randrange(4)
+    if kind == 0:
+        groups.pop(rng.randrange(len(groups)))
+    elif kind == 1:
+        groups.append(rng.choice(groups))
+    elif kind == 2:
+        rng.shuffle(groups)
+    else:
+        k = rng.randrange(len(groups))
+        groups[k] = groups[k].rstrip().removesuffix("/") + "\n"
+    return "".join(groups)
+
+
+def noise(rng, text):
+    characters = list(text)
+    for _ in range(rng.choice([1, 1, 2, 4, 30])):
+        k = rng.randrange(len(characters) + 1)
+        if rng.random() < 0.5:
+            characters.insert(k, rng.choice(PIECES))
+        elif characters:
+            del characters[k:k + rng.choice([1, 1, 5])]
+    return "".join(characters)
+
+
+def truncate(rng, text):
+    return text[:rng.randrange(len(text) + 1)]
+
+
+MUTATIONS = [replace_value, replace_value, replace_value, swap_values, add_key, add_key, remove_key,
+             change_groups, noise, truncate]
+
+
+def mutate(rng, text):
+    for _ in range(rng.choice([1, 1, 1, 2, 3, 6])):
+        text = rng.choice(MUTATIONS)(rng, text)
+    return text
+
+
+def create(rng, folder):
+    """Write `case.nml`."""
+    text = mutate(rng, rng.choice(BASES))
+    (folder / "case.nml").write_bytes(text.encode(rng.choice(["utf-8", "utf-8", "latin-1",
+                                                              "utf-16"]), errors="replace"))
+    return ["case.nml"]
