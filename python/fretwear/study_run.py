@@ -156,10 +156,10 @@ def run_job(job: Job, stop: threading.Event | None = None) -> Record:
                                env=_environment(), start_new_session=True)
     out, err, status = _wait(process, stop, job.timeout)
     if stop is not None and stop.is_set() and process.returncode < 0:
-        _remove_partial(result, process.pid)
+        _remove_partial(result)
         raise RunStopped(job.name)
     if status < 0 or status == _TIMEOUT_STATUS:
-        _remove_partial(result, process.pid)
+        _remove_partial(result)
     kind = STATUS.get(status, "failed")
     message = "" if status == 0 else _message(err)
     if kind == "not converged":
@@ -255,7 +255,7 @@ def _write(path: Path, text: str) -> None:
     partial.replace(path)
 
 
-def _remove_partial(result: Path, process: int) -> None:
-    for name in (f"{result.name}.part", f"{result.name}.part.{process}"):
+def _remove_partial(result: Path) -> None:
+    for name in (f"{result.name}.part", f"{result.name}.part.2"):
         with contextlib.suppress(OSError):
             result.with_name(name).unlink()

@@ -39,14 +39,15 @@ contains
       integer, intent(in) :: side_1(:), side_2(:)
       type(relative_type), intent(out) :: self
       real(wp), allocatable :: echelon(:, :), row(:), combination(:)
-      integer :: r, m, n_rows
+      integer :: r, m, n_rows, most
 
       n_rows = size(side_1)
       self%n_dof = n_dof
       self%n_rows = n_rows
-      allocate (echelon(n_rows, n_dof), source=0.0_wp)
-      allocate (self%c(n_rows, n_rows), source=0.0_wp)
-      allocate (self%pivot(n_rows), self%first(n_rows + 1), row(n_dof), combination(n_rows))
+      most = min(n_rows, n_dof) ! rows that can be independent
+      allocate (echelon(most, n_dof), source=0.0_wp)
+      allocate (self%c(most, most), source=0.0_wp)
+      allocate (self%pivot(most), self%first(n_rows + 1), row(n_dof), combination(most))
       allocate (self%coordinate(0), self%coefficient(0), self%independent(n_rows))
       m = 0
       self%first(1) = 1

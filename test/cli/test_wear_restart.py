@@ -84,7 +84,7 @@ def test_killed_run(tmp_path):
     assert left["attributes"]["status"] == "incomplete"
     assert 1 <= len(left["omega"]) < len(whole["omega"])
     assert_same(result(tmp_path, groups, "--restart", "case.h5.part"), whole)
-    assert (tmp_path / "case.h5.part").exists(), "what a killed run left is never touched"
+    assert not (tmp_path / "case.h5.part").exists(), "all that the killed run left is in the result"
 
 
 def test_restart_may_be_the_result(tmp_path):
