@@ -113,11 +113,28 @@ contains
          else
             call linear_step(self, system, before, cycles, after, report)
          end if
+         ! At a kink linear steps may go to and fro; Newton's method with its line search does not.
+         if (.not. report%converged) &
+            call try_implicitly(self, system, before, cycles, after, report)
       case default
          call implicit_step(self, system, before, cycles, after, report)
       end select
       after%cycles = before%cycles + cycles
    end subroutine advance
+
+   !> An implicit step of the same order where a linear one has failed.
+   subroutine try_implicitly(self, system, before, cycles, after, report)
+      type(wear_stepper), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      real(wp), intent(in) :: cycles
+      type(wear_state), intent(inout) :: after
+      type(wear_step_report), intent(inout) :: report
+      type(wear_state) :: implicit_after
+
+      call implicit_step(self, system, before, cycles, implicit_after, report)
+      after = implicit_after
+   end subroutine try_implicitly
 
    !> The vibration at given depths, from the guess in state%x; its rates.
    subroutine settle(self, system, state, report)

@@ -2,9 +2,12 @@
 hold, or says what is wrong. Sliding at the end is checked by a path that shares no code with the
 program.
 """
+import subprocess
+
+import h5py
 import numpy as np
 import pytest
-from wear_cases import merged, oscillator, prescribed_slip, result, run, shared_load
+from wear_cases import PROGRAM, ROOT, merged, oscillator, prescribed_slip, result, run, shared_load
 
 N_PAIRS = 3
 TANGENTIAL, NORMAL = 20.0, 30.0
@@ -179,3 +182,22 @@ def test_nothing_to_wear(tmp_path, spring):
     groups = {name: keys for name, keys in prescribed_slip().items() if name != "contact"}
     message = run(tmp_path, {**groups, **spring}, status=3).stderr
     assert "needs contact pairs" in message
+
+
+@pytest.mark.parametrize("scheme, control", [
+    ("implicit_euler", "wear%max_depth_step=1e-4"), ("rosenbrock", "wear%error_tolerance=1e-2")])
+def test_pseudo_time_passes_kinks_of_the_sector(tmp_path, scheme, control):
+    """At 2500 rpm nearly every pair wears, and linear steps alone go to and fro."""
+    done = subprocess.run(
+        [PROGRAM, "-q", "-o", tmp_path / "worn.h5", ROOT / "example/blade_sector/frf_48.nml",
+         "--set", "case%analysis='wear'", "--set", "model%rotation_speed=261.8",
+         "--set", "sweep%start=1006.5", "--set", "sweep%n_points=1",
+         "--set", "harmonics%n_harmonics=3", "--set", "wear%scheme='pseudo_time'",
+         "--set", "wear%coefficient=1e-12", "--set", f"pseudo_time%scheme='{scheme}'",
+         "--set", control], capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "worn.h5") as file:
+        assert file["wear"].attrs["steady_state"] == "reached"
+        depth = file["wear/depth"][-1]
+        assert (depth > 0.01 * depth.max()).sum() >= 40
+        assert file["amplitude"][-1, 0] < 0.2 * file["amplitude"][0, 0]
