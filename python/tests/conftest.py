@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from program import run
 
 from fretwear.result import Result
 from fretwear.sector import (
@@ -60,8 +59,6 @@ def examples() -> Path:
     return Path(__file__).resolve().parents[2] / "example" / "blade_sector"
 
 
-PROGRAM = os.environ.get(
-    "FW_RUN", str(Path(__file__).resolve().parents[2] / "build" / "release" / "fw_run"))
 #: Fast enough for the flanks to carry the blade, slow enough for them to slip.
 SPEED = 460.8
 CASE = """&case title = 'Coarse sector' /
@@ -72,13 +69,6 @@ CASE = """&case title = 'Coarse sector' /
 &sweep start = {start} end = {end} n_points = 40 unit = 'Hz' /
 &output observe = 'tip', 'tip_x' /
 """
-
-
-def run(namelist: Path, target: Path, *settings: str) -> Result:
-    """Run a case; settings are for --set."""
-    options = [word for setting in settings for word in ("--set", setting)]
-    subprocess.run([PROGRAM, "-q", *options, "-o", target, namelist], check=True)
-    return Result(target)
 
 
 @pytest.fixture(scope="session")

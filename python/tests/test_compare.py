@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import run
+from program import run
 
 from fretwear.cli import main
 from fretwear.compare import compare, plot_comparison

@@ -9,7 +9,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from conftest import run
+from program import run
 
 from fretwear import InputError
 from fretwear.cli import main

@@ -7,8 +7,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import run
 from matplotlib.figure import Figure
+from program import run
 
 from fretwear import InputError
 from fretwear.cli import main

@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import run
+from program import run
 
 from fretwear import InputError
 from fretwear.export_recovery import (

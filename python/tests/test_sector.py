@@ -264,5 +264,5 @@ def test_the_lock_holds_the_blade_along_its_slot(full: FullModel, reduced: Reduc
 
 
 def test_a_negative_lock_is_refused() -> None:
-    with pytest.raises(ValueError, match="Retention: retention = -1.0"):
+    with pytest.raises(ValueError, match=r"Retention: retention = -1\.0"):
         Retention(-1.0)

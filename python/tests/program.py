@@ -1,0 +1,19 @@
+"""The program as the tests of the package run it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+from fretwear.result import Result
+
+PROGRAM = os.environ.get(
+    "FW_RUN", str(Path(__file__).resolve().parents[2] / "build" / "release" / "fw_run"))
+
+
+def run(namelist: Path, target: Path, *settings: str) -> Result:
+    """Run a case; settings are for --set."""
+    options = [word for setting in settings for word in ("--set", setting)]
+    subprocess.run([PROGRAM, "-q", *options, "-o", target, namelist], check=True)
+    return Result(target)
