@@ -60,6 +60,18 @@ module fw_wear_response
       procedure :: take
    end type wear_recorder
 
+   !> Everything between the start of a run and its end.
+   type :: wear_run
+      type(hbm_system) :: balance
+      type(wear_system) :: system
+      type(point_solver) :: solver
+      type(wear_recorder) :: recorder
+      type(wear_march) :: march
+      !> Where the run stands, and where it started.
+      type(wear_state) :: state, first
+      real(wp) :: first_omega = 0.0_wp
+   end type wear_run
+
 contains
 
    !> The vibration of the unworn joint, then the march; every accepted step is written as soon as
@@ -72,19 +84,41 @@ contains
       type(result_writer), intent(inout), target :: writer
       type(summary_type), intent(inout), target :: summary
       type(error_type), allocatable, intent(out) :: error
-      type(hbm_system), target :: balance
-      type(wear_system), target :: system
-      type(point_solver) :: solver
+      type(wear_run), target :: run
       type(point_type) :: point
-      type(wear_recorder), target :: recorder
-      type(wear_march), target :: march
-      type(wear_state) :: state, first
-      type(error_type), allocatable :: row_error
-      character(:), allocatable :: reason
-      real(wp) :: first_omega
 
-      call build_system(case, balance, error)
+      call build_system(case, run%balance, error)
+      if (.not. allocated(error)) &
+         call start_recorder(run%recorder, case, observer, writer, summary, error)
       if (allocated(error)) return
+      call observer%on_start(case%title, 0)
+      call run%solver%start(case, run%balance%n)
+      call run%solver%solve(case, run%balance, case%sweep%start, point, error)
+      if (allocated(error)) return
+      if (point%converged) then
+         call start_march(run, case, point, error)
+         if (.not. allocated(error)) call march_on(run, restart, error)
+      else
+         call give_up_unworn(run, point, error)
+      end if
+      call observer%on_end()
+      if (.not. allocated(error)) call report_end(run, restart, error)
+      if (.not. allocated(error) .and. case%wear%check_steps .and. point%converged) &
+         call compare_halved(run%recorder, run%system, run%march, run%first, run%first_omega, &
+                             run%state, error)
+      call run%recorder%rows%close()
+      call run%recorder%restart_rows%close()
+   end subroutine run_wear
+
+   !> The rows of a result that is incomplete until the run says otherwise.
+   subroutine start_recorder(recorder, case, observer, writer, summary, error)
+      type(wear_recorder), intent(inout) :: recorder
+      type(case_type), intent(in), target :: case
+      class(observer_type), intent(inout), target :: observer
+      type(result_writer), intent(inout), target :: writer
+      type(summary_type), intent(inout), target :: summary
+      type(error_type), allocatable, intent(out) :: error
+
       recorder%case => case
       recorder%observer => observer
       recorder%writer => writer
@@ -94,61 +128,90 @@ contains
                                 cycles_units(case), error)
       if (.not. allocated(error)) call recorder%rows%state_outcome(writer%file, &
          steady_words(steady_not_reached), 'incomplete', error)
-      if (allocated(error)) return
-      call observer%on_start(case%title, 0)
-      call solver%start(case, balance%n)
-      call solver%solve(case, balance, case%sweep%start, point, error)
-      if (allocated(error)) return
-      march%options = case%wear
-      if (point%converged) then
-         call new_wear_system(balance, case%contact, case%wear%coefficient, &
-                              case%wear%law == wear_energy, system)
-         call first_state(system, solver%x, point, state)
+   end subroutine start_recorder
+
+   !> From the vibration of the unworn joint, at its resonance where that is to be followed.
+   subroutine start_march(run, case, point, error)
+      type(wear_run), intent(inout), target :: run
+      type(case_type), intent(in) :: case
+      type(point_type), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      call new_wear_system(run%balance, case%contact, case%wear%coefficient, &
+                           case%wear%law == wear_energy, run%system)
+      call first_state(run%system, run%solver%x, point, run%state)
+      associate (march => run%march)
+         march%options = case%wear
          if (needs_depth_step(case)) &
-            march%options%max_depth_step = depth_step*system%depth_scale()
+            march%options%max_depth_step = depth_step*run%system%depth_scale()
          march%stepper = new_wear_stepper(march%options, case%pseudo_time%scheme, &
-                                           solver%method%newton)
+                                          run%solver%method%newton)
          march%resonance = resonance_type(n_harmonics=case%harmonics%n_harmonics, &
                                           first=case%sweep%start)
          if (case%wear%follow_resonance) &
-            call march%resonance%follow(march%stepper, system, state, point%iterations, error)
-         first = state
-         first_omega = system%structure%omega
-         if (.not. allocated(error)) call recorder%restart_rows%create(writer%file, case%contact, &
-                                                               system%n_vibration(), error)
-         if (.not. allocated(error) .and. restart%n_rows > 0) &
-            call resume(restart, recorder, system, march, state, error)
-         if (.not. allocated(error)) &
-            call march%run(system, state, recorder, error, resumed=restart%n_rows > 0)
-         if (march%gave_up .and. .not. allocated(error)) then
-            balance%depth = state%x(system%n_vibration() + 1:)
-            call explain_failure(balance, solver%method, reason)
-            march%ending = march%ending//': '//reason
-         end if
-      else
-         call explain_failure(balance, solver%method, reason)
-         march%ending = 'nothing was worn: '//reason
-         call writer%add_point(point, error)
-         call summary%add(point)
-         call observer%on_point(1, 0, point)
-      end if
-      call observer%on_end()
-      if (.not. allocated(error)) then
-         call observer%on_message('wear: '//march%ending)
+            call march%resonance%follow(march%stepper, run%system, run%state, point%iterations, &
+                                        error)
+      end associate
+      run%first = run%state
+      run%first_omega = run%system%structure%omega
+   end subroutine start_march
+
+   !> The march to its end, and why it ended.
+   subroutine march_on(run, restart, error)
+      type(wear_run), intent(inout), target :: run
+      type(restart_type), intent(in) :: restart
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: reason
+
+      associate (recorder => run%recorder)
+         call recorder%restart_rows%create(recorder%writer%file, recorder%case%contact, &
+                                           run%system%n_vibration(), error)
+         if (allocated(error)) return
+         if (restart%n_rows > 0) &
+            call resume(restart, recorder, run%system, run%march, run%state, error)
+         if (allocated(error)) return
+         call run%march%run(run%system, run%state, recorder, error, resumed=restart%n_rows > 0)
+      end associate
+      if (allocated(error) .or. .not. run%march%gave_up) return
+      run%balance%depth = run%state%x(run%system%n_vibration() + 1:)
+      call explain_failure(run%balance, run%solver%method, reason)
+      run%march%ending = run%march%ending//': '//reason
+   end subroutine march_on
+
+   !> The result of a joint whose vibration was not found.
+   subroutine give_up_unworn(run, point, error)
+      type(wear_run), intent(inout) :: run
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: reason
+
+      call explain_failure(run%balance, run%solver%method, reason)
+      run%march%options = run%recorder%case%wear
+      run%march%ending = 'nothing was worn: '//reason
+      call run%recorder%writer%add_point(point, error)
+      call run%recorder%summary%add(point)
+      call run%recorder%observer%on_point(1, 0, point)
+   end subroutine give_up_unworn
+
+   !> How the run ended: to the observer, the summary and the result.
+   subroutine report_end(run, restart, error)
+      type(wear_run), intent(inout) :: run
+      type(restart_type), intent(in) :: restart
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (march => run%march, recorder => run%recorder, summary => run%recorder%summary)
+         call recorder%observer%on_message('wear: '//march%ending)
          if (.not. march%complete) call summary%mark_incomplete()
-         call summary%describe_work(balance, march%stepper%newton%linear, case%solver%kind)
+         call summary%describe_work(run%balance, march%stepper%newton%linear, &
+                                    recorder%case%solver%kind)
          call summary%describe_wear(trim(steady_words(march%steady)), march%n_steps, &
-                                    march%n_rejected, state%cycles, depth_of(system, state))
+                                    march%n_rejected, run%state%cycles, &
+                                    depth_of(run%system, run%state))
          if (restart%n_rows > 0) call summary%note_restart(restart%n_rows, restart%path)
-         call recorder%rows%state_outcome(writer%file, trim(steady_words(march%steady)), &
-                                          march%ending, row_error)
-         if (allocated(row_error)) call move_alloc(row_error, error)
-      end if
-      if (.not. allocated(error) .and. case%wear%check_steps .and. point%converged) &
-         call compare_halved(recorder, system, march, first, first_omega, state, error)
-      call recorder%rows%close()
-      call recorder%restart_rows%close()
-   end subroutine run_wear
+         call recorder%rows%state_outcome(recorder%writer%file, &
+                                          trim(steady_words(march%steady)), march%ending, error)
+      end associate
+   end subroutine report_end
 
    !> Take over the steps of an earlier run, and stand where it stood after the last of them.
    subroutine resume(restart, recorder, system, march, state, error)
@@ -159,7 +222,6 @@ contains
       !> First state of the case, replaced.
       type(wear_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: r(:)
       integer :: i
 
       call restart%check_first(state, error)
@@ -174,10 +236,7 @@ contains
       state = restart%state
       call system%set_frequency(restart%omega, error)
       if (allocated(error)) return
-      ! The forces that the next step starts from.
-      allocate (r(system%n))
-      call system%begin_step(state%x(system%n_vibration() + 1:), 0.0_wp)
-      call system%residual(state%x, r)
+      call stand_at(system, state%x)
    end subroutine resume
 
    !> The rows of the earlier run become the first of this result.
@@ -215,7 +274,6 @@ contains
       type(wear_march), target :: halved
       type(silent_observer) :: silent
       type(wear_state) :: end_state
-      real(wp), allocatable :: r(:)
       real(wp) :: change
       integer :: n
 
@@ -234,9 +292,7 @@ contains
       end_state = first
       call system%set_frequency(first_omega, error)
       if (allocated(error)) return
-      allocate (r(system%n))
-      call system%begin_step(end_state%x(n + 1:), 0.0_wp)
-      call system%residual(end_state%x, r)
+      call stand_at(system, end_state%x)
       call halved%run(system, end_state, silent, error)
       if (allocated(error)) return
       if (.not. halved%complete .or. halved%steady /= march%steady) then
@@ -292,15 +348,23 @@ contains
       real(wp), intent(in) :: x(:)
       type(point_type), intent(in) :: point
       type(wear_state), intent(out) :: state
-      real(wp), allocatable :: r(:)
 
       state%x = [x, system%depth]
-      allocate (r(system%n))
-      call system%begin_step(system%depth, 0.0_wp)
-      call system%residual(state%x, r)
+      call stand_at(system, state%x)
       state%rate = system%rate
       state%residual = point%residual
    end subroutine first_state
+
+   !> Contact forces and rates that the next step starts from.
+   subroutine stand_at(system, x)
+      type(wear_system), intent(inout) :: system
+      real(wp), intent(in) :: x(:)
+      real(wp), allocatable :: r(:)
+
+      allocate (r(system%n))
+      call system%begin_step(x(system%n_vibration() + 1:), 0.0_wp)
+      call system%residual(x, r)
+   end subroutine stand_at
 
    !> A state of the march becomes a row of the result.
    subroutine take(self, march, system, state, iterations, go_on, error)
@@ -323,8 +387,8 @@ contains
       point%wear_rate = state%rate
       point%iterations = iterations
       point%residual = state%residual
-      point%converged = state%residual <= self%case%solver%tolerance .and. &
-                        is_lasting(system%hbm_system)
+      point%converged = is_lasting(system%hbm_system)
+      point%converged = point%converged .and. state%residual <= self%case%solver%tolerance
       call recover_point(system%hbm_system, state%x(:n), self%case%harmonics%n_harmonics, &
                          self%case%output%contact, point)
       if (self%case%output%histories) then

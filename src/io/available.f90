@@ -1,23 +1,21 @@
-!> What this version can run. The one place to change when a method arrives.
+!> Combinations of sound keys that cannot be run, each with what to use instead.
 module fw_available
-   use fw_case, only: case_type, analysis_words, analysis_frf, analysis_point, analysis_wear, &
-      analysis_time
+   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_wear
+   use fw_contact_data, only: law_penalty
    use fw_contact_data, only: memory_carried
-   use fw_contact_data, only: law_words, law_dlft, law_dlft_velocity, law_penalty
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_harmonics_options, only: method_words, method_hbm, method_tcm, &
-                                   method_tcm_least_squares, method_hdhb, &
-                                   sampling_words, sampling_uniform, sampling_events
-   use fw_text, only: to_text
+   use fw_harmonics_options, only: sampling_uniform
    use fw_kinds, only: wp
+   use fw_solver_options, only: continuation_arclength
+   use fw_solver_options, only: continuation_natural
    use fw_solver_options, only: jacobian_analytic
-   use fw_solver_options, only: solver_words, solver_newton, solver_powell, solver_kinsol, &
-                                 solver_pseudo_time, continuation_words, &
-                                continuation_natural, continuation_arclength
    use fw_solver_options, only: scheme_bdf
    use fw_solver_options, only: scheme_implicit_euler
    use fw_solver_options, only: scheme_runge_kutta
-   use fw_wear_options, only: wear_explicit, wear_pseudo_time
+   use fw_solver_options, only: solver_pseudo_time
+   use fw_text, only: to_text
+   use fw_wear_options, only: wear_explicit
+   use fw_wear_options, only: wear_pseudo_time
    implicit none (type, external)
    private
 
@@ -25,140 +23,125 @@ module fw_available
 
 contains
 
-   !> Refuse what is valid input but cannot be run by this version.
+   !> Refuse what is valid key by key but cannot be run together.
    subroutine check_available(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
-      call check('case%analysis', analysis_words, case%analysis, &
-                 [analysis_frf, analysis_point, analysis_wear, analysis_time])
-      call check('contact%law', law_words, case%contact%law, [law_dlft, law_dlft_velocity, &
-         law_penalty])
-      call check('harmonics%method', method_words, case%harmonics%method, &
-                 [method_hbm, method_tcm, method_tcm_least_squares, method_hdhb])
-      call check('harmonics%sampling', sampling_words, case%harmonics%sampling, &
-                 [sampling_uniform, sampling_events])
-      call check('solver%kind', solver_words, case%solver%kind, &
-                 [solver_newton, solver_powell, solver_kinsol, solver_pseudo_time])
-      call check('sweep%continuation', continuation_words, case%sweep%continuation, &
-                 [continuation_natural, continuation_arclength])
-      call check_jacobian()
-      call check_memory()
-      call check_adaptive()
-      call check_stability()
-      call check_wear()
-
-   contains
-
-      subroutine check(name, words, choice, available)
-         character(*), intent(in) :: name
-         character(*), intent(in) :: words(:)
-         integer, intent(in) :: choice
-         integer, intent(in) :: available(:)
-         character(:), allocatable :: list
-         integer :: i
-
-         if (allocated(error) .or. any(available == choice)) return
-         list = ''
-         do i = 1, size(available)
-            if (i > 1) list = list//' or '
-            list = list//"'"//trim(words(available(i)))//"'"
-         end do
-         call fatal_error(error, name//" = '"//trim(words(choice))//"' is not available in "// &
-                          'this version: use '//list, status_input)
-      end subroutine check
-
-      !> The derivative of the sliding path is known for sampled forces.
-      subroutine check_wear()
-         if (allocated(error) .or. case%analysis /= analysis_wear) return
-         if (case%contact%n_pairs == 0) then
-            call fatal_error(error, "case%analysis = 'wear' needs contact pairs, and there are "// &
-                             "none: give group &contact, or take a model file with contact", &
-                             status_input)
-            return
-         end if
-         call check_order()
-         if (allocated(error)) return
-         if (has_history(case) .and. case%wear%follow_resonance) then
-            call fatal_error(error, "wear%follow_resonance = .true. does not go with "// &
-                             "pseudo_time%scheme = 'bdf', which builds on earlier steps: use "// &
-                             "'rosenbrock', or wear%scheme = 'implicit'", status_input)
-            return
-         end if
-         if (case%wear%scheme == wear_pseudo_time .and. &
-             case%pseudo_time%scheme == scheme_runge_kutta) then
-            call fatal_error(error, "pseudo_time%scheme = 'runge_kutta' does not step wear, "// &
-                             "which is stiff: use 'implicit_euler', 'rosenbrock' or 'bdf'", &
-                             status_input)
-            return
-         end if
-         if (case%harmonics%sampling == sampling_uniform) return
-         if (case%wear%scheme == wear_explicit) return
-         call fatal_error(error, "wear%scheme = 'implicit' and 'pseudo_time' need "// &
-                          "harmonics%sampling = 'uniform': use that, or scheme = 'explicit'", &
-                          status_input)
-      end subroutine check_wear
-
-      !> What sets the steps has to be something that the scheme has.
-      subroutine check_order()
-         if (case%wear%scheme == wear_explicit .and. case%wear%order > 2) then
-            call fatal_error(error, 'wear%order = '//to_text(case%wear%order)// &
-                             ": scheme = 'explicit' has orders 1 and 2, 'implicit' 1 to 4", &
-                             status_input)
-         else if (case%wear%scheme == wear_pseudo_time .and. case%wear%order > 0) then
-            call fatal_error(error, 'wear%order = '//to_text(case%wear%order)// &
-                             ": with scheme = 'pseudo_time' pseudo_time%scheme sets the order; "// &
-                             'leave wear%order out', status_input)
-         else if (is_linear_euler(case) .and. case%wear%error_tolerance > 0.0_wp) then
-            call fatal_error(error, 'wear%error_tolerance does not go with '// &
-                             "pseudo_time%scheme = 'implicit_euler', which estimates no error: "// &
-                             "give wear%max_depth_step, or use 'rosenbrock' or 'bdf'", &
-                             status_input)
-         end if
-      end subroutine check_order
-
-      !> Rigid contact has no derivative in the state from which a multiplier could be computed.
-      subroutine check_stability()
-         if (allocated(error) .or. .not. case%sweep%stability) return
-         if (case%contact%n_pairs == 0 .or. case%contact%law == law_penalty) return
-         call fatal_error(error, "sweep%stability = .true. needs contact%law = 'penalty' (or "// &
-                          "no contact pairs): rigid contact has no Floquet multipliers", status_input)
-      end subroutine check_stability
-
-      !> Differences serve the solution of a point at given depths; the rest takes the derivative
-      !> apart.
-      subroutine check_jacobian()
-         if (allocated(error) .or. case%solver%jacobian == jacobian_analytic) return
-         if (case%solver%kind /= solver_pseudo_time .and. case%analysis /= analysis_wear .and. &
-             case%sweep%continuation == continuation_natural) return
-         call fatal_error(error, "solver%jacobian = 'difference' goes with natural sweeps and "// &
-                          "points by 'newton', 'powell' or 'kinsol': use 'analytic'", &
-                          status_input)
-      end subroutine check_jacobian
-
-      !> A branch turns back on itself: there is no one last point to carry the memory from.
-      subroutine check_memory()
-         if (allocated(error) .or. case%contact%memory /= memory_carried) return
-         if (case%sweep%continuation /= continuation_arclength) return
-         call fatal_error(error, &
-            "contact%memory = 'carried' does not go with sweep%continuation "// &
-                          "= 'arclength': use 'assembly'", status_input)
-      end subroutine check_memory
-
-      !> Harmonics change from point to point of a natural sweep; a history has one length.
-      subroutine check_adaptive()
-         if (allocated(error) .or. .not. case%harmonics%adaptive) return
-         if (all(case%analysis /= [analysis_frf, analysis_point]) .or. &
-             case%sweep%continuation /= continuation_natural) then
-            call fatal_error(error, 'harmonics%adaptive = .true. goes with natural sweeps and '// &
-                             'points: use .false.', status_input)
-         else if (case%output%histories .and. case%harmonics%n_time == 0) then
-            call fatal_error(error, 'harmonics%adaptive = .true. with output%histories needs '// &
-                             'a given harmonics%n_time', status_input)
-         end if
-      end subroutine check_adaptive
-
+      call check_jacobian(case, error)
+      if (.not. allocated(error)) call check_memory(case, error)
+      if (.not. allocated(error)) call check_adaptive(case, error)
+      if (.not. allocated(error)) call check_stability(case, error)
+      if (.not. allocated(error)) call check_wear(case, error)
    end subroutine check_available
+
+   !> The derivative of the sliding path is known for sampled forces.
+   subroutine check_wear(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%analysis /= analysis_wear) return
+      if (case%contact%n_pairs == 0) then
+         call fatal_error(error, "case%analysis = 'wear' needs contact pairs, and there are "// &
+                          "none: give group &contact, or take a model file with contact", &
+                          status_input)
+         return
+      end if
+      call check_order(case, error)
+      if (allocated(error)) return
+      if (has_history(case) .and. case%wear%follow_resonance) then
+         call fatal_error(error, "wear%follow_resonance = .true. does not go with "// &
+                          "pseudo_time%scheme = 'bdf', which builds on earlier steps: use "// &
+                          "'rosenbrock', or wear%scheme = 'implicit'", status_input)
+         return
+      end if
+      if (case%wear%scheme == wear_pseudo_time .and. &
+          case%pseudo_time%scheme == scheme_runge_kutta) then
+         call fatal_error(error, "pseudo_time%scheme = 'runge_kutta' does not step wear, "// &
+                          "which is stiff: use 'implicit_euler', 'rosenbrock' or 'bdf'", &
+                          status_input)
+         return
+      end if
+      if (case%harmonics%sampling == sampling_uniform) return
+      if (case%wear%scheme == wear_explicit) return
+      call fatal_error(error, "wear%scheme = 'implicit' and 'pseudo_time' need "// &
+                       "harmonics%sampling = 'uniform': use that, or scheme = 'explicit'", &
+                       status_input)
+   end subroutine check_wear
+
+   !> What sets the steps has to be something that the scheme has.
+   subroutine check_order(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%wear%scheme == wear_explicit .and. case%wear%order > 2) then
+         call fatal_error(error, 'wear%order = '//to_text(case%wear%order)// &
+                          ": scheme = 'explicit' has orders 1 and 2, 'implicit' 1 to 4", &
+                          status_input)
+      else if (case%wear%scheme == wear_pseudo_time .and. case%wear%order > 0) then
+         call fatal_error(error, 'wear%order = '//to_text(case%wear%order)// &
+                          ": with scheme = 'pseudo_time' pseudo_time%scheme sets the order; "// &
+                          'leave wear%order out', status_input)
+      else if (is_linear_euler(case) .and. case%wear%error_tolerance > 0.0_wp) then
+         call fatal_error(error, 'wear%error_tolerance does not go with '// &
+                          "pseudo_time%scheme = 'implicit_euler', which estimates no error: "// &
+                          "give wear%max_depth_step, or use 'rosenbrock' or 'bdf'", &
+                          status_input)
+      end if
+   end subroutine check_order
+
+   !> Rigid contact has no derivative in the state from which a multiplier could be computed.
+   subroutine check_stability(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. case%sweep%stability) return
+      if (case%contact%n_pairs == 0 .or. case%contact%law == law_penalty) return
+      call fatal_error(error, "sweep%stability = .true. needs contact%law = 'penalty' (or "// &
+                       "no contact pairs): rigid contact has no Floquet multipliers", status_input)
+   end subroutine check_stability
+
+   !> Differences serve the solution of a point at given depths; the rest takes the derivative
+   !> apart.
+   subroutine check_jacobian(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%solver%jacobian == jacobian_analytic) return
+      if (case%solver%kind /= solver_pseudo_time .and. case%analysis /= analysis_wear .and. &
+          case%sweep%continuation == continuation_natural) return
+      call fatal_error(error, "solver%jacobian = 'difference' goes with natural sweeps and "// &
+                       "points by 'newton', 'powell' or 'kinsol': use 'analytic'", &
+                       status_input)
+   end subroutine check_jacobian
+
+   !> A branch turns back on itself: there is no one last point to carry the memory from.
+   subroutine check_memory(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%contact%memory /= memory_carried) return
+      if (case%sweep%continuation /= continuation_arclength) return
+      call fatal_error(error, &
+         "contact%memory = 'carried' does not go with sweep%continuation "// &
+                       "= 'arclength': use 'assembly'", status_input)
+   end subroutine check_memory
+
+   !> Harmonics change from point to point of a natural sweep; a history has one length.
+   subroutine check_adaptive(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. case%harmonics%adaptive) return
+      if (all(case%analysis /= [analysis_frf, analysis_point]) .or. &
+          case%sweep%continuation /= continuation_natural) then
+         call fatal_error(error, 'harmonics%adaptive = .true. goes with natural sweeps and '// &
+                          'points: use .false.', status_input)
+      else if (case%output%histories .and. case%harmonics%n_time == 0) then
+         call fatal_error(error, 'harmonics%adaptive = .true. with output%histories needs '// &
+                          'a given harmonics%n_time', status_input)
+      end if
+   end subroutine check_adaptive
 
    !> Whether wear steps are linearly implicit Euler steps in pseudo-time.
    pure logical function is_linear_euler(case)
