@@ -2,7 +2,7 @@
 module fw_run
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
-   use fw_available, only: check_available
+   use fw_combinations, only: check_combinations
    use fw_case, only: analysis_time
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
@@ -38,7 +38,7 @@ contains
       type(thread_scope) :: threads
       type(restart_type) :: restart
 
-      call check_available(case, error)
+      call check_combinations(case, error)
       if (allocated(error)) return
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
@@ -66,7 +66,7 @@ contains
       real(wp) :: elapsed
 
       call system_clock(clock, rate)
-      call check_available(case, error)
+      call check_combinations(case, error)
       if (allocated(error)) return
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return

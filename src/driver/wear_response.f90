@@ -1,7 +1,7 @@
 !> Analysis 'wear': the joint wears over the cycles at the first frequency of the sweep.
 module fw_wear_response
    use, intrinsic :: iso_fortran_env, only: int64
-   use fw_available, only: is_linear_euler
+   use fw_combinations, only: is_linear_euler
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type

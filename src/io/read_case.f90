@@ -1,6 +1,6 @@
 !> From a namelist file to a validated case.
 module fw_read_case
-   use fw_available, only: check_available
+   use fw_combinations, only: check_combinations
    use fw_case, only: case_type, analysis_wear
    use fw_error, only: error_type
    use fw_model_file, only: file_model_type
@@ -94,7 +94,7 @@ contains
       call reader%finish(error)
       if (allocated(error)) return
       case%namelist = reader%effective()
-      call check_available(case, error)
+      call check_combinations(case, error)
    end subroutine read_groups
 
    !> The files that the case was read from, after those that are listed already.

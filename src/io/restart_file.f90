@@ -1,6 +1,6 @@
 !> An interrupted wear run as its result file tells it, read to be continued.
 module fw_restart_file
-   use fw_available, only: has_history
+   use fw_combinations, only: has_history
    use fw_case, only: analysis_wear
    use fw_case, only: analysis_words
    use fw_case, only: case_type

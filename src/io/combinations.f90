@@ -1,5 +1,5 @@
 !> Combinations of sound keys that cannot be run, each with what to use instead.
-module fw_available
+module fw_combinations
    use fw_case, only: case_type, analysis_frf, analysis_point, analysis_wear
    use fw_contact_data, only: law_penalty
    use fw_contact_data, only: memory_carried
@@ -19,12 +19,12 @@ module fw_available
    implicit none (type, external)
    private
 
-   public :: check_available, has_history, is_linear_euler
+   public :: check_combinations, has_history, is_linear_euler
 
 contains
 
    !> Refuse what is valid key by key but cannot be run together.
-   subroutine check_available(case, error)
+   subroutine check_combinations(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
@@ -33,7 +33,7 @@ contains
       if (.not. allocated(error)) call check_adaptive(case, error)
       if (.not. allocated(error)) call check_stability(case, error)
       if (.not. allocated(error)) call check_wear(case, error)
-   end subroutine check_available
+   end subroutine check_combinations
 
    !> The derivative of the sliding path is known for sampled forces.
    subroutine check_wear(case, error)
@@ -159,4 +159,4 @@ contains
                     case%pseudo_time%scheme == scheme_bdf
    end function has_history
 
-end module fw_available
+end module fw_combinations
