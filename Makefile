@@ -8,7 +8,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint docs clean
 .PHONY: fuzz
-.PHONY: bench bench-solvers bench-paper bench-time bench-full paper
+.PHONY: bench bench-solvers bench-paper bench-time bench-peers bench-full paper
 .PHONY: stress long
 
 BUILD := build/release
@@ -92,8 +92,13 @@ bench-paper: build ## methods, iterations against frequency, aliasing
 bench-time: build ## harmonic balance against integration in time
 	PYTHONPATH=python $(PYTHON) bench/run.py time
 
+# Another environment's Python where pyharm-os is installed: make bench-peers PEER_PYTHON=...
+PEER_PYTHON ?= $(PYTHON)
+bench-peers: build ## pyHarm on the same problems, where it is installed
+	PYTHONPATH=python $(PYTHON) bench/run.py peers --peer-python $(PEER_PYTHON)
+
 bench-full: build ## every part of docs/benchmarks.md
-	PYTHONPATH=python $(PYTHON) bench/run.py all
+	PYTHONPATH=python $(PYTHON) bench/run.py all --peer-python $(PEER_PYTHON)
 
 paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) bench/gallery.py

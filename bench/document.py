@@ -15,7 +15,8 @@ from layout import table
 __all__ = ["ORDER", "update_document"]
 
 #: Parts in the order of the document.
-ORDER = ("speed", "solvers", "paper", "iterations", "aliasing", "time")
+ORDER = ("speed", "solvers", "paper", "iterations", "aliasing", "time",
+         "peers")
 #: What the head says; the rest of the description goes with each part.
 COMMON = ("processor", "compiler", "flags")
 HEAD = """# Benchmarks

@@ -2,8 +2,8 @@
 
     python bench/run.py [PART ...] [--build build/release] [--quick] [-o docs]
 
-Parts: speed, solvers, paper, iterations, aliasing, time, or all; without any, speed. A part
-replaces its section of the document and leaves the others.
+Parts: speed, solvers, paper, iterations, aliasing, time, peers, or all; without any, speed. A
+part replaces its section of the document and leaves the others.
 
 Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
 tries the scripts and measures nothing.
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from iterations import measure_iterations, write_iterations
 from measure import ROOT, Bench, describe_machine
 from oscillators import measure_oscillators
 from paper import measure_methods, write_methods
+from peers import measure_peers, write_peers
 from programs import build_programs, run_program
 from sector import measure_crossing, measure_points, measure_sweeps, measure_threads
 from solvers import measure_solvers
@@ -44,6 +46,7 @@ class Job:
     work : folder for results and measuring programs
     images : folder of the pictures
     step : says what is being measured
+    peer_python : interpreter that may have pyHarm
     """
 
     bench: Bench
@@ -51,6 +54,7 @@ class Job:
     work: Path
     images: Path
     step: Callable[[str], None]
+    peer_python: Path = Path(sys.executable)
 
     def program(self, name: str) -> Path:
         """A measuring program, built if need be."""
@@ -99,8 +103,14 @@ def integration(job: Job) -> str:
     return write_integration(measure_integration(job.bench, job.step))
 
 
+def peers(job: Job) -> str:
+    """Another program on the same problems."""
+    return write_peers(measure_peers(job.bench, job.peer_python))
+
+
 PARTS = {"speed": speed, "solvers": solvers, "paper": paper, "iterations": iterations,
-         "aliasing": aliasing, "time": integration}
+         "aliasing": aliasing, "time": integration,
+         "peers": peers}
 
 
 def main() -> None:
@@ -113,6 +123,8 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "bench",
                         help="folder for results and measuring programs")
     parser.add_argument("--quick", action="store_true", help="only try the scripts")
+    parser.add_argument("--peer-python", type=Path, default=Path(sys.executable),
+                        help="Python with pyharm-os, for the part peers")
     parser.add_argument("-o", "--output", type=Path, help="folder of the report (default: docs)")
     options = parser.parse_args()
     parts = list(ORDER) if "all" in options.parts else options.parts
@@ -128,7 +140,8 @@ def main() -> None:
     def step(title: str) -> None:
         print(f"{time.perf_counter() - start:6.1f} s  {title}", flush=True)
 
-    job = Job(Bench(build / "fw_run", work, options.quick), build, work, images, step)
+    job = Job(Bench(build / "fw_run", work, options.quick), build, work, images, step,
+              options.peer_python)
     for part in parts:
         step(part)
         machine = describe_machine(build)

@@ -58,9 +58,17 @@ module fw_hbm
       integer :: n_active = 0
       integer :: n_used = 0
       integer, allocatable :: used(:), place(:)
+      !> Frequency and coordinates (first n_gathered entries, as `used`) of `active_stiffness`.
+      real(wp) :: gathered_omega = -1.0_wp
+      integer :: n_gathered = 0
+      integer :: n_gathered_active = 0
+      integer, allocatable :: gathered(:)
       complex(wp), allocatable :: active_stiffness(:, :, :)
       real(wp), allocatable :: active_out(:, :), pair_in(:, :), pair_out(:, :)
       type(complex_lu_type), allocatable :: preconditioner(:)
+      !> Coordinates for which the preconditioner was built (first n_preconditioned entries).
+      integer :: n_preconditioned = 0
+      integer, allocatable :: preconditioned(:)
    contains
       procedure :: set_parameter => set_frequency
       procedure :: set_frequency
@@ -72,6 +80,7 @@ module fw_hbm
       procedure :: expand
       procedure :: apply
       procedure :: build_preconditioner
+      procedure :: preconditioner_fits
       procedure :: precondition
       procedure :: assemble
    end type hbm_system
@@ -110,6 +119,10 @@ module fw_hbm
       module subroutine build_preconditioner(self)
          class(hbm_system), intent(inout) :: self
       end subroutine build_preconditioner
+
+      pure module logical function preconditioner_fits(self)
+         class(hbm_system), intent(in) :: self
+      end function preconditioner_fits
 
       module subroutine precondition(self, vector)
          class(hbm_system), intent(inout) :: self
@@ -164,7 +177,8 @@ contains
       call set_stiffness(self, contact)
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       allocate (self%complex_in(m, nh), self%complex_out(m, nh), source=(0.0_wp, 0.0_wp))
-      allocate (self%active_out(m, nc), self%used(m), self%place(m))
+      allocate (self%active_out(m, nc), self%used(m), self%place(m), self%preconditioned(m))
+      allocate (self%gathered(m))
       allocate (self%pair_in(3*nc, contact%n_pairs), source=0.0_wp)
       allocate (self%pair_out(3*nc, contact%n_pairs), source=0.0_wp)
       allocate (self%preconditioner(nh))

@@ -76,6 +76,7 @@ contains
       if (.not. allocated(self%active_stiffness)) then
          allocate (self%active_stiffness(m, m, self%fourier%n_retained))
       end if
+      if (is_gathered(self)) return
       !$omp parallel do default(none) shared(self) private(h, j) if(m > threads_pay_from)
       do h = 1, self%fourier%n_retained
          do j = 1, self%n_active
@@ -84,7 +85,20 @@ contains
          end do
       end do
       !$omp end parallel do
+      self%gathered_omega = self%structure%omega
+      self%n_gathered_active = self%n_active
+      self%n_gathered = self%n_used
+      self%gathered(:self%n_used) = self%used(:self%n_used)
    end subroutine gather_stiffness
+
+   !> Whether the copies of this frequency and these coordinates are there from the last step.
+   pure logical function is_gathered(self)
+      type(hbm_system), intent(in) :: self
+
+      is_gathered = self%n_gathered == self%n_used .and. self%n_gathered_active == self%n_active &
+                    .and. abs(self%gathered_omega - self%structure%omega) <= 0.0_wp
+      if (is_gathered) is_gathered = all(self%gathered(:self%n_used) == self%used(:self%n_used))
+   end function is_gathered
 
    module procedure reduce
       integer :: m, nc
@@ -419,7 +433,19 @@ contains
          call self%preconditioner(h)%factor(singular)
       end do
       !$omp end parallel do
+      self%n_preconditioned = self%n_active
+      self%preconditioned(:self%n_active) = self%used(:self%n_active)
+      ! The shift belongs to one step of pseudo-time.
+      if (allocated(self%shift)) self%n_preconditioned = 0
    end procedure build_preconditioner
+
+   module procedure preconditioner_fits
+      preconditioner_fits = self%n_preconditioned == self%n_active .and. .not. allocated(self%shift)
+      if (preconditioner_fits) then
+         preconditioner_fits = all(self%preconditioned(:self%n_active) == &
+                                   self%used(:self%n_active))
+      end if
+   end procedure preconditioner_fits
 
    !> Mean over cosine and sine of a block of a transposed derivative, as a complex factor.
    pure complex(wp) function mean_block(block, harmonic, input, output) result(mean)

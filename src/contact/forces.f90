@@ -401,6 +401,8 @@ contains
       real(wp), intent(in) :: y_n(fourier%n_time)
       logical, intent(in) :: has_normal
       integer :: nc, c, k, j
+      real(wp) :: factor
+      logical :: closes
 
       nc = fourier%n_coefficients
       do c = 1, 2
@@ -409,12 +411,21 @@ contains
       end do
       jacobian(:, 2*nc + 1:) = 0.0_wp
       if (.not. has_normal) return
+      ! A pair that bears throughout keeps its coefficients; of any other, the instants of the
+      ! rarer state are added up.
+      closes = 2*count(y_n < 0.0_wp) > fourier%n_time .and. fourier%projects .and. &
+               fourier%n_time > 2*maxval(fourier%harmonic)
+      factor = merge(-1.0_wp, 1.0_wp, closes)
       do k = 1, fourier%n_time
-         if (y_n(k) >= 0.0_wp) cycle
+         if ((y_n(k) < 0.0_wp) .eqv. closes) cycle
          do j = 1, nc
             jacobian(2*nc + 1:, 2*nc + j) = jacobian(2*nc + 1:, 2*nc + j) + &
-                                            fourier%analysis(j, k)*fourier%synthesis(:, k)
+                                            factor*fourier%analysis(j, k)*fourier%synthesis(:, k)
          end do
+      end do
+      if (.not. closes) return
+      do j = 1, nc
+         jacobian(2*nc + j, 2*nc + j) = jacobian(2*nc + j, 2*nc + j) + 1.0_wp
       end do
    end subroutine project
 

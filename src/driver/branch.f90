@@ -181,6 +181,7 @@ contains
 
       total%factorizations = total%factorizations + branch%factorizations
       total%krylov_iterations = total%krylov_iterations + branch%krylov_iterations
+      total%preconditioners = total%preconditioners + branch%preconditioners
       total%n_problems = total%n_problems + branch%n_problems
       total%share_skipped = total%share_skipped + branch%share_skipped
    end subroutine merge_work

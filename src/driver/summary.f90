@@ -101,7 +101,8 @@ contains
                            ' coefficients, '// &
                         to_text(system%fourier%n_time)//' instants)'), &
                    line('linear solver', to_text(linear%factorizations)//' LU factorizations, '// &
-                        to_text(linear%krylov_iterations)//' Krylov iterations')]
+                        to_text(linear%krylov_iterations)//' Krylov iterations, '// &
+                        to_text(linear%preconditioners)//' preconditioners')]
       if (.not. system%fourier%has_constant()) then
          self%work = [self%work, line('skipped', 'even harmonics (half-wave symmetry)')]
       end if

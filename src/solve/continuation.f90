@@ -165,6 +165,8 @@ contains
       logical :: done
 
       self%linear%kind = self%options%linear
+      ! Derivatives near folds and runaway branches are too close to singular for old factors.
+      self%linear%keeps = .false.
       self%p_scale = max(abs(self%finish - self%start), tiny(1.0_wp))
       here%x = x
       here%p = self%start

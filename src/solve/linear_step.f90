@@ -1,5 +1,6 @@
 !> The linear problem of a Newton step: dense LU for small ones, GMRES with the system's
-!> preconditioner for large ones.
+!> preconditioner for large ones. A preconditioner is kept from step to step and from point to
+!> point while it fits and GMRES needs few more iterations than it did with it fresh.
 module fw_linear_step
    use fw_kinds, only: wp
    use fw_krylov, only: gmres_type
@@ -20,6 +21,11 @@ module fw_linear_step
    !> guesses that are left.
    integer, parameter :: lu_possible_up_to = 600
 
+   !> A kept preconditioner may cost this much more than a fresh one, in iterations: a build takes
+   !> as long as about five of them.
+   real(wp), parameter :: kept_factor = 1.3_wp
+   integer, parameter :: kept_excess = 4
+
    type :: linear_step_type
       integer :: kind = linear_auto
       type(lu_type) :: lu
@@ -27,8 +33,17 @@ module fw_linear_step
       real(wp), allocatable :: rhs(:), solution(:)
       !> Whether `lu` holds the factors of the last derivative.
       logical :: factored = .false.
+      !> Iterations with the preconditioner when it was fresh, and whether those of the last
+      !> solution still were few enough to keep it.
+      integer :: fresh_iterations = 0
+      logical :: worth_keeping = .false.
+      !> Whether the preconditioner in use is one from before the last `prepare`.
+      logical :: kept = .false.
+      !> Whether preconditioners are kept at all.
+      logical :: keeps = .true.
       !> Work done so far.
       integer :: factorizations = 0
+      integer :: preconditioners = 0
       integer :: krylov_iterations = 0
       !> Linear problems with unknowns left, and the sum of the shares that had left them.
       integer :: n_problems = 0
@@ -72,10 +87,45 @@ contains
          if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_pays_up_to)) then
             call factor(self, system, n, done)
          else
-            call system%build_preconditioner()
+            self%kept = self%keeps .and. self%worth_keeping .and. system%preconditioner_fits()
+            if (.not. self%kept) call build(self, system)
          end if
       end if
    end subroutine prepare
+
+   subroutine build(self, system)
+      type(linear_step_type), intent(inout) :: self
+      class(nonlinear_system), intent(inout) :: system
+
+      call system%build_preconditioner()
+      self%preconditioners = self%preconditioners + 1
+      self%kept = .false.
+   end subroutine build
+
+   !> GMRES; where a kept preconditioner does not serve after all, again with a fresh one.
+   subroutine iterate(self, system, tolerance, done)
+      type(linear_step_type), intent(inout) :: self
+      class(nonlinear_system), intent(inout) :: system
+      real(wp), intent(in) :: tolerance
+      logical, intent(out) :: done
+      integer :: limit, most
+
+      if (self%kept) then
+         limit = int(kept_factor*self%fresh_iterations) + kept_excess
+         most = self%gmres%max_iterations
+         self%gmres%max_iterations = min(most, 2*limit)
+         call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
+         self%gmres%max_iterations = most
+         self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+         self%worth_keeping = done .and. self%gmres%iterations <= limit
+         if (done) return
+         call build(self, system)
+      end if
+      call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
+      self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+      self%fresh_iterations = self%gmres%iterations
+      self%worth_keeping = done
+   end subroutine iterate
 
    !> step = -J^-1 r with the derivative that was prepared.
    subroutine solve_prepared(self, system, r, tolerance, step, done)
@@ -92,8 +142,7 @@ contains
       call system%reduce(r, self%rhs)
       self%solution = 0.0_wp
       if (n > 0 .and. .not. self%factored) then
-         call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
-         self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+         call iterate(self, system, tolerance, done)
          ! A last resort that costs more, but only where GMRES has failed.
          if (.not. done .and. self%kind /= linear_krylov .and. n <= lu_possible_up_to) then
             call factor(self, system, n, done)

@@ -26,6 +26,7 @@ module fw_system
       procedure(reduce_rhs), deferred :: reduce
       procedure(expand_step), deferred :: expand
       procedure(build), deferred :: build_preconditioner
+      procedure :: preconditioner_fits
       procedure(assemble_matrix), deferred :: assemble
    end type nonlinear_system
 
@@ -73,5 +74,16 @@ module fw_system
          real(wp), intent(inout), contiguous :: matrix(:, :)
       end subroutine assemble_matrix
    end interface
+
+contains
+
+   !> Whether the preconditioner that was built last may serve the derivative that was prepared
+   !> last: the same unknowns in the same places. How well it serves is for the caller to watch.
+   pure logical function preconditioner_fits(self)
+      class(nonlinear_system), intent(in) :: self
+
+      ! A system that says nothing keeps nothing.
+      preconditioner_fits = self%n < 0
+   end function preconditioner_fits
 
 end module fw_system

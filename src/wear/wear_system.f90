@@ -59,6 +59,7 @@ module fw_wear_system
       procedure :: expand
       procedure :: apply
       procedure :: build_preconditioner
+      procedure :: preconditioner_fits
       procedure :: precondition
    end type wear_system
 
@@ -345,6 +346,14 @@ contains
       end associate
       call self%complement%factor(singular)
    end subroutine build_preconditioner
+
+   !> The complement holds the cycles of its step and the sliding at its point: it is built anew.
+   pure logical function preconditioner_fits(self)
+      class(wear_system), intent(in) :: self
+
+      preconditioner_fits = self%n_wearing == 0
+      if (preconditioner_fits) preconditioner_fits = self%hbm_system%preconditioner_fits()
+   end function preconditioner_fits
 
    subroutine reserve(self)
       type(wear_system), intent(inout) :: self

@@ -1,0 +1,62 @@
+"""Work of fixed cases in counts, which noise cannot change: Newton steps, GMRES iterations,
+factorisations, preconditioners. A limit is the count measured when it was set and a twentieth,
+for what compilers and libraries differ by."""
+import re
+
+import h5py
+import numpy as np
+import pytest
+from conftest import ROOT
+
+ALLOWANCE = 1.05
+
+
+def work(done):
+    """Newton steps, LU factorizations, Krylov iterations, preconditioners."""
+    assert done.returncode == 0, done.stderr
+    steps = int(re.search(r"^iterations +(\d+)", done.stdout, re.MULTILINE)[1])
+    counts = re.search(r"(\d+) LU factorizations, (\d+) Krylov iterations, (\d+) preconditioners",
+                       done.stdout)
+    return (steps, *map(int, counts.groups()))
+
+
+def sector(fw_run, n_pairs, n_harmonics, start, end, linear="auto", name="sector.h5"):
+    fw_run.write(f"""&model source = 'hdf5', rotation_speed = 460.8, modal_damping = 1e-3
+   file = '{ROOT / "example" / "blade_sector" / f"sector_{n_pairs}.h5"}' /
+&load harmonic_scale = 0.5 /
+&harmonics n_harmonics = {n_harmonics}, n_time = 128 /
+&solver linear = '{linear}', tolerance = 1e-10 /
+&sweep start = {start}, end = {end}, n_points = 11, unit = 'Hz' /
+""", "sector.nml")
+    return fw_run("-o", name, "sector.nml")
+
+
+@pytest.mark.parametrize(("n_pairs", "n_harmonics", "start", "end", "limits"), [
+    (16, 3, 1021, 1024, (40, 0, 243, 2)),
+    (48, 7, 1016, 1019, (62, 0, 551, 36)),
+])
+def test_work_on_the_sector(fw_run, n_pairs, n_harmonics, start, end, limits):
+    counts = work(sector(fw_run, n_pairs, n_harmonics, start, end))
+    assert counts[1] == 0, "GMRES everywhere"
+    assert all(count <= ALLOWANCE * limit for count, limit in zip(counts, limits)), counts
+
+
+def test_small_problems_are_factored(fw_run):
+    steps, factorizations, krylov, preconditioners = work(fw_run("case.nml"))
+    assert factorizations <= steps
+    assert krylov == preconditioners == 0
+    assert steps <= 13
+
+
+def test_kept_preconditioners_change_no_answer(fw_run):
+    """GMRES with preconditioners from other points against LU, through the resonance."""
+    found = {}
+    for linear in ("krylov", "lu"):
+        counts = work(sector(fw_run, 16, 3, 1021, 1024, linear, f"{linear}.h5"))
+        with h5py.File(fw_run.directory / f"{linear}.h5") as file:
+            found[linear] = file["coefficients"][()]
+        if linear == "krylov":
+            assert 0 < counts[3] < 0.7 * counts[0], "most preconditioners are kept"
+    scale = np.abs(found["lu"]).max()
+    # Residuals of 1e-10 of the load, at a resonance of a damping of 0.1 %.
+    assert np.abs(found["krylov"] - found["lu"]).max() < 1e-6 * scale
