@@ -11,6 +11,7 @@
 !> a step means the same in every system of units.
 module fw_continuation
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use fw_bordered, only: bordered_type
    use fw_kinds, only: wp
    use fw_error, only: error_type
    use fw_linalg, only: lu_type
@@ -56,6 +57,8 @@ module fw_continuation
    type :: arclength_type
       type(solver_options) :: options
       type(linear_step_type) :: linear
+      !> What it takes where the derivative by x alone is close to singular.
+      type(bordered_type) :: bordered
       !> The interval of p: from start to finish.
       real(wp) :: start = 0.0_wp
       real(wp) :: finish = 1.0_wp
@@ -144,7 +147,7 @@ contains
          if (report%iterations <= quick) ds = min(1.4_wp*ds, largest_growth*self%step)
          if (report%iterations >= slow) ds = 0.6_wp*ds
          here = next
-         n_constant = merge(n_constant + 1, 0, abs(here%t_p) <= constant*self%p_scale)
+         n_constant = merge(n_constant + 1, 0, stands(self, here))
          self%runs_away = n_constant >= max_constant
          if (self%runs_away) then
             self%ending = 'its points run away at a constant parameter'
@@ -297,10 +300,10 @@ contains
       ! Beyond a sharp turn the angle with the last tangent says nothing.
       if (next%t_p*dp < 0.0_wp) call reverse(next)
       if (.not. self%oriented) return
-      if (orientation == 0) call find_orientation(system, here, orientation, error)
+      if (orientation == 0) call find_orientation(self, system, here, orientation, error)
       if (allocated(error)) return
-      call find_orientation(system, next, its_orientation, error)
-      report%converged = its_orientation == orientation
+      call find_orientation(self, system, next, its_orientation, error)
+      report%converged = .not. differ(its_orientation, orientation)
    end subroutine leap_to
 
    !> Step along the tangent of the piece just beyond `here`, in the direction that keeps the
@@ -319,7 +322,7 @@ contains
       integer :: its_orientation
       logical :: done
 
-      if (orientation == 0) call find_orientation(system, here, orientation, error)
+      if (orientation == 0) call find_orientation(self, system, here, orientation, error)
       if (allocated(error)) return
       beyond = here
       beyond%x = here%x + ds*here%t
@@ -328,16 +331,16 @@ contains
       if (allocated(error)) return
       call find_tangent(self, system, here, beyond, done)
       if (.not. done) return
-      call find_orientation(system, beyond, its_orientation, error)
+      call find_orientation(self, system, beyond, its_orientation, error)
       if (allocated(error)) return
-      if (its_orientation /= orientation) call reverse(beyond)
-      beyond%x = here%x
-      beyond%p = here%p
+      ! Of a tangent with no orientation, the corrector has tried the direction of `here`.
+      if (stands(self, beyond) .or. differ(its_orientation, orientation)) call reverse(beyond)
+      ! From the piece beyond: a plane across its tangent may meet the piece of `here` as well.
       call correct(self, system, beyond, ds, next, report, error)
       if (allocated(error) .or. .not. report%converged) return
       ! A point with the other orientation lies on the way back.
-      call find_orientation(system, next, its_orientation, error)
-      report%converged = its_orientation == orientation
+      call find_orientation(self, system, next, its_orientation, error)
+      report%converged = .not. differ(its_orientation, orientation)
    end subroutine turn_at_kink
 
    !> A point with the other orientation: where the branch turns sharply, the tangent that makes the
@@ -359,10 +362,10 @@ contains
 
       done = .true.
       if (.not. self%oriented) return
-      if (orientation == 0) call find_orientation(system, here, orientation, error)
+      if (orientation == 0) call find_orientation(self, system, here, orientation, error)
       if (allocated(error)) return
-      call find_orientation(system, next, its_orientation, error)
-      if (allocated(error) .or. its_orientation == orientation) return
+      call find_orientation(self, system, next, its_orientation, error)
+      if (allocated(error) .or. .not. differ(its_orientation, orientation)) return
       if (inner(self, here%t, here%t_p, next%t, next%t_p) > sharp) then
          done = ds < turn_below*self%step
       else
@@ -379,8 +382,10 @@ contains
    end subroutine reverse
 
    !> Sign of det(dR/dx) dp/ds. It is the same all along a branch: det(dR/dx) changes its sign where
-   !> p turns, in a smooth fold as at a kink.
-   subroutine find_orientation(system, point, orientation, error)
+   !> p turns, in a smooth fold as at a kink. 0 where p does not move and dR/dx is singular: the
+   !> sign would be that of round-off.
+   subroutine find_orientation(self, system, point, orientation, error)
+      class(arclength_type), intent(in) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: point
       integer, intent(out) :: orientation
@@ -391,6 +396,7 @@ contains
       integer :: n
 
       orientation = 0
+      if (stands(self, point)) return
       call system%set_parameter(point%p, error)
       if (allocated(error)) return
       allocate (r(system%n))
@@ -403,6 +409,21 @@ contains
       if (point%t_p < 0.0_wp) orientation = -orientation
    end subroutine find_orientation
 
+   !> Whether p does not move along the branch at a point.
+   pure logical function stands(self, point)
+      class(arclength_type), intent(in) :: self
+      type(branch_point), intent(in) :: point
+
+      stands = abs(point%t_p) <= constant*self%p_scale
+   end function stands
+
+   !> Whether the orientations of two points are known and differ.
+   pure logical function differ(a, b)
+      integer, intent(in) :: a, b
+
+      differ = a*b < 0
+   end function differ
+
    !> Newton's method on R = 0 with the distance along the tangent fixed to ds.
    subroutine correct(self, system, here, ds, next, report, error)
       class(arclength_type), intent(inout) :: self
@@ -412,12 +433,12 @@ contains
       type(branch_point), intent(out) :: next
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: r(:), step(:), slope(:), dx_dp(:)
+      real(wp), allocatable :: r(:), step(:)
       real(wp) :: dp, best
       logical :: done
       integer :: stalled
 
-      allocate (r(system%n), step(system%n), slope(system%n), dx_dp(system%n))
+      allocate (r(system%n), step(system%n))
       next%x = here%x + ds*here%t
       next%p = here%p + ds*here%t_p
       best = huge(1.0_wp)
@@ -434,15 +455,14 @@ contains
          if (report%residual < 0.9_wp*best) stalled = 0
          best = min(best, report%residual)
          if (stalled >= patience .or. report%residual > 1.0e3_wp*best) exit
-         call self%linear%solve(system, r, forcing, step, done)
-         if (.not. done) exit
-         call system%parameter_derivative(next%x, slope)
-         call self%linear%solve_prepared(system, slope, forcing, dx_dp, done)
+         if (ds < turn_below*self%step .and. self%oriented) then
+            call bordered_step(self, system, here, next, r, step, dp, done)
+         else
+            call combined_step(self, system, here, next, r, step, dp, done)
+         end if
          if (.not. done) exit
          report%iterations = report%iterations + 1
-         dp = -inner(self, here%t, here%t_p, step, 0.0_wp)/inner(self, here%t, here%t_p, dx_dp, &
-            1.0_wp)
-         next%x = next%x + step + dp*dx_dp
+         next%x = next%x + step
          next%p = next%p + dp
       end do
       if (report%converged) then
@@ -450,6 +470,47 @@ contains
          report%converged = done
       end if
    end subroutine correct
+
+   !> One step of the corrector from two solutions with the derivative by x.
+   subroutine combined_step(self, system, here, next, r, step, dp, done)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here, next
+      real(wp), intent(in), contiguous :: r(:)
+      real(wp), intent(out), contiguous :: step(:)
+      real(wp), intent(out) :: dp
+      logical, intent(out) :: done
+      real(wp), allocatable :: slope(:), dx_dp(:)
+
+      allocate (slope(system%n), dx_dp(system%n))
+      dp = 0.0_wp
+      call self%linear%solve(system, r, forcing, step, done)
+      if (.not. done) return
+      call system%parameter_derivative(next%x, slope)
+      call self%linear%solve_prepared(system, slope, forcing, dx_dp, done)
+      if (.not. done) return
+      dp = -inner(self, here%t, here%t_p, step, 0.0_wp)/inner(self, here%t, here%t_p, dx_dp, &
+         1.0_wp)
+      step = step + dp*dx_dp
+   end subroutine combined_step
+
+   !> The same from the bordered matrix.
+   subroutine bordered_step(self, system, here, next, r, step, dp, done)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here, next
+      real(wp), intent(in), contiguous :: r(:)
+      real(wp), intent(out), contiguous :: step(:)
+      real(wp), intent(out) :: dp
+      logical, intent(out) :: done
+      logical :: singular
+
+      dp = 0.0_wp
+      call self%bordered%prepare(system, next%x, here%t, &
+                                 here%t_p*(self%x_scale/self%p_scale)**2, singular)
+      done = .not. singular
+      if (done) call self%bordered%solve(system, r, 0.0_wp, step, dp)
+   end subroutine bordered_step
 
    !> Between two points whose tangents differ in the sign of dp/ds lies a fold: regula falsi
    !> (Illinois) on that sign.

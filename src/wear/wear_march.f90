@@ -122,6 +122,8 @@ contains
             self%ending = 'stopped by its observer'
             exit
          end if
+         ! A run that is continued from here has no preconditioners from before either.
+         self%stepper%newton%linear%worth_keeping = .false.
          if (self%options%scheme == wear_pseudo_time .and. &
              self%stepper%pseudo_scheme == scheme_bdf) then
             call one_bdf_step(self, system, state, after, iterations)
