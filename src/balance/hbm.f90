@@ -23,6 +23,7 @@ module fw_hbm
    use fw_polynomial, only: springs_type
    use fw_polynomial, only: new_springs
    use fw_parameter_system, only: parameter_system
+   use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
 
@@ -320,7 +321,8 @@ contains
       complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
       call to_complex(self%fourier, m, q, self%complex_in)
-      !$omp parallel do default(none) shared(self, m) private(h) if(m > 80)
+      !$omp parallel do default(none) shared(self, m) private(h) &
+      !$omp if(m >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
          call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, &
                     self%complex_in(1, h), 1, zero, self%complex_out(1, h), 1)

@@ -11,11 +11,10 @@ submodule(fw_hbm) fw_hbm_linear
    use fw_forces, only: pair_open
    use fw_forces, only: pair_stuck
    use fw_lapack, only: dgemv
+   use fw_threads, only: pairs_for_threads
    implicit none (type, external)
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
-   !> Coordinates above which the harmonics of a product are worth a thread each.
-   integer, parameter :: threads_pay_from = 80
 
 contains
 
@@ -77,7 +76,8 @@ contains
          allocate (self%active_stiffness(m, m, self%fourier%n_retained))
       end if
       if (is_gathered(self)) return
-      !$omp parallel do default(none) shared(self) private(h, j) if(m > threads_pay_from)
+      !$omp parallel do default(none) shared(self) private(h, j) &
+      !$omp if(m >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
          do j = 1, self%n_active
             self%active_stiffness(:self%n_used, j, h) = &
@@ -219,7 +219,8 @@ contains
       nu = self%n_used
       ld = self%structure%n_coordinates
       call active_to_complex(self, na, vector)
-      !$omp parallel do default(none) shared(self, na, nu, ld) private(h) if(na > threads_pay_from)
+      !$omp parallel do default(none) shared(self, na, nu, ld) private(h) &
+      !$omp if(ld >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
          call zgemv('N', nu, na, one, self%active_stiffness(1, 1, h), ld, &
                     self%complex_in(1, h), 1, zero, self%complex_out(1, h), 1)
@@ -323,7 +324,7 @@ contains
 
       n = 3*self%fourier%n_coefficients
       !$omp parallel do default(none) shared(self, n_rows, vector, spread_out, n) private(i) &
-      !$omp schedule(static) if(n_rows > threads_pay_from)
+      !$omp schedule(static) if(self%contact%n_pairs >= pairs_for_threads)
       do i = 1, self%contact%n_pairs
          if (self%contact%linear_state(i) == pair_open) cycle
          call gather_inputs(self, i, n_rows, vector, spread_out, self%pair_in(:, i))
@@ -421,7 +422,7 @@ contains
       logical :: singular
 
       !$omp parallel do default(none) shared(self) private(h, singular) schedule(dynamic) &
-      !$omp if(self%n_active > threads_pay_from)
+      !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
          call self%preconditioner(h)%reserve(self%n_active)
          associate (m => self%preconditioner(h)%matrix, na => self%n_active)
@@ -549,7 +550,8 @@ contains
 
       na = self%n_active
       call active_to_complex(self, na, vector)
-      !$omp parallel do default(none) shared(self) private(h) if(na > threads_pay_from)
+      !$omp parallel do default(none) shared(self) private(h) &
+      !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
          call self%preconditioner(h)%solve(1, self%complex_in(:, h:h))
       end do

@@ -7,7 +7,13 @@ module fw_threads
    implicit none (type, external)
    private
 
-   public :: thread_scope
+   public :: thread_scope, pairs_for_threads, coordinates_for_threads
+
+   !> Contact pairs, and coordinates of a joint, from which parallel regions pay. One rule for all
+   !> of them, because threads that wait for the next region spin, some milliseconds long: below, a
+   !> run stays in one thread altogether (docs/benchmarks.md, "Close to the limit").
+   integer, parameter :: pairs_for_threads = 64
+   integer, parameter :: coordinates_for_threads = 3*pairs_for_threads
 
    type :: thread_scope
       private

@@ -9,13 +9,11 @@ module fw_event_contact
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    use fw_lapack, only: dgemv
+   use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private
 
    public :: event_contact_type, new_event_contact
-
-   !> Pairs above which threads pay; with fewer, a parallel region costs more than its work.
-   integer, parameter :: threads_pay_from = 24
 
    type :: event_contact_type
       integer :: n_pairs = 0
@@ -107,7 +105,7 @@ contains
                  0.0_wp, self%samples, fourier%n_time)
       !$omp parallel do default(none) private(c, i) schedule(dynamic) &
       !$omp shared(self, fourier, prediction, offset, x_start, force, x) &
-      !$omp if(self%n_pairs > threads_pay_from)
+      !$omp if(self%n_pairs >= pairs_for_threads)
       do i = 1, self%n_pairs
          if (self%is_planar(i)) then
             call evaluate_planar(self, i, fourier, prediction(i, :, :), offset(i), x_start(i, :))
@@ -263,7 +261,7 @@ contains
       nc = fourier%n_coefficients
       n = 2*nc
       !$omp parallel default(none) shared(self, fourier, wanted, x_start, jacobian, nc, n) &
-      !$omp private(block, start, i, t) if(self%n_pairs > threads_pay_from)
+      !$omp private(block, start, i, t) if(self%n_pairs >= pairs_for_threads)
       allocate (block(nc, nc, 3))
       !$omp do schedule(dynamic)
       do i = 1, self%n_pairs

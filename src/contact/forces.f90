@@ -19,6 +19,7 @@ module fw_forces
    use fw_settling, only: settle
    use fw_slip, only: slip_gradient
    use fw_slip, only: slip_work
+   use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private
 
@@ -29,8 +30,6 @@ module fw_forces
    integer, parameter :: pair_stuck = 1, pair_open = 2, pair_mixed = 3
    !> Pairs marched together: one cache line, and a whole number of vector registers.
    integer, parameter :: block_size = 8
-   !> Pairs above which threads pay; with fewer, a parallel region costs more than its work.
-   integer, parameter :: threads_pay_from = 24
    !> Turns after which the limit of a march is looked for by Newton's method. One direction needs
    !> one; a random sample with two needed 4 at most, pairs of a blade root that creep thousands.
    integer, parameter :: plain_turns = 4
@@ -148,7 +147,7 @@ contains
       end do
       n_blocks = (self%n_pairs + block_size - 1)/block_size
       !$omp parallel do default(none) shared(self, n_blocks, fourier) private(first, block) &
-      !$omp schedule(static) if(self%n_pairs > threads_pay_from)
+      !$omp schedule(static) if(self%n_pairs >= pairs_for_threads)
       do block = 1, n_blocks
          first = (block - 1)*block_size + 1
          call march(self, fourier%n_time, first, min(first + block_size - 1, self%n_pairs))
@@ -342,7 +341,7 @@ contains
          return
       end if
       !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i) &
-      !$omp if(self%n_pairs > threads_pay_from)
+      !$omp if(self%n_pairs >= pairs_for_threads)
       allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
       allocate (y_n(fourier%n_time))
       !$omp do schedule(dynamic)

@@ -25,6 +25,7 @@ module fw_condensation
    use fw_reduction, only: new_reduction
    use fw_relative, only: relative_type
    use fw_text, only: to_text
+   use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
 
@@ -85,7 +86,7 @@ contains
       if (self%n_coordinates == 0) return
       n_failed = 0
       !$omp parallel do default(none) shared(self, omega) private(h) reduction(+:n_failed) &
-      !$omp schedule(dynamic) if(self%n_coordinates > 80)
+      !$omp schedule(dynamic) if(self%n_coordinates >= coordinates_for_threads)
       do h = 1, size(self%harmonic)
          call condense(self, h, omega, n_failed)
       end do

@@ -1,0 +1,48 @@
+"""Joints that are large enough for threads: the same bits with 1, 2 and 4 of them."""
+import h5py
+import numpy as np
+import pytest
+from wear_cases import result
+
+N_PAIRS = 72
+
+
+@pytest.fixture
+def chain(tmp_path):
+    """A chain of masses on frictional ground, pressed less and less towards its loaded end."""
+    n = 3 * N_PAIRS
+    link = 2.0 * np.eye(N_PAIRS) - np.eye(N_PAIRS, k=1) - np.eye(N_PAIRS, k=-1)
+    stiffness = np.kron(link, np.diag([40.0, 25.0, 10.0])) + np.eye(n)
+    load = np.zeros((3, n))
+    load[0, 2::3] = -np.linspace(1.5, 0.2, N_PAIRS)
+    load[1, -3], load[1, -1], load[2, -2] = 6.0, 0.5, 3.0
+    with h5py.File(tmp_path / "chain.h5", "w") as file:
+        file.attrs.update(format="fretwear-model", format_version=1)
+        file["mass"], file["stiffness"] = 0.5 * np.eye(n), stiffness
+        file["damping"] = 0.02 * stiffness
+        file["contact/side_1"] = np.arange(1, n + 1).reshape(N_PAIRS, 3)
+        file["contact/side_2"] = np.zeros((N_PAIRS, 3), dtype=int)
+        for name, row in zip(("static", "cosine", "sine"), load):
+            file[f"load/{name}"] = row
+    return tmp_path
+
+
+def run(folder, threads, harmonics):
+    groups = {"case": {"analysis": "frf", "threads": threads},
+              "model": {"source": "hdf5", "file": "chain.h5"},
+              "contact": {"mu": 0.4, "gap": 0.0, "area": 1.0},
+              "harmonics": {"n_harmonics": 5, **harmonics},
+              "sweep": {"start": 1.2, "end": 1.8, "n_points": 4}}
+    return result(folder, groups, name=f"threads_{threads}")
+
+
+@pytest.mark.parametrize("harmonics", [{"n_time": 64}, {"sampling": "events"}],
+                         ids=["uniform", "events"])
+def test_same_bits(chain, harmonics):
+    one = run(chain, 1, harmonics)
+    share = one["contact/fraction"]
+    assert (share[-1, :, 0] == 1.0).any() and (share[-1, :, 1] > 0.0).any()
+    for threads in (2, 4):
+        found = run(chain, threads, harmonics)
+        for name in ("coefficients", "contact/force", "iterations", "residual"):
+            assert found[name].tobytes() == one[name].tobytes(), (threads, name)
