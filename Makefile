@@ -74,8 +74,9 @@ docs: build/deps.stamp ## reference of library and Python package, in build/docs
 wheel: build/deps.stamp ## the package in a fresh environment, used as the README says
 	@tools/check_install.sh build/wheel
 
+# Goes on where it was stopped; a changed program starts anew.
 stress: build ## every case to its extremes, written to docs/robustness.md
-	$(PYTHON) test/stress/stress.py -o docs/robustness.md
+	$(PYTHON) test/stress/stress.py --state build/stress -o docs/robustness.md
 
 long: build ## memory and time of long runs, written to docs/robustness.md
 	$(PYTHON) test/stress/long_runs.py -o docs/robustness.md

@@ -54,7 +54,8 @@ contains
       call build_system(case, system, error)
       if (allocated(error)) return
       call solver%start(case, system%n)
-      if (case%analysis == analysis_frf .and. &
+      ! A linear structure leaves no unknowns, and no branch that could turn back.
+      if (case%analysis == analysis_frf .and. system%n > 0 .and. &
           case%sweep%continuation == continuation_arclength) then
          call observer%on_start(case%title, 0)
          call run_branch(case, system, solver, observer, writer, summary, error)

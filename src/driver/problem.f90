@@ -23,6 +23,9 @@ module fw_problem
    use fw_hbm, only: new_hbm
    use fw_joint, only: joint_type
    use fw_joint, only: new_joint
+   use fw_memory, only: require_memory
+   use fw_solver_options, only: linear_lu
+   use fw_solver_options, only: solver_powell
    use fw_solver_options, only: sweep_options
    use fw_text, only: to_text
    use fw_wear_options, only: follow_range
@@ -122,6 +125,8 @@ contains
          end if
          odd_only = .true.
       end select
+      call check_memory(case, n_time, error)
+      if (allocated(error)) return
       fourier = new_fourier(case%harmonics%n_harmonics, n_time, odd_only)
       select case (case%harmonics%method)
       case (method_tcm)
@@ -130,6 +135,29 @@ contains
          call fourier%collocate(least_squares_points(case, fourier))
       end select
    end subroutine choose_harmonics
+
+   !> Room for what grows with the square of the harmonics: transforms, derivatives of the
+   !> histories and of the pairs, and the Jacobian where it is asked for.
+   subroutine check_memory(case, n_time, error)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: n_time
+      type(error_type), allocatable, intent(out) :: error
+      !> Copies of the transforms, and derivatives of the three components with their scratch.
+      real(wp), parameter :: transforms = 4.0_wp, derivatives = 6.0_wp
+      real(wp) :: nc, n_pairs, n_reals
+
+      nc = 2.0_wp*case%harmonics%n_harmonics + 1.0_wp
+      n_pairs = real(case%contact%n_pairs, wp)
+      n_reals = transforms*nc*n_time + nc*case%model%n_dof
+      if (case%contact%n_pairs > 0) then
+         n_reals = n_reals + derivatives*nc*n_time + (3.0_wp*nc)**2*n_pairs + 12.0_wp*n_pairs*n_time
+         if (case%solver%linear == linear_lu .or. case%solver%kind == solver_powell) &
+            n_reals = n_reals + (3.0_wp*nc*n_pairs)**2
+      end if
+      call require_memory(n_reals, '&harmonics n_harmonics = '// &
+                          to_text(case%harmonics%n_harmonics)//' with '//to_text(n_time)// &
+                          ' instants', 'take fewer harmonics or instants', error)
+   end subroutine check_memory
 
    !> Instants of the equations in the least-squares variant: twice the unknowns, where the user
    !> leaves the choice.

@@ -2,6 +2,7 @@
 !>
 !> Rows not given (skipped) read as NaN for reals and 0 otherwise. A chunk holds about 64 kB, so
 !> that a flush, which writes whole chunks, stays cheap, and never more rows than are expected.
+!> Only the chunk that grows is kept in memory: HDF5 would keep a megabyte of each dataset.
 module fw_hdf5_append
    use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_c_binding, only: c_loc
@@ -30,8 +31,10 @@ module fw_hdf5_append
    use hdf5, only: h5_real_kind
    use hdf5, only: h5pclose_f
    use hdf5, only: h5pcreate_f
+   use hdf5, only: h5pset_chunk_cache_f
    use hdf5, only: h5pset_chunk_f
    use hdf5, only: h5pset_fill_value_f
+   use hdf5, only: h5p_dataset_access_f
    use hdf5, only: h5p_dataset_create_f
    use hdf5, only: h5sclose_f
    use hdf5, only: h5screate_simple_f
@@ -52,6 +55,8 @@ module fw_hdf5_append
    integer, parameter :: growing_real = 1, growing_integer = 2, growing_logical = 3
 
    integer, parameter :: chunk_bytes = 65536, max_chunk_rows = 1024
+   !> Of the table that finds a chunk in memory: any number serves for one chunk.
+   integer(size_t), parameter :: cache_slots = 7_size_t
 
    !> A dataset of rows, in the file while that is open. Not to be copied.
    type :: growing_dataset
@@ -88,7 +93,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> How many rows are likely (default: not known); more may come.
       integer, intent(in), optional :: expected_rows
-      integer(hid_t) :: space, creation
+      integer(hid_t) :: space, creation, access
       integer(hsize_t) :: limit(size(row_shape) + 1), chunk(size(row_shape) + 1)
       integer :: status
 
@@ -107,10 +112,25 @@ contains
       end if
       call h5screate_simple_f(size(limit), [self%row(:size(row_shape)), 0_hsize_t], space, &
                               status, limit)
-      call new_dataset(file, name, self%type_id, space, self%id, error, creation)
+      access = cache_of_one(self, product(chunk))
+      call new_dataset(file, name, self%type_id, space, self%id, error, creation, access)
       call h5sclose_f(space, status)
       call h5pclose_f(creation, status)
+      call h5pclose_f(access, status)
    end subroutine create
+
+   !> Access properties of a dataset that keeps a single chunk in memory.
+   integer(hid_t) function cache_of_one(self, n_elements) result(access)
+      type(growing_dataset), intent(in) :: self
+      !> Elements of a chunk.
+      integer(hsize_t), intent(in) :: n_elements
+      integer(size_t) :: bytes
+      integer :: status
+
+      call h5tget_size_f(self%type_id, bytes, status)
+      call h5pcreate_f(h5p_dataset_access_f, access, status)
+      call h5pset_chunk_cache_f(access, cache_slots, bytes*int(n_elements, size_t), 1.0, status)
+   end function cache_of_one
 
    pure logical function is_created(self)
       class(growing_dataset), intent(in) :: self

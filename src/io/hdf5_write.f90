@@ -46,7 +46,7 @@ module fw_hdf5_write
 contains
 
    !> Create a dataset and the groups above it.
-   subroutine new_dataset(file, name, type_id, space, id, error, creation)
+   subroutine new_dataset(file, name, type_id, space, id, error, creation, access)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
       integer(hid_t), intent(in) :: type_id, space
@@ -54,14 +54,19 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Dataset creation property list (chunks, fill value).
       integer(hid_t), intent(in), optional :: creation
-      integer(hid_t) :: links, properties
+      !> Dataset access property list (cache).
+      integer(hid_t), intent(in), optional :: access
+      integer(hid_t) :: links, properties, access_properties
       integer :: status, ignored
 
       properties = h5p_default_f
       if (present(creation)) properties = creation
+      access_properties = h5p_default_f
+      if (present(access)) access_properties = access
       call h5pcreate_f(h5p_link_create_f, links, status)
       call h5pset_create_inter_group_f(links, 1, status)
-      call h5dcreate_f(file%id, name, type_id, space, id, status, properties, links)
+      call h5dcreate_f(file%id, name, type_id, space, id, status, properties, links, &
+                       access_properties)
       call h5pclose_f(links, ignored)
       if (status < 0) call dataset_failure(file, name, 'cannot be created (name taken, or disk '// &
                                            'full?)', error)

@@ -25,7 +25,7 @@ module fw_reader
    public :: reader_type, new_reader
 
    !> Larger arrays than this in a namelist are taken for a wrong size.
-   integer(i8), parameter :: largest_array = 100000000_i8
+   integer(i8), parameter :: largest_array = 10000000_i8
    !> More problems than this are counted only.
    integer, parameter :: most_problems = 12
    !> A list of mixed values has no shape to be checked against.
@@ -526,7 +526,7 @@ contains
       if (self%failed()) return
       if (product(int(dims, i8)) > largest_array) then
          call self%refuse(group, key, 'would have '//dims_text(dims)// &
-                          ' values: too large for a namelist')
+                          ' values: too many for a namelist; a model file may hold them')
          return
       end if
       allocate (source%entry(product(dims)), source%value(product(dims)), source=0)

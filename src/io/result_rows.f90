@@ -2,6 +2,7 @@
 module fw_result_rows
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_point
+   use fw_case, only: analysis_wear
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_hdf5, only: growing_dataset
@@ -31,6 +32,9 @@ module fw_result_rows
                          d_stable = 15, d_multipliers = 16, d_served_by = 17, d_harmonics = 18
    integer, parameter :: n_datasets = 18
 
+   !> Rows of a run that ends when it is done: its limit says little, and may be far away.
+   integer, parameter :: usual_rows = 128
+
    type :: row_set
       integer, private :: n_rows = 0, n_coefficients = 1, expected = 1
       character(:), allocatable, private :: unit_system
@@ -58,7 +62,7 @@ contains
       n_observed = 0
       if (allocated(case%model%observe_matrix)) n_observed = size(case%model%observe_matrix, 1)
       self%n_coefficients = 2*case%harmonics%n_harmonics + 1
-      if (case%analysis == analysis_frf) self%expected = max(1, case%sweep%n_points)
+      self%expected = expected_rows(case)
       call self%new(file, d_omega, '/omega', scalar, error)
       if (allocated(error)) return
       call self%new(file, d_coefficients, '/coefficients', [n_observed, self%n_coefficients], error)
@@ -94,6 +98,20 @@ contains
       if (allocated(error)) return
       call self%new(file, d_dissipation, '/contact/dissipation', [n_pairs], error)
    end subroutine create
+
+   !> How many rows are likely.
+   pure integer function expected_rows(case)
+      type(case_type), intent(in) :: case
+
+      expected_rows = 1
+      if (case%analysis == analysis_wear) then
+         expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
+      else if (case%analysis == analysis_frf) then
+         expected_rows = max(1, case%sweep%n_points)
+         if (case%sweep%continuation == continuation_arclength) &
+            expected_rows = min(usual_rows, case%sweep%max_points)
+      end if
+   end function expected_rows
 
    !> Append a row to every dataset.
    subroutine append(self, file, point, error)

@@ -85,8 +85,36 @@ def test_memory_of_the_machine_is_not_needed(tmp_path):
     with h5py.File(tmp_path / "model.h5", "r+") as file:
         del file["mass"]
         file.create_dataset("mass", (10**6, 10**6), dtype="f8", chunks=(1, 1))
-    done = subprocess.run(["/bin/sh", "-c",
-                           f"ulimit -v 2000000; exec '{PROGRAM}' --check case.nml"], cwd=tmp_path, text=True, capture_output=True, timeout=60, check=False,
-                          env=dict(os.environ, OMP_NUM_THREADS="1"))
+    done = check_in_two_gigabytes(tmp_path)
     assert done.returncode == 3, done.stderr
     assert "/mass" in done.stderr
+
+
+def check_in_two_gigabytes(folder):
+    return subprocess.run(["/bin/sh", "-c", f"ulimit -v 2000000; exec '{PROGRAM}' --check case.nml"],
+                          cwd=folder, text=True, capture_output=True, timeout=60, check=False,
+                          env=dict(os.environ, OMP_NUM_THREADS="1"))
+
+
+@pytest.mark.parametrize("change, words", [
+    (("n_harmonics = 3 n_time = 64", "n_harmonics = 10000"), "GB of memory"),
+    (("n_dof = 2", "n_dof = 10000"), "too many for a namelist")])
+def test_sizes_of_a_namelist_that_no_memory_holds(tmp_path, change, words):
+    """The transforms of 20001 coefficients, and 10000 x 10000 masses, ended in a failed
+    allocation."""
+    assert change[0] in fuzz_bases.JOINT
+    (tmp_path / "case.nml").write_text(fuzz_bases.JOINT.replace(*change))
+    done = check_in_two_gigabytes(tmp_path)
+    assert done.returncode == 3, done.stderr
+    assert words in done.stderr
+
+
+def test_branch_of_a_linear_structure(tmp_path):
+    """Without springs no unknowns are left, and the length of a step along them was 0/0."""
+    text = fuzz_bases.SPRINGS
+    (tmp_path / "case.nml").write_text(text[:text.index("&spring")] + text[text.index("&load"):])
+    done = check(tmp_path, "-q")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert list(file["omega"]) == pytest.approx([0.5, 0.6, 0.7])
+        assert file["floquet/stable"][:].all()

@@ -2,8 +2,9 @@
 
     long_runs.py [--points 10000] [--steps 5000] [-o docs/robustness.md]
 
-Memory is the resident set of the process, read while it runs; the cost of a point is what the
-result file says. Ends with status 1 where one of them grows.
+Memory is what the process holds of its own (resident, without the pages of the program and its
+libraries, which come in when a procedure is first called), read while it runs; the cost of a point
+is what the result file says. Ends with status 1 where one of them grows.
 """
 from __future__ import annotations
 
@@ -40,17 +41,17 @@ def wear(n_steps):
 
 
 def resident(pid):
-    """Resident set of a process [MB]; None where it has ended."""
+    """Resident memory of a process of its own [MB]; None where it has ended."""
     try:
         status = Path(f"/proc/{pid}/status").read_text()
     except OSError:
         return None
-    line = [line for line in status.splitlines() if line.startswith("VmRSS")]
+    line = [line for line in status.splitlines() if line.startswith("RssAnon")]
     return int(line[0].split()[1]) / 1024 if line else None
 
 
 def measure(case):
-    """Points, resident sets (time, MB), seconds of every point."""
+    """Resident memory [MB] at equal intervals, seconds of every point, whether it converged."""
     with tempfile.TemporaryDirectory(prefix="fw_long_") as name:
         folder = Path(name)
         runs.write_case(case, folder)

@@ -1,6 +1,6 @@
 """The numerical stress suite: every family to its extremes, every end of a case judged.
 
-    stress.py [--short] [--jobs N] [--family NAME ..] [-o docs/robustness.md]
+    stress.py [--short] [--jobs N] [--family NAME ..] [--state FOLDER] [-o docs/robustness.md]
 
 A case ends well in one of two ways: converged, with residual and energy balance verified in NumPy
 by `stress_check`; or in words that say what failed, where, and what to try. Ends with status 1
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections import Counter, defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
@@ -19,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import stress_cases as cases
 import stress_run as runs
+from stress_store import Store
 
 ROOT = Path(__file__).resolve().parents[2]
 BAD = ("crash", "hang", "nan", "false", "silent")
@@ -36,15 +36,29 @@ def spread(items, number):
     return [items[i] for i in np.linspace(0, len(items) - 1, number).astype(int)]
 
 
-def run_units(pool, groups):
-    """Outcomes of groups that have to agree; one that does not is a false answer."""
-    ends = list(pool.map(runs.run, (case for group in groups for _, case in group)))
+def run_family(pool, store, name, every):
+    """Ends of the cases in their order; what the store has is not run again."""
+    ends = store.ends(name, every)
+    pending = [case for case in every if case.title not in ends]
+    for end in pool.map(runs.run, pending):
+        store.add(name, end)
+        ends[end.case.title] = end
+    return [ends[case.title] for case in every]
+
+
+def run_units(pool, store, groups):
+    """Ends of groups that have to agree; one that does not is a false answer."""
+    every = [case for group in groups for _, case in group]
+    ends = store.ends("units", every)
     for group in groups:
-        part, ends = ends[:len(group)], ends[len(group):]
-        first = part[0]
-        for (unit, _), end in zip(group, part):
-            compare_units(unit, first, end)
-        yield from part
+        if not all(case.title in ends for _, case in group):
+            part = list(pool.map(runs.run, (case for _, case in group)))
+            for (unit, _), end in zip(group, part, strict=True):
+                compare_units(unit, part[0], end)
+            for end in part:
+                store.add("units", end)
+                ends[end.case.title] = end
+    return [ends[case.title] for case in every]
 
 
 def compare_units(unit, first, end):
@@ -61,21 +75,17 @@ def compare_units(unit, first, end):
             end.text = f"differs from SI units by {difference:.1e}"
 
 
-def outcomes(families, jobs, short):
+def outcomes(families, jobs, short, store):
     """Every end, family by family."""
     with ThreadPoolExecutor(jobs) as pool:
         for name, function in cases.FAMILIES.items():
             if families and name not in families:
                 continue
             every = list(function())
-            started = time.monotonic()
-            ends = list(pool.map(runs.run, spread(every, SHORT) if short else every))
-            yield name, ends, time.monotonic() - started
+            yield name, run_family(pool, store, name, spread(every, SHORT) if short else every)
         if not families or "units" in families:
             groups = list(cases.units_groups())
-            started = time.monotonic()
-            ends = list(run_units(pool, spread(groups, 3) if short else groups))
-            yield "units", ends, time.monotonic() - started
+            yield "units", run_units(pool, store, spread(groups, 3) if short else groups)
 
 
 def share(part, whole):
@@ -135,10 +145,14 @@ def clean(text):
     return " ".join(words)
 
 
-def write(path, results, seconds, short):
+def write(path, results, short):
     """Put the tables between the marks of the document."""
-    total = sum(map(len, results.values()))
-    body = [BEGIN, f"{total} cases{' (short form)' if short else ''}, {seconds:.0f} s.", "", *table_of_families(results), "",
+    ends = list(chain.from_iterable(results.values()))
+    hours = sum(end.seconds for end in ends) / 3600
+    revisions = ", ".join(sorted({end.revision for end in ends}))
+    body = [BEGIN, f"{len(ends)} cases{' (short form)' if short else ''} at commit {revisions}, "
+            f"{hours:.2f} hours of runs by the clock.", "",
+            *table_of_families(results), "",
             "Share converged by solver, fallbacks included:", "", *table_of_solvers(results), "",
             "Cases that end in words:", "", *table_of_words(results), END]
     text = path.read_text()
@@ -151,20 +165,21 @@ def main():
     parser.add_argument("--short", action="store_true", help="some cases of each family")
     parser.add_argument("--jobs", type=int, default=2, help="runs at a time")
     parser.add_argument("--family", nargs="+", default=[], help="only these families")
+    parser.add_argument("--state", type=Path, help="folder where a suite that is stopped goes on")
     parser.add_argument("-o", "--output", type=Path, help="document whose tables are replaced")
     arguments = parser.parse_args()
-    results, started = {}, time.monotonic()
-    for name, ends, seconds in outcomes(arguments.family, arguments.jobs, arguments.short):
+    results, store = {}, Store(arguments.state, runs.FW_RUN)
+    for name, ends in outcomes(arguments.family, arguments.jobs, arguments.short, store):
         results[name] = ends
         count = Counter(end.verdict for end in ends)
-        print(f"{name:14s} {len(ends):5d} cases {seconds:5.0f} s ",
+        print(f"{name:14s} {len(ends):5d} cases {sum(end.seconds for end in ends):5.0f} s ",
               ", ".join(f"{key} {number}" for key, number in count.most_common()), flush=True)
         for end in ends:
             if end.verdict in BAD:
                 print(f"   {end.verdict}: {end.case.title}\n      "
                       + end.text[:600].replace("\n", "\n      "), flush=True)
     if arguments.output:
-        write(arguments.output, results, time.monotonic() - started, arguments.short)
+        write(arguments.output, results, arguments.short)
     return int(any(end.verdict in BAD for ends in results.values() for end in ends))
 
 

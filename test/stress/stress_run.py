@@ -5,6 +5,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,6 +40,8 @@ class Outcome:
     saved: list = field(default_factory=list)
     text: str = ""
     coefficients: np.ndarray | None = None
+    seconds: float = 0.0
+    revision: str = ""
 
 
 def write_case(case, folder):
@@ -94,7 +97,14 @@ def limit_time():
 
 
 def run(case, program=FW_RUN):
-    """Outcome of a case."""
+    """Outcome of a case, and the time that it took by the clock."""
+    started = time.monotonic()
+    end = run_once(case, program)
+    end.seconds = time.monotonic() - started
+    return end
+
+
+def run_once(case, program):
     with tempfile.TemporaryDirectory(prefix="fw_stress_") as name:
         folder = Path(name)
         write_case(case, folder)

@@ -8,10 +8,11 @@ import stress_cases as cases
 import stress_check as check
 import stress_run as runs
 from stress_models import interface
+from stress_store import Store
 
 
 def test_every_end_is_converged_or_in_words():
-    ends = [end for _, family, _ in stress.outcomes([], 2, short=True) for end in family]
+    ends = [end for _, family in stress.outcomes([], 2, True, Store(None, runs.FW_RUN)) for end in family]
     bad = [f"{end.verdict}: {end.case.title}\n{end.text}" for end in ends
            if end.verdict in stress.BAD]
     assert not bad, "\n".join(bad)

@@ -1,0 +1,43 @@
+!> Whether memory is to be had, asked before it is needed: an allocation that fails deep inside
+!> would end the program without a word of what to change.
+module fw_memory
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: require_memory
+
+   !> More than any address space holds.
+   real(wp), parameter :: most_bytes = 1.0e17_wp
+
+contains
+
+   !> Refuse what so many reals do not fit for. Nothing is reserved: the system gives pages when
+   !> they are first written to.
+   subroutine require_memory(n_reals, subject, remedy, error)
+      !> A real number, because the product of sizes may exceed every integer.
+      real(wp), intent(in) :: n_reals
+      !> What needs the memory, with its values, and what to do where it is not there.
+      character(*), intent(in) :: subject, remedy
+      !> status_input where the system has no such amount.
+      type(error_type), allocatable, intent(out) :: error
+      ! Otherwise the compiler leaves out an allocation that nobody uses.
+      real(wp), allocatable, volatile :: probe(:)
+      real(wp) :: bytes
+      character(16) :: size_text
+      integer :: status
+
+      bytes = n_reals*real(storage_size(n_reals)/8, wp)
+      status = 1
+      if (bytes < most_bytes) allocate (probe(int(n_reals, int64)), stat=status)
+      if (status == 0) return
+      write (size_text, '(es8.1)') bytes*1.0e-9_wp
+      call fatal_error(error, subject//' needs about '//trim(adjustl(size_text))// &
+                       ' GB of memory, which is not to be had: '//remedy, status_input)
+   end subroutine require_memory
+
+end module fw_memory

@@ -1,0 +1,12 @@
+"""Memory of runs long enough for growth to show; `make long` has longer ones, and their times."""
+from __future__ import annotations
+
+import long_runs
+import pytest
+
+
+@pytest.mark.parametrize("case", [long_runs.sweep(4000), long_runs.wear(1000)],
+                         ids=["sweep", "wear"])
+def test_memory_is_flat(case):
+    memory, _, _ = long_runs.measure(case)
+    assert memory[-1] - memory[len(memory) // 10] < long_runs.MEMORY_GROWTH
