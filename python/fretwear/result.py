@@ -38,6 +38,8 @@ _DIMENSIONS: dict[str, tuple[str, ...]] = {
     "served_by": ("point",),
     "fold": ("point",),
     "harmonics": ("point",),
+    "instants": ("point",),
+    "error_estimate": ("point",),
     "floquet/stable": ("point",),
     "contact/force": ("point", "coefficient", "pair", "direction"),
     "contact/fraction": ("point", "pair", "state"),

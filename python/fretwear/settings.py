@@ -89,6 +89,7 @@ class Harmonics(TypedDict, total=False):
     parity: Literal["auto", "all", "odd"]
     adaptive: bool
     adaptive_tolerance: float
+    accuracy: float
 
 
 class Sweep(TypedDict, total=False):

@@ -7,7 +7,7 @@ module fw_harmonics_options
    public :: harmonics_options
    public :: method_words, method_hbm, method_tcm, method_tcm_least_squares, method_hdhb
    public :: sampling_words, sampling_uniform, sampling_events
-   public :: instants_per_event_wave
+   public :: instants_per_event_wave, most_for_accuracy
    public :: parity_words, parity_auto, parity_all, parity_odd
 
    character(*), parameter :: method_words(*) = &
@@ -20,6 +20,8 @@ module fw_harmonics_options
 
    !> Instants for each wave of the highest harmonic that isolate every event.
    integer, parameter :: instants_per_event_wave = 4
+   !> Harmonics at most where an accuracy is asked for and no number is given.
+   integer, parameter :: most_for_accuracy = 53
 
    character(*), parameter :: parity_words(*) = [character(4) :: 'auto', 'all', 'odd']
    integer, parameter :: parity_auto = 1, parity_all = 2, parity_odd = 3
@@ -40,6 +42,10 @@ module fw_harmonics_options
       logical :: adaptive = .false.
       !> Share of the contact force that may be left out of the retained harmonics.
       real(wp) :: adaptive_tolerance = 1.0e-3_wp
+      !> Relative error that the response is to keep within (0: harmonics as given).
+      real(wp) :: accuracy = 0.0_wp
+      !> Doublings of an automatic n_time, below 0 halvings; no input, but set where accuracy asks.
+      integer :: doublings = 0
    end type harmonics_options
 
 end module fw_harmonics_options

@@ -30,8 +30,12 @@ module fw_point
       logical :: converged = .false.
       !> What gave the solution.
       integer :: served_by = served_by_none
-      !> Harmonics of the balance; 0 where it is that of the case.
+      !> Harmonics of the balance and instants per period; 0 where they are those of the case.
       integer :: n_harmonics = 0
+      integer :: n_time = 0
+      !> Bound of the relative error of the response; 0 where none was asked for, huge(1.0_wp) where
+      !> none is known.
+      real(wp) :: error_estimate = 0.0_wp
       !> The branch turns here.
       logical :: fold = .false.
       !> Floquet multipliers, only when asked for (n_multipliers), and whether all lie in the unit

@@ -3,11 +3,13 @@ module fw_frequency_response
    use fw_kinds, only: wp
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
+   use fw_accuracy, only: accuracy_solver
    use fw_adaptive, only: adaptive_solver
    use fw_branch, only: run_branch
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
    use fw_hbm, only: hbm_system
+   use fw_level, only: level_solver
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
@@ -31,7 +33,7 @@ contains
       type(summary_type), intent(inout), target :: summary
       type(error_type), allocatable, intent(out) :: error
 
-      if (case%harmonics%adaptive) then
+      if (case%harmonics%adaptive .or. case%harmonics%accuracy > 0.0_wp) then
          call sweep_adaptively(case, observer, writer, summary, error)
       else
          call sweep(case, observer, writer, summary, error)
@@ -83,17 +85,23 @@ contains
       call observer%on_message('not converged: '//reason)
    end subroutine sweep
 
-   !> With as many harmonics as each point needs, up to those of the case.
+   !> With harmonics and instants that each point chooses, up to those of the case.
    subroutine sweep_adaptively(case, observer, writer, summary, error)
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(result_writer), intent(inout), target :: writer
       type(summary_type), intent(inout), target :: summary
       type(error_type), allocatable, intent(out) :: error
-      type(adaptive_solver) :: solver
+      class(level_solver), allocatable :: solver
       type(point_type) :: point
+      character(:), allocatable :: message
       integer :: k, n_points
 
+      if (case%harmonics%adaptive) then
+         allocate (adaptive_solver :: solver)
+      else
+         allocate (accuracy_solver :: solver)
+      end if
       call solver%start(case, error)
       if (allocated(error)) return
       n_points = point_count(case)
@@ -105,11 +113,8 @@ contains
          if (allocated(error) .or. summary%incomplete) exit
       end do
       call observer%on_end()
-      associate (level => solver%level(solver%current))
-         call summary%describe_work(level%system, level%solver%method%newton%linear, &
-                                    case%solver%kind)
-      end associate
-      call summary%describe_harmonics(solver%n_short, case%harmonics%adaptive_tolerance)
+      call solver%describe(case, summary, message)
+      if (len(message) > 0) call observer%on_message(message)
    end subroutine sweep_adaptively
 
    pure integer function point_count(case)

@@ -188,6 +188,7 @@ contains
          n_time = max(n_time, fewest_instants, instants_friction*h)
          if (any(joint%row(3, :) > 0)) n_time = max(n_time, instants_separation*h)
       end if
+      n_time = nint(n_time*2.0_wp**case%harmonics%doublings)
       n_time = n_time + modulo(n_time, 2)
    end function automatic_n_time
 

@@ -237,11 +237,11 @@ contains
       if (allocated(error)) return
       if (all(self%case%analysis /= [analysis_frf, analysis_point]) .or. &
           self%case%sweep%continuation /= continuation_natural .or. &
-          self%case%harmonics%adaptive) then
+          self%case%harmonics%adaptive .or. self%case%harmonics%accuracy > 0.0_wp) then
          call fatal_error(error, 'steps go through frequencies of harmonic balance: '// &
                           "case%analysis must be 'frf' or 'point', sweep%continuation "// &
-                          "'natural' and harmonics%adaptive .false.; run the case as a whole "// &
-                          'instead', status_usage)
+                          "'natural', harmonics%adaptive .false. and harmonics%accuracy 0; run "// &
+                          'the case as a whole instead', status_usage)
          return
       end if
       call forget_system(self)

@@ -24,6 +24,8 @@ module fw_summary
       integer :: iterations = 0
       !> Fewest and most harmonics of a point, where they adapt.
       integer :: harmonics(2) = [huge(0), 0]
+      !> Fewest and most instants of a point, where they are chosen.
+      integer :: instants(2) = [huge(0), 0]
       !> The run ended before it had covered what was asked for.
       logical :: incomplete = .false.
       type(string_type), allocatable :: name(:)
@@ -37,6 +39,7 @@ module fw_summary
       procedure :: describe_work
       procedure :: note_fallback
       procedure :: describe_harmonics
+      procedure :: describe_accuracy
       procedure :: describe_wear
       procedure :: note_restart
       procedure :: note_profile_change
@@ -64,6 +67,7 @@ contains
       self%iterations = self%iterations + point%iterations
       self%harmonics = [min(self%harmonics(1), point%n_harmonics), &
                         max(self%harmonics(2), point%n_harmonics)]
+      self%instants = [min(self%instants(1), point%n_time), max(self%instants(2), point%n_time)]
       if (.not. point%converged) return
       self%n_converged = self%n_converged + 1
       do i = 1, size(self%peak)
@@ -145,6 +149,23 @@ contains
                                    'out more than '//trim(adjustl(text))//' of the force: '// &
                                    'raise harmonics%n_harmonics')]
    end subroutine describe_harmonics
+
+   !> What the points took to be accurate.
+   subroutine describe_accuracy(self, worst, accuracy)
+      class(summary_type), intent(inout) :: self
+      !> Largest estimate of the error, and what was asked for.
+      real(wp), intent(in) :: worst, accuracy
+      character(10) :: text(2)
+
+      write (text(1), '(es8.1)') worst
+      write (text(2), '(es8.1)') accuracy
+      self%work = [self%work, &
+                   line('harmonics', to_text(self%harmonics(1))//' to '// &
+                        to_text(self%harmonics(2))), &
+                   line('instants', to_text(self%instants(1))//' to '//to_text(self%instants(2))), &
+                   line('error', 'at most '//trim(adjustl(text(1)))//' by estimate, '// &
+                        trim(adjustl(text(2)))//' asked for')]
+   end subroutine describe_accuracy
 
    !> What became of the wear.
    subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth)

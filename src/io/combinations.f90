@@ -21,6 +21,9 @@ module fw_combinations
 
    public :: check_combinations, has_history, is_linear_euler
 
+   !> Accuracy that may be asked for, as a multiple of the tolerance of the iterations.
+   real(wp), parameter :: least_to_tolerance = 100.0_wp
+
 contains
 
    !> Refuse what is valid key by key but cannot be run together.
@@ -31,6 +34,7 @@ contains
       call check_jacobian(case, error)
       if (.not. allocated(error)) call check_memory(case, error)
       if (.not. allocated(error)) call check_adaptive(case, error)
+      if (.not. allocated(error)) call check_accuracy(case, error)
       if (.not. allocated(error)) call check_stability(case, error)
       if (.not. allocated(error)) call check_wear(case, error)
    end subroutine check_combinations
@@ -142,6 +146,30 @@ contains
                           'a given harmonics%n_time', status_input)
       end if
    end subroutine check_adaptive
+
+   !> Levels change from point to point; the estimate compares solutions that start alike, and sees
+   !> no error below that of the iterations.
+   subroutine check_accuracy(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%harmonics%accuracy <= 0.0_wp) return
+      if (all(case%analysis /= [analysis_frf, analysis_point]) .or. &
+          case%sweep%continuation /= continuation_natural) then
+         call fatal_error(error, 'harmonics%accuracy goes with natural sweeps and points: '// &
+                          'leave it out, and give n_harmonics', status_input)
+      else if (case%output%histories) then
+         call fatal_error(error, 'harmonics%accuracy does not go with output%histories, '// &
+                          'which have one length: leave it out, and give n_harmonics and '// &
+                          'n_time as large as a run with accuracy reports', status_input)
+      else if (case%contact%memory == memory_carried) then
+         call fatal_error(error, "harmonics%accuracy does not go with contact%memory = "// &
+                          "'carried': use 'assembly'", status_input)
+      else if (case%harmonics%accuracy < least_to_tolerance*case%solver%tolerance) then
+         call fatal_error(error, 'harmonics%accuracy must be at least 100 times '// &
+                          'solver%tolerance: lower the tolerance', status_input)
+      end if
+   end subroutine check_accuracy
 
    !> Whether wear steps are linearly implicit Euler steps in pseudo-time.
    pure logical function is_linear_euler(case)

@@ -1,8 +1,9 @@
 !> The namelist groups that hold options only: one procedure per group.
 module fw_read_options
    use fw_case, only: case_type, analysis_words, analysis_frf, analysis_wear
-   use fw_harmonics_options, only: harmonics_options, method_words, method_hdhb, sampling_words, &
-                                   sampling_events, parity_words, instants_per_event_wave
+   use fw_harmonics_options, only: harmonics_options, method_words, method_hbm, method_hdhb, &
+                                   sampling_words, sampling_events, parity_words, &
+                                   instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
    use fw_reader, only: reader_type
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options, solver_words, &
@@ -12,6 +13,7 @@ module fw_read_options
    use fw_text, only: to_text
    use fw_time_options, only: time_options
    use fw_values, only: number_text
+   use fw_values, only: quoted_text
    use fw_wear_options, only: wear_options, wear_scheme_words, wear_law_words
    implicit none (type, external)
    private
@@ -46,6 +48,8 @@ contains
       call reader%get_word('harmonics', 'parity', options%parity, parity_words)
       call reader%get('harmonics', 'adaptive', options%adaptive)
       call reader%get('harmonics', 'adaptive_tolerance', options%adaptive_tolerance, above=0.0_wp)
+      call reader%get('harmonics', 'accuracy', options%accuracy, least=0.0_wp, below=1.0_wp)
+      if (options%accuracy > 0.0_wp) call choose_for_accuracy(reader, options)
       if (options%sampling == sampling_events .and. options%method == method_hdhb) then
          call reader%refuse('harmonics', 'sampling', "= 'events': method 'hdhb' is defined by "// &
                             "its 2*n_harmonics + 1 instants; use 'hbm' or 'tcm', or 'uniform'")
@@ -67,6 +71,37 @@ contains
                             "'hdhb' takes 2*n_harmonics + 1 = "//to_text(least)//' instants')
       end if
    end subroutine read_harmonics
+
+   !> With an accuracy n_harmonics is the most, and the events decide unless instants are to.
+   subroutine choose_for_accuracy(reader, options)
+      type(reader_type), intent(inout) :: reader
+      type(harmonics_options), intent(inout) :: options
+
+      if (.not. reader%given('harmonics', 'n_harmonics')) then
+         options%n_harmonics = most_for_accuracy
+         call reader%amend('harmonics', 'n_harmonics', to_text(options%n_harmonics))
+      else if (options%n_harmonics < 3) then
+         call reader%refuse('harmonics', 'n_harmonics', '= '//to_text(options%n_harmonics)// &
+                            ': with accuracy it is the most that may be used, at least 3; '// &
+                            'leave it out for '//to_text(most_for_accuracy))
+      end if
+      if (.not. reader%given('harmonics', 'sampling') .and. options%method /= method_hdhb) then
+         options%sampling = sampling_events
+         call reader%amend('harmonics', 'sampling', &
+                           quoted_text(trim(sampling_words(options%sampling))))
+      end if
+      if (options%n_time > 0) then
+         call reader%refuse('harmonics', 'n_time', '= '//to_text(options%n_time)//': with '// &
+                            'accuracy the program chooses it; leave it out')
+      else if (options%adaptive) then
+         call reader%refuse('harmonics', 'adaptive', '= .true.: accuracy chooses harmonics by '// &
+                            'the error of the response instead; leave adaptive out')
+      else if (options%method /= method_hbm) then
+         call reader%refuse('harmonics', 'accuracy', "goes with method = 'hbm': collocation "// &
+                            'leaves an error of first order in 1/H that no estimate bounds; '// &
+                            "use 'hbm', or leave accuracy out")
+      end if
+   end subroutine choose_for_accuracy
 
    !> Group &sweep; frequencies leave in rad/s.
    subroutine read_sweep(reader, analysis, options)

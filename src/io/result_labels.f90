@@ -35,6 +35,8 @@ module fw_result_labels
       label_type('/seconds', 's', 'point', 'time spent on the point'), &
       label_type('/fold', '', 'point', 'whether the branch turns here'), &
       label_type('/harmonics', '1', 'point', 'harmonics of the balance'), &
+      label_type('/instants', '1', 'point', 'instants of the period'), &
+      label_type('/error_estimate', '1', 'point', 'bound of the relative error of the response'), &
       label_type('/floquet/stable', '', 'point', '1 stable, 0 unstable, -1 not known'), &
       label_type('/floquet/multipliers', '1', 'point multiplier part', &
                  'Floquet multipliers, real and imaginary part'), &

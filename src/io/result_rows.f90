@@ -29,8 +29,9 @@ module fw_result_rows
                          d_iterations = 5, d_residual = 6, d_seconds = 7, d_force = 8, &
                          d_fraction = 9, d_dissipation = 10, d_observed = 11, &
                          d_force_history = 12, d_slip_history = 13, d_fold = 14, &
-                         d_stable = 15, d_multipliers = 16, d_served_by = 17, d_harmonics = 18
-   integer, parameter :: n_datasets = 18
+                         d_stable = 15, d_multipliers = 16, d_served_by = 17, d_harmonics = 18, &
+                         d_instants = 19, d_error = 20
+   integer, parameter :: n_datasets = 20
 
    !> Rows of a run that ends when it is done: its limit says little, and may be far away.
    integer, parameter :: usual_rows = 128
@@ -84,9 +85,7 @@ contains
       if (case%sweep%continuation == continuation_arclength) then
          call self%new(file, d_fold, '/fold', scalar, error, kind_of=growing_logical)
       end if
-      if (.not. allocated(error) .and. case%harmonics%adaptive) then
-         call self%new(file, d_harmonics, '/harmonics', scalar, error, kind_of=growing_integer)
-      end if
+      if (.not. allocated(error)) call create_levels(self, file, case, error)
       if (.not. allocated(error) .and. case%sweep%stability) then
          call self%new(file, d_stable, '/floquet/stable', scalar, error, kind_of=growing_integer)
       end if
@@ -146,8 +145,7 @@ contains
       end if
       if (self%list(d_fold)%is_created()) call self%list(d_fold)%append(file, point%fold, error)
       if (allocated(error)) return
-      if (self%list(d_harmonics)%is_created()) call self%list(d_harmonics)%append(file, &
-         point%n_harmonics, error)
+      call append_levels(self, file, point, error)
       if (.not. allocated(error)) call append_stability(self, file, point, error)
       if (.not. allocated(error)) call self%append_contact(file, point, error)
       if (.not. allocated(error)) call self%append_histories(file, point, error)
@@ -205,6 +203,40 @@ contains
       end do
       call write_attribute(file, name, 'names', words, error)
    end subroutine create_served_by
+
+   !> Harmonics of each point where they differ; instants and error where the program saw to both.
+   subroutine create_levels(self, file, case, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: scalar(0) = [integer ::]
+
+      if (.not. (case%harmonics%adaptive .or. case%harmonics%accuracy > 0.0_wp)) return
+      call self%new(file, d_harmonics, '/harmonics', scalar, error, kind_of=growing_integer)
+      if (allocated(error) .or. case%harmonics%adaptive) return
+      call self%new(file, d_instants, '/instants', scalar, error, kind_of=growing_integer)
+      if (allocated(error)) return
+      call self%new(file, d_error, '/error_estimate', scalar, error)
+   end subroutine create_levels
+
+   subroutine append_levels(self, file, point, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. self%list(d_harmonics)%is_created()) return
+      call self%list(d_harmonics)%append(file, point%n_harmonics, error)
+      if (allocated(error) .or. .not. self%list(d_instants)%is_created()) return
+      call self%list(d_instants)%append(file, point%n_time, error)
+      if (allocated(error)) return
+      if (point%converged .and. point%error_estimate < huge(1.0_wp)) then
+         call self%list(d_error)%append(file, point%error_estimate, error)
+      else
+         call self%list(d_error)%skip(file, 1, error)
+      end if
+   end subroutine append_levels
 
    subroutine new(self, file, i, name, row_shape, error, kind_of)
       class(row_set), intent(inout) :: self

@@ -72,6 +72,49 @@ def test_too_few_allowed_is_said(fw_run):
     assert "raise harmonics%n_harmonics" in done.stdout
 
 
+ACCURATE = FRICTION.replace("n_harmonics = {most} n_time = 1024 adaptive = {adaptive} "
+                            "adaptive_tolerance = {tolerance}", "accuracy = {accuracy} {more}")
+
+
+def test_accuracy_along_a_sweep(fw_run):
+    """Every point keeps it; harmonics rise towards the peaks and fall behind them."""
+    whole, _ = run(fw_run, FRICTION, most=61, adaptive=".false.", tolerance=1e-3)
+    for accuracy in (1e-2, 1e-3):
+        found, done = run(fw_run, ACCURATE, accuracy=accuracy, more="")
+        assert (found["error_estimate"] <= accuracy).all() and "is missed" not in done.stderr
+        # 123 columns against 107: the default ceiling is 53 harmonics.
+        difference = whole["coefficients"][:, :107, 0] - found["coefficients"][:, :, 0]
+        error = np.sqrt((difference ** 2).sum(axis=1) / (whole["coefficients"][:, 1:, 0] ** 2).sum(
+            axis=1))
+        assert (error <= accuracy).all()
+        for row, n, instants in zip(found["coefficients"], found["harmonics"], found["instants"]):
+            assert not row[2 * n + 1:].any() and instants >= 4 * n
+    # The superharmonic peak at 0.4 takes more than the end of the sweep.
+    assert found["harmonics"][:5].max() > found["harmonics"][-1]
+
+
+def test_accuracy_reads_back_what_it_chose(fw_run):
+    """The effective input of a run with accuracy is a valid input with the same answer."""
+    fw_run.write(ACCURATE.format(accuracy=1e-2, more=""))
+    shown = fw_run("--check", "case.nml").stdout
+    assert "n_harmonics = 53" in shown and "sampling = 'events'" in shown
+    fw_run.write(shown, "again.nml")
+    assert fw_run("-q", "again.nml").returncode == 0
+
+
+@pytest.mark.parametrize("setting, remedy", [
+    ("harmonics%n_time=64", "leave it out"), ("harmonics%adaptive=.true.", "leave adaptive out"),
+    ("harmonics%n_harmonics=2", "at least 3"), ("harmonics%method='tcm'", "use 'hbm'"),
+    ("harmonics%method='hdhb'", "use 'hbm'"), ("harmonics%accuracy=1e-7", "lower the tolerance"),
+    ("harmonics%accuracy=1", "below 1"), ("output%histories=.true.", "give n_harmonics and n_time"),
+    ("contact%memory='carried'", "use 'assembly'"),
+    ("sweep%continuation='arclength'", "leave it out, and give n_harmonics"),
+    ("case%analysis='time'", "leave it out, and give n_harmonics")])
+def test_accuracy_refuses_what_does_not_go_with_it(fw_run, setting, remedy):
+    fw_run.write(ACCURATE.format(accuracy=1e-2, more=""))
+    assert remedy in fw_run.refused("--set", setting, "case.nml")
+
+
 def test_refused_with_a_branch(fw_run):
     fw_run.write(STOP.format(most=3, adaptive=".true.", tolerance=1e-2))
     message = fw_run.refused("--set", "sweep%continuation='arclength'", "case.nml")

@@ -13,7 +13,7 @@ KEYS = {
     "spring": ["n_springs", "side_1", "side_2", "coefficient", "power"],
     "load": ["static", "cosine", "sine", "static_scale", "harmonic_scale"],
     "harmonics": ["method", "n_harmonics", "n_time", "n_collocation", "filter_harmonics", "parity",
-                  "sampling", "adaptive", "adaptive_tolerance"],
+                  "sampling", "adaptive", "adaptive_tolerance", "accuracy"],
     "sweep": ["start", "end", "n_points", "unit", "continuation", "max_points", "stability"],
     "solver": ["kind", "linear", "jacobian", "tolerance", "max_iterations", "fallback", "skips"],
     "pseudo_time": ["flow", "scheme", "step", "cfl", "max_steps"],
