@@ -64,7 +64,8 @@ $(RUN)/frf.png: $(RUN)/frf.h5 $(RUN)/frf_stuck.h5 $(wildcard python/fretwear/*.p
 test: build ## every test; the last line counts the cases
 	@$(PYTHON) test/support/run_tests.py --build $(BUILD) --python $(PYTHON)
 
-lint: build/deps.stamp ## type checker and linter of the Python code
+lint: build/deps.stamp ## linters of the Fortran and the Python code, type checker
+	@$(PYTHON) -m fortitude check --quiet
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs
 

@@ -50,7 +50,8 @@ contains
 
       progress%quiet = quiet
       progress%verbose = verbose
-      progress%draws_bar = .not. verbose .and. c_isatty(standard_error) == 1
+      progress%draws_bar = c_isatty(standard_error) == 1
+      if (verbose) progress%draws_bar = .false.
    end function new_progress
 
    subroutine on_start(self, case_title, n_points)
@@ -139,8 +140,9 @@ contains
       if (n_points >= index) text = text//' of '//to_text(n_points)
       text = text//': omega = '//number_text(rounded(point%omega))//' rad/s'
       if (allocated(point%amplitude)) then
-         if (size(point%amplitude) > 0) &
+         if (size(point%amplitude) > 0) then
             text = text//', amplitude '//number_text(rounded(maxval(point%amplitude)))
+         end if
       end if
       if (.not. point%converged) text = text//', NOT CONVERGED'
       if (with_details .or. .not. point%converged) then

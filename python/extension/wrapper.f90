@@ -75,7 +75,7 @@ contains
          session%model%stiffness_rotation = values
       case ('observe_matrix')
          session%model%observe_matrix = values
-      case ('position')
+      case default ! 'position'
          session%model%position = values
       end select
    end subroutine give_matrix
@@ -104,7 +104,7 @@ contains
          session%model%load_cosine = values
       case ('load_sine')
          session%model%load_sine = values
-      case ('load_static_rotation')
+      case default ! 'load_static_rotation'
          session%model%load_static_rotation = values
       end select
    end subroutine give_vector
@@ -137,7 +137,7 @@ contains
          session%model%title = from_bytes(text)
       case ('observe_name')
          session%model%observe_name = list_of(text)
-      case ('patch')
+      case default ! 'patch'
          session%model%patch = list_of(text)
       end select
    end subroutine give_text
@@ -214,7 +214,7 @@ contains
          if (allocated(session%remarks)) text = session%remarks
       case ('namelist')
          if (allocated(session%case%namelist)) text = session%case%namelist
-      case ('output')
+      case default ! 'output'
          if (allocated(session%case%output%file)) text = session%case%output%file
       end select
    end function text_of

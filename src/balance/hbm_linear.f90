@@ -30,10 +30,10 @@ contains
    !> Sort the coordinates into active, used and solved at once.
    subroutine choose_active(self)
       type(hbm_system), intent(inout) :: self
-      logical :: pinned(self%structure%n_coordinates), wanted(self%structure%n_coordinates)
+      logical :: held(self%structure%n_coordinates), wanted(self%structure%n_coordinates)
       integer :: i, c, j, k
 
-      pinned = .false.
+      held = .false.
       wanted = .false.
       if (self%rigid .and. self%reduced) then
          do i = 1, self%contact%n_pairs
@@ -42,7 +42,7 @@ contains
                j = self%coordinate_of(c, i)
                ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
                if (c < 3 .and. self%velocity_level) cycle
-               pinned(j) = self%contact%linear_state(i) == pair_stuck .or. &
+               held(j) = self%contact%linear_state(i) == pair_stuck .or. &
                            (c == 3 .and. self%pins_normals .and. self%contact%always_closed(i))
                wanted(j) = self%contact%linear_state(i) == pair_mixed
             end do
@@ -51,14 +51,14 @@ contains
       self%place = 0
       k = 0
       do j = 1, self%structure%n_coordinates
-         if (pinned(j)) cycle
+         if (held(j)) cycle
          k = k + 1
          self%used(k) = j
          self%place(j) = k
       end do
       self%n_active = k
       do j = 1, self%structure%n_coordinates
-         if (.not. (pinned(j) .and. wanted(j))) cycle
+         if (.not. (held(j) .and. wanted(j))) cycle
          k = k + 1
          self%used(k) = j
          self%place(j) = k

@@ -26,8 +26,8 @@ module fw_threads
    !> Scopes that are open, and the threads of OpenBLAS before the first one. The switch of
    !> OpenBLAS holds for the whole process, so what belongs to it does so too: of the scopes of
    !> several threads, which may overlap, the first one sets it and the last one restores it.
-   integer, save :: n_open = 0
-   integer(c_int), save :: blas_before = 1_c_int
+   integer :: n_open = 0
+   integer(c_int) :: blas_before = 1_c_int
 
    interface
       integer(c_int) function openblas_get_num_threads() bind(c)

@@ -15,7 +15,24 @@ module fw_c_interface
    use, intrinsic :: iso_c_binding, only: c_size_t
    use fw_c_text, only: give_text
    use fw_c_text, only: take_text
-   use fw_calls
+   use fw_calls, only: call_check
+   use fw_calls, only: call_count
+   use fw_calls, only: call_frequency
+   use fw_calls, only: call_get
+   use fw_calls, only: call_get_text
+   use fw_calls, only: call_load_file
+   use fw_calls, only: call_load_text
+   use fw_calls, only: call_message
+   use fw_calls, only: call_new_model
+   use fw_calls, only: call_observe
+   use fw_calls, only: call_put_integers
+   use fw_calls, only: call_put_reals
+   use fw_calls, only: call_refuse
+   use fw_calls, only: call_run
+   use fw_calls, only: call_set
+   use fw_calls, only: call_size
+   use fw_calls, only: call_solve
+   use fw_calls, only: call_start
    use fw_error, only: error_type
    use fw_error, only: status_ok
    use fw_error, only: status_usage
@@ -33,7 +50,7 @@ module fw_c_interface
    !> Changes when a program that was built with an older header can no longer be linked.
    integer(c_int), parameter :: interface_version = 1_c_int
 
-   character(kind=c_char, len=len(version) + 1), target, save :: version_text = &
+   character(kind=c_char, len=len(version) + 1), target :: version_text = &
       version//c_null_char
 
 contains

@@ -213,6 +213,7 @@ contains
          case (status_not_converged)
             call fatal_error(error, 'not every point converged, or the branch ended early: see '// &
                              'the summary', status_not_converged)
+         case default ! complete
          end select
       end if
       status = leave(handle, error)
@@ -242,8 +243,9 @@ contains
          case ('pairs')
             n = session%case%contact%n_pairs
          case ('observed')
-            if (allocated(session%case%model%observe_name)) &
+            if (allocated(session%case%model%observe_name)) then
                n = size(session%case%model%observe_name)
+            end if
          case ('coefficients')
             n = 2*session%case%harmonics%n_harmonics + 1
          case default
@@ -329,8 +331,9 @@ contains
             end do
          case ('observed')
             n = 0
-            if (allocated(session%case%model%observe_name)) &
+            if (allocated(session%case%model%observe_name)) then
                n = size(session%case%model%observe_name)
+            end if
             if (k >= 1 .and. k <= n) then
                text = session%case%model%observe_name(k)%text
             else

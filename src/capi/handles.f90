@@ -30,8 +30,8 @@ module fw_handles
       type(handle_type), pointer :: handle => null()
    end type slot_type
 
-   type(slot_type), allocatable, save :: slots(:)
-   integer, save :: last_id = 0
+   type(slot_type), allocatable :: slots(:)
+   integer :: last_id = 0
 
 contains
 

@@ -102,6 +102,7 @@ contains
                behind = [0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp]
             case (phase_backward)
                behind = [0.0_wp, -1.0_wp, 1.0_wp, 0.0_wp]
+            case default ! open: no force at all
             end select
          end if
          before = before - behind
@@ -257,6 +258,7 @@ contains
             tangential(k) = self%curves%mu*pressure
          case (phase_backward)
             tangential(k) = -self%curves%mu*pressure
+         case default ! open: no force at all
          end select
       end do
    end subroutine values_at
@@ -306,6 +308,7 @@ contains
             by_normal(:, k) = -self%curves%mu*waves(:, k)
          case (phase_backward)
             by_normal(:, k) = self%curves%mu*waves(:, k)
+         case default ! open: no force at all
          end select
       end do
    end subroutine rows_at

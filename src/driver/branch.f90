@@ -140,7 +140,8 @@ contains
       end if
       call self%system%residual(coefficients, self%r)
       point%omega = p
-      point%converged = report%converged .and. is_lasting(self%system)
+      point%converged = report%converged
+      if (point%converged) point%converged = is_lasting(self%system)
       if (point%converged) point%served_by = served_by_arclength
       point%iterations = report%iterations
       point%residual = report%residual

@@ -330,7 +330,7 @@ contains
             self%x = self%last + step*(self%last - self%before)
          case (2)
             self%x = self%last
-         case (3)
+         case default
             call stuck_guess(system, self%x)
          end select
          call attempt(self, system, report)

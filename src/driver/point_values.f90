@@ -57,8 +57,9 @@ contains
          if (allocated(point%force)) call pad(flat_3(point%force), &
             3*size(point%force, 2)*n_coefficients, values)
       case ('contact/fraction')
-         if (allocated(point%fraction)) &
+         if (allocated(point%fraction)) then
             values = reshape(point%fraction, [size(point%fraction)])
+         end if
       case ('contact/dissipation')
          if (allocated(point%dissipation)) values = point%dissipation
       case ('history/observed')

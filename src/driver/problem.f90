@@ -124,6 +124,7 @@ contains
             return
          end if
          odd_only = .true.
+      case default ! by what the model keeps
       end select
       call check_memory(case, n_time, error)
       if (allocated(error)) return
@@ -133,6 +134,7 @@ contains
          call fourier%collocate(fourier%n_coefficients)
       case (method_tcm_least_squares)
          call fourier%collocate(least_squares_points(case, fourier))
+      case default ! the equations are those of the harmonics
       end select
    end subroutine choose_harmonics
 

@@ -86,8 +86,9 @@ contains
       call threads%leave()
       call system_clock(clock_end)
       elapsed = real(clock_end - clock, wp)/real(rate, wp)
-      if (summary%n_converged < summary%n_points .or. summary%incomplete) &
+      if (summary%n_converged < summary%n_points .or. summary%incomplete) then
          outcome%status = status_not_converged
+      end if
       if (observer%stop_requested .and. summary%incomplete) outcome%status = status_stopped
       if (allocated(error)) then
          if (summary%n_points == 0) then

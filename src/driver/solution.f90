@@ -113,7 +113,7 @@ contains
 
       is_lasting = system%contact%all_periodic()
       if (system%contact%n_pairs == 0 .or. any(system%springs%power == 1)) return
-      if (system%contact%all_open()) is_lasting = is_lasting .and. held_without_contact(system)
+      if (is_lasting .and. system%contact%all_open()) is_lasting = held_without_contact(system)
    end function is_lasting
 
    !> With the derivative that the case asks for.

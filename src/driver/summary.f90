@@ -226,9 +226,8 @@ contains
          table = [table, line('...', to_text(size(self%name) - max_shown)// &
             ' more in the result file')]
       end if
-      write (text, '(f0.3, a)') seconds, ' s'
-      if (text(1:1) == '.') text = '0'//text
-      table = [table, self%work, line('time', trim(text))]
+      write (text, '(f20.3, a)') seconds, ' s'
+      table = [table, self%work, line('time', trim(adjustl(text)))]
    end function lines
 
    pure function line(label, value)

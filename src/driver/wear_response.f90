@@ -88,8 +88,9 @@ contains
       type(point_type) :: point
 
       call build_system(case, run%balance, error)
-      if (.not. allocated(error)) &
+      if (.not. allocated(error)) then
          call start_recorder(run%recorder, case, observer, writer, summary, error)
+      end if
       if (allocated(error)) return
       call observer%on_start(case%title, 0)
       call run%solver%start(case, run%balance%n)
@@ -103,9 +104,10 @@ contains
       end if
       call observer%on_end()
       if (.not. allocated(error)) call report_end(run, restart, error)
-      if (.not. allocated(error) .and. case%wear%check_steps .and. point%converged) &
+      if (.not. allocated(error) .and. case%wear%check_steps .and. point%converged) then
          call compare_halved(run%recorder, run%system, run%march, run%first, run%first_omega, &
-                             run%state, error)
+                              run%state, error)
+      end if
       call run%recorder%rows%close()
       call run%recorder%restart_rows%close()
    end subroutine run_wear
@@ -142,15 +144,17 @@ contains
       call first_state(run%system, run%solver%x, point, run%state)
       associate (march => run%march)
          march%options = case%wear
-         if (needs_depth_step(case)) &
+         if (needs_depth_step(case)) then
             march%options%max_depth_step = depth_step*run%system%depth_scale()
+         end if
          march%stepper = new_wear_stepper(march%options, case%pseudo_time%scheme, &
                                           run%solver%method%newton)
          march%resonance = resonance_type(n_harmonics=case%harmonics%n_harmonics, &
                                           first=case%sweep%start)
-         if (case%wear%follow_resonance) &
+         if (case%wear%follow_resonance) then
             call march%resonance%follow(march%stepper, run%system, run%state, point%iterations, &
-                                        error)
+                                         error)
+         end if
       end associate
       run%first = run%state
       run%first_omega = run%system%structure%omega
@@ -167,8 +171,9 @@ contains
          call recorder%restart_rows%create(recorder%writer%file, recorder%case%contact, &
                                            run%system%n_vibration(), error)
          if (allocated(error)) return
-         if (restart%n_rows > 0) &
+         if (restart%n_rows > 0) then
             call resume(restart, recorder, run%system, run%march, run%state, error)
+         end if
          if (allocated(error)) return
          call run%march%run(run%system, run%state, recorder, error, resumed=restart%n_rows > 0)
       end associate
@@ -316,6 +321,9 @@ contains
       logical, intent(out) :: go_on
       type(error_type), allocatable, intent(out) :: error
 
+      associate (unused => self, unused_march => march, unused_system => system, &
+                 unused_state => state, unused_number => iterations)
+      end associate
       go_on = .true.
    end subroutine pass_by
 

@@ -233,6 +233,7 @@ contains
 
       number = 0
       status = verify(word, '+-0123456789')
+      ! allow(C181): the caller does
       if (status == 0) read (word, *, iostat=status) number
    end subroutine to_integer
 

@@ -108,7 +108,7 @@ contains
             parts%gap = values
          case ('contact/area')
             parts%area = values
-         case ('contact/position')
+         case default ! 'contact/position'
             parts%position = reshape(values, [3, self%n_pairs])
          end select
       end associate

@@ -18,22 +18,22 @@ module fw_namelist
 contains
 
    !> Parse the whole text of a namelist file.
-   subroutine parse_namelist(text, source, namelist, error)
+   subroutine parse_namelist(text, source, input, error)
       character(*), intent(in) :: text
       !> Name of the file, for messages.
       character(*), intent(in) :: source
-      type(namelist_type), intent(out) :: namelist
+      type(namelist_type), intent(out) :: input
       type(error_type), allocatable, intent(out) :: error
       type(cursor_type) :: cursor
 
-      namelist%source = source
-      allocate (namelist%groups(0), namelist%entries(16))
+      input%source = source
+      allocate (input%groups(0), input%entries(16))
       cursor%text = text
       if (index(text, byte_order_mark()) == 1) cursor%position = 4
       do
          call cursor%skip_blank()
          if (cursor%at_end()) return
-         call parse_group(cursor, namelist, error)
+         call parse_group(cursor, input, error)
          if (allocated(error)) return
       end do
    end subroutine parse_namelist
@@ -80,36 +80,36 @@ contains
    end subroutine parse_override
 
    !> One group, from its & to its /.
-   subroutine parse_group(cursor, namelist, error)
+   subroutine parse_group(cursor, input, error)
       type(cursor_type), intent(inout) :: cursor
-      type(namelist_type), intent(inout) :: namelist
+      type(namelist_type), intent(inout) :: input
       type(error_type), allocatable, intent(out) :: error
       type(group_type) :: group
       type(entry_type) :: entry
 
-      call parse_group_name(cursor, namelist, group, error)
+      call parse_group_name(cursor, input, group, error)
       do while (.not. allocated(error))
          call cursor%skip_blank()
          if (cursor%at_end()) then
-            call fatal_error(error, at_line(namelist, group%line)//': &'//group%name// &
+            call fatal_error(error, at_line(input, group%line)//': &'//group%name// &
                              ' is not closed: end the group with a /', status_input)
          else if (cursor%peek() == '/') then
             cursor%position = cursor%position + 1
             return
          else if (cursor%peek() == '&') then
-            call close_by_name(cursor, namelist, group, error)
+            call close_by_name(cursor, input, group, error)
             return
          else
-            call parse_entry(cursor, namelist%source, group, entry, error)
-            if (.not. allocated(error)) call add_entry(namelist, entry)
+            call parse_entry(cursor, input%source, group, entry, error)
+            if (.not. allocated(error)) call add_entry(input, entry)
          end if
       end do
    end subroutine parse_group
 
    !> The & and the name; a group may be given once.
-   subroutine parse_group_name(cursor, namelist, group, error)
+   subroutine parse_group_name(cursor, input, group, error)
       type(cursor_type), intent(inout) :: cursor
-      type(namelist_type), intent(inout) :: namelist
+      type(namelist_type), intent(inout) :: input
       type(group_type), intent(out) :: group
       type(error_type), allocatable, intent(out) :: error
       !> A binary file may have no ends of lines.
@@ -122,27 +122,27 @@ contains
       if (cursor%peek() /= '&') then
          call cursor%take_through(achar(10), rest, found)
          rest = trim(rest(:min(len(rest), most_quoted)))
-         call fatal_error(error, at_line(namelist, group%line)//': "'//rest// &
+         call fatal_error(error, at_line(input, group%line)//': "'//rest// &
                           '" stands outside of any group: a group is &name ... /, and a / '// &
                           'outside of quotes ends it', status_input)
          return
       end if
       cursor%position = cursor%position + 1
       call cursor%take_name(group%name)
-      do i = 1, size(namelist%groups)
-         if (namelist%groups(i)%name /= group%name) cycle
-         call fatal_error(error, at_line(namelist, group%line)//': group &'//group%name// &
+      do i = 1, size(input%groups)
+         if (input%groups(i)%name /= group%name) cycle
+         call fatal_error(error, at_line(input, group%line)//': group &'//group%name// &
                           ' is given twice (first in line '// &
-                          to_text(namelist%groups(i)%line)//'): join the two', status_input)
+                          to_text(input%groups(i)%line)//'): join the two', status_input)
          return
       end do
-      namelist%groups = [namelist%groups, group]
+      input%groups = [input%groups, group]
    end subroutine parse_group_name
 
    !> `&end` closes a group; any other &name shows that the / was forgotten.
-   subroutine close_by_name(cursor, namelist, group, error)
+   subroutine close_by_name(cursor, input, group, error)
       type(cursor_type), intent(inout) :: cursor
-      type(namelist_type), intent(in) :: namelist
+      type(namelist_type), intent(in) :: input
       type(group_type), intent(in) :: group
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: name
@@ -150,7 +150,7 @@ contains
       cursor%position = cursor%position + 1
       call cursor%take_name(name)
       if (name == 'end') return
-      call fatal_error(error, at_line(namelist, group%line)//': &'//group%name// &
+      call fatal_error(error, at_line(input, group%line)//': &'//group%name// &
                        ' is not closed: put a / before &'//name//' in line '// &
                        to_text(cursor%line), status_input)
    end subroutine close_by_name
@@ -185,12 +185,12 @@ contains
       call parse_values(cursor, place, entry, error)
    end subroutine parse_entry
 
-   pure function at_line(namelist, line) result(place)
-      type(namelist_type), intent(in) :: namelist
+   pure function at_line(input, line) result(place)
+      type(namelist_type), intent(in) :: input
       integer, intent(in) :: line
       character(:), allocatable :: place
 
-      place = namelist%source//':'//to_text(line)
+      place = input%source//':'//to_text(line)
    end function at_line
 
    !> Some editors begin a UTF-8 file with these three bytes.

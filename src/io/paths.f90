@@ -220,8 +220,9 @@ contains
 
       name = ''
       buffer = c_null_char
-      if (c_gethostname(c_loc(buffer), size(buffer, kind=c_size_t)) == 0) &
+      if (c_gethostname(c_loc(buffer), size(buffer, kind=c_size_t)) == 0) then
          name = from_buffer(buffer)
+      end if
    end function machine_name
 
    logical function is_directory(path)

@@ -1,5 +1,6 @@
 !> Contact pairs and nonlinear springs: groups &contact and &spring on top of a model file.
 module fw_read_contact
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_contact_data, only: contact_type, spring_type, law_words, law_penalty, memory_words
    use fw_kinds, only: wp
    use fw_model_file, only: file_model_type
@@ -187,12 +188,15 @@ contains
       type(file_model_type), intent(in) :: file_model
       type(contact_type), intent(in) :: contact
 
-      if (allocated(contact%mu)) &
+      if (allocated(contact%mu)) then
          call check('mu', contact%mu, contact%mu >= 0.0_wp, 'must be at least 0')
-      if (allocated(contact%gap)) &
-         call check('gap', contact%gap, abs(contact%gap) <= huge(1.0_wp), 'must be finite')
-      if (allocated(contact%area)) &
+      end if
+      if (allocated(contact%gap)) then
+         call check('gap', contact%gap, ieee_is_finite(contact%gap), 'must be finite')
+      end if
+      if (allocated(contact%area)) then
          call check('area', contact%area, contact%area > 0.0_wp, 'must be above 0')
+      end if
 
    contains
 
@@ -208,7 +212,7 @@ contains
                               ': must be '//to_text(contact%n_pairs)//', one per pair')
             return
          end if
-         i = findloc(ok .and. abs(values) <= huge(1.0_wp), .false., 1)
+         i = findloc(ok .and. ieee_is_finite(values), .false., 1)
          if (i > 0) call refuse_model(reader, file_model, key//'('//to_text(i)//') = '// &
                                       number_text(values(i))//': '//accepts)
       end subroutine check
@@ -268,8 +272,10 @@ contains
 
       call reader%get('spring', 'n_springs', springs%n_springs, least=0, most=1000000)
       m = springs%n_springs
-      if (reader%given('spring', 'coefficient') .and. .not. reader%given('spring', 'n_springs')) &
+      if (reader%given('spring', 'coefficient') .and. &
+          .not. reader%given('spring', 'n_springs')) then
          call reader%refuse('spring', 'n_springs', 'is missing: must be the number of springs')
+      end if
       allocate (springs%side_2(m), source=0)
       allocate (springs%power(m), source=3)
       call reader%get_array('spring', 'side_1', springs%side_1, [m], .true., least=-n_dof, &

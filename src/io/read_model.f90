@@ -114,8 +114,9 @@ contains
       call reader%amend('model', 'file', quoted_text(resolve_path(options%file, directory)))
       if (options%source == source_hdf5) then
          if (reader%tries_files) call try_model_hdf5(in_directory(options%file, directory), error)
-         if (.not. allocated(error)) &
+         if (.not. allocated(error)) then
             call read_model_hdf5(in_directory(options%file, directory), raw, error)
+         end if
       else
          call read_matrix_market_model(in_directory(options%file, directory), raw, error)
       end if
@@ -229,10 +230,12 @@ contains
       type(model_type), intent(inout) :: model
 
       if (speed <= 0.0_wp) return
-      if (allocated(raw%stiffness_rotation)) &
+      if (allocated(raw%stiffness_rotation)) then
          model%stiffness = model%stiffness + speed**2*raw%stiffness_rotation
-      if (allocated(raw%load_static_rotation)) &
+      end if
+      if (allocated(raw%load_static_rotation)) then
          model%load_static = model%load_static + speed**2*raw%load_static_rotation
+      end if
       if (allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)) return
       call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
                          'stiffness_rotation and no load static_rotation: remove it, or use a '// &
@@ -251,13 +254,15 @@ contains
       call check_one('mass', raw%mass)
       call check_one('stiffness', raw%stiffness)
       if (allocated(raw%damping)) call check_one('damping', raw%damping)
-      if (allocated(raw%stiffness_rotation)) &
+      if (allocated(raw%stiffness_rotation)) then
          call check_one('stiffness_rotation', raw%stiffness_rotation)
+      end if
       call check_load('static', raw%load_static)
       call check_load('cosine', raw%load_cosine)
       call check_load('sine', raw%load_sine)
-      if (allocated(raw%load_static_rotation)) &
+      if (allocated(raw%load_static_rotation)) then
          call check_load('static_rotation', raw%load_static_rotation)
+      end if
 
    contains
 

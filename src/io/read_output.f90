@@ -128,8 +128,9 @@ contains
 
       n = size(names)
       do i = 1, n - 1
-         if (names(i)%text == names(n)%text) &
+         if (names(i)%text == names(n)%text) then
             call reader%refuse('output', 'observe', 'names '//names(n)%text//' twice')
+         end if
       end do
    end subroutine refuse_repeated
 

@@ -1,6 +1,7 @@
 !> Key `worn` of &contact: the wear depth that an earlier result ends with, at which the joint of
 !> this case starts.
 module fw_read_worn
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
    use fw_error, only: status_io
@@ -103,7 +104,7 @@ contains
       else if (step > last) then
          call reader%refuse('contact', 'worn_step', '= '//to_text(step)//': '//path//' has '// &
                             to_text(last)//' steps; 0 takes the last')
-      else if (.not. all(abs(depth(:, merge(step, last, step > 0))) <= huge(1.0_wp))) then
+      else if (.not. all(ieee_is_finite(depth(:, merge(step, last, step > 0))))) then
          call reader%refuse('contact', 'worn', path//': that step holds depths that are not '// &
                             'finite (a run that was killed while it wrote?): choose an '// &
                             'earlier one with worn_step')

@@ -578,8 +578,9 @@ contains
       place = self%input%source
       if (i_entry > 0) place = location(self%input%entries(i_entry), self%input%source)
       if (present(line)) then
-         if (.not. allocated(self%input%entries(i_entry)%option)) &
+         if (.not. allocated(self%input%entries(i_entry)%option)) then
             place = self%input%source//':'//to_text(line)
+         end if
       end if
       call append(self%problems, place//': '//message)
    end subroutine blame

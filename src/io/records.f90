@@ -126,8 +126,9 @@ contains
       integer, parameter :: comment_column = 40
 
       text = '   '//record%key//' = '//record%value
-      if (index(record%value, new_line('a')) == 0 .and. len(text) < comment_column) &
+      if (index(record%value, new_line('a')) == 0 .and. len(text) < comment_column) then
          text = text//repeat(' ', comment_column - len(text))//'! '//record%accepts
+      end if
       text = text//new_line('a')
    end function record_text
 

@@ -1,5 +1,6 @@
 !> An interrupted wear run as its result file tells it, read to be continued.
 module fw_restart_file
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_combinations, only: has_history
    use fw_case, only: analysis_wear
    use fw_case, only: analysis_words
@@ -210,10 +211,10 @@ contains
       self%state%rate = rate(:, n)
       self%control = control(:, n)
       ! Not looked for yet: no rates.
-      if (all(abs(checked(:, n)) <= huge(1.0_wp))) self%checked_rate = checked(:, n)
+      if (all(ieee_is_finite(checked(:, n)))) self%checked_rate = checked(:, n)
       self%first%x = [vibration(:, 1), depth(:, 1)]
       self%first%rate = rate(:, 1)
-      if (.not. all(abs(self%state%x) <= huge(1.0_wp))) then
+      if (.not. all(ieee_is_finite(self%state%x))) then
          call fatal_error(error, file%path//': its last step is not complete (damaged file?)', &
                           status_input)
          return
@@ -257,8 +258,8 @@ contains
                            same_vibration*norm2(self%first%rate)
       if (agrees) return
       call fatal_error(error, self%path//': its joint vibrates otherwise than that of this '// &
-                       'case before any wear: the matrices or loads of &model have changed; start '// &
-                       'anew, or use &contact worn to go on from its depths', status_input)
+                       'case before any wear: the matrices or loads of &model have changed; '// &
+                       'start anew, or use &contact worn to go on from its depths', status_input)
    end subroutine check_first
 
    !> Set a march to where it stood after the last step.

@@ -122,8 +122,9 @@ contains
       call self%rows%append(self%file, point, error)
       if (allocated(error)) return
       call system_clock(clock)
-      if (clock - self%last_flush >= flush_patience*self%flush_duration) &
+      if (clock - self%last_flush >= flush_patience*self%flush_duration) then
          call flush_file(self, error)
+      end if
    end subroutine append_point
 
    !> Make what was written so far safe against the end of the program.
@@ -225,8 +226,9 @@ contains
       end if
       if (allocated(error) .or. .not. allocated(case%model%observe_name)) return
       call write_text(file, '/observed/name', case%model%observe_name, error)
-      if (.not. allocated(error)) &
+      if (.not. allocated(error)) then
          call label_dataset(file, '/observed/name', case%model%unit_system, error)
+      end if
    end subroutine write_header
 
    !> Where the pairs are, for pictures: what the case knows of it.
@@ -238,20 +240,23 @@ contains
       if (case%contact%n_pairs == 0) return
       if (allocated(case%contact%position)) then
          call write_dataset(file, '/contact/position', case%contact%position, error)
-         if (.not. allocated(error)) &
+         if (.not. allocated(error)) then
             call label_dataset(file, '/contact/position', case%model%unit_system, error)
+         end if
          if (allocated(error)) return
       end if
       if (allocated(case%contact%area)) then
          call write_dataset(file, '/contact/area', case%contact%area, error)
-         if (.not. allocated(error)) &
+         if (.not. allocated(error)) then
             call label_dataset(file, '/contact/area', case%model%unit_system, error)
+         end if
          if (allocated(error)) return
       end if
       if (.not. allocated(case%contact%patch)) return
       call write_text(file, '/contact/patch', case%contact%patch, error)
-      if (.not. allocated(error)) &
+      if (.not. allocated(error)) then
          call label_dataset(file, '/contact/patch', case%model%unit_system, error)
+      end if
    end subroutine write_pairs
 
    subroutine write_optional(file, name, text, error)

@@ -114,6 +114,7 @@ contains
          unit = words(force)%text
       case ('<energy>')
          unit = words(force)%text//' '//words(length)%text
+      case default ! a number
       end select
    end function unit_of
 

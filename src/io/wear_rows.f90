@@ -84,8 +84,9 @@ contains
       call write_text(file, '/wear/patch', patches, error)
       if (allocated(error)) return
       call label_dataset(file, '/wear/cycles', unit_system, error)
-      if (.not. allocated(error)) &
+      if (.not. allocated(error)) then
          call write_attribute(file, '/wear/cycles', 'units', cycles_units, error)
+      end if
       if (.not. allocated(error)) call label_dataset(file, '/wear/depth', unit_system, error)
       if (.not. allocated(error)) call label_dataset(file, '/wear/rate', unit_system, error)
       if (.not. allocated(error)) call label_dataset(file, '/wear/energy', unit_system, error)
@@ -169,8 +170,9 @@ contains
       if (.not. self%list(d_cycles)%is_created()) return
       !$omp critical (fretwear_io)
       call write_dataset(file, '/wear/depth_halved', depth, error)
-      if (.not. allocated(error)) &
+      if (.not. allocated(error)) then
          call label_dataset(file, '/wear/depth_halved', unit_system, error)
+      end if
       if (.not. allocated(error)) call write_attribute(file, '/wear', 'profile_change', change, &
                                                        error)
       !$omp end critical (fretwear_io)

@@ -1,5 +1,6 @@
 !> Batched real transforms through FFTW along the second index of (row, instant) arrays.
 module fw_fft
+   ! allow(C121): all that fftw3.f03 takes from there
    use, intrinsic :: iso_c_binding
    use fw_kinds, only: wp
    implicit none (type, external)

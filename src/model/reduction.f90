@@ -179,8 +179,8 @@ contains
       end do
    end function undamped_resonances
 
-   !> Kept modes are scaled to a largest displacement of 1: their equations are forces then, as those
-   !> of the relative coordinates are, and the norm of a residual means the same in all units.
+   !> Kept modes are scaled to a largest displacement of 1: their equations are forces then, as
+   !> those of the relative coordinates are, and the norm of a residual means the same in all units.
    subroutine move_to_coordinates(keep, t_q, t_i, self)
       logical, intent(in) :: keep(:)
       real(wp), intent(inout), allocatable :: t_q(:, :), t_i(:, :)

@@ -40,7 +40,7 @@ module fw_powell
    !> hybrj has no argument for the caller's data, so that the callback finds the solution it
    !> belongs to here. One pointer per thread: solutions in different threads do not meet, and
    !> `solve` restores the pointer, so that a residual may itself call the solver.
-   type(powell_state), pointer, save :: current => null()
+   type(powell_state), pointer :: current => null()
    !$omp threadprivate(current)
 
    !> Residuals for each Jacobian allowed.

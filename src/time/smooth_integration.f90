@@ -154,7 +154,7 @@ contains
    integer(c_int) function evaluate(t, y_vector, slope_vector, user_data) bind(c, name='') &
       result(status)
       real(c_double), value :: t
-      type(n_vector) :: y_vector, slope_vector
+      type(n_vector), intent(inout) :: y_vector, slope_vector
       type(c_ptr), value :: user_data
       type(acceleration_type), pointer :: a
       real(c_double), pointer :: y(:), slope(:)

@@ -101,8 +101,9 @@ contains
 
       spacing = self%spacing
       call try(self, stepper, system, best, best%omega + spacing, high, iterations, error)
-      if (.not. allocated(error)) &
+      if (.not. allocated(error)) then
          call try(self, stepper, system, best, best%omega - spacing, low, iterations, error)
+      end if
       do i = 1, max_climb
          if (allocated(error)) return
          spacing = climb_factor*spacing

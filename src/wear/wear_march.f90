@@ -153,8 +153,9 @@ contains
          self%complete = .true.
          if (self%n_steps == 0) then
             self%ending = 'no pair slips under pressure: nothing wears'
-            if (maxval(system%contact%slip) > 0.0_wp) &
+            if (maxval(system%contact%slip) > 0.0_wp) then
                self%ending = 'no pair has friction: by energy nothing wears'
+            end if
          else
             self%ending = 'steady state after '//to_text(self%n_steps)//' steps'
          end if
@@ -274,10 +275,12 @@ contains
       end if
       iterations = 0
       allocate (after%x(size(state%x)))
-      if (report%converged .and. self%options%max_depth_step > 0.0_wp) &
+      if (report%converged .and. self%options%max_depth_step > 0.0_wp) then
          call self%bdf%limit_step(largest/maxval(state%rate), report%converged)
-      if (report%converged) &
+      end if
+      if (report%converged) then
          call self%bdf%advance(after%x, after%cycles, iterations, report%converged)
+      end if
       if (report%converged) then
          ! Within its tolerance the integrator may take a little wear back; a joint does not.
          n = system%n_vibration()

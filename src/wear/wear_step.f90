@@ -114,8 +114,9 @@ contains
             call linear_step(self, system, before, cycles, after, report)
          end if
          ! At a kink linear steps may go to and fro; Newton's method with its line search does not.
-         if (.not. report%converged) &
+         if (.not. report%converged) then
             call try_implicitly(self, system, before, cycles, after, report)
+         end if
       case default
          call implicit_step(self, system, before, cycles, after, report)
       end select

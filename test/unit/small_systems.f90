@@ -402,7 +402,7 @@ contains
       end associate
       where (abs(x) <= 1.0_wp)
          r = sqrt(1.0_wp - min(1.0_wp, x**2)) - 0.5_wp
-      elsewhere
+      else where
          r = ieee_value(1.0_wp, ieee_quiet_nan)
       end where
    end subroutine broken_value

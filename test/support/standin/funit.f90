@@ -249,11 +249,18 @@ contains
       if (ieee_is_nan(real(expected)) .or. ieee_is_nan(aimag(expected))) return
       if (ieee_is_nan(real(found)) .or. ieee_is_nan(aimag(found))) return
       if (ieee_is_nan(tolerance)) return
-      within = found == expected
+      ! Infinities are equal, though their difference is no number.
+      within = same(real(expected), real(found)) .and. same(aimag(expected), aimag(found))
       if (within) return
       if (.not. (ieee_is_finite(abs(expected)) .and. ieee_is_finite(abs(found)))) return
       within = abs(found - expected) <= tolerance
    end function within
+
+   pure logical function same(a, b)
+      real(wp), intent(in) :: a, b
+
+      same = a <= b .and. a >= b
+   end function same
 
    subroutine equal_integer(expected, found, message, location)
       integer, intent(in) :: expected(..), found(..)
