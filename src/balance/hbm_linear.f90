@@ -15,6 +15,8 @@ submodule(fw_hbm) fw_hbm_linear
    implicit none (type, external)
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+   !> Part of a residual whose effect on a step is far below the tolerance of linear solutions.
+   real(wp), parameter :: negligible = 1.0e-9_wp
 
 contains
 
@@ -142,6 +144,7 @@ contains
          rhs(:, k) = -r(self%used(:self%n_active), k)
       end do
       if (self%n_active == m .or. self%n_active == 0) return
+      if (pinned_are_solved(self, m, nc, r)) return
       call to_complex(self%fourier, m, self%balance, self%complex_in)
       do h = 1, self%fourier%n_retained
          call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, self%complex_in(1, h), &
@@ -154,6 +157,29 @@ contains
       call contact_product(self, m, self%balance, spread_out=.true.)
       rhs = rhs - self%active_out(:self%n_active, :)
    end subroutine reduce_shaped
+
+   !> Whether what is left of the pinned rows is nothing to the others: so it is from the second
+   !> step on.
+   pure logical function pinned_are_solved(self, m, nc, r)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: r(m, nc)
+      real(wp) :: largest_pinned, largest
+      integer :: j, k
+
+      largest_pinned = 0.0_wp
+      largest = 0.0_wp
+      do k = 1, nc
+         do j = 1, m
+            if (self%place(j) > 0 .and. self%place(j) <= self%n_active) then
+               largest = max(largest, abs(r(j, k)))
+            else
+               largest_pinned = max(largest_pinned, abs(r(j, k)))
+            end if
+         end do
+      end do
+      pinned_are_solved = largest_pinned <= negligible*largest
+   end function pinned_are_solved
 
    module procedure expand
       integer :: m, nc

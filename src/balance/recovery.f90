@@ -3,6 +3,7 @@
 module fw_recovery
    use fw_kinds, only: wp
    use fw_kinds, only: pi
+   use fw_fourier, only: coefficient_count
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
    use fw_hbm, only: hbm_system
@@ -96,12 +97,14 @@ contains
       type(point_type), intent(inout) :: point
       type(fourier_type) :: all_harmonics
       real(wp), allocatable :: force(:, :, :)
-      integer :: n_pairs, c, h, i, k, n
+      integer :: n_pairs, h, k, n
 
       n_pairs = system%contact%n_pairs
-      all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
-      allocate (force(n_pairs, 3, all_harmonics%n_coefficients))
-      call system%contact%coefficients(system%fourier, all_harmonics, force)
+      allocate (force(n_pairs, 3, coefficient_count(n_harmonics)))
+      if (system%fourier%n_retained <= n_harmonics) then
+         all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
+         call system%contact%coefficients(system%fourier, all_harmonics, force)
+      end if
       do h = 1, system%fourier%n_retained
          n = system%fourier%harmonic(h)
          do k = 0, merge(0, 1, n == 0)
@@ -109,11 +112,9 @@ contains
                system%contact%force(:, :, system%fourier%column(h) + k)
          end do
       end do
-      allocate (point%force(3, n_pairs, all_harmonics%n_coefficients))
-      do c = 1, 3
-         do i = 1, n_pairs
-            point%force(c, i, :) = force(i, c, :)
-         end do
+      allocate (point%force(3, n_pairs, size(force, 3)))
+      do k = 1, size(force, 3)
+         point%force(:, :, k) = transpose(force(:, :, k))
       end do
       allocate (point%fraction(3, n_pairs))
       call system%contact%fractions(point%fraction)
@@ -231,14 +232,18 @@ contains
       real(wp), intent(in) :: coefficients(:), tau
       real(wp), intent(out) :: value, slope, curvature
       real(wp) :: c, s
+      complex(wp) :: turn, angle
       integer :: n
 
+      turn = cmplx(cos(tau), sin(tau), wp)
+      angle = (1.0_wp, 0.0_wp)
       value = coefficients(1)
       slope = 0.0_wp
       curvature = 0.0_wp
       do n = 1, (size(coefficients) - 1)/2
-         c = coefficients(2*n)*cos(n*tau) + coefficients(2*n + 1)*sin(n*tau)
-         s = coefficients(2*n + 1)*cos(n*tau) - coefficients(2*n)*sin(n*tau)
+         angle = angle*turn
+         c = coefficients(2*n)*real(angle) + coefficients(2*n + 1)*aimag(angle)
+         s = coefficients(2*n + 1)*real(angle) - coefficients(2*n)*aimag(angle)
          value = value + c
          slope = slope + n*s
          curvature = curvature - real(n, wp)**2*c

@@ -5,7 +5,7 @@ module fw_lapack
    private
 
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
-   public :: dgeev
+   public :: dgeev, ztrsv
 
    interface
       subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
@@ -55,6 +55,14 @@ module fw_lapack
          real(wp), intent(inout) :: b(ldb, *)
          integer, intent(out) :: info
       end subroutine dgetrs
+
+      subroutine ztrsv(uplo, trans, diag, n, a, lda, x, incx)
+         import :: wp
+         character(1), intent(in) :: uplo, trans, diag
+         integer, intent(in) :: n, lda, incx
+         complex(wp), intent(in) :: a(lda, *)
+         complex(wp), intent(inout) :: x(*)
+      end subroutine ztrsv
 
       subroutine zgetrf(m, n, a, lda, ipiv, info)
          import :: wp

@@ -9,6 +9,7 @@ module fw_linalg
    use fw_lapack, only: dgetrs
    use fw_lapack, only: zgetrf
    use fw_lapack, only: zgetrs
+   use fw_lapack, only: ztrsv
    use fw_lapack, only: dsyevd
    use fw_lapack, only: dsygvd
    implicit none (type, external)
@@ -118,9 +119,30 @@ contains
       complex(wp), intent(inout), contiguous :: b(:, :)
       integer :: info
 
-      call zgetrs('N', self%n, n_right, self%matrix, size(self%matrix, 1), self%pivot, &
-                  b, size(b, 1), info)
+      if (n_right == 1) then
+         call solve_one(self, b)
+      else
+         call zgetrs('N', self%n, n_right, self%matrix, size(self%matrix, 1), self%pivot, &
+                     b, size(b, 1), info)
+      end if
    end subroutine solve_complex
+
+   !> One right-hand side: the solver for many packs the factors first, which takes as long as the
+   !> solution.
+   subroutine solve_one(self, b)
+      type(complex_lu_type), intent(in) :: self
+      complex(wp), intent(inout) :: b(*)
+      complex(wp) :: entry
+      integer :: i
+
+      do i = 1, self%n
+         entry = b(i)
+         b(i) = b(self%pivot(i))
+         b(self%pivot(i)) = entry
+      end do
+      call ztrsv('L', 'N', 'U', self%n, self%matrix, size(self%matrix, 1), b, 1)
+      call ztrsv('U', 'N', 'N', self%n, self%matrix, size(self%matrix, 1), b, 1)
+   end subroutine solve_one
 
    !> Eigenpairs of a x = value b x with b positive definite, ascending; x^T b x = 1.
    !> `done` is false where b is not positive definite (to working precision).

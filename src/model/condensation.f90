@@ -108,7 +108,7 @@ contains
       integer, intent(inout) :: n_failed
       complex(wp), allocatable :: coupling(:, :), solved(:, :), load(:, :)
       logical :: failed
-      integer :: m, n_i
+      integer :: m, n_i, j
       real(wp) :: s
       complex(wp), parameter :: one = (1.0_wp, 0.0_wp)
 
@@ -119,19 +119,44 @@ contains
          self%stiffness(:, :, h) = cmplx(b%k_qq - s**2*b%m_qq, s*b%c_qq, wp)
          self%load(:, h) = harmonic_load(b%load_q, self%harmonic(h))
          if (n_i == 0) return
-         coupling = cmplx(b%k_qi - s**2*b%m_qi, s*b%c_qi, wp)
-         allocate (solved(n_i, m + 1), load(m, 1))
-         solved(:, :m) = transpose(coupling)
+         allocate (coupling(n_i, m), solved(n_i, m + 1), load(m, 1))
+         do j = 1, m
+            coupling(:, j) = cmplx(b%k_iq(:, j) - s**2*b%m_iq(:, j), s*b%c_iq(:, j), wp)
+            solved(:, j) = coupling(:, j)
+         end do
          solved(:, m + 1) = harmonic_load(b%load_i, self%harmonic(h))
          call solve_internal(b, s, solved, failed)
          if (failed) n_failed = n_failed + 1
-         call zgemm('N', 'N', m, m, n_i, -one, coupling, m, solved, n_i, one, &
-                    self%stiffness(:, :, h), m)
-         call zgemm('N', 'N', m, 1, n_i, -one, coupling, m, solved(:, m + 1), n_i, &
+         call add_symmetric_product(m, n_i, coupling, solved, self%stiffness(:, :, h))
+         call zgemm('T', 'N', m, 1, n_i, -one, coupling, n_i, solved(:, m + 1), n_i, &
                     (0.0_wp, 0.0_wp), load, m)
          self%load(:, h) = self%load(:, h) + load(:, 1)
       end associate
    end subroutine condense
+
+   !> z = z - coupling^T solved, whose product is symmetric: by blocks of columns down to the diagonal,
+   !> the rest by its symmetry.
+   subroutine add_symmetric_product(m, n_i, coupling, solved, z)
+      integer, intent(in) :: m, n_i
+      complex(wp), intent(in) :: coupling(n_i, m), solved(n_i, *)
+      complex(wp), intent(inout) :: z(m, m)
+      complex(wp), parameter :: one = (1.0_wp, 0.0_wp)
+      !> Columns of a block: fewer leave the product no speed.
+      integer, parameter :: width = 48
+      integer :: first, last, j
+
+      do first = 1, m, width
+         last = min(first + width - 1, m)
+         call zgemm('T', 'N', last, last - first + 1, n_i, -one, coupling, n_i, &
+                    solved(1, first), n_i, one, z(1, first), m)
+      end do
+      do first = 1, m - width, width
+         last = first + width - 1
+         do j = first, last
+            z(last + 1:, j) = z(j, last + 1:)
+         end do
+      end do
+   end subroutine add_symmetric_product
 
    !> Complex load of a harmonic from the static, cosine and sine parts in columns.
    pure function harmonic_load(parts, n) result(load)
@@ -156,7 +181,7 @@ contains
       complex(wp), intent(inout), contiguous :: rhs(:, :)
       logical, intent(out) :: failed
       type(complex_lu_type) :: lu
-      complex(wp), allocatable :: diagonal(:)
+      complex(wp), allocatable :: diagonal(:), inverse(:)
       integer :: j
 
       failed = .false.
@@ -172,12 +197,12 @@ contains
          if (.not. failed) call lu%solve(size(rhs, 2), rhs)
       else
          diagonal = diagonal + cmplx(0.0_wp, s*basis%c_i, wp)
-         do j = 1, basis%n_internal
-            if (abs(diagonal(j)) > 0.0_wp) then
-               rhs(j, :) = rhs(j, :)/diagonal(j)
-            else if (s > 0.0_wp) then
-               failed = .true.
-            end if
+         failed = s > 0.0_wp .and. any(abs(diagonal) <= 0.0_wp)
+         inverse = diagonal
+         where (abs(diagonal) <= 0.0_wp) inverse = (1.0_wp, 0.0_wp)
+         inverse = 1.0_wp/inverse
+         do j = 1, size(rhs, 2)
+            rhs(:, j) = inverse*rhs(:, j)
          end do
       end if
       ! A free internal mode carries no static load (checked on construction): leave it at rest.
@@ -195,23 +220,31 @@ contains
       complex(wp), intent(in) :: q(:, :)
       !> Complex observed quantities (n_observed, n_retained).
       complex(wp), intent(out) :: observed(:, :)
-      complex(wp), allocatable :: coupling(:, :), xi(:, :)
+      complex(wp), allocatable :: xi(:, :)
+      real(wp), allocatable :: parts(:, :), elastic(:, :), inertial(:, :), damping(:, :)
       logical :: failed
-      integer :: h
+      integer :: h, n
       real(wp) :: s
 
-      allocate (xi(self%basis%n_internal, 1))
-      do h = 1, size(self%harmonic)
-         s = real(self%harmonic(h), wp)*self%omega
-         associate (b => self%basis)
+      n = size(self%harmonic)
+      associate (b => self%basis)
+         allocate (parts(self%n_coordinates, 2*n), xi(b%n_internal, 1))
+         parts(:, :n) = real(q, wp)
+         parts(:, n + 1:) = aimag(q)
+         elastic = matmul(b%k_iq, parts)
+         inertial = matmul(b%m_iq, parts)
+         damping = matmul(b%c_iq, parts)
+         do h = 1, n
+            s = real(self%harmonic(h), wp)*self%omega
             observed(:, h) = matmul(b%observe_q, q(:, h))
             if (b%n_internal == 0) cycle
-            coupling = cmplx(b%k_qi - s**2*b%m_qi, s*b%c_qi, wp)
-            xi(:, 1) = harmonic_load(b%load_i, self%harmonic(h)) - matmul(q(:, h), coupling)
+            xi(:, 1) = harmonic_load(b%load_i, self%harmonic(h)) - cmplx( &
+                       elastic(:, h) - s**2*inertial(:, h) - s*damping(:, n + h), &
+                       elastic(:, n + h) - s**2*inertial(:, n + h) + s*damping(:, h), wp)
             call solve_internal(b, s, xi, failed)
             observed(:, h) = observed(:, h) + matmul(b%observe_i, xi(:, 1))
-         end associate
-      end do
+         end do
+      end associate
    end subroutine recover
 
    !> d(Z_r q - F_r)/d omega at fixed q (n_coordinates, n_retained). With Z' = dZ/d omega of the
@@ -233,14 +266,14 @@ contains
          associate (b => self%basis)
             derivative(:, h) = n*matmul(cmplx(-2.0_wp*s*b%m_qq, b%c_qq, wp), q(:, h))
             if (b%n_internal == 0) cycle
-            coupling = cmplx(b%k_qi - s**2*b%m_qi, s*b%c_qi, wp)
-            slope = n*cmplx(-2.0_wp*s*b%m_qi, b%c_qi, wp)
-            xi(:, 1) = harmonic_load(b%load_i, self%harmonic(h)) - matmul(q(:, h), coupling)
+            coupling = cmplx(b%k_iq - s**2*b%m_iq, s*b%c_iq, wp)
+            slope = n*cmplx(-2.0_wp*s*b%m_iq, b%c_iq, wp)
+            xi(:, 1) = harmonic_load(b%load_i, self%harmonic(h)) - matmul(coupling, q(:, h))
             call solve_internal(b, s, xi, failed)
-            derivative(:, h) = derivative(:, h) + matmul(slope, xi(:, 1))
-            xi(:, 1) = matmul(q(:, h), slope) + n*internal_slope(b, s, xi(:, 1))
+            derivative(:, h) = derivative(:, h) + matmul(xi(:, 1), slope)
+            xi(:, 1) = matmul(slope, q(:, h)) + n*internal_slope(b, s, xi(:, 1))
             call solve_internal(b, s, xi, failed)
-            derivative(:, h) = derivative(:, h) - matmul(coupling, xi(:, 1))
+            derivative(:, h) = derivative(:, h) - matmul(xi(:, 1), coupling)
          end associate
       end do
    end subroutine frequency_derivative
@@ -271,7 +304,7 @@ contains
       associate (b => self%basis)
          static_stiffness = b%k_qq(i, i)
          if (b%n_internal > 0) then
-            static_stiffness = static_stiffness - sum(b%k_qi(i, :)**2/b%k_i, mask=abs(b%k_i) > 0)
+            static_stiffness = static_stiffness - sum(b%k_iq(:, i)**2/b%k_i, mask=abs(b%k_i) > 0)
          end if
       end associate
    end function static_stiffness

@@ -21,8 +21,8 @@ module fw_reduction
       integer, allocatable :: kept(:)
       !> Blocks of the coordinates (n_coordinates, n_coordinates).
       real(wp), allocatable :: k_qq(:, :), m_qq(:, :), c_qq(:, :)
-      !> Coupling blocks (n_coordinates, n_internal).
-      real(wp), allocatable :: k_qi(:, :), m_qi(:, :), c_qi(:, :)
+      !> Coupling blocks (n_internal, n_coordinates).
+      real(wp), allocatable :: k_iq(:, :), m_iq(:, :), c_iq(:, :)
       !> Diagonals of the internal modes (n_internal).
       real(wp), allocatable :: k_i(:), m_i(:), c_i(:)
       !> Internal damping, only where it is not diagonal (n_internal, n_internal).
@@ -119,7 +119,7 @@ contains
       where (abs(self%k_i) < free_stiffness) self%k_i = 0.0_wp
       t_i = product_of(t_i, modes)
       if (trial > 1) return
-      ! Static constraint modes: K_qi vanishes, and Z_r(0) is exact.
+      ! Static constraint modes: K_iq vanishes, and Z_r(0) is exact.
       k_iq = congruence(t_i, model%stiffness, t_q)
       t_q = t_q - product_of(t_i, k_iq)
    end subroutine internal_modes
@@ -137,9 +137,9 @@ contains
       self%k_qq = congruence(t_q, model%stiffness, t_q)
       self%m_qq = congruence(t_q, model%mass, t_q)
       self%c_qq = congruence(t_q, model%damping, t_q)
-      self%k_qi = congruence(t_q, model%stiffness, t_i)
-      self%m_qi = congruence(t_q, model%mass, t_i)
-      self%c_qi = congruence(t_q, model%damping, t_i)
+      self%k_iq = congruence(t_i, model%stiffness, t_q)
+      self%m_iq = congruence(t_i, model%mass, t_q)
+      self%c_iq = congruence(t_i, model%damping, t_q)
       damping = congruence(t_i, model%damping, t_i)
       self%c_i = [(damping(j, j), j=1, self%n_internal)]
       do j = 1, self%n_internal
