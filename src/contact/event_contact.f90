@@ -3,6 +3,8 @@
 !> sampling error: the instants of the transform only isolate the events, for which four for each
 !> wave of the highest harmonic are enough. With two they are the steps of slip.
 module fw_event_contact
+   use fw_event_cells, only: cells_type
+   use fw_event_cells, only: new_cells
    use fw_event_pair, only: event_pair_type
    use fw_event_planar, only: planar_pair_type
    use fw_fourier, only: fourier_type
@@ -22,6 +24,8 @@ module fw_event_contact
       type(event_pair_type), allocatable :: pair(:)
       type(planar_pair_type), allocatable :: planar(:)
       logical, allocatable :: is_planar(:)
+      !> Waves on the grid of the planar pairs.
+      type(cells_type), private :: cells
       !> Component of the one tangential direction of each pair, 0 where there is none.
       integer, allocatable :: direction(:)
       !> Whether a pair bears throughout, or never; whether it ever slips or opens; change of the
@@ -67,12 +71,10 @@ contains
       self%is_planar = present(1, :) .and. present(2, :)
       self%direction = findloc(present(1:2, :), .true., dim=1)
       self%has_normal = present(3, :)
+      if (any(self%is_planar)) self%cells = new_cells(fourier)
       do i = 1, self%n_pairs
          if (self%is_planar(i)) then
-            call self%planar(i)%reserve(maxval(fourier%harmonic), fourier%n_time, &
-                                        fourier%n_coefficients)
-            self%planar(i)%mu = mu(i)
-            self%planar(i)%remembers = remembers
+            call self%planar(i)%reserve(self%cells, mu(i), remembers)
             cycle
          end if
          call self%pair(i)%reserve(maxval(fourier%harmonic), fourier%n_time, fourier%n_coefficients)
@@ -97,18 +99,22 @@ contains
       real(wp), intent(inout) :: x(:, :)
       !> Coefficients of the contact forces (n_pairs, 3, n_coefficients).
       real(wp), intent(inout) :: force(:, :, :)
+      real(wp) :: start(2)
       integer :: c, i
 
-      call fill_batch(self, fourier, prediction)
-      call dgemm('T', 'N', fourier%n_time, 6*self%n_pairs, fourier%n_coefficients, 1.0_wp, &
-                 fourier%synthesis, fourier%n_coefficients, self%batch, fourier%n_coefficients, &
-                 0.0_wp, self%samples, fourier%n_time)
-      !$omp parallel do default(none) private(c, i) schedule(dynamic) &
+      if (.not. all(self%is_planar)) then
+         call fill_batch(self, fourier, prediction)
+         call dgemm('T', 'N', fourier%n_time, 6*self%n_pairs, fourier%n_coefficients, 1.0_wp, &
+                    fourier%synthesis, fourier%n_coefficients, self%batch, &
+                    fourier%n_coefficients, 0.0_wp, self%samples, fourier%n_time)
+      end if
+      !$omp parallel do default(none) private(c, i, start) schedule(dynamic) &
       !$omp shared(self, fourier, prediction, offset, x_start, force, x) &
       !$omp if(self%n_pairs >= pairs_for_threads)
       do i = 1, self%n_pairs
          if (self%is_planar(i)) then
-            call evaluate_planar(self, i, fourier, prediction(i, :, :), offset(i), x_start(i, :))
+            start = x_start(i, :)
+            call evaluate_planar(self, i, fourier, prediction(i, :, :), offset(i), start)
             do c = 1, 3
                force(i, c, :) = self%planar(i)%force(:, c)
             end do
@@ -189,29 +195,13 @@ contains
 
    !> A pair with two tangential directions.
    subroutine evaluate_planar(self, i, fourier, prediction, offset, x_start)
-      type(event_contact_type), intent(inout) :: self
+      class(event_contact_type), intent(inout) :: self
       integer, intent(in) :: i
       type(fourier_type), intent(in) :: fourier
-      real(wp), intent(in) :: prediction(:, :), offset, x_start(:)
-      real(wp) :: start(2)
-      integer :: h, k, n
+      real(wp), intent(in) :: prediction(:, :), offset, x_start(2)
 
       associate (pair => self%planar(i))
-         do h = 1, fourier%n_retained
-            n = fourier%harmonic(h)
-            k = fourier%column(h)
-            pair%tangential(n, 1, :) = prediction(1:2, k)
-            pair%normal(n, 1) = -prediction(3, k)
-            if (n == 0) cycle
-            pair%tangential(n, 2, :) = prediction(1:2, k + 1)
-            pair%normal(n, 2) = -prediction(3, k + 1)
-         end do
-         if (.not. fourier%has_constant()) pair%normal(0, 1) = 0.0_wp
-         pair%normal(0, 1) = pair%normal(0, 1) - offset
-         pair%values = self%samples(:, 4, i) - offset
-         pair%slopes = self%samples(:, 5, i)
-         start = x_start
-         call pair%follow(fourier, start)
+         call pair%follow(self%cells, fourier, prediction, offset, x_start)
          self%closed(i) = pair%closed
          self%open(i) = pair%open
          self%moved(i) = pair%moved
@@ -246,7 +236,7 @@ contains
 
    !> Transposed derivatives of pairs at the last evaluation: (coefficient, component) of the input,
    !> then of the output, pair.
-   subroutine linearize(self, fourier, wanted, x_start, jacobian)
+   subroutine linearize(self, fourier, wanted, x_start, jacobian, by_path)
       class(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
       !> Pairs to differentiate (n_pairs).
@@ -254,23 +244,28 @@ contains
       !> As in the evaluation (n_pairs, 2).
       real(wp), intent(in) :: x_start(:, :)
       real(wp), intent(inout) :: jacobian(:, :, :)
-      real(wp), allocatable :: block(:, :, :)
+      !> Derivatives of the friction paths (coefficient and component, pair), if they are wanted.
+      real(wp), intent(inout), optional :: by_path(:, :)
+      real(wp), allocatable :: block(:, :, :), path(:)
       real(wp) :: start(2)
       integer :: i, nc, t, n
 
       nc = fourier%n_coefficients
       n = 2*nc
-      !$omp parallel default(none) shared(self, fourier, wanted, x_start, jacobian, nc, n) &
-      !$omp private(block, start, i, t) if(self%n_pairs >= pairs_for_threads)
-      allocate (block(nc, nc, 3))
+      !$omp parallel default(none) shared(self, fourier, wanted, x_start, jacobian, by_path) &
+      !$omp shared(nc, n) private(block, path, start, i, t) if(self%n_pairs >= pairs_for_threads)
+      allocate (block(nc, nc, 3), path(3*nc))
       !$omp do schedule(dynamic)
       do i = 1, self%n_pairs
          if (.not. wanted(i)) cycle
          if (self%is_planar(i)) then
             start = x_start(i, :)
-            call self%planar(i)%derivative(fourier, start, jacobian(:, :, i))
+            call self%planar(i)%derivative(self%cells, fourier, start, present(by_path), &
+                                           jacobian(:, :, i), path)
+            if (present(by_path)) by_path(:, i) = path
             cycle
          end if
+         if (present(by_path)) call path_derivative(self, i, fourier, by_path(:, i))
          jacobian(:, :, i) = 0.0_wp
          if (fourier%projects) then
             call self%pair(i)%derivative(fourier%n_retained, fourier%harmonic, fourier%column, &
@@ -287,6 +282,22 @@ contains
       !$omp end do
       !$omp end parallel
    end subroutine linearize
+
+   !> Derivative of the friction path of a pair with at most one tangential direction.
+   subroutine path_derivative(self, i, fourier, by_path)
+      class(event_contact_type), intent(inout) :: self
+      integer, intent(in) :: i
+      type(fourier_type), intent(in) :: fourier
+      !> (coefficient, component).
+      real(wp), intent(inout) :: by_path(fourier%n_coefficients, 3)
+      real(wp) :: by_normal(fourier%n_coefficients)
+
+      by_path = 0.0_wp
+      if (self%direction(i) == 0) return
+      call self%pair(i)%path_derivative(fourier%n_retained, fourier%harmonic, fourier%column, &
+                                        by_path(:, self%direction(i)), by_normal)
+      if (self%has_normal(i)) by_path(:, 3) = by_normal
+   end subroutine path_derivative
 
    !> The derivatives of forces that are fitted at instants.
    subroutine collocate(pair, fourier, block)
@@ -340,14 +351,14 @@ contains
    subroutine values(self, force)
       class(event_contact_type), intent(inout) :: self
       real(wp), intent(inout) :: force(:, :, :)
-      real(wp) :: out(size(force, 3), 2)
+      real(wp) :: out(size(force, 3), 2), planar(3, size(force, 3))
       integer :: i
 
       force = 0.0_wp
       do i = 1, self%n_pairs
          if (self%is_planar(i)) then
-            force(i, 1:2, :) = self%planar(i)%on_grid
-            force(i, 3, :) = min(-self%planar(i)%values, 0.0_wp)
+            call self%planar(i)%sample(self%cells, planar)
+            force(i, :, :) = planar
             cycle
          end if
          call self%pair(i)%values_at(size(force, 3), out(:, 1), out(:, 2))
@@ -364,7 +375,7 @@ contains
 
       do i = 1, self%n_pairs
          if (self%is_planar(i)) then
-            path(i) = self%planar(i)%friction_path
+            path(i) = self%planar(i)%friction_path()
          else
             path(i) = self%pair(i)%friction_path()
          end if
@@ -379,7 +390,7 @@ contains
 
       do i = 1, self%n_pairs
          if (self%is_planar(i)) then
-            share(:, i) = self%planar(i)%share
+            share(:, i) = self%planar(i)%share()
          else
             share(:, i) = self%pair(i)%shares()
          end if

@@ -10,7 +10,6 @@
 !>
 !> Moments are stored for m = -2 degree..2 degree: C even, S odd.
 module fw_event_moments
-   use fw_event_polynomial, only: fill_waves
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    implicit none (type, external)
@@ -27,6 +26,7 @@ module fw_event_moments
       procedure :: clear
       procedure :: add_step
       procedure :: finish
+      procedure :: set
       procedure :: project
       procedure :: pairing
       procedure :: add_gram
@@ -77,6 +77,22 @@ contains
          self%sine(-m) = -self%sine(m)
       end do
    end subroutine finish
+
+   !> State the moments themselves: m = 0..2 degree.
+   pure subroutine set(self, cosine, sine)
+      class(moments_type), intent(inout) :: self
+      real(wp), intent(in) :: cosine(0:), sine(0:)
+      integer :: m
+
+      self%sine(0) = 0.0_wp
+      self%cosine(0) = cosine(0)
+      do m = 1, 2*self%degree
+         self%cosine(m) = cosine(m)
+         self%sine(m) = sine(m)
+         self%cosine(-m) = cosine(m)
+         self%sine(-m) = -sine(m)
+      end do
+   end subroutine set
 
    !> Add factor times the Fourier coefficients of chi p (harmonic k in coefficient(column)).
    pure subroutine project(self, factor, p, n_retained, harmonic, column, coefficient)

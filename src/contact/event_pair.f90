@@ -16,6 +16,7 @@ module fw_event_pair
    use fw_event_path, only: phase_forward
    use fw_event_path, only: phase_open
    use fw_event_path, only: phase_stick
+   use fw_event_polynomial, only: differentiate
    use fw_event_polynomial, only: fill_waves
    use fw_event_polynomial, only: value_of
    use fw_kinds, only: pi
@@ -36,6 +37,7 @@ module fw_event_pair
       type(moments_type) :: stick, slip, contact, held
       !> Workspace: waves of an angle (0:2 degree), waves at an origin and integrals of one stick.
       real(wp), allocatable, private :: cosines(:), sines(:), origin(:), integral(:)
+      real(wp), allocatable, private :: rate(:, :), normal_rate(:, :)
       type(moments_type), private :: one
    contains
       procedure :: reserve
@@ -45,6 +47,7 @@ module fw_event_pair
       procedure :: values_at
       procedure :: rows_at
       procedure :: friction_path
+      procedure :: path_derivative
       procedure :: shares
    end type event_pair_type
 
@@ -64,6 +67,7 @@ contains
       call self%one%reserve(degree)
       allocate (self%cosines(0:2*degree), self%sines(0:2*degree))
       allocate (self%origin(n_coefficients), self%integral(n_coefficients))
+      allocate (self%rate(0:degree, 2), self%normal_rate(0:degree, 2))
    end subroutine reserve
 
    !> Find the path of the pair from x_start, and the moments of its sets. The curves have been
@@ -196,7 +200,7 @@ contains
          call integrate_segment(self, j)
          self%integral = 0.0_wp
          call add_means(self%one, 1.0_wp, n_retained, harmonic, column, self%integral)
-         call waves_at_origin(self, j, n_retained, harmonic, column)
+         call waves_at(self, self%path%set_at(j), n_retained, harmonic, column)
          do k = 1, size(self%integral)
             by_tangential(:, k) = by_tangential(:, k) - self%integral(k)*self%origin
             by_normal(:, k) = by_normal(:, k) + &
@@ -218,18 +222,19 @@ contains
       call self%one%finish()
    end subroutine integrate_segment
 
-   !> Waves at the angle where the z of a stick was set.
-   pure subroutine waves_at_origin(self, j, n_retained, harmonic, column)
+   !> Waves of the coefficients at an angle, such as that where the z of a stick was set.
+   pure subroutine waves_at(self, angle, n_retained, harmonic, column)
       type(event_pair_type), intent(inout) :: self
-      integer, intent(in) :: j, n_retained, harmonic(n_retained), column(n_retained)
+      real(wp), intent(in) :: angle
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
       integer :: h
 
-      call fill_waves(self%curves%degree, self%path%set_at(j), self%cosines, self%sines)
+      call fill_waves(self%curves%degree, angle, self%cosines, self%sines)
       do h = 1, n_retained
          self%origin(column(h)) = self%cosines(harmonic(h))
          if (harmonic(h) > 0) self%origin(column(h) + 1) = self%sines(harmonic(h))
       end do
-   end subroutine waves_at_origin
+   end subroutine waves_at
 
    !> Contact forces at n_time uniform instants: what collocation and histories take.
    pure subroutine values_at(self, n_time, tangential, normal)
@@ -300,7 +305,7 @@ contains
          case (phase_stick)
             by_tangential(:, k) = waves(:, k)
             if (.not. self%path%set(j)) cycle
-            if (j /= last) call waves_at_origin(self, j, n_retained, harmonic, column)
+            if (j /= last) call waves_at(self, self%path%set_at(j), n_retained, harmonic, column)
             last = j
             by_tangential(:, k) = by_tangential(:, k) - self%origin
             by_normal(:, k) = (self%curves%mu*self%path%weight(j))*self%origin
@@ -313,30 +318,121 @@ contains
       end do
    end subroutine rows_at
 
-   !> int N |dx| over the period, x the corrected position in units of force: what wears. At
-   !> velocity level x moves by P - T for each radian.
+   !> int N |dx| over the period, x the corrected position in units of force: what wears. With chi
+   !> the sets of forward less backward slip and of all slip, it is
+   !>
+   !>   int chi_slip N P' - mu int chi_all N N'        (x moves with the bound that pushes it),
+   !>   int chi_slip N P - mu int chi_all N N          at velocity level, where x moves by P - T.
    real(wp) function friction_path(self) result(path)
       class(event_pair_type), intent(inout) :: self
-      integer :: j
 
       path = 0.0_wp
       if (.not. self%rubs) return
-      do j = 1, self%path%n_segments
-         if (all(self%path%phase(j) /= [phase_forward, phase_backward])) cycle
-         call integrate_segment(self, j)
-         associate (c => self%curves)
-            if (self%remembers .and. self%path%phase(j) == phase_forward) then
-               path = path + self%one%pairing(c%normal, c%lower_slope)
-            else if (self%remembers) then
-               path = path - self%one%pairing(c%normal, c%upper_slope)
-            else if (self%path%phase(j) == phase_forward) then
-               path = path + self%one%pairing(c%normal, c%lower)
-            else
-               path = path - self%one%pairing(c%normal, c%upper)
-            end if
-         end associate
-      end do
+      call set_rates(self)
+      associate (c => self%curves)
+         path = self%slip%pairing(c%normal, self%rate) - &
+                c%mu*self%one%pairing(c%normal, self%normal_rate)
+      end associate
    end function friction_path
+
+   !> P' and N' (P and N at velocity level), and the moments of all slip in self%one.
+   pure subroutine set_rates(self)
+      type(event_pair_type), intent(inout) :: self
+
+      self%one%cosine = self%contact%cosine - self%stick%cosine
+      self%one%sine = self%contact%sine - self%stick%sine
+      associate (c => self%curves)
+         if (self%remembers) then
+            call differentiate(c%degree, c%tangential, self%rate)
+            call differentiate(c%degree, c%normal, self%normal_rate)
+         else
+            self%rate = c%tangential
+            self%normal_rate = c%normal
+         end if
+      end associate
+   end subroutine set_rates
+
+   !> Derivative of the friction path by the coefficients of P and of y_n = -N. Where slip begins
+   !> out of stick the rate jumps, at an angle that moves until the bound L meets z: that adds
+   !> N (dL - dz) forward, -N (dL - dz) backward.
+   pure subroutine path_derivative(self, n_retained, harmonic, column, by_tangential, by_normal)
+      class(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> (n_coefficients).
+      real(wp), intent(inout) :: by_tangential(:), by_normal(:)
+      real(wp) :: raw(size(by_normal), 4)
+      integer :: j
+
+      raw = 0.0_wp
+      call set_rates(self)
+      associate (c => self%curves, n => n_retained)
+         call self%slip%project(pi, c%normal, n, harmonic, column, raw(:, 1))
+         call self%slip%project(pi, self%rate, n, harmonic, column, raw(:, 2))
+         call self%one%project(pi, self%normal_rate, n, harmonic, column, raw(:, 3))
+         call self%one%project(pi, c%normal, n, harmonic, column, raw(:, 4))
+         ! Projections halve the constant.
+         if (harmonic(1) == 0) raw(column(1), :) = 2.0_wp*raw(column(1), :)
+         if (self%remembers) then
+            call transpose_slope(n, harmonic, column, raw(:, 1))
+            call transpose_slope(n, harmonic, column, raw(:, 4))
+         end if
+         by_tangential = raw(:, 1)
+         by_normal = -raw(:, 2) + c%mu*(raw(:, 3) + raw(:, 4))
+      end associate
+      if (.not. self%remembers) return
+      do j = 1, self%path%n_segments
+         select case (self%path%phase(j))
+         case (phase_forward)
+            call add_onset(self, j, 1.0_wp, n_retained, harmonic, column, by_tangential, by_normal)
+         case (phase_backward)
+            call add_onset(self, j, -1.0_wp, n_retained, harmonic, column, by_tangential, by_normal)
+         end select
+      end do
+   end subroutine path_derivative
+
+   !> Integrals of p times the slopes of the waves from those of p times the waves.
+   pure subroutine transpose_slope(n_retained, harmonic, column, integral)
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      real(wp), intent(inout) :: integral(*)
+      real(wp) :: on_cosine
+      integer :: h, k
+
+      do h = 1, n_retained
+         k = column(h)
+         on_cosine = integral(k)
+         if (harmonic(h) == 0) then
+            integral(k) = 0.0_wp
+         else
+            integral(k) = -real(harmonic(h), wp)*integral(k + 1)
+            integral(k + 1) = real(harmonic(h), wp)*on_cosine
+         end if
+      end do
+   end subroutine transpose_slope
+
+   !> What the angle adds where slip begins; nothing where the pair lands, N being 0.
+   pure subroutine add_onset(self, j, side, n_retained, harmonic, column, by_tangential, by_normal)
+      class(event_pair_type), intent(inout) :: self
+      integer, intent(in) :: j, n_retained, harmonic(n_retained), column(n_retained)
+      !> +1 forward, -1 backward.
+      real(wp), intent(in) :: side
+      real(wp), intent(inout) :: by_tangential(:), by_normal(:)
+      real(wp) :: normal
+
+      associate (c => self%curves, path => self%path)
+         if (j > 1) then
+            if (path%phase(j - 1) == phase_open) return
+         end if
+         call waves_at(self, path%angle(j), n_retained, harmonic, column)
+         normal = value_of(c%degree, c%normal, self%cosines, self%sines)
+         ! dL = dP - side dQ, dQ = -mu dy_n.
+         by_tangential = by_tangential + side*normal*self%origin
+         by_normal = by_normal + normal*c%mu*self%origin
+         if (.not. path%set(j)) return
+         call waves_at(self, path%set_at(j), n_retained, harmonic, column)
+         by_tangential = by_tangential - side*normal*self%origin
+         by_normal = by_normal + side*normal*c%mu*path%weight(j)*self%origin
+      end associate
+   end subroutine add_onset
 
    !> Share of the period in stick, slip and open.
    pure function shares(self)

@@ -9,6 +9,8 @@
 !>
 !>   v_1 = exp(Omega) v_0,   Omega = h/2 (A_1 + A_2) - sqrt(3)/12 h**2 [A_1, A_2].
 !>
+!> The exponential does not depend on v: one for each step serves every turn.
+!>
 !> Where a pair lands, R = 0 and a is infinite, but phi is smooth: there it is a quadratic that
 !> satisfies the equation at the Gauss points.
 module fw_event_rotation
@@ -16,7 +18,8 @@ module fw_event_rotation
    implicit none (type, external)
    private
 
-   public :: gauss_point, rotate, rotation_derivative, direction_of, half_angle
+   public :: gauss_point, direction_of, half_angle
+   public :: rotation_type, new_rotation, rotate, rotation_derivative
    public :: arc_type, new_arc
 
    !> Places of the two Gauss points in a step.
@@ -25,6 +28,13 @@ module fw_event_rotation
    !> Factor of h**2 (a_2 x a_1) in the antisymmetric part of Omega.
    real(wp), parameter :: commutator = sqrt(3.0_wp)/24.0_wp
    integer, parameter :: newton_steps = 20
+
+   !> exp(Omega) up to a factor: 1 + ratio Omega, Omega = [[p, q + r], [q - r, -p]].
+   type :: rotation_type
+      real(wp) :: h = 0.0_wp, p = 0.0_wp, q = 0.0_wp, r = 0.0_wp
+      !> tanh(s)/s, s**2 = p**2 + q**2 - r**2, its derivative by s**2, and 1/cosh(s)**2.
+      real(wp) :: ratio = 0.0_wp, slope = 0.0_wp, decay = 0.0_wp
+   end type rotation_type
 
    !> phi = phi_0 + slope s + curvature s**2 behind a landing.
    type :: arc_type
@@ -48,21 +58,32 @@ contains
    pure function half_angle(d) result(v)
       real(wp), intent(in) :: d(2)
       real(wp) :: v(2)
-      real(wp) :: phi
+      real(wp) :: length
 
-      phi = 0.5_wp*atan2(d(2), d(1))
-      v = [cos(phi), sin(phi)]
+      v = [1.0_wp, 0.0_wp]
+      length = norm2(d)
+      if (length <= 0.0_wp) return
+      ! 2 cos**2 = 1 + d_x/|d|, 2 sin**2 = 1 - d_x/|d|, 2 sin cos = d_y/|d|: without cancellation.
+      if (d(1) >= 0.0_wp) then
+         v(1) = sqrt(0.5_wp*(1.0_wp + d(1)/length))
+         v(2) = 0.5_wp*d(2)/(length*v(1))
+      else
+         v(2) = sign(sqrt(0.5_wp*(1.0_wp - d(1)/length)), d(2))
+         v(1) = 0.5_wp*d(2)/(length*v(2))
+      end if
    end function half_angle
 
-   !> Omega = [[p, q + r], [q - r, -p]] of a step.
-   pure subroutine exponent(h, a_1, a_2, p, q, r)
+   !> The rotation of a step.
+   pure type(rotation_type) function new_rotation(h, a_1, a_2) result(self)
+      !> Length of the step, and P'/R at its Gauss points.
       real(wp), intent(in) :: h, a_1(2), a_2(2)
-      real(wp), intent(out) :: p, q, r
 
-      p = 0.25_wp*h*(a_1(1) + a_2(1))
-      q = 0.25_wp*h*(a_1(2) + a_2(2))
-      r = commutator*h**2*(a_2(1)*a_1(2) - a_2(2)*a_1(1))
-   end subroutine exponent
+      self%h = h
+      self%p = 0.25_wp*h*(a_1(1) + a_2(1))
+      self%q = 0.25_wp*h*(a_1(2) + a_2(2))
+      self%r = commutator*h**2*(a_2(1)*a_1(2) - a_2(2)*a_1(1))
+      call hyperbolic(self%p**2 + self%q**2 - self%r**2, self%ratio, self%slope, self%decay)
+   end function new_rotation
 
    !> exp(Omega) = cosh (1 + ratio Omega): ratio = tanh(s)/s, s**2 = p**2 + q**2 - r**2, its
    !> derivative by s**2, and 1/cosh**2.
@@ -99,38 +120,39 @@ contains
       slope = (decay - ratio)/(2.0_wp*square)
    end subroutine hyperbolic
 
-   !> Half-angle vector after a step (of length 1).
-   pure function rotate(h, a_1, a_2, v) result(after)
-      !> Length of the step, P'/R at its Gauss points, and the vector before it.
-      real(wp), intent(in) :: h, a_1(2), a_2(2), v(2)
-      real(wp) :: after(2)
-      real(wp) :: p, q, r, ratio, slope, decay
+   !> Half-angle vector (of length 1) after a step, and the derivative of phi by that before it.
+   pure subroutine rotate(step, v, after, gain)
+      type(rotation_type), intent(in) :: step
+      real(wp), intent(in) :: v(2)
+      real(wp), intent(out) :: after(2), gain
+      real(wp) :: square
 
-      call exponent(h, a_1, a_2, p, q, r)
-      call hyperbolic(p**2 + q**2 - r**2, ratio, slope, decay)
-      after = [v(1) + ratio*(p*v(1) + (q + r)*v(2)), v(2) + ratio*((q - r)*v(1) - p*v(2))]
-      after = after/norm2(after)
-   end function rotate
-
-   !> Derivatives of phi after a step by phi before it and by a at the Gauss points.
-   pure subroutine rotation_derivative(h, a_1, a_2, v, gain, by_a_1, by_a_2)
-      real(wp), intent(in) :: h, a_1(2), a_2(2), v(2)
-      real(wp), intent(out) :: gain, by_a_1(2), by_a_2(2)
-      real(wp) :: p, q, r, ratio, slope, decay, m(2), after(2), by(3), square
-
-      call exponent(h, a_1, a_2, p, q, r)
-      call hyperbolic(p**2 + q**2 - r**2, ratio, slope, decay)
-      m = [p*v(1) + (q + r)*v(2), (q - r)*v(1) - p*v(2)]
-      after = v + ratio*m
-      square = dot_product(after, after)
+      after(1) = v(1) + step%ratio*(step%p*v(1) + (step%q + step%r)*v(2))
+      after(2) = v(2) + step%ratio*((step%q - step%r)*v(1) - step%p*v(2))
+      square = after(1)**2 + after(2)**2
       ! The determinant of the exponential is 1.
-      gain = decay/square
-      by(1) = cross(after, 2.0_wp*slope*p*m + ratio*[v(1), -v(2)])
-      by(2) = cross(after, 2.0_wp*slope*q*m + ratio*[v(2), v(1)])
-      by(3) = cross(after, -2.0_wp*slope*r*m + ratio*[v(2), -v(1)])
-      by = 2.0_wp*by/square
-      by_a_1 = 0.25_wp*h*by(1:2) + commutator*h**2*by(3)*[-a_2(2), a_2(1)]
-      by_a_2 = 0.25_wp*h*by(1:2) + commutator*h**2*by(3)*[a_1(2), -a_1(1)]
+      gain = step%decay/square
+      after = after/sqrt(square)
+   end subroutine rotate
+
+   !> Derivatives of phi after a step by a at the Gauss points.
+   pure subroutine rotation_derivative(step, a_1, a_2, v, by_a_1, by_a_2)
+      type(rotation_type), intent(in) :: step
+      real(wp), intent(in) :: a_1(2), a_2(2), v(2)
+      real(wp), intent(out) :: by_a_1(2), by_a_2(2)
+      real(wp) :: m(2), after(2), by(3), along
+
+      associate (p => step%p, q => step%q, r => step%r, ratio => step%ratio)
+         m = [p*v(1) + (q + r)*v(2), (q - r)*v(1) - p*v(2)]
+         after = v + ratio*m
+         along = 2.0_wp*step%slope*cross(after, m)
+         by(1) = along*p + ratio*cross(after, [v(1), -v(2)])
+         by(2) = along*q + ratio*cross(after, [v(2), v(1)])
+         by(3) = -along*r + ratio*cross(after, [v(2), -v(1)])
+      end associate
+      by = 2.0_wp*by/dot_product(after, after)
+      by_a_1 = 0.25_wp*step%h*by(1:2) + commutator*step%h**2*by(3)*[-a_2(2), a_2(1)]
+      by_a_2 = 0.25_wp*step%h*by(1:2) + commutator*step%h**2*by(3)*[a_1(2), -a_1(1)]
    end subroutine rotation_derivative
 
    pure real(wp) function cross(a, b)

@@ -15,8 +15,10 @@ module fw_forces
    use fw_event_contact, only: new_event_contact
    use fw_fourier, only: fourier_type
    use fw_lapack, only: dgemm
-   use fw_settling, only: limit_is_unique
-   use fw_settling, only: settle
+   use fw_sampled_turn, only: limit_is_unique
+   use fw_sampled_turn, only: settle_samples
+   use fw_settling, only: periodic_tolerance
+   use fw_settling, only: shakedown_turns
    use fw_slip, only: slip_gradient
    use fw_slip, only: slip_work
    use fw_threads, only: pairs_for_threads
@@ -33,14 +35,9 @@ module fw_forces
    !> Turns after which the limit of a march is looked for by Newton's method. One direction needs
    !> one; a random sample with two needed 4 at most, pairs of a blade root that creep thousands.
    integer, parameter :: plain_turns = 4
-   !> Turns that count in the derivative of a pair that shook down after more than plain_turns.
-   integer, parameter :: shakedown_turns = 60
    !> Change of x over the last turn, as a part of the largest predicted force, above which a march
    !> counts as not periodic.
    real(wp), parameter :: negligible_drift = 1.0e-9_wp
-   !> A march is periodic when x repeats to this part of the largest predicted force of the pair:
-   !> far below the tolerance of any balance, well above round-off.
-   real(wp), parameter :: periodic_tolerance = 1.0e-12_wp
    !> Distance from the friction cone, in the same measure, that round-off leaves of a pair that
    !> has settled on it.
    real(wp), parameter :: touch = 1.0e-10_wp
@@ -318,8 +315,8 @@ contains
       do i = first, last
          if (self%turns(i) > 0) cycle
          x = self%x(i, :)
-         call settle(self%n_pairs, n_time, i, self%prediction_time, self%mu(i), self%scale(i), &
-                     periodic_tolerance, x, self%settled(i))
+         call settle_samples(self%n_pairs, n_time, i, self%prediction_time, self%mu(i), &
+                             self%scale(i), periodic_tolerance, x, self%settled(i))
          self%x(i, :) = x
       end do
    end subroutine find_limits
@@ -337,7 +334,9 @@ contains
       nc = fourier%n_coefficients
       if (.not. allocated(self%jacobian)) allocate (self%jacobian(3*nc, 3*nc, self%n_pairs))
       if (allocated(self%events)) then
-         call self%events%linearize(fourier, self%state == pair_mixed, self%x_start, self%jacobian)
+         ! Where slip is not measured, the derivative of it is not allocated: not present.
+         call self%events%linearize(fourier, self%state == pair_mixed, self%x_start, &
+                                    self%jacobian, self%slip_derivative)
          return
       end if
       !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i) &

@@ -21,7 +21,31 @@ module fw_settling
    implicit none (type, external)
    private
 
-   public :: settle, turn_map, limit_is_unique
+   public :: period_map, settle, invert
+   public :: shakedown_turns, periodic_tolerance
+
+   !> A turn of one pair.
+   type, abstract :: period_map
+   contains
+      procedure(turn_interface), deferred :: turn
+   end type period_map
+
+   abstract interface
+      !> From a position x, to that a period after, with its derivative m by x.
+      subroutine turn_interface(self, x, after, m)
+         import :: period_map, wp
+         implicit none (type, external)
+         class(period_map), intent(inout) :: self
+         real(wp), intent(in) :: x(2)
+         real(wp), intent(out) :: after(2), m(2, 2)
+      end subroutine turn_interface
+   end interface
+
+   !> Turns that count in the derivative of a pair that shook down after more than a few.
+   integer, parameter :: shakedown_turns = 60
+   !> A march is periodic when x repeats to this part of the largest predicted force of the pair:
+   !> far below the tolerance of any balance, well above round-off.
+   real(wp), parameter :: periodic_tolerance = 1.0e-12_wp
 
    !> Turns with their derivatives before a pair is given up.
    integer, parameter :: max_turns = 100
@@ -37,10 +61,10 @@ module fw_settling
 contains
 
    !> From a position to the limit of the turns that follow.
-   pure subroutine settle(n_pairs, n_time, pair, y, mu, scale, tolerance, x, done)
-      integer, intent(in) :: n_pairs, n_time, pair
-      !> Predicted forces, friction coefficient, size of the tangential forces of the pair.
-      real(wp), intent(in) :: y(n_pairs, 3, n_time), mu, scale
+   subroutine settle(map, scale, tolerance, x, done)
+      class(period_map), intent(inout) :: map
+      !> Size of the tangential forces of the pair.
+      real(wp), intent(in) :: scale
       !> On the distance from the limit, over the scale.
       real(wp), intent(in) :: tolerance
       !> Corrected position [force].
@@ -51,7 +75,7 @@ contains
       integer :: turn, k
       logical :: better
 
-      call turn_map(n_pairs, n_time, pair, y, mu, 0.0_wp, x, after, m)
+      call map%turn(x, after, m)
       turn = 1
       do
          call newton_step(m, after - x, step)
@@ -61,7 +85,7 @@ contains
          better = .false.
          do k = 0, max_halvings
             trial = x + 0.5_wp**k*step
-            call turn_map(n_pairs, n_time, pair, y, mu, 0.0_wp, trial, trial_after, trial_m)
+            call map%turn(trial, trial_after, trial_m)
             turn = turn + 1
             movement = norm2(trial_after - trial)
             better = movement > 0.0_wp .and. &
@@ -74,26 +98,11 @@ contains
             m = trial_m
          else
             x = after
-            call turn_map(n_pairs, n_time, pair, y, mu, 0.0_wp, x, after, m)
+            call map%turn(x, after, m)
             turn = turn + 1
          end if
       end do
    end subroutine settle
-
-   !> Whether the discs that hold the limit x determine it alone, without its start: every direction
-   !> of x shrinks in a turn. `inverse` is (I - M)^-1 then. A pair that has shaken down into the
-   !> corner between two discs touches them, and round-off must not decide whether they count.
-   pure subroutine limit_is_unique(n_pairs, n_time, pair, y, mu, touch, x, unique, inverse)
-      integer, intent(in) :: n_pairs, n_time, pair
-      !> As settle.
-      real(wp), intent(in) :: y(n_pairs, 3, n_time), mu, touch, x(2)
-      logical, intent(out) :: unique
-      real(wp), intent(out) :: inverse(2, 2)
-      real(wp) :: after(2), m(2, 2)
-
-      call turn_map(n_pairs, n_time, pair, y, mu, touch, x, after, m)
-      call invert(m, inverse, unique)
-   end subroutine limit_is_unique
 
    !> Solve (I - M) step = move; the movement itself where I - M is singular.
    pure subroutine newton_step(m, move, step)
@@ -125,33 +134,5 @@ contains
       inverse(2, 1) = m(2, 1)/determinant
       inverse(2, 2) = (1.0_wp - m(1, 1))/determinant
    end subroutine invert
-
-   !> One turn from x, and its derivative by x.
-   pure subroutine turn_map(n_pairs, n_time, pair, y, mu, touch, x, after, m)
-      integer, intent(in) :: n_pairs, n_time, pair
-      real(wp), intent(in) :: y(n_pairs, 3, n_time), mu, x(2)
-      !> Distance from a disc within which the position counts as held by it [force].
-      real(wp), intent(in) :: touch
-      real(wp), intent(out) :: after(2), m(2, 2)
-      real(wp) :: d(2), e(2), along(2), length, limit
-      integer :: k
-
-      after = x
-      m = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
-      do k = 1, n_time
-         limit = mu*max(-y(pair, 3, k), 0.0_wp)
-         d(1) = y(pair, 1, k) - after(1)
-         d(2) = y(pair, 2, k) - after(2)
-         length = sqrt(d(1)**2 + d(2)**2)
-         if (length <= limit - touch) cycle
-         ! x = y - (mu p/|d|) d: what points along d is lost, the rest shrinks.
-         e = d/length
-         after(1) = y(pair, 1, k) - limit*e(1)
-         after(2) = y(pair, 2, k) - limit*e(2)
-         along = e(1)*m(1, :) + e(2)*m(2, :)
-         m(1, :) = (limit/length)*(m(1, :) - e(1)*along)
-         m(2, :) = (limit/length)*(m(2, :) - e(2)*along)
-      end do
-   end subroutine turn_map
 
 end module fw_settling

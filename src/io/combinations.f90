@@ -4,7 +4,6 @@ module fw_combinations
    use fw_contact_data, only: law_penalty
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_harmonics_options, only: sampling_uniform
    use fw_kinds, only: wp
    use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: continuation_natural
@@ -39,7 +38,7 @@ contains
       if (.not. allocated(error)) call check_wear(case, error)
    end subroutine check_combinations
 
-   !> The derivative of the sliding path is known for sampled forces.
+   !> What wear needs, and which schemes step it.
    subroutine check_wear(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
@@ -64,13 +63,7 @@ contains
          call fatal_error(error, "pseudo_time%scheme = 'runge_kutta' does not step wear, "// &
                           "which is stiff: use 'implicit_euler', 'rosenbrock' or 'bdf'", &
                           status_input)
-         return
       end if
-      if (case%harmonics%sampling == sampling_uniform) return
-      if (case%wear%scheme == wear_explicit) return
-      call fatal_error(error, "wear%scheme = 'implicit' and 'pseudo_time' need "// &
-                       "harmonics%sampling = 'uniform': use that, or scheme = 'explicit'", &
-                       status_input)
    end subroutine check_wear
 
    !> What sets the steps has to be something that the scheme has.

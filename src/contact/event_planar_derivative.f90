@@ -1,0 +1,453 @@
+!> Derivative of the force and of the friction path of a pair with two tangential directions, by the
+!> inputs of fw_event_planar_tangent: of the integrals of fw_event_planar_force along the same path.
+!> The force is continuous at every switch, so that no switch moves its integral; the rate of the
+!> friction path N pull jumps where slip begins out of stick, at an angle that moves by
+!>
+!>   dtheta = -(t.(dP - dz) - dR)/pull.
+module fw_event_planar_derivative
+   use fw_event_cells, only: cells_type
+   use fw_event_cells, only: waves_at
+   use fw_event_moments, only: moments_type
+   use fw_event_motion, only: instant_type
+   use fw_event_motion, only: motion_type
+   use fw_event_planar_force, only: first_instant
+   use fw_event_planar_force, only: simpson
+   use fw_event_planar_path, only: phase_slip
+   use fw_event_planar_path, only: phase_stick
+   use fw_event_planar_path, only: piece_type
+   use fw_event_planar_path, only: planar_path_type
+   use fw_event_planar_path, only: slide_of
+   use fw_event_planar_tangent, only: new_tangent
+   use fw_event_planar_tangent, only: tangent_type
+   use fw_event_polynomial, only: fill_waves
+   use fw_event_rotation, only: direction_of
+   use fw_event_slide, only: pull
+   use fw_event_slide, only: slide_type
+   use fw_fourier, only: fourier_type
+   use fw_kinds, only: wp
+   use fw_lapack, only: dgemm
+   implicit none (type, external)
+   private
+
+   public :: planar_derivative_type, new_derivative
+
+   !> Rows that one matrix product takes.
+   integer, parameter :: buffer_size = 128
+
+   type :: planar_derivative_type
+      type(tangent_type) :: tangent
+      !> Of the tangential coefficients and the friction path (input, coefficient and direction and
+      !> then the path).
+      real(wp), allocatable :: gradient(:, :)
+      !> The friction path is wanted.
+      logical, private :: measures = .false.
+      !> Inputs and weights of products that add up to the gradient (input, row), (output, row), and
+      !> the weight in the quadrature of the last row.
+      real(wp), allocatable, private :: row(:, :), projector(:, :)
+      integer, private :: n_rows = 0
+      real(wp), private :: last_weight = 0.0_wp
+      !> Directions of slip at the nodes times the weights of the quadrature (2, 2 n_cells), and
+      !> their moments (0:2 degree, direction).
+      real(wp), allocatable, private :: node(:, :), cosine(:, :), sine(:, :)
+   contains
+      procedure :: carry
+      procedure :: accumulate
+      procedure, private :: add_row
+      procedure, private :: flush_rows
+   end type planar_derivative_type
+
+contains
+
+   pure type(planar_derivative_type) function new_derivative(cells, measures) result(self)
+      type(cells_type), intent(in) :: cells
+      logical, intent(in) :: measures
+      integer :: n
+
+      self%tangent = new_tangent(cells%n_coefficients)
+      self%measures = measures
+      n = 2*cells%n_coefficients + 1
+      allocate (self%gradient(self%tangent%n_inputs, n), source=0.0_wp)
+      allocate (self%row(self%tangent%n_inputs, buffer_size), self%projector(n, buffer_size))
+      allocate (self%node(2, 2*cells%n_cells), source=0.0_wp)
+      allocate (self%cosine(0:2*cells%degree, 2), self%sine(0:2*cells%degree, 2), source=0.0_wp)
+   end function new_derivative
+
+   !> Carry the derivatives through a turn.
+   pure subroutine carry(self, path, motion, cells)
+      class(planar_derivative_type), intent(inout) :: self
+      type(planar_path_type), intent(in) :: path
+      type(motion_type), intent(inout) :: motion
+      type(cells_type), intent(in) :: cells
+      type(slide_type) :: slide
+      integer :: i, k
+
+      call self%tangent%start()
+      do i = 1, path%n_pieces
+         call begin_piece(self, path, motion, cells, i, .false.)
+         if (path%piece(i)%phase == phase_stick) cycle
+         slide = slide_of(path%piece(i), motion, cells)
+         do k = 1, 2
+            call self%tangent%advance(motion, cells, slide, k)
+         end do
+      end do
+      call end_turn(self, path, motion, cells)
+   end subroutine carry
+
+   !> The same, and the derivative of the integrals over the turn; self%gradient is complete then.
+   subroutine accumulate(self, path, motion, cells, fourier)
+      class(planar_derivative_type), intent(inout) :: self
+      type(planar_path_type), intent(in) :: path
+      type(motion_type), intent(inout) :: motion
+      type(cells_type), intent(in) :: cells
+      type(fourier_type), intent(in) :: fourier
+      integer :: i
+
+      call self%tangent%start()
+      do i = 1, path%n_pieces
+         call begin_piece(self, path, motion, cells, i, self%measures)
+         associate (piece => path%piece(i))
+            if (.not. fourier%projects) call add_samples(self, motion, cells, piece, fourier)
+            if (piece%phase == phase_slip) then
+               call add_slip(self, motion, cells, piece, fourier%projects)
+            else if (fourier%projects) then
+               call add_stick(self, cells, piece)
+            end if
+         end associate
+      end do
+      call self%flush_rows()
+      call end_turn(self, path, motion, cells)
+      if (fourier%projects) call add_turning(self, motion, cells)
+   end subroutine accumulate
+
+   !> What the switch at the start of a piece does.
+   pure subroutine begin_piece(self, path, motion, cells, i, records)
+      type(planar_derivative_type), intent(inout) :: self
+      type(planar_path_type), intent(in) :: path
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      integer, intent(in) :: i
+      !> The friction path is differentiated too.
+      logical, intent(in) :: records
+      type(instant_type) :: at
+
+      associate (piece => path%piece(i), tangent => self%tangent)
+         if (.not. piece%begins .or. motion%mu <= 0.0_wp) return
+         at = motion%look(piece%from)
+         if (piece%phase == phase_stick) then
+            if (piece%lands) then
+               call tangent%land(cells, at)
+            else if (i > 1) then
+               call tangent%stop_slip(motion, cells, at, path%piece(i - 1)%v(:, 3))
+            else if (.not. motion%remembers) then
+               tangent%dz = 0.0_wp
+            end if
+         else if (.not. piece%lands) then
+            call tangent%set_waves(cells, piece%from)
+            if (.not. motion%remembers) tangent%dz = 0.0_wp
+            call tangent%begin_slip(at, piece%z)
+            if (records .and. motion%remembers) call add_onset(self, motion, at, piece%v(:, 1))
+         end if
+      end associate
+   end subroutine begin_piece
+
+   !> The friction path loses -N pull dtheta = N (t.(dP - dz) - dR), dR = -mu dy_n.
+   pure subroutine add_onset(self, motion, at, v)
+      type(planar_derivative_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      type(instant_type), intent(in) :: at
+      real(wp), intent(in) :: v(2)
+      real(wp) :: t(2)
+      integer :: path, nc
+
+      t = direction_of(v)
+      nc = self%tangent%nc
+      path = size(self%gradient, 2)
+      associate (to => self%gradient(:, path), wave => self%tangent%wave)
+         to = to - at%normal*(t(1)*self%tangent%dz(:, 1) + t(2)*self%tangent%dz(:, 2))
+         to(:nc) = to(:nc) + at%normal*t(1)*wave
+         to(nc + 1:2*nc) = to(nc + 1:2*nc) + at%normal*t(2)*wave
+         to(2*nc + 1:3*nc) = to(2*nc + 1:3*nc) + at%normal*motion%mu*wave
+      end associate
+   end subroutine add_onset
+
+   !> Position at the end of the turn, in the place of that at its start.
+   pure subroutine end_turn(self, path, motion, cells)
+      type(planar_derivative_type), intent(inout) :: self
+      type(planar_path_type), intent(in) :: path
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      integer :: c
+
+      associate (last => path%piece(max(path%n_pieces, 1)), tangent => self%tangent)
+         if (path%lifted(path%n_knots - 1) .or. motion%mu <= 0.0_wp) then
+            tangent%dz = 0.0_wp
+            call tangent%set_waves(cells, 0.0_wp)
+            do c = 1, 2
+               tangent%dz((c - 1)*tangent%nc + 1:c*tangent%nc, c) = tangent%wave
+            end do
+         else if (last%phase == phase_slip) then
+            call tangent%stop_slip(motion, cells, motion%at_node(cells, 1), last%v(:, 3))
+         end if
+      end associate
+   end subroutine end_turn
+
+   !> A row with its projector; products are made once there is no room for more.
+   subroutine add_row(self, row, projector, weight)
+      class(planar_derivative_type), intent(inout) :: self
+      real(wp), intent(in) :: row(:), projector(:), weight
+
+      if (self%n_rows == buffer_size) call self%flush_rows()
+      self%n_rows = self%n_rows + 1
+      self%row(:, self%n_rows) = row
+      self%projector(:, self%n_rows) = projector
+      self%last_weight = weight
+   end subroutine add_row
+
+   subroutine flush_rows(self)
+      class(planar_derivative_type), intent(inout) :: self
+      integer :: n, n_out
+
+      n = self%tangent%n_inputs
+      n_out = size(self%projector, 1)
+      if (self%n_rows > 0) then
+         call dgemm('N', 'T', n, n_out, self%n_rows, 1.0_wp, self%row, n, self%projector, n_out, &
+                    1.0_wp, self%gradient, n)
+      end if
+      self%n_rows = 0
+   end subroutine flush_rows
+
+   !> Stick: -dz times the waves integrated over it; their slopes are n times their conjugates.
+   subroutine add_stick(self, cells, piece)
+      type(planar_derivative_type), intent(inout) :: self
+      type(cells_type), intent(in) :: cells
+      type(piece_type), intent(in) :: piece
+      real(wp) :: integral(cells%n_coefficients), projector(2*cells%n_coefficients + 1), n
+      integer :: c, h, k, nc
+
+      nc = cells%n_coefficients
+      call self%tangent%set_waves(cells, piece%to)
+      integral = self%tangent%slope
+      call self%tangent%set_waves(cells, piece%from)
+      integral = integral - self%tangent%slope
+      do h = 1, cells%n_retained
+         n = real(cells%harmonic(h), wp)
+         k = cells%column(h)
+         if (n > 0.0_wp) then
+            integral(k:k + 1) = -integral(k:k + 1)/n**2
+         else
+            integral(k) = piece%to - piece%from
+         end if
+      end do
+      do c = 1, 2
+         projector = 0.0_wp
+         projector((c - 1)*nc + 1:c*nc) = -cells%weight*integral
+         call self%add_row(self%tangent%dz(:, c), projector, 0.0_wp)
+      end do
+   end subroutine add_stick
+
+   !> Nodes of one stretch of slip: dT = dR t + R n dphi.
+   subroutine add_slip(self, motion, cells, piece, projects)
+      type(planar_derivative_type), intent(inout) :: self
+      type(motion_type), intent(inout) :: motion
+      type(cells_type), intent(in) :: cells
+      type(piece_type), intent(in) :: piece
+      logical, intent(in) :: projects
+      type(slide_type) :: slide
+      real(wp) :: weight
+      integer :: k
+
+      slide = slide_of(piece, motion, cells)
+      do k = 1, 3
+         if (k > 1) call self%tangent%advance(motion, cells, slide, k - 1)
+         weight = simpson(k)*(piece%to - piece%from)
+         if (self%measures) call add_path_node(self, motion, cells, slide, k, weight)
+         if (motion%mu <= 0.0_wp) cycle
+         if (k == 1 .and. .not. piece%begins .and. self%n_rows > 0 .and. &
+             self%last_weight > 0.0_wp) then
+            ! The end of the stretch before is the same node.
+            associate (last => self%projector(:, self%n_rows))
+               last = (1.0_wp + weight/self%last_weight)*last
+            end associate
+            if (projects) call turn_node(self, cells, slide, k, weight)
+         else
+            call add_node(self, motion, cells, slide, k, weight, projects)
+         end if
+      end do
+   end subroutine add_slip
+
+   !> One node: its rows by dphi, and by dR.
+   subroutine add_node(self, motion, cells, slide, k, weight, projects)
+      type(planar_derivative_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      type(slide_type), intent(in) :: slide
+      integer, intent(in) :: k
+      real(wp), intent(in) :: weight
+      logical, intent(in) :: projects
+      real(wp) :: t(2), projector(2*cells%n_coefficients + 1), wave(cells%n_coefficients)
+      real(wp) :: slope(cells%n_coefficients)
+      integer :: nc
+
+      if (.not. (projects .or. self%measures)) return
+      nc = cells%n_coefficients
+      projector = 0.0_wp
+      associate (at => slide%at(k))
+         t = direction_of(slide%v(:, k))
+         if (projects) then
+            if (slide%cell > 0) then
+               wave = cells%node(:, node_of(self, slide, k))
+            else
+               call waves_at(cells, at%angle, wave, slope)
+            end if
+            projector(:nc) = (-weight*at%radius*t(2))*cells%weight*wave
+            projector(nc + 1:2*nc) = (weight*at%radius*t(1))*cells%weight*wave
+            call turn_node(self, cells, slide, k, weight)
+         end if
+         if (self%measures .and. motion%remembers) then
+            projector(2*nc + 1) = weight*at%normal*(t(1)*at%dp(2) - t(2)*at%dp(1))
+         end if
+      end associate
+      call self%add_row(self%tangent%dphi, projector, weight)
+   end subroutine add_node
+
+   !> Node on the cells, for a stretch that covers one.
+   pure integer function node_of(self, slide, k)
+      type(planar_derivative_type), intent(in) :: self
+      type(slide_type), intent(in) :: slide
+      integer, intent(in) :: k
+
+      node_of = modulo(2*slide%cell + k - 3, size(self%node, 2)) + 1
+   end function node_of
+
+   !> The direction of slip at a node, for the Gram matrix of dR.
+   pure subroutine turn_node(self, cells, slide, k, weight)
+      type(planar_derivative_type), intent(inout) :: self
+      type(cells_type), intent(in) :: cells
+      type(slide_type), intent(in) :: slide
+      integer, intent(in) :: k
+      real(wp), intent(in) :: weight
+      real(wp) :: t(2), cosines(0:2*cells%degree), sines(0:2*cells%degree)
+      integer :: c
+
+      t = weight*direction_of(slide%v(:, k))
+      if (slide%cell > 0) then
+         associate (to => self%node(:, node_of(self, slide, k)))
+            to = to + t
+         end associate
+         return
+      end if
+      call fill_waves(2*cells%degree, slide%at(k)%angle, cosines, sines)
+      do c = 1, 2
+         self%cosine(:, c) = self%cosine(:, c) + t(c)*cosines
+         self%sine(:, c) = self%sine(:, c) + t(c)*sines
+      end do
+   end subroutine turn_node
+
+   !> What the friction path takes of a node beside dphi: d(N pull), with t fixed.
+   pure subroutine add_path_node(self, motion, cells, slide, k, weight)
+      type(planar_derivative_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      type(slide_type), intent(in) :: slide
+      integer, intent(in) :: k
+      real(wp), intent(in) :: weight
+      real(wp) :: t(2), rate, normal
+      integer :: nc, path
+
+      call self%tangent%set_waves(cells, slide%at(k)%angle)
+      t = direction_of(slide%v(:, k))
+      rate = weight*max(pull(motion, slide%at(k), slide%v(:, k)), 0.0_wp)
+      normal = weight*slide%at(k)%normal
+      nc = self%tangent%nc
+      path = size(self%gradient, 2)
+      associate (to => self%gradient(:, path), wave => self%tangent%wave, &
+                 slope => self%tangent%slope)
+         if (motion%remembers) then
+            to(:nc) = to(:nc) + normal*t(1)*slope
+            to(nc + 1:2*nc) = to(nc + 1:2*nc) + normal*t(2)*slope
+            to(2*nc + 1:3*nc) = to(2*nc + 1:3*nc) + normal*motion%mu*slope - rate*wave
+         else
+            to(:nc) = to(:nc) + normal*t(1)*wave
+            to(nc + 1:2*nc) = to(nc + 1:2*nc) + normal*t(2)*wave
+            to(2*nc + 1:3*nc) = to(2*nc + 1:3*nc) + (normal*motion%mu - rate)*wave
+         end if
+      end associate
+   end subroutine add_path_node
+
+   !> dT by dR: the Gram matrix of the waves under t, over the nodes.
+   subroutine add_turning(self, motion, cells)
+      type(planar_derivative_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      type(moments_type) :: moments
+      integer :: c, n, nc
+
+      n = 2*cells%degree + 1
+      nc = cells%n_coefficients
+      call dgemm('N', 'T', n, 2, size(self%node, 2), 1.0_wp, cells%cosine, n, self%node, 2, &
+                 1.0_wp, self%cosine, n)
+      call dgemm('N', 'T', n, 2, size(self%node, 2), 1.0_wp, cells%sine, n, self%node, 2, &
+                 1.0_wp, self%sine, n)
+      call moments%reserve(cells%degree)
+      do c = 1, 2
+         call moments%set(self%cosine(:, c), self%sine(:, c))
+         call moments%add_gram(-motion%mu, cells%n_retained, cells%harmonic, cells%column, &
+                               self%gradient(2*nc + 1:3*nc, (c - 1)*nc + 1:c*nc))
+      end do
+   end subroutine add_turning
+
+   !> Forces at the instants of a piece, fitted instead of projected.
+   subroutine add_samples(self, motion, cells, piece, fourier)
+      type(planar_derivative_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      type(piece_type), intent(in) :: piece
+      type(fourier_type), intent(in) :: fourier
+      real(wp) :: t(2), projector(2*cells%n_coefficients + 1)
+      type(instant_type) :: at
+      integer :: c, k, nc
+
+      nc = cells%n_coefficients
+      if (motion%mu <= 0.0_wp) return
+      do k = first_instant(cells, piece%from), cells%n_cells
+         if (cells%node_angle(2*k - 1) >= piece%to) exit
+         associate (weight => fourier%analysis(:, k))
+            if (.not. any(abs(weight) > 0.0_wp)) cycle
+            if (piece%phase == phase_slip) then
+               at = motion%at_node(cells, 2*k - 1)
+               t = direction_of(piece%v(:, 1))
+               projector(:nc) = -at%radius*t(2)*weight
+               projector(nc + 1:2*nc) = at%radius*t(1)*weight
+               projector(2*nc + 1) = 0.0_wp
+               call self%add_row(self%tangent%dphi, projector, 0.0_wp)
+               do c = 1, 2
+                  call add_outer(self, 3, c, -motion%mu*t(c), fourier%synthesis(:, k), weight)
+               end do
+               cycle
+            end if
+            do c = 1, 2
+               projector = 0.0_wp
+               projector((c - 1)*nc + 1:c*nc) = -weight
+               call self%add_row(self%tangent%dz(:, c), projector, 0.0_wp)
+               call add_outer(self, c, c, 1.0_wp, fourier%synthesis(:, k), weight)
+            end do
+         end associate
+      end do
+   end subroutine add_samples
+
+   !> Add a product of waves and weights to one block of the gradient.
+   pure subroutine add_outer(self, input, output, factor, wave, weight)
+      type(planar_derivative_type), intent(inout) :: self
+      integer, intent(in) :: input, output
+      real(wp), intent(in) :: factor, wave(:), weight(:)
+      integer :: k, nc
+
+      nc = self%tangent%nc
+      do k = 1, nc
+         associate (to => self%gradient((input - 1)*nc + 1:input*nc, (output - 1)*nc + k))
+            to = to + (factor*weight(k))*wave
+         end associate
+      end do
+   end subroutine add_outer
+
+end module fw_event_planar_derivative

@@ -1,0 +1,235 @@
+!> Integrals along the path of a pair with two tangential directions: the coefficients of its
+!> forces, shares of stick, slip and open, and the path of friction. Stick and contact are
+!> integrated exactly, slip by Simpson's rule over every stretch: an error of fourth order in the
+!> width of the cells.
+module fw_event_planar_force
+   use fw_event_cells, only: cells_type
+   use fw_event_cells, only: waves_at
+   use fw_event_moments, only: moments_type
+   use fw_event_motion, only: instant_type
+   use fw_event_motion, only: motion_type
+   use fw_event_planar_path, only: phase_slip
+   use fw_event_planar_path, only: phase_stick
+   use fw_event_planar_path, only: piece_type
+   use fw_event_planar_path, only: planar_path_type
+   use fw_event_planar_path, only: slide_of
+   use fw_event_polynomial, only: fill_waves
+   use fw_event_rotation, only: direction_of
+   use fw_event_slide, only: pull
+   use fw_event_slide, only: slide_type
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   use fw_lapack, only: dgemm
+   implicit none (type, external)
+   private
+
+   public :: planar_force_type, first_instant, simpson
+
+   !> Weights of start, middle and end.
+   real(wp), parameter :: simpson(3) = [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp
+
+   type :: planar_force_type
+      !> Projected coefficients (n_coefficients, 3), and mean of the tangential forces.
+      real(wp), allocatable :: projected(:, :)
+      real(wp) :: mean(2) = 0.0_wp
+      !> Shares of stick, slip and open; int N |dz|.
+      real(wp) :: share(3) = 0.0_wp, friction_path = 0.0_wp
+      !> Sets of stick and contact; stick weighted by z.
+      type(moments_type) :: stick, contact, held(2)
+      !> Tangential forces at the nodes times the weights of the quadrature (2, 2 n_cells).
+      real(wp), allocatable, private :: node(:, :)
+      real(wp), allocatable, private :: cosines(:), sines(:), wave(:), slope(:)
+   contains
+      procedure :: reserve
+      procedure :: integrate
+      procedure :: sample
+   end type planar_force_type
+
+contains
+
+   pure subroutine reserve(self, cells)
+      class(planar_force_type), intent(inout) :: self
+      type(cells_type), intent(in) :: cells
+
+      allocate (self%projected(cells%n_coefficients, 3), source=0.0_wp)
+      allocate (self%node(2, 2*cells%n_cells), source=0.0_wp)
+      call self%stick%reserve(cells%degree)
+      call self%contact%reserve(cells%degree)
+      call self%held(1)%reserve(cells%degree)
+      call self%held(2)%reserve(cells%degree)
+      allocate (self%cosines(0:2*cells%degree), self%sines(0:2*cells%degree))
+      allocate (self%wave(cells%n_coefficients), self%slope(cells%n_coefficients))
+   end subroutine reserve
+
+   !> Everything from a path.
+   subroutine integrate(self, path, motion, cells)
+      class(planar_force_type), intent(inout) :: self
+      type(planar_path_type), intent(in) :: path
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      integer :: c, i, nc
+
+      nc = cells%n_coefficients
+      self%projected = 0.0_wp
+      self%mean = 0.0_wp
+      self%share = 0.0_wp
+      self%friction_path = 0.0_wp
+      self%node = 0.0_wp
+      call self%stick%clear()
+      call self%held(1)%clear()
+      call self%held(2)%clear()
+      do i = 1, path%n_pieces
+         associate (piece => path%piece(i))
+            if (piece%phase == phase_stick) then
+               call add_stick(self, piece%from, -1.0_wp, piece%z)
+               call add_stick(self, piece%to, 1.0_wp, piece%z)
+               self%share(1) = self%share(1) + 0.5_wp/pi*(piece%to - piece%from)
+            else
+               call add_slip(self, motion, cells, piece)
+            end if
+         end associate
+      end do
+      call add_contact(self, path)
+      call dgemm('N', 'T', nc, 2, 2*cells%n_cells, 1.0_wp, cells%node, nc, self%node, 2, 1.0_wp, &
+                 self%projected, nc)
+      do c = 1, 2
+         self%mean(c) = self%mean(c) + 0.5_wp/pi*sum(self%node(c, :))
+         self%projected(:, c) = cells%weight*self%projected(:, c)
+      end do
+      call add_sets(self, motion, cells)
+   end subroutine integrate
+
+   !> One end of a stick: what the set and z lose there.
+   pure subroutine add_stick(self, angle, drop, z)
+      type(planar_force_type), intent(inout) :: self
+      real(wp), intent(in) :: angle, drop, z(2)
+      integer :: c
+
+      call fill_waves(size(self%cosines) - 1, angle, self%cosines, self%sines)
+      call self%stick%add_step(drop, angle, self%cosines, self%sines)
+      do c = 1, 2
+         call self%held(c)%add_step(drop*z(c), angle, self%cosines, self%sines)
+      end do
+   end subroutine add_stick
+
+   !> Nodes of one stretch of slip.
+   pure subroutine add_slip(self, motion, cells, piece)
+      type(planar_force_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      type(piece_type), intent(in) :: piece
+      type(slide_type) :: slide
+      real(wp) :: force(2), width
+      integer :: c, j, k
+
+      width = piece%to - piece%from
+      self%share(2) = self%share(2) + 0.5_wp/pi*width
+      slide = slide_of(piece, motion, cells)
+      do k = 1, 3
+         associate (at => slide%at(k), v => slide%v(:, k))
+            self%friction_path = self%friction_path + &
+                                 simpson(k)*width*at%normal*max(pull(motion, at, v), 0.0_wp)
+            force = simpson(k)*width*at%radius*direction_of(v)
+            if (piece%cell > 0) then
+               j = modulo(2*piece%cell + k - 3, 2*cells%n_cells) + 1
+               self%node(:, j) = self%node(:, j) + force
+               cycle
+            end if
+            call waves_at(cells, at%angle, self%wave, self%slope)
+            do c = 1, 2
+               self%mean(c) = self%mean(c) + 0.5_wp/pi*force(c)
+               self%projected(:, c) = self%projected(:, c) + force(c)*self%wave
+            end do
+         end associate
+      end do
+   end subroutine add_slip
+
+   !> Moments of contact: steps at 0, at the roots of N and at 2 pi.
+   pure subroutine add_contact(self, path)
+      type(planar_force_type), intent(inout) :: self
+      type(planar_path_type), intent(in) :: path
+      integer :: k
+      logical :: before, behind
+
+      call self%contact%clear()
+      before = .true.
+      do k = 1, path%n_knots
+         ! Behind the last knot nothing bears.
+         behind = k == path%n_knots .or. path%lifted(k)
+         if (behind .neqv. before) then
+            call fill_waves(size(self%cosines) - 1, path%knot(k), self%cosines, self%sines)
+            call self%contact%add_step(merge(1.0_wp, -1.0_wp, behind), path%knot(k), &
+                                       self%cosines, self%sines)
+         end if
+         before = behind
+      end do
+      call self%contact%finish()
+      self%share(3) = 1.0_wp - 0.5_wp/pi*self%contact%cosine(0)
+   end subroutine add_contact
+
+   !> What stick and contact leave in the coefficients.
+   pure subroutine add_sets(self, motion, cells)
+      type(planar_force_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      integer :: c, h, k
+
+      call self%stick%finish()
+      associate (n => cells%n_retained, harmonic => cells%harmonic, column => cells%column)
+         call self%contact%project(-1.0_wp, motion%normal, n, harmonic, column, &
+                                   self%projected(:, 3))
+         do c = 1, 2
+            call self%held(c)%finish()
+            call self%stick%project(1.0_wp, motion%tangential(:, :, c), n, harmonic, column, &
+                                    self%projected(:, c))
+            call self%stick%project(1.0_wp, motion%tangential(:, :, c), 1, [0], [1], &
+                                    self%mean(c:c))
+            self%mean(c) = self%mean(c) - 0.5_wp/pi*self%held(c)%cosine(0)
+            do h = 1, n
+               k = column(h)
+               self%projected(k, c) = self%projected(k, c) - &
+                                      cells%weight(k)*self%held(c)%cosine(harmonic(h))
+               if (harmonic(h) > 0) self%projected(k + 1, c) = self%projected(k + 1, c) - &
+                  cells%weight(k + 1)*self%held(c)%sine(harmonic(h))
+            end do
+         end do
+      end associate
+   end subroutine add_sets
+
+   !> Tangential forces at the starts of the cells (2, n_cells), for collocation and histories.
+   pure subroutine sample(self, path, motion, cells, values)
+      class(planar_force_type), intent(in) :: self
+      type(planar_path_type), intent(in) :: path
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      real(wp), intent(out) :: values(2, size(self%node, 2)/2)
+      type(instant_type) :: at
+      integer :: i, k
+
+      values = 0.0_wp
+      do i = 1, path%n_pieces
+         associate (piece => path%piece(i))
+            do k = first_instant(cells, piece%from), cells%n_cells
+               if (cells%node_angle(2*k - 1) >= piece%to) exit
+               at = motion%at_node(cells, 2*k - 1)
+               if (piece%phase == phase_slip) then
+                  values(:, k) = at%radius*direction_of(piece%v(:, 1))
+               else
+                  values(:, k) = at%p - piece%z
+               end if
+            end do
+         end associate
+      end do
+   end subroutine sample
+
+   !> The first start of a cell that is not before an angle.
+   pure integer function first_instant(cells, angle) result(k)
+      type(cells_type), intent(in) :: cells
+      real(wp), intent(in) :: angle
+
+      k = int(0.5_wp*angle/cells%half) + 1
+      if (cells%node_angle(2*k - 1) < angle) k = k + 1
+      if (k > 1 .and. cells%node_angle(2*k - 3) >= angle) k = k - 1
+   end function first_instant
+
+end module fw_event_planar_force
