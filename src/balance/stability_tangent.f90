@@ -91,7 +91,7 @@ contains
       end associate
    end subroutine relative_displacements
 
-   pure subroutine add_springs(system, rows, self)
+   subroutine add_springs(system, rows, self)
       class(hbm_system), intent(in) :: system
       real(wp), intent(in) :: rows(:, :)
       type(tangent_type), intent(inout) :: self
@@ -111,7 +111,7 @@ contains
    end subroutine add_springs
 
    !> Pairs that bear without friction.
-   pure subroutine add_gaps(system, rows, self)
+   subroutine add_gaps(system, rows, self)
       class(hbm_system), intent(in) :: system
       real(wp), intent(in) :: rows(:, :)
       type(tangent_type), intent(inout) :: self

@@ -53,8 +53,8 @@ contains
    end function coefficient_count
 
    !> Operators for the harmonics 0..n_harmonics, or only the odd ones.
-   !> n_time must be at least 2 n_harmonics + 1.
-   pure function new_fourier(n_harmonics, n_time, odd_only) result(self)
+   !> n_time must be at least 2 n_harmonics + 1. Not pure: plans of transforms are finalized.
+   function new_fourier(n_harmonics, n_time, odd_only) result(self)
       integer, intent(in) :: n_harmonics, n_time
       logical, intent(in), optional :: odd_only
       type(fourier_type) :: self

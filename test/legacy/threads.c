@@ -1,7 +1,7 @@
 /* Separate handles in separate threads: every case is run alone first, then all of them at the
  * same time, several times over; every number must come out the same to the bit.
  *
- *    threads sector_16.h5 directory
+ *    threads sector_16.h5 directory [rounds]
  *
  * The cases differ in what they use: model files and result files (HDF5), long transforms (FFTW),
  * MINPACK, KINSOL, CVODE, wear, steps of their own and wrong input. */
@@ -12,7 +12,7 @@
 
 #include <fretwear.h>
 
-enum { n_cases = 9, n_rounds = 3, most_values = 200000 };
+enum { n_cases = 9, most_values = 200000 };
 
 /* Cases that are run as a whole always: steps write no file and wear nothing. */
 static int only_whole(int number)
@@ -127,9 +127,10 @@ int main(int argc, char **argv)
 {
    struct task alone[n_cases], together[n_cases];
    pthread_t threads[n_cases];
-   int failures = 0;
+   int failures = 0, n_rounds = 3;
 
    if (argc < 3) return 2;
+   if (argc > 3) n_rounds = atoi(argv[3]);
    model_path = argv[1];
    directory = argv[2];
    for (int i = 0; i < n_cases; i++) {
