@@ -10,6 +10,7 @@ program fw_run_program
    use fw_progress, only: progress_type, new_progress
    use fw_read_case, only: read_case
    use fw_reader_text, only: printable
+   use fw_restart_trial, only: try_restart
    use fw_run, only: check_case, run_case
    use fw_text, only: string_type
    use fw_threads, only: thread_scope
@@ -61,6 +62,8 @@ contains
       call threads%leave()
       if (allocated(error)) return
       if (allocated(options%restart)) case%restart = options%restart
+      call try_restart(case, error)
+      if (allocated(error)) return
       if (options%check) then
          call check_case(case, error)
          if (allocated(error)) return

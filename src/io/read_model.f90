@@ -11,7 +11,8 @@ module fw_read_model
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
    use fw_text, only: to_text
-   use fw_trial, only: try_model_hdf5
+   use fw_trial, only: trial_type
+   use fw_trial, only: try_file
    use fw_values, only: quoted_text
    implicit none (type, external)
    private
@@ -38,6 +39,11 @@ module fw_read_model
       real(wp) :: static_scale = 1.0_wp
       real(wp) :: harmonic_scale = 1.0_wp
    end type model_options
+
+   type, extends(trial_type) :: model_trial
+   contains
+      procedure :: read => read_in_trial
+   end type model_trial
 
 contains
 
@@ -113,7 +119,9 @@ contains
 
       call reader%amend('model', 'file', quoted_text(resolve_path(options%file, directory)))
       if (options%source == source_hdf5) then
-         if (reader%tries_files) call try_model_hdf5(in_directory(options%file, directory), error)
+         if (reader%tries_files) then
+            call try_file(model_trial(), in_directory(options%file, directory), error)
+         end if
          if (.not. allocated(error)) then
             call read_model_hdf5(in_directory(options%file, directory), raw, error)
          end if
@@ -122,6 +130,17 @@ contains
       end if
       if (allocated(error)) error%message = reader%place_of('model', 'file')//': '//error%message
    end subroutine read_file
+
+   subroutine read_in_trial(self, path)
+      class(model_trial), intent(in) :: self
+      character(*), intent(in) :: path
+      type(file_model_type) :: model
+      type(error_type), allocatable :: ignored
+
+      associate (unused => self)
+      end associate
+      call read_model_hdf5(path, model, ignored)
+   end subroutine read_in_trial
 
    !> The inline matrices, or the refusal of them beside a model file.
    subroutine read_matrices(reader, is_inline, n_file, raw)

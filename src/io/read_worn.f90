@@ -4,6 +4,8 @@ module fw_read_worn
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
    use fw_error, only: status_io
    use fw_hdf5, only: hdf5_file
    use fw_hdf5, only: read_dataset
@@ -12,11 +14,18 @@ module fw_read_worn
    use fw_reader, only: reader_type
    use fw_result_target, only: is_result
    use fw_text, only: to_text
+   use fw_trial, only: trial_type
+   use fw_trial, only: try_file
    use fw_values, only: quoted_text
    implicit none (type, external)
    private
 
    public :: read_worn
+
+   type, extends(trial_type) :: worn_trial
+   contains
+      procedure :: read => read_in_trial
+   end type worn_trial
 
 contains
 
@@ -60,31 +69,51 @@ contains
       character(*), intent(in) :: path
       real(wp), allocatable, intent(out) :: depth(:, :)
       type(error_type), allocatable, intent(out) :: error
-      type(error_type), allocatable :: failure, ignored
+      type(error_type), allocatable :: failure
+
+      if (reader%tries_files) call try_file(worn_trial(), path, failure)
+      if (.not. allocated(failure)) call load_depths(path, depth, failure)
+      if (.not. allocated(failure)) return
+      if (failure%status == status_io) then
+         failure%message = reader%place_of('contact', 'worn')//': '//failure%message
+         call move_alloc(failure, error)
+      else
+         call reader%refuse('contact', 'worn', failure%message)
+      end if
+   end subroutine read_depths
+
+   subroutine load_depths(path, depth, error)
+      character(*), intent(in) :: path
+      real(wp), allocatable, intent(out) :: depth(:, :)
+      !> status_io where the file cannot be read, status_input where it is no result of a wear run.
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: ignored
       type(hdf5_file) :: file
 
-      call file%open_read(path, failure)
-      if (allocated(failure)) then
-         if (failure%status == status_io) then
-            failure%message = reader%place_of('contact', 'worn')//': '//failure%message
-            call move_alloc(failure, error)
-         else
-            call reader%refuse('contact', 'worn', failure%message)
-         end if
-         return
-      end if
+      call file%open_read(path, error)
+      if (allocated(error)) return
       if (.not. is_result(file)) then
-         call reader%refuse('contact', 'worn', path//': is no result file of fw_run: name one '// &
-                            "of analysis = 'wear'")
+         call fatal_error(error, path//': is no result file of fw_run: name one '// &
+                          "of analysis = 'wear'", status_input)
       else if (.not. file%exists('/wear/depth')) then
-         call reader%refuse('contact', 'worn', path//': is a result without wear: name one of '// &
-                            "analysis = 'wear'")
+         call fatal_error(error, path//': is a result without wear: name one of '// &
+                          "analysis = 'wear'", status_input)
       else
-         call read_dataset(file, '/wear/depth', depth, failure)
-         if (allocated(failure)) call reader%refuse('contact', 'worn', failure%message)
+         call read_dataset(file, '/wear/depth', depth, error)
       end if
       call file%close(ignored)
-   end subroutine read_depths
+   end subroutine load_depths
+
+   subroutine read_in_trial(self, path)
+      class(worn_trial), intent(in) :: self
+      character(*), intent(in) :: path
+      real(wp), allocatable :: depth(:, :)
+      type(error_type), allocatable :: ignored
+
+      associate (unused => self)
+      end associate
+      call load_depths(path, depth, ignored)
+   end subroutine read_in_trial
 
    subroutine check_depths(reader, path, step, depth, n_pairs)
       type(reader_type), intent(inout) :: reader

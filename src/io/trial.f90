@@ -1,4 +1,4 @@
-!> Model files from anywhere, tried first in a process of its own: releases of HDF5 in wide use
+!> HDF5 files from anywhere, tried first in a process of its own: releases of HDF5 in wide use
 !> crash, or search for ever, where the inner structure of a file is damaged, and no call says
 !> beforehand whether one will. The trial ends instead of the program.
 !>
@@ -11,17 +11,31 @@ module fw_trial
    use fw_error, only: fatal_error
    use fw_error, only: status_input
    use fw_kinds, only: i8
-   use fw_model_file, only: file_model_type
-   use fw_model_file, only: read_model_hdf5
    use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: try_model_hdf5
+   public :: trial_type, try_file
+
+   !> What is going to be read: the calls of a trial are those of the reading.
+   type, abstract :: trial_type
+   contains
+      procedure(read_in_trial), deferred :: read
+   end type trial_type
 
    !> Processor time of a trial [s]: so much, and one more for every so many bytes of the file.
    integer(c_long), parameter :: least_seconds = 2_c_long
    integer(i8), parameter :: bytes_per_second = 10000000_i8
+
+   abstract interface
+      !> Read the file; nothing of it is kept, nor what is wrong with it.
+      subroutine read_in_trial(self, path)
+         import :: trial_type
+         implicit none (type, external)
+         class(trial_type), intent(in) :: self
+         character(*), intent(in) :: path
+      end subroutine read_in_trial
+   end interface
 
    interface
       function c_fork() bind(c, name='fork') result(process)
@@ -64,7 +78,8 @@ contains
 
    !> Refuse a file that the library cannot survive. What is wrong in one that it can is left to
    !> the reading itself; so is everything where the system gives no second process.
-   subroutine try_model_hdf5(path, error)
+   subroutine try_file(trial, path, error)
+      class(trial_type), intent(in) :: trial
       character(*), intent(in) :: path
       !> status_input where the trial crashed or found no end.
       type(error_type), allocatable, intent(out) :: error
@@ -78,7 +93,7 @@ contains
       seconds = least_seconds + int(max(length, 0_i8)/bytes_per_second, c_long)
       process = c_fork()
       if (process < 0) return
-      if (process == 0) call run_trial(path, seconds)
+      if (process == 0) call run_trial(trial, path, seconds)
       if (c_waitpid(process, status, 0) /= process .or. status == 0) return
       signal = iand(status, 127)
       if (signal == end_of_time .or. signal == killed) then
@@ -90,21 +105,20 @@ contains
       end if
       call fatal_error(error, path//': the file is damaged: the HDF5 library '//ending// &
                        ' while reading it; write the file again', status_input)
-   end subroutine try_model_hdf5
+   end subroutine try_file
 
    !> The child: it reads and ends, without a word.
-   subroutine run_trial(path, seconds)
+   subroutine run_trial(trial, path, seconds)
+      class(trial_type), intent(in) :: trial
       character(*), intent(in) :: path
       integer(c_long), intent(in) :: seconds
       integer(c_int), parameter :: processor_time = 0, core_file = 4, standard_error = 2
-      type(file_model_type) :: model
-      type(error_type), allocatable :: ignored
       integer(c_int) :: status
 
       status = c_setrlimit(core_file, [0_c_long, 0_c_long])
       status = c_setrlimit(processor_time, [seconds, seconds + 1_c_long])
       status = c_close(standard_error)
-      call read_model_hdf5(path, model, ignored)
+      call trial%read(path)
       call c_exit_now(0_c_int)
    end subroutine run_trial
 

@@ -38,11 +38,12 @@ import fuzz_command
 import fuzz_matrix_market
 import fuzz_model
 import fuzz_namelist
+import fuzz_result
 
 HERE = Path(__file__).resolve().parent
 FAMILIES = {"namelist": fuzz_namelist.create, "model file": fuzz_model.create,
             "damaged model file": fuzz_model.damage, "Matrix Market": fuzz_matrix_market.create,
-            "command line": fuzz_command.create}
+            "command line": fuzz_command.create, "damaged result file": fuzz_result.create}
 #: Of 20 inputs in a row.
 SHARES = (["namelist"]*8 + ["model file"]*4 + ["damaged model file"]*2 + ["Matrix Market"]*3
           + ["command line"]*3)
@@ -201,7 +202,7 @@ class Worker(threading.Thread):
             yield "program", status, errors, (2, 3, 4, 5, 6)
             return
         group = k//len(SHARES)
-        if family == "damaged model file":
+        if family.startswith("damaged"):
             status, _, errors = run_program(program, folder, ["--check", *arguments], TIME_LIMIT)
             yield "check", status, errors, REFUSALS
             return

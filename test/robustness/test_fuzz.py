@@ -13,6 +13,7 @@ sys.path[:0] = [str(HERE)]
 import fault_cases  # noqa: E402
 import fuzz_bases  # noqa: E402
 import fuzz_model  # noqa: E402
+import fuzz_result  # noqa: E402
 
 PROGRAM = fault_cases.program()
 
@@ -76,6 +77,22 @@ def test_files_that_hdf5_does_not_survive(tmp_path, number):
     done = check(tmp_path, "--check")
     assert done.returncode == 3, done.stderr
     assert ": error: " in done.stderr and "Backtrace" not in done.stderr
+
+
+def test_a_result_to_start_from_that_hdf5_does_not_survive(tmp_path):
+    """A search without end in a damaged result, where a run was to start."""
+    arguments = fuzz_result.create(random.Random("3-99"), tmp_path)
+    done = subprocess.run([PROGRAM, "--check", *arguments], cwd=tmp_path, text=True,
+                          capture_output=True, timeout=60, check=False)
+    assert done.returncode == 3, done.stderr
+    assert "finds no end" in done.stderr
+
+
+def test_a_sound_result_to_start_from(tmp_path):
+    (tmp_path / "case.nml").write_text(fuzz_bases.WEAR)
+    (tmp_path / "sound.h5").write_bytes(fuzz_result.SOUND)
+    assert check(tmp_path, "--check", "--restart", "sound.h5").returncode == 0
+    assert check(tmp_path, "--check", "--set", "contact%worn='sound.h5'").returncode == 0
 
 
 def test_memory_of_the_machine_is_not_needed(tmp_path):
