@@ -67,7 +67,8 @@ test: build ## every test; the last line counts the cases
 lint: build/deps.stamp ## linters of the Fortran and the Python code, type checker
 	@$(PYTHON) -m fortitude check --quiet
 	@$(PYTHON) -m mypy
-	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs
+	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs \
+	   test/robustness test/stress
 
 docs: build/deps.stamp ## reference of library and Python package, in build/docs
 	@$(PYTHON) tools/build_docs.py build/docs
@@ -110,10 +111,15 @@ N ?= 100000
 FUZZ := build/fuzz
 fuzz: build ## N hostile inputs (100000), written to docs/robustness/inputs.md
 	@mkdir -p $(FUZZ)
-	@if [ $(BUILD)/fw_run -nt $(FUZZ)/fuzz.json ]; then rm -f $(FUZZ)/fuzz.json; fi
+	@if [ $(BUILD)/fw_run -nt $(FUZZ)/fuzz.json ]; then \
+	   rm -f $(FUZZ)/fuzz.json $(FUZZ)/results/fuzz.json; fi
 	OMP_NUM_THREADS=1 $(PYTHON) test/robustness/fuzz.py --build $(BUILD) -n $(N) --jobs 2 \
 	   --state $(FUZZ)
-	$(PYTHON) test/robustness/fuzz_report.py $(FUZZ)/fuzz.json
+	OMP_NUM_THREADS=1 $(PYTHON) test/robustness/fuzz.py --build $(BUILD) -n $$(($(N)/50)) --jobs 2 \
+	   --state $(FUZZ)/results --family "damaged result file"
+	OMP_NUM_THREADS=1 PYTHONPATH=python:$(BUILD)/python $(PYTHON) test/robustness/fuzz_python.py \
+	   -n $$(($(N)/5)) --report $(FUZZ)/python.json
+	$(PYTHON) test/robustness/fuzz_report.py $(FUZZ)
 
 clean: ## remove everything built but the Python environment
 	rm -rf $(BUILD) build/debug build/docs build/wheel $(RUN) $(FUZZ)

@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from .errors import InputError
 
-__all__ = ["array", "dofs", "output"]
+__all__ = ["array", "dofs", "flag", "output", "text", "whole"]
+
+#: Largest integer that the library takes.
+_MOST = 2**31 - 1
 
 
 def array(name: str, value: ArrayLike, shape: Sequence[int | None], *,
@@ -49,12 +52,37 @@ def dofs(name: str, value: ArrayLike, shape: Sequence[int | None], n_dof: int) -
         raise InputError(f"{name}: its elements are of type {given.dtype}, must be integers "
                          "(signed dof numbers, counted from 1; 0 for the ground)")
     _check_shape(name, given, shape)
-    wrong = np.argwhere(np.abs(given) > n_dof)
+    wrong = np.argwhere((given > n_dof) | (given < -n_dof))
     if len(wrong):
         where = tuple(int(i) for i in wrong[0])
         raise InputError(f"{name}{list(where)} = {given[where]}: must be a dof from 1 to {n_dof}, "
                          "with its sign, or 0 for the ground")
     return np.ascontiguousarray(given, dtype=np.int32)
+
+
+def whole(name: str, value: int, least: int, most: int = _MOST) -> int:
+    """An integer of Python, from `least` to `most`."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or not (
+            least <= value <= most):
+        wanted = f"from {least} to {most}" if most < _MOST else f"of at least {least}"
+        raise InputError(f"{name} = {value!r}: must be an integer {wanted}")
+    return int(value)
+
+
+def flag(name: str, value: bool) -> bool:
+    """A truth value; anything else that Python takes for one is more likely a mistake."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name}: is a {type(value).__name__}, must be True or False")
+    return bool(value)
+
+
+def text(name: str, value: str) -> str:
+    """A text without the character that ends one in C."""
+    if not isinstance(value, str):
+        raise InputError(f"{name}: is a {type(value).__name__}, must be a text")
+    if "\0" in value:
+        raise InputError(f"{name}: must not hold a null character")
+    return value
 
 
 def output(name: str, value: NDArray[Any] | None, shape: tuple[int, ...],

@@ -76,6 +76,9 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     RunInterrupted
         The run was stopped (a KeyboardInterrupt); its `result` holds the points up to there.
     """
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress: is a {type(progress).__name__}, must be a function of the "
+                         "points done and the points to come")
     if not isinstance(case, Case):
         case = Case.from_file(case)
     folder = None
@@ -202,6 +205,9 @@ def _case(model: ModelLike, analysis: CaseGroup, sweep: Sweep, groups: Groups) -
 
 
 def _refuse_twice(group: str, own: Mapping[str, object], given: Mapping[str, object]) -> None:
+    if not isinstance(given, Mapping):
+        raise InputError(f"{group}: is a {type(given).__name__}, must be a dictionary of the keys "
+                         "of the group")
     for key in own.keys() & given.keys():
         raise InputError(f"{group}[{key!r}]: is set by an argument of the function already; leave "
                          "it out, or make a Case and run it")

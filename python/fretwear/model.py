@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arguments import array, dofs
+from ._arguments import array, dofs, text
 from ._native import Session
 from .errors import InputError, OutputError
 from .model_file import FORMAT, strings, write_model_file
@@ -161,13 +161,18 @@ class Model:
             name: array(name, value, (n,)) for name, value in (
                 ("static", static), ("cosine", cosine), ("sine", sine),
                 ("static_rotation", static_rotation)) if value is not None}
+        if contact is not None and not isinstance(contact, ContactPairs):
+            raise InputError(f"contact: is a {type(contact).__name__}, must be ContactPairs")
         self.contact = None if contact is None else contact.checked(n)
         self.springs = tuple(springs)
         for number, spring in enumerate(self.springs):
+            if not isinstance(spring, Spring):
+                raise InputError(f"springs[{number}]: is a {type(spring).__name__}, must be a "
+                                 "Spring")
             dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
             array(f"springs[{number}].coefficient", spring.coefficient, ())
         self._observe = None if observe is None else _rows(observe, n)
-        self.title, self.unit_system = title, unit_system
+        self.title, self.unit_system = text("title", title), text("unit_system", unit_system)
 
     def __repr__(self) -> str:
         title = f" {self.title!r}" if self.title else ""
@@ -370,8 +375,11 @@ _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
 
 
 def _rows(observe: Mapping[str, Observation], n_dof: int) -> tuple[tuple[str, ...], Floats]:
+    if not isinstance(observe, Mapping):
+        raise InputError(f"observe: is a {type(observe).__name__}, must be a dictionary of names")
     rows = np.zeros((len(observe), n_dof), order="F")
     for i, (name, wanted) in enumerate(observe.items()):
+        text("observe, a name", name)
         argument = f"observe['{name}']"
         if isinstance(wanted, (int, np.integer)):
             if not 1 <= wanted <= n_dof:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arguments import array, dofs, output
+from ._arguments import array, dofs, flag, output, whole
 from ._native import raise_status, routines
 from .errors import InputError
 
@@ -26,11 +26,14 @@ __all__ = ["ContactForces", "amplitude", "coefficient_count", "condense", "conta
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+#: As for the keys n_harmonics and n_time of a case.
+_MOST_HARMONICS, _MOST_INSTANTS = 10000, 1000000
+
 
 def coefficient_count(n_harmonics: int, odd_only: bool = False) -> int:
     """Coefficients of the harmonics 0..H: 2H+1; of the odd ones up to H: 2 ceil(H/2)."""
-    _whole("n_harmonics", n_harmonics, 1)
-    return 2 * ((n_harmonics + 1) // 2) if odd_only else 2 * n_harmonics + 1
+    whole("n_harmonics", n_harmonics, 1, _MOST_HARMONICS)
+    return 2 * ((n_harmonics + 1) // 2) if flag("odd_only", odd_only) else 2 * n_harmonics + 1
 
 
 def harmonic_operators(n_harmonics: int, n_time: int, *,
@@ -52,7 +55,7 @@ def harmonic_operators(n_harmonics: int, n_time: int, *,
         Fortran-ordered.
     """
     n_coefficients = coefficient_count(n_harmonics, odd_only)
-    _whole("n_time", n_time, 2 * n_harmonics + 1)
+    whole("n_time", n_time, 2 * n_harmonics + 1, _MOST_INSTANTS)
     synthesis = output("synthesis", None, (n_coefficients, n_time))
     analysis = output("analysis", None, (n_coefficients, n_time))
     routines().harmonic_operators(n_harmonics, odd_only, synthesis, analysis)
@@ -80,7 +83,7 @@ def to_time(coefficients: ArrayLike, n_time: int, *, odd_only: bool = False,
     """
     given = array("coefficients", coefficients, (None, None))
     n_harmonics = _harmonics_of("coefficients", given.shape[1], odd_only)
-    _whole("n_time", n_time, 2 * n_harmonics + 1)
+    whole("n_time", n_time, 2 * n_harmonics + 1, _MOST_INSTANTS)
     values = output("out", out, (given.shape[0], n_time))
     routines().to_time(n_harmonics, odd_only, given, values)
     return values
@@ -107,7 +110,7 @@ def to_coefficients(values: ArrayLike, n_harmonics: int, *, odd_only: bool = Fal
     """
     n_coefficients = coefficient_count(n_harmonics, odd_only)
     given = array("values", values, (None, None))
-    _whole("n_time, the second length of values,", given.shape[1], 2 * n_harmonics + 1)
+    whole("n_time, the second length of values,", given.shape[1], 2 * n_harmonics + 1)
     coefficients = output("out", out, (given.shape[0], n_coefficients))
     routines().to_coefficients(n_harmonics, odd_only, given, coefficients)
     return coefficients
@@ -347,7 +350,9 @@ def contact_forces(prediction: ArrayLike, mu: ArrayLike, n_time: int, *,
     if n_pairs == 0:
         raise InputError("prediction: holds no pair")
     n_harmonics = _harmonics_of("prediction", n_coefficients, odd_only)
-    _whole("n_time", n_time, 2 * n_harmonics + 1)
+    whole("n_time", n_time, 2 * n_harmonics + 1, _MOST_INSTANTS)
+    flag("remembers", remembers)
+    flag("jacobian", jacobian)
     friction = array("mu", mu, (n_pairs,))
     if (friction < 0.0).any():
         raise InputError(f"mu[{int(np.argmax(friction < 0.0))}]: is negative")
@@ -388,8 +393,9 @@ def _matrices(M: ArrayLike, C: ArrayLike | None,
 def _numbers(harmonics: Sequence[int]) -> NDArray[np.int32]:
     numbers = np.asarray(harmonics)
     if numbers.ndim != 1 or numbers.size == 0 or numbers.dtype.kind not in "iu" or (
-            numbers < 0).any():
-        raise InputError(f"harmonics: is {harmonics!r}, must be a list of integers of at least 0")
+            (numbers < 0) | (numbers > _MOST_HARMONICS)).any():
+        raise InputError(f"harmonics: is {harmonics!r}, must be a list of integers from 0 to "
+                         f"{_MOST_HARMONICS}")
     return np.asarray(numbers, dtype=np.int32)
 
 
@@ -402,7 +408,7 @@ def _frequency(omega: float) -> float:
 
 def _harmonics_of(name: str, n_coefficients: int, odd_only: bool) -> int:
     """H from the number of coefficients."""
-    if odd_only:
+    if flag("odd_only", odd_only):
         if n_coefficients < 2 or n_coefficients % 2 == 1:
             raise InputError(f"{name}: has {n_coefficients} coefficients, must have 2 for each "
                              "odd harmonic")
@@ -410,8 +416,3 @@ def _harmonics_of(name: str, n_coefficients: int, odd_only: bool) -> int:
     if n_coefficients < 3 or n_coefficients % 2 == 0:
         raise InputError(f"{name}: has {n_coefficients} coefficients, must have 2H+1")
     return (n_coefficients - 1) // 2
-
-
-def _whole(name: str, value: int, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InputError(f"{name} = {value!r}: must be an integer of at least {least}")

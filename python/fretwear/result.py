@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ._arguments import text, whole
 from .errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -128,34 +129,38 @@ class Result:
     # ------------------------------------------------------------------ any dataset
 
     def __contains__(self, name: str) -> bool:
-        return name.strip("/") in self._names
+        return isinstance(name, str) and name.strip("/") in self._names
 
     def __iter__(self) -> Iterator[str]:
         return iter(sorted(self._names))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Read a dataset by its name in the file, such as "contact/force"."""
-        name = name.strip("/")
+        name = text("name", name).strip("/")
         if name not in self._arrays:
             self._arrays[name] = self._read(name)
         return self._arrays[name]
 
     def _read(self, name: str) -> NDArray[Any]:
         with self.open() as file:
-            found = file.get(name)
-            if not isinstance(found, h5py.Dataset):
-                raise InputError(f"{self.path}: holds no dataset /{name}; there are "
-                                 + ", ".join("/" + known for known in self))
-            array: NDArray[Any] = np.asarray(found[()])
+            array: NDArray[Any] = np.asarray(self._find(file, name)[()])
         if array.dtype.kind in "SO":
             array = np.array([_text(word) for word in array.ravel()]).reshape(array.shape)
         array.flags.writeable = False
         return array
 
+    def _find(self, file: h5py.File, name: str) -> h5py.Dataset:
+        found = file.get(name) if name else None
+        if not isinstance(found, h5py.Dataset):
+            raise InputError(f"{self.path}: holds no dataset /{name}; there are "
+                             + ", ".join("/" + known for known in self))
+        return found
+
     def units(self, name: str) -> str:
         """Units of a dataset; '' where the file does not say (units of the model)."""
+        name = text("name", name).strip("/")
         with self.open() as file:
-            return _text(file[name].attrs.get("units", ""))
+            return _text(self._find(file, name).attrs.get("units", ""))
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -333,10 +338,9 @@ class Result:
                 raise InputError(f"{self.path}: '{observe}' is not observed; available: "
                                  + ", ".join(names))
             return names.index(observe)
-        if not 0 <= observe < len(names):
-            raise InputError(f"{self.path}: column {observe} is not observed; there are "
-                             f"{len(names)}, counted from 0")
-        return observe
+        if not names:
+            raise InputError(f"{self.path}: nothing is observed")
+        return whole("observe, a column,", observe, 0, len(names) - 1)
 
     def amplitude_of(self, observe: str | int | None = None) -> Floats:
         """Amplitude of one observed quantity (n_points), NaN at points that did not converge."""
@@ -353,8 +357,7 @@ class Result:
         observe : str or int, optional
             See `index`.
         """
-        if not 0 <= n <= self.n_harmonics:
-            raise InputError(f"n = {n}: must be a harmonic from 0 to {self.n_harmonics}")
+        whole("n, a harmonic,", n, 0, self.n_harmonics)
         values = self.coefficients[:, :, self.index(observe)]
         if n == 0:
             return values[:, 0].astype(np.complex128)

@@ -242,7 +242,7 @@ I2 = np.eye(2)
 @pytest.mark.parametrize(("argument", "call"), [
     ("n_harmonics = 0", lambda: op.coefficient_count(0)),
     ("n_harmonics = 1.5", lambda: op.coefficient_count(1.5)),  # type: ignore[arg-type]
-    ("n_time = 6: must be an integer of at least 7", lambda: op.harmonic_operators(3, 6)),
+    ("n_time = 6: must be an integer from 7", lambda: op.harmonic_operators(3, 6)),
     (r"coefficients: its shape is \(7,\)", lambda: op.to_time(np.zeros(7), 16)),
     ("coefficients: has 4 coefficients, must have 2H", lambda: op.to_time(np.zeros((2, 4)), 16)),
     ("coefficients: has 3", lambda: op.to_time(np.zeros((2, 3)), 16, odd_only=True)),
@@ -285,3 +285,23 @@ I2 = np.eye(2)
 def test_wrong_arguments_are_named(argument: str, call: Callable[[], object]) -> None:
     with pytest.raises(fw.InputError, match=argument):
         call()
+
+
+@pytest.mark.parametrize("odd_only", [1e-320, 0.5, 2, "", None, np.array([True])])
+def test_a_truth_value_is_one(odd_only: Any) -> None:
+    """0.5 is true to Python and 0 to the library: it wrote five coefficients where two fit."""
+    with pytest.raises(fw.InputError, match=r"odd_only: is a .*, must be True or False"):
+        op.to_coefficients(np.ones((1, 8)), 2, odd_only=odd_only)
+
+
+@pytest.mark.parametrize("n_time", [2**31, 10**400, 10**6 + 1, True, 8.0])
+def test_more_instants_than_the_library_counts(n_time: Any) -> None:
+    with pytest.raises(fw.InputError, match=r"n_time = .* must be an integer from 5 to 1000000"):
+        op.harmonic_operators(2, n_time)
+
+
+def test_dof_numbers_that_no_integer_of_the_library_holds() -> None:
+    """The least integer has no absolute value."""
+    one = np.eye(1)
+    with pytest.raises(fw.InputError, match="must be a dof from 1 to 1"):
+        op.condense(one, None, one, [-2**63], [0], 1.0)

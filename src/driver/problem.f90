@@ -153,8 +153,9 @@ contains
       n_reals = transforms*nc*n_time + nc*case%model%n_dof
       if (case%contact%n_pairs > 0) then
          n_reals = n_reals + derivatives*nc*n_time + (3.0_wp*nc)**2*n_pairs + 12.0_wp*n_pairs*n_time
-         if (case%solver%linear == linear_lu .or. case%solver%kind == solver_powell) &
+         if (case%solver%linear == linear_lu .or. case%solver%kind == solver_powell) then
             n_reals = n_reals + (3.0_wp*nc*n_pairs)**2
+         end if
       end if
       call require_memory(n_reals, '&harmonics n_harmonics = '// &
                           to_text(case%harmonics%n_harmonics)//' with '//to_text(n_time)// &

@@ -107,8 +107,9 @@ contains
          expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
       else if (case%analysis == analysis_frf) then
          expected_rows = max(1, case%sweep%n_points)
-         if (case%sweep%continuation == continuation_arclength) &
+         if (case%sweep%continuation == continuation_arclength) then
             expected_rows = min(usual_rows, case%sweep%max_points)
+         end if
       end if
    end function expected_rows
 

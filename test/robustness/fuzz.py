@@ -31,16 +31,18 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import h5py
-import numpy as np
-
 import fuzz_command
 import fuzz_matrix_market
 import fuzz_model
 import fuzz_namelist
 import fuzz_result
+import h5py
+import numpy as np
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "support"))
+from revision import revision  # noqa: E402
+
 FAMILIES = {"namelist": fuzz_namelist.create, "model file": fuzz_model.create,
             "damaged model file": fuzz_model.damage, "Matrix Market": fuzz_matrix_market.create,
             "command line": fuzz_command.create, "damaged result file": fuzz_result.create}
@@ -225,8 +227,10 @@ def summary(settings, workers, earlier):
         counts.update(worker.counts)
         failures += worker.failures
     peaks = [max(worker.library.peaks, default=0) for worker in workers]
-    return {"seed": settings.seed, "jobs": settings.jobs, "done": [w.done for w in workers],
-            "counts": dict(counts), "failures": sorted(failures),
+    return {"seed": settings.seed, "goal": settings.n, "jobs": settings.jobs,
+            "revision": earlier.get("revision", settings.revision),
+            "done": [w.done for w in workers], "counts": dict(counts),
+            "failures": sorted(failures),
             "slowest": max([earlier.get("slowest", 0.0), *[w.slowest for w in workers]]),
             "peak_mb": max([earlier.get("peak_mb", 0), *[peak//1024 for peak in peaks]])}
 
@@ -245,6 +249,8 @@ def arguments():
     settings.program = (settings.build / "fw_run").resolve()
     settings.library = (settings.build / "libfretwear.so").resolve()
     settings.keep = settings.only is not None
+    fuzz_result.PROGRAM = settings.program
+    settings.revision = revision()
     return settings
 
 

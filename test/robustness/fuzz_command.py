@@ -6,9 +6,9 @@ OPTIONS = ["--set", "--output", "-o", "--check", "-q", "--quiet", "-v", "--verbo
            "--version", "--", "-", "-qv", "-vo", "--sett", "--chek", "--set=", "--output=", "-x",
            "--check=1", "--quiet=yes", "---", "--restart", "--restart="]
 PATHS = ["case.nml", "nothing.nml", ".", "", " ", "/", "/dev/null", "/dev/full", "folder",
-         "folder/case.nml", "case.nml/x", "x" * 300, "x" * 5000, "a/" * 2100, "case.nml ", "\xe9.nml",
-         "-case.nml", "circle", "out.h5", "no/such/folder/x.h5", "\n", "*", "locked/x.h5",
-         "empty.nml"]
+         "folder/case.nml", "case.nml/x", "x" * 300, "x" * 5000, "a/" * 2100, "case.nml ",
+         "\xe9.nml", "-case.nml", "circle", "out.h5", "no/such/folder/x.h5", "\n", "*",
+         "locked/x.h5", "empty.nml"]
 
 
 def word(rng):

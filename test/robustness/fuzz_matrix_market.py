@@ -4,7 +4,8 @@ from fuzz_bases import FROM_MATRIX_MARKET, MATRIX_MARKET
 TOKENS = ["0", "-1", "4", "1", "2147483647", "2147483648", "9223372036854775808", "1e400", "-1e400",
           "nan", "inf", "x", "", "1.5", "1e308", "1e-400", "1d0", "%", "1,2", "\0", "+", "1 1",
           "100000", "65536", "46341", "\xe9"]
-HEADS = ["%%MatrixMarket matrix coordinate real general", "%%MatrixMarket matrix array real general",
+HEADS = ["%%MatrixMarket matrix coordinate real general",
+         "%%MatrixMarket matrix array real general",
          "%%MatrixMarket matrix coordinate pattern symmetric", "%%MatrixMarket", "%%matrixmarket",
          "%%MatrixMarket matrix coordinate complex hermitian", "%%MatrixMarket vector array real",
          "%%MatrixMarket matrix coordinate integer skew-symmetric", "%%MATRIXMARKET MATRIX ARRAY",

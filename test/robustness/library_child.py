@@ -13,7 +13,6 @@ import signal
 import sys
 from pathlib import Path
 
-
 #: Processor time of one input.
 SECONDS = 10.0
 

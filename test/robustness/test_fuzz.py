@@ -1,4 +1,5 @@
 """The short form of the fuzzing, and every crash that the long one has found."""
+import gzip
 import os
 import random
 import subprocess
@@ -29,6 +30,13 @@ def test_three_hundred_inputs():
                           timeout=900, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.startswith("300 inputs, 0 failures")
+
+
+def test_five_hundred_calls_of_the_package():
+    done = subprocess.run([sys.executable, HERE / "fuzz_python.py", "-n", "500", "--seed", "7"],
+                          text=True, capture_output=True, timeout=900, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout == "500 inputs, 0 failures\n"
 
 
 @pytest.mark.parametrize("name", ["JOINT", "SPRINGS", "TIME", "WEAR", "FROM_HDF5",
@@ -81,16 +89,18 @@ def test_files_that_hdf5_does_not_survive(tmp_path, number):
 
 def test_a_result_to_start_from_that_hdf5_does_not_survive(tmp_path):
     """A search without end in a damaged result, where a run was to start."""
-    arguments = fuzz_result.create(random.Random("3-99"), tmp_path)
-    done = subprocess.run([PROGRAM, "--check", *arguments], cwd=tmp_path, text=True,
-                          capture_output=True, timeout=60, check=False)
+    content = (HERE / "inputs/damaged_result.h5.gz").read_bytes()
+    (tmp_path / "damaged.h5").write_bytes(gzip.decompress(content))
+    (tmp_path / "case.nml").write_text(
+        fuzz_bases.WEAR.replace("area = 1", "area = 1 worn = 'damaged.h5'"))
+    done = check(tmp_path, "--check")
     assert done.returncode == 3, done.stderr
     assert "finds no end" in done.stderr
 
 
 def test_a_sound_result_to_start_from(tmp_path):
     (tmp_path / "case.nml").write_text(fuzz_bases.WEAR)
-    (tmp_path / "sound.h5").write_bytes(fuzz_result.SOUND)
+    (tmp_path / "sound.h5").write_bytes(fuzz_result.sound())
     assert check(tmp_path, "--check", "--restart", "sound.h5").returncode == 0
     assert check(tmp_path, "--check", "--set", "contact%worn='sound.h5'").returncode == 0
 
@@ -108,12 +118,13 @@ def test_memory_of_the_machine_is_not_needed(tmp_path):
 
 
 def check_in_two_gigabytes(folder):
-    return subprocess.run(["/bin/sh", "-c", f"ulimit -v 2000000; exec '{PROGRAM}' --check case.nml"],
-                          cwd=folder, text=True, capture_output=True, timeout=60, check=False,
+    command = f"ulimit -v 2000000; exec '{PROGRAM}' --check case.nml"
+    return subprocess.run(["/bin/sh", "-c", command], cwd=folder, text=True,
+                          capture_output=True, timeout=60, check=False,
                           env=dict(os.environ, OMP_NUM_THREADS="1"))
 
 
-@pytest.mark.parametrize("change, words", [
+@pytest.mark.parametrize(("change", "words"), [
     (("n_harmonics = 3 n_time = 64", "n_harmonics = 10000"), "GB of memory"),
     (("n_dof = 2", "n_dof = 10000"), "too many for a namelist")])
 def test_sizes_of_a_namelist_that_no_memory_holds(tmp_path, change, words):

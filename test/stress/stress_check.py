@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-import slow_balance as slow  # noqa: E402
+import slow_balance as slow
 
 # On the residual over the vibratory load. The program asks 1e-8 of the condensed equations; the
 # norms of condensed and whole loads differ by the flexibility of the structure.
@@ -273,7 +273,8 @@ def check_energy(case, verdict, omega, damping, u, force, rows, load, dissipatio
     for n in range(1, (len(u) + 1) // 2):
         viscous += np.pi * n**2 * omega * (u[2 * n - 1] @ damping @ u[2 * n - 1]
                                            + u[2 * n] @ damping @ u[2 * n])
-        friction += np.pi * n * (lam[2 * n - 1] @ relative[2 * n] - lam[2 * n] @ relative[2 * n - 1])
+        friction += np.pi * n * (lam[2 * n - 1] @ relative[2 * n]
+                                 - lam[2 * n] @ relative[2 * n - 1])
     size = apparent + abs(viscous) + abs(friction)
     limit = 10 * RESIDUAL * size + 10 * np.pi * len(u) * slack * np.linalg.norm(u)
     verdict.require(abs(work_in - viscous - friction), limit, "energy balance")

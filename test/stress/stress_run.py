@@ -14,7 +14,7 @@ import numpy as np
 import stress_check as check
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-from oracle_runs import FW_RUN, write_namelist  # noqa: E402
+from oracle_runs import FW_RUN, write_namelist
 
 # Processor time that no case needs [s]; a busy machine only lengthens the wall clock.
 TIME_LIMIT = 60

@@ -13,7 +13,7 @@ from pathlib import Path
 from stress_run import Outcome
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
-from revision import revision  # noqa: E402
+from revision import revision
 
 KEPT = ("verdict", "n_points", "n_converged", "saved", "text", "seconds", "revision")
 

@@ -12,7 +12,8 @@ from stress_store import Store
 
 
 def test_every_end_is_converged_or_in_words():
-    ends = [end for _, family in stress.outcomes([], 2, True, Store(None, runs.FW_RUN)) for end in family]
+    families = stress.outcomes([], 2, True, Store(None, runs.FW_RUN))
+    ends = [end for _, family in families for end in family]
     bad = [f"{end.verdict}: {end.case.title}\n{end.text}" for end in ends
            if end.verdict in stress.BAD]
     assert not bad, "\n".join(bad)
@@ -39,7 +40,7 @@ def test_the_judge_accepts_a_solution(solved):
 
 
 # What a solver could leave wrong, each 1e-4 of its size: more than 100 tolerances.
-@pytest.mark.parametrize("what, complaint", [
+@pytest.mark.parametrize(("what", "complaint"), [
     ("displacement", "equilibrium"), ("force", "equilibrium"), ("both", "contact law"),
     ("dissipation", "dissipation")])
 def test_the_judge_sees_a_wrong_solution(solved, what, complaint):

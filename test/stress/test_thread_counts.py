@@ -15,7 +15,7 @@ from stress_models import interface
 N_PAIRS = 70
 
 
-@pytest.mark.parametrize("law, solver", [("dlft", "newton, krylov"), ("penalty", "kinsol"),
+@pytest.mark.parametrize(("law", "solver"), [("dlft", "newton, krylov"), ("penalty", "kinsol"),
                                          ("dlft", "newton")])
 def test_numbers_do_not_depend_on_the_threads(tmp_path, law, solver):
     joint = interface(N_PAIRS, preload=0.5 / N_PAIRS)
