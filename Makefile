@@ -9,7 +9,7 @@ SHELL := /bin/bash
 .PHONY: help deps build debug run test lint docs clean
 .PHONY: fuzz
 .PHONY: bench bench-solvers bench-paper bench-time bench-peers bench-full paper
-.PHONY: stress long
+.PHONY: stress long faults
 
 BUILD := build/release
 RUN := build/run
@@ -105,6 +105,10 @@ bench-full: build ## every part of docs/benchmarks.md
 
 paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) bench/gallery.py
+
+faults: build ## kills, signals, full disks, two runs at a time, written to docs/robustness.md
+	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \
+	   -o docs/robustness.md
 
 # Goes on where it was stopped; a changed program starts anew.
 N ?= 100000

@@ -134,8 +134,8 @@ contains
       end associate
    end subroutine condense
 
-   !> z = z - coupling^T solved, whose product is symmetric: by blocks of columns down to the diagonal,
-   !> the rest by its symmetry.
+   !> z = z - coupling^T solved, whose product is symmetric: by blocks of columns down to the
+   !> diagonal, the rest by its symmetry.
    subroutine add_symmetric_product(m, n_i, coupling, solved, z)
       integer, intent(in) :: m, n_i
       complex(wp), intent(in) :: coupling(n_i, m), solved(n_i, *)

@@ -7,26 +7,8 @@ import subprocess
 import h5py
 import numpy as np
 import pytest
-from wear_cases import PROGRAM, ROOT, merged, oscillator, prescribed_slip, read, result, run, \
-    shared_load, write_namelist
-
-# What depends on the clock or on the name of the run.
-CLOCK = {"seconds", "attributes"}
-
-
-def assert_same(found, expected):
-    """Bit by bit."""
-    assert set(found) == set(expected)
-    for name in set(expected) - CLOCK - {"wear"}:
-        assert found[name].dtype == expected[name].dtype, name
-        if expected[name].dtype == object:
-            assert found[name].tolist() == expected[name].tolist(), name
-        else:
-            assert found[name].tobytes() == expected[name].tobytes(), name
-    assert found["wear"] == expected["wear"]
-    for name in ("status", "steady_state"):
-        assert found["attributes"][name] == expected["attributes"][name]
-
+from wear_cases import PROGRAM, ROOT, assert_same, merged, oscillator, prescribed_slip, read, \
+    result, run, shared_load, write_namelist
 
 CASES = {
     "implicit": shared_load(scheme="implicit", error_tolerance=1e-4, n_cycles=300.0),

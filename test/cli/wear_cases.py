@@ -10,6 +10,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 REFERENCE = json.loads((ROOT / "test" / "reference" / "oracle_g_wear.json").read_text())
+# What depends on the clock or on the name of the run.
+CLOCK = {"seconds", "attributes"}
 
 
 def literal(value):
@@ -70,6 +72,20 @@ def result(folder, groups, *arguments, name="case", status=0):
     """Run a case and read its result."""
     run(folder, groups, *arguments, name=name, status=status)
     return read(folder / f"{name}.h5")
+
+
+def assert_same(found, expected):
+    """Every dataset and the outcome of the wear run, bit by bit."""
+    assert set(found) == set(expected)
+    for name in set(expected) - CLOCK - {"wear"}:
+        assert found[name].dtype == expected[name].dtype, name
+        if expected[name].dtype == object:
+            assert found[name].tolist() == expected[name].tolist(), name
+        else:
+            assert found[name].tobytes() == expected[name].tobytes(), name
+    assert found["wear"] == expected["wear"]
+    for name in ("status", "steady_state"):
+        assert found["attributes"][name] == expected["attributes"][name]
 
 
 def joint(model, contact, load, omega, coefficient, wear, **harmonics):

@@ -14,6 +14,8 @@ import pytest
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE)]
 import fault_cases  # noqa: E402
+import fault_trials  # noqa: E402
+import faults  # noqa: E402
 
 PROGRAM = fault_cases.program()
 
@@ -90,16 +92,30 @@ def test_a_part_whose_lock_proves_nothing_is_left_alone(case):
     assert case.files() == ["case.nml", "x.h5", "x.h5.part"]
 
 
-def test_killed_at_any_moment(case):
-    for k in range(6):
-        process = case.start()
-        time.sleep(0.03*k)
-        process.kill()
-        process.communicate()
-        assert not case.result.exists()
-        case.check_parts()
-    case.complete()
-    assert case.equals_reference()
+@pytest.mark.parametrize("name", faults.SCENARIOS)
+def test_at_random_moments(tmp_path, name):
+    """A few tries of each fault; `make faults` takes hundreds."""
+    tried, complaints = faults.campaign(name, tmp_path, tries=3)
+    assert not complaints
+    assert tried == 3 or name in faults.NEED_FILE_SYSTEM
+
+
+def test_what_is_left_is_judged(tmp_path):
+    sweep = fault_trials.Sweep(tmp_path)
+    sweep.complete()
+    with h5py.File(sweep.case.result, "r+") as file:
+        file["coefficients"][7, 1, 0] *= 1.001
+    with pytest.raises(fault_trials.Fault, match="numbers"):
+        sweep.check_result()
+    sweep.case.result.write_bytes(sweep.case.result.read_bytes()[:5000])
+    with pytest.raises(fault_trials.Fault, match="half"):
+        sweep.check_result()
+    sweep.case.result.unlink()
+    with pytest.raises(fault_trials.Fault, match="lost"):
+        sweep.check_result()
+    sweep.reset()
+    with pytest.raises(fault_trials.Fault, match="crash"):
+        sweep.refused(sweep.start())
 
 
 def test_two_runs_of_one_name(case):
@@ -124,6 +140,13 @@ def test_no_room(case):
     assert done.returncode == 5, done.stderr
     assert "disk full?" in done.stderr
     assert case.result.read_bytes() == before
+
+
+def test_a_place_that_takes_no_files(case):
+    """The file systems of the kernel stand for one that is mounted read-only."""
+    done = case.run("-o", "/proc/x.h5")
+    assert done.returncode == 5, done.stderr
+    assert "/proc/x.h5" in done.stderr
 
 
 def test_a_folder_without_permission(case):
