@@ -70,7 +70,7 @@ class Library:
     def __init__(self, path):
         self.path = path
         self.process = None
-        self.peaks = []
+        self.peak, self.slowest = 0, 0.0
 
     def start(self):
         environment = dict(os.environ, OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
@@ -103,8 +103,8 @@ class Library:
             if code == -signal.SIGPROF:
                 return None, "hang"
             return None, f"crash: ended with {code}: {errors[-300:]}"
-        status, message, peak = json.loads(answer)
-        self.peaks.append(peak)
+        status, message, peak, seconds = json.loads(answer)
+        self.peak, self.slowest = max(self.peak, peak), max(self.slowest, seconds)
         return status, message
 
 
@@ -163,7 +163,6 @@ class Worker(threading.Thread):
         self.library = Library(settings.library)
         self.counts = Counter()
         self.failures = []
-        self.slowest = 0.0
         self.stopped = False
 
     def run(self):
@@ -181,9 +180,7 @@ class Worker(threading.Thread):
         folder = Path(tempfile.mkdtemp(prefix=f"fuzz-{k}-", dir=self.settings.scratch))
         try:
             arguments = FAMILIES[family](rng, folder)
-            start = time.monotonic()
             ends = [*self.ends(k, family, folder, arguments)]
-            self.slowest = max(self.slowest, (time.monotonic() - start)/max(len(ends), 1))
             for entry, status, message, allowed in ends:
                 self.counts[f"{family}|{entry}|{status}"] += 1
                 bad = verdict(status, message, allowed)
@@ -226,13 +223,13 @@ def summary(settings, workers, earlier):
     for worker in workers:
         counts.update(worker.counts)
         failures += worker.failures
-    peaks = [max(worker.library.peaks, default=0) for worker in workers]
+    libraries = [worker.library for worker in workers]
     return {"seed": settings.seed, "goal": settings.n, "jobs": settings.jobs,
             "revision": earlier.get("revision", settings.revision),
             "done": [w.done for w in workers], "counts": dict(counts),
             "failures": sorted(failures),
-            "slowest": max([earlier.get("slowest", 0.0), *[w.slowest for w in workers]]),
-            "peak_mb": max([earlier.get("peak_mb", 0), *[peak//1024 for peak in peaks]])}
+            "slowest": max([earlier.get("slowest", 0.0), *[lib.slowest for lib in libraries]]),
+            "peak_mb": max([earlier.get("peak_mb", 0), *[lib.peak//1024 for lib in libraries]])}
 
 
 def arguments():

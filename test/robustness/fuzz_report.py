@@ -33,8 +33,8 @@ one of the statuses below, with a message if that is 2, 3 or 5, within 10 s of p
 
 {table}
 
-{total_all} inputs, {ends} ends. The largest process of the library took {peak} MB; the slowest
-input took {slowest:.1f} s of the clock.
+{total_all} inputs, {ends} ends. The largest process of the library took {peak} MB; the
+slowest of its inputs took {slowest:.2f} s of processor time.
 
 HDF5 itself crashes on some damaged files, or searches them for ever, so `fw_run` tries a model file
 or a result to start from in a process of its own before it reads it, and refuses what the trial did

@@ -3,14 +3,15 @@
     library_child.py LIBRARY MEGABYTES
 
 Every line of the standard input names a folder with a namelist case.nml; the answer is a line of
-JSON: status and message of fw_load_file or fw_check, and the peak of the memory in kB. The process
-that started it takes the time, and learns of a crash by the end of this one.
+JSON: status and message of fw_load_file or fw_check, the peak of the memory in kB, and the
+processor time in s. The process that started it learns of a crash by the end of this one.
 """
 import ctypes
 import json
 import resource
 import signal
 import sys
+import time
 from pathlib import Path
 
 #: Processor time of one input.
@@ -43,10 +44,11 @@ def main():
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     for line in sys.stdin:
         signal.setitimer(signal.ITIMER_PROF, SECONDS) # its signal ends this process
+        start = time.process_time()
         status, message = check(library, Path(line.rstrip("\n")) / "case.nml")
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         signal.setitimer(signal.ITIMER_PROF, 0.0)
-        print(json.dumps([status, message, peak]), flush=True)
+        print(json.dumps([status, message, peak, time.process_time() - start]), flush=True)
 
 
 if __name__ == "__main__":
