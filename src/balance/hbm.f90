@@ -19,10 +19,10 @@ module fw_hbm
    use fw_fourier, only: fourier_type
    use fw_joint, only: joint_type
    use fw_lapack, only: zgemv
-   use fw_linalg, only: complex_lu_type
    use fw_polynomial, only: springs_type
    use fw_polynomial, only: new_springs
    use fw_parameter_system, only: parameter_system
+   use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
@@ -66,7 +66,7 @@ module fw_hbm
       integer, allocatable :: gathered(:)
       complex(wp), allocatable :: active_stiffness(:, :, :)
       real(wp), allocatable :: active_out(:, :), pair_in(:, :), pair_out(:, :)
-      type(complex_lu_type), allocatable :: preconditioner(:)
+      type(preconditioner_lu_type), allocatable :: preconditioner(:)
       !> Coordinates for which the preconditioner was built (first n_preconditioned entries).
       integer :: n_preconditioned = 0
       integer, allocatable :: preconditioned(:)

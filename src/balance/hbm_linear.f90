@@ -10,6 +10,7 @@ submodule(fw_hbm) fw_hbm_linear
    use fw_forces, only: pair_mixed
    use fw_forces, only: pair_open
    use fw_forces, only: pair_stuck
+   use fw_kinds, only: sp
    use fw_lapack, only: dgemv
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
@@ -450,12 +451,15 @@ contains
       !$omp parallel do default(none) shared(self) private(h, singular) schedule(dynamic) &
       !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
-         call self%preconditioner(h)%reserve(self%n_active)
-         associate (m => self%preconditioner(h)%matrix, na => self%n_active)
-            m(:na, :na) = self%active_stiffness(:na, :na, h)
-            call add_mean_springs(self, h, m)
-            call add_mean_contact(self, h, m)
-            if (allocated(self%shift)) m(:na, :na) = m(:na, :na) + self%shift(:, :, h)
+         call self%preconditioner(h)%reserve(self%n_active, largest_diagonal(self, h))
+         associate (m => self%preconditioner(h)%matrix, na => self%n_active, &
+                    scale => self%preconditioner(h)%scale)
+            m(:na, :na) = cmplx(scale*self%active_stiffness(:na, :na, h), kind=sp)
+            call add_mean_springs(self, h, scale, m)
+            call add_mean_contact(self, h, scale, m)
+            if (allocated(self%shift)) then
+               m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
+            end if
          end associate
          call self%preconditioner(h)%factor(singular)
       end do
@@ -465,6 +469,18 @@ contains
       ! The shift belongs to one step of pseudo-time.
       if (allocated(self%shift)) self%n_preconditioned = 0
    end procedure build_preconditioner
+
+   !> Largest diagonal entry of the stiffness in absolute value.
+   pure real(wp) function largest_diagonal(self, h)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h
+      integer :: j
+
+      largest_diagonal = 0.0_wp
+      do j = 1, self%n_active
+         largest_diagonal = max(largest_diagonal, abs(self%active_stiffness(j, j, h)))
+      end do
+   end function largest_diagonal
 
    module procedure preconditioner_fits
       preconditioner_fits = self%n_preconditioned == self%n_active .and. .not. allocated(self%shift)
@@ -489,34 +505,36 @@ contains
       end if
    end function mean_block
 
-   subroutine add_mean_springs(self, h, m)
+   subroutine add_mean_springs(self, h, scale, m)
       type(hbm_system), intent(in) :: self
       integer, intent(in) :: h
-      complex(wp), intent(inout) :: m(:, :)
+      real(wp), intent(in) :: scale
+      complex(sp), intent(inout) :: m(:, :)
       integer :: i, e, f, k
       complex(wp) :: mean
 
       k = self%fourier%column(h)
       associate (r => self%joint%relative, row => self%joint%spring_row, place => self%place)
          do i = 1, self%springs%n_springs
-            mean = mean_block(self%springs%jacobian(:, :, i), self%fourier%harmonic(h), k, k)
+            mean = scale*mean_block(self%springs%jacobian(:, :, i), self%fourier%harmonic(h), k, k)
             do e = r%first(row(i)), r%first(row(i) + 1) - 1
                do f = r%first(row(i)), r%first(row(i) + 1) - 1
                   if (max(place(r%coordinate(e)), place(r%coordinate(f))) > self%n_active) cycle
                   if (min(place(r%coordinate(e)), place(r%coordinate(f))) == 0) cycle
                   m(place(r%coordinate(e)), place(r%coordinate(f))) = &
                      m(place(r%coordinate(e)), place(r%coordinate(f))) + &
-                     r%coefficient(e)*r%coefficient(f)*mean
+                     cmplx(r%coefficient(e)*r%coefficient(f)*mean, kind=sp)
                end do
             end do
          end do
       end associate
    end subroutine add_mean_springs
 
-   subroutine add_mean_contact(self, h, m)
+   subroutine add_mean_contact(self, h, scale, m)
       type(hbm_system), intent(in) :: self
       integer, intent(in) :: h
-      complex(wp), intent(inout) :: m(:, :)
+      real(wp), intent(in) :: scale
+      complex(sp), intent(inout) :: m(:, :)
       integer :: i, c_out, c_in, k, nc
       complex(wp) :: mean
 
@@ -534,7 +552,7 @@ contains
                else
                   mean = merge(one, zero, c_in == c_out)
                end if
-               call add_rows(self, h, i, c_out, c_in, mean, m)
+               call add_rows(self, h, i, c_out, c_in, scale*mean, m)
             end do
          end do
       end do
@@ -545,7 +563,7 @@ contains
       type(hbm_system), intent(in) :: self
       integer, intent(in) :: h, pair, c_out, c_in
       complex(wp), intent(in) :: mean
-      complex(wp), intent(inout) :: m(:, :)
+      complex(sp), intent(inout) :: m(:, :)
       integer :: e, f, p_out, p_in, n
       complex(wp) :: factor
 
@@ -561,11 +579,14 @@ contains
             do f = r%first(row(c_in, pair)), r%first(row(c_in, pair) + 1) - 1
                p_in = self%place(r%coordinate(f))
                if (p_in == 0) cycle
-               if (self%rigid) m(p_out, :na) = m(p_out, :na) - mean*self%active_stiffness(p_in, &
-                  :na, h)
+               if (self%rigid) then
+                  m(p_out, :na) = cmplx(m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h), &
+                                        kind=sp)
+               end if
                if (p_in > na) cycle
-               m(p_out, p_in) = m(p_out, p_in) + r%coefficient(e)*r%coefficient(f)* &
-                                self%stiffness(pair, c_in)*factor*mean
+               m(p_out, p_in) = m(p_out, p_in) + &
+                                cmplx(r%coefficient(e)*r%coefficient(f)* &
+                                      self%stiffness(pair, c_in)*factor*mean, kind=sp)
             end do
          end do
       end associate
@@ -579,7 +600,7 @@ contains
       !$omp parallel do default(none) shared(self) private(h) &
       !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
-         call self%preconditioner(h)%solve(1, self%complex_in(:, h:h))
+         call self%preconditioner(h)%solve(self%complex_in(:self%n_active, h))
       end do
       !$omp end parallel do
       do h = 1, self%fourier%n_retained

@@ -1,11 +1,12 @@
 !> Explicit interfaces to the BLAS and LAPACK routines in use, so that every call is checked.
 module fw_lapack
+   use fw_kinds, only: sp
    use fw_kinds, only: wp
    implicit none (type, external)
    private
 
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
-   public :: dgeev, ztrsv
+   public :: dgeev, ztrsv, cgetrf, claswp, ctrsv
 
    interface
       subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
@@ -70,6 +71,27 @@ module fw_lapack
          complex(wp), intent(inout) :: a(lda, *)
          integer, intent(out) :: ipiv(*), info
       end subroutine zgetrf
+
+      subroutine cgetrf(m, n, a, lda, ipiv, info)
+         import :: sp
+         integer, intent(in) :: m, n, lda
+         complex(sp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*), info
+      end subroutine cgetrf
+
+      subroutine claswp(n, a, lda, k1, k2, ipiv, incx)
+         import :: sp
+         integer, intent(in) :: n, lda, k1, k2, ipiv(*), incx
+         complex(sp), intent(inout) :: a(lda, *)
+      end subroutine claswp
+
+      subroutine ctrsv(uplo, trans, diag, n, a, lda, x, incx)
+         import :: sp
+         character, intent(in) :: uplo, trans, diag
+         integer, intent(in) :: n, lda, incx
+         complex(sp), intent(in) :: a(lda, *)
+         complex(sp), intent(inout) :: x(*)
+      end subroutine ctrsv
 
       subroutine zgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
          import :: wp

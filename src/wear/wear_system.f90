@@ -340,7 +340,9 @@ contains
             s(j, j) = self%weight(i)*(1.0_wp - self%cycles*self%factor(i)*depth_slope(self, i))
          end do
          do h = 1, self%fourier%n_retained
-            call self%preconditioner(h)%solve(self%n_wearing, self%columns(:na, :, h))
+            do j = 1, self%n_wearing
+               call self%preconditioner(h)%solve(self%columns(:na, j, h))
+            end do
             call subtract_rows(self, h, self%n_wearing, self%columns(:, :, h), s)
          end do
       end associate

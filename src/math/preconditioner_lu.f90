@@ -1,0 +1,76 @@
+!> LU factors of a complex matrix in single precision, to precondition with: they take half the
+!> memory and half the time of double ones, and a solution, which memory bounds, less still. An
+!> iterative solver in double precision needs no more of a preconditioner than a few digits.
+module fw_preconditioner_lu
+   use fw_kinds, only: sp
+   use fw_kinds, only: wp
+   use fw_lapack, only: cgetrf
+   use fw_lapack, only: claswp
+   use fw_lapack, only: ctrsv
+   implicit none (type, external)
+   private
+
+   public :: preconditioner_lu_type
+
+   !> The storage only grows, so that refactoring does not allocate.
+   type :: preconditioner_lu_type
+      integer :: n = 0
+      !> Times this the entries are of the order of one, whatever the units.
+      real(wp) :: scale = 1.0_wp
+      !> The caller fills matrix(1:n, 1:n) with `scale` times its entries.
+      complex(sp), allocatable :: matrix(:, :)
+      complex(sp), allocatable :: rhs(:)
+      integer, allocatable :: pivot(:)
+   contains
+      procedure :: reserve
+      procedure :: factor
+      procedure :: solve
+   end type preconditioner_lu_type
+
+contains
+
+   !> Make room for order n and entries up to `largest` in absolute value.
+   pure subroutine reserve(self, n, largest)
+      class(preconditioner_lu_type), intent(inout) :: self
+      integer, intent(in) :: n
+      real(wp), intent(in) :: largest
+
+      self%n = n
+      self%scale = 1.0_wp
+      if (largest > 0.0_wp) self%scale = 1.0_wp/largest
+      if (allocated(self%matrix)) then
+         if (size(self%matrix, 1) >= n) return
+         deallocate (self%matrix, self%rhs, self%pivot)
+      end if
+      allocate (self%matrix(n, n), self%rhs(n), self%pivot(n))
+   end subroutine reserve
+
+   !> Factor the matrix in place; singular is true where a pivot is exactly zero.
+   subroutine factor(self, singular)
+      class(preconditioner_lu_type), intent(inout) :: self
+      logical, intent(out) :: singular
+      integer :: info
+
+      call cgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
+      singular = info /= 0
+   end subroutine factor
+
+   !> Solve in place for one right-hand side (n), to single precision.
+   subroutine solve(self, b)
+      class(preconditioner_lu_type), intent(inout) :: self
+      complex(wp), intent(inout), contiguous :: b(:)
+      real(wp) :: largest
+      integer :: ld
+
+      largest = max(maxval(abs(real(b, wp))), maxval(abs(aimag(b))))
+      if (.not. largest > 0.0_wp) return
+      ! Not cgetrs, which packs the factors anew for a single right-hand side.
+      ld = size(self%matrix, 1)
+      self%rhs(:self%n) = cmplx(b/largest, kind=sp)
+      call claswp(1, self%rhs, ld, 1, self%n, self%pivot, 1)
+      call ctrsv('L', 'N', 'U', self%n, self%matrix, ld, self%rhs, 1)
+      call ctrsv('U', 'N', 'N', self%n, self%matrix, ld, self%rhs, 1)
+      b = self%scale*largest*cmplx(self%rhs(:self%n), kind=wp)
+   end subroutine solve
+
+end module fw_preconditioner_lu
