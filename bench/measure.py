@@ -8,8 +8,10 @@ import re
 import resource
 import statistics
 import subprocess
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -18,7 +20,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ROOT", "Bench", "Floats", "Groups", "Run", "describe_machine", "write_namelist"]
+__all__ = ["ROOT", "Bench", "Cost", "Floats", "Groups", "Run", "describe_machine",
+           "write_namelist"]
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
@@ -70,6 +73,28 @@ class Run:
         return int((self.converged & ~self.is_loose).sum())
 
 
+@dataclass(frozen=True)
+class Cost:
+    """What a run took of the machine.
+
+    Attributes
+    ----------
+    processor : float
+        Time in the program and for it in the system [s].
+    share : float
+        The same over the wall time: below one where other programs had the processor meanwhile.
+    memory : float
+        At its peak [MB].
+    krylov_iterations, preconditioners : int
+    """
+
+    processor: float
+    share: float
+    memory: float
+    krylov_iterations: int
+    preconditioners: int
+
+
 class Bench:
     """Runs cases in a folder of their own.
 
@@ -110,6 +135,17 @@ class Bench:
             raise RuntimeError(f"fw_run ended with {done.returncode}:\n{done.stderr}")
         return done.stdout, processor_time() - before
 
+    def run_and_weigh(self, groups: Groups) -> tuple[Run, Cost]:
+        """Run a case in one thread, and what it took."""
+        result = self.folder / "case.h5"
+        start = time.perf_counter()
+        with watch_memory(self.program) as peak:
+            summary, processor = self.execute(groups, result)
+        wall = time.perf_counter() - start
+        counts = re.search(r"(\d+) Krylov iterations, (\d+) preconditioners", summary)
+        return read_run(result, summary), Cost(processor, min(processor / wall, 1.0), peak[0],
+                                               *map(int, counts.groups()))
+
     def repeat(self, groups: Groups, value: Callable[[Run], float], threads: int = 1,
                most: int = 5, budget: float = 5.0, wait: str | None = None) -> tuple[float, Run]:
         """Median of a value over repeated runs, as many as fit into the budget [s]."""
@@ -119,6 +155,49 @@ class Bench:
             values.append(value(run))
             if self.quick or len(values) == most or time.perf_counter() - start > budget:
                 return statistics.median(values), run
+
+
+@contextmanager
+def watch_memory(program: Path) -> Iterator[list[float]]:
+    """Peak memory [MB] of a child that runs the program, read while it runs.
+
+    Not that of getrusage, which counts what this program held when it started the child.
+    """
+    peak, done = [0.0], threading.Event()
+
+    def watch() -> None:
+        while not done.wait(0.002):
+            for child in children():
+                peak[0] = max(peak[0], high_water(child, program))
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    try:
+        yield peak
+    finally:
+        done.set()
+        watcher.join()
+
+
+def children() -> list[str]:
+    """Processes that this one has started."""
+    try:
+        return [number for task in Path("/proc/self/task").iterdir()
+                for number in (task / "children").read_text().split()]
+    except OSError:
+        return []
+
+
+def high_water(number: str, program: Path) -> float:
+    """Largest memory [MB] that a process has held, if it runs the program by now."""
+    try:
+        if not os.path.samefile(f"/proc/{number}/exe", program):
+            return 0.0
+        status = Path(f"/proc/{number}/status").read_text()
+    except OSError:
+        return 0.0
+    found = re.search(r"VmHWM:\s+(\d+) kB", status)
+    return int(found[1]) / 1024.0 if found else 0.0
 
 
 def processor_time() -> float:

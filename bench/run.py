@@ -2,8 +2,8 @@
 
     python bench/run.py [PART ...] [--build build/release] [--quick] [-o docs]
 
-Parts: speed, solvers, paper, iterations, aliasing, time, peers, or all; without any, speed. A
-part replaces its section of the document and leaves the others.
+Parts: speed, solvers, paper, iterations, aliasing, time, scaling, peers, or all; without any,
+speed. A part replaces its section of the document and leaves the others.
 
 Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
 tries the scripts and measures nothing.
@@ -29,6 +29,7 @@ from oscillators import measure_oscillators
 from paper import measure_methods, write_methods
 from peers import measure_peers, write_peers
 from programs import build_programs, run_program
+from scaling import measure_scaling, write_scaling
 from sector import measure_crossing, measure_points, measure_sweeps, measure_threads
 from solvers import measure_solvers
 from solvers_report import write_solvers
@@ -108,9 +109,14 @@ def peers(job: Job) -> str:
     return write_peers(measure_peers(job.bench, job.peer_python))
 
 
+def scaling(job: Job) -> str:
+    """Time and memory against pairs and harmonics."""
+    return write_scaling(job.images, *measure_scaling(job.bench, job.step))
+
+
 PARTS = {"speed": speed, "solvers": solvers, "paper": paper, "iterations": iterations,
          "aliasing": aliasing, "time": integration,
-         "peers": peers}
+         "scaling": scaling, "peers": peers}
 
 
 def main() -> None:

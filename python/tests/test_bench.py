@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -122,3 +125,54 @@ def test_the_difference_is_attributed(at_7: float, word: str) -> None:
     assert word in verdict(comparison)
     assert comparison.difference(7) == pytest.approx(at_7 - 1.0)
     assert math.isnan(comparison.difference(15))
+
+
+def measured(pairs: int, n_harmonics: int, seconds: float, memory: float = 100.0) -> Any:
+    """A size of the scaling."""
+    from scaling import Measured
+
+    unknowns = 3 * pairs * (2 * n_harmonics + 1)
+    return Measured(pairs, n_harmonics, seconds, 0.1, memory, unknowns, unknowns, 4.0, 40.0, 9, 9,
+                    1020.0, 0.9)
+
+
+@pytest.mark.parametrize(("power", "word"), [(1.9, "met"), (2.3, "missed by 0.30")])
+def test_exponents_judge_the_targets(power: float, word: str) -> None:
+    from scaling import exponents
+
+    rows = [measured(pairs, n, pairs**power * n) for pairs in (16, 48, 768) for n in (1, 31)]
+    lines = exponents(rows)
+    over_pairs = [line for line in lines if line.endswith(f"2: {word} |")]
+    over_harmonics = [line for line in lines if line.endswith("1: met |")]
+    assert len(over_pairs) == 2 and len(over_harmonics) == 3
+    assert all(f"| {power:.2f} |" in line for line in over_pairs)
+
+
+def test_memory_tells_whether_there_is_a_matrix_of_the_order_of_the_unknowns() -> None:
+    from scaling import largest_matrix
+
+    small, large = measured(16, 3, 1.0), measured(96, 31, 1.0)
+    assert small.full_matrix == pytest.approx(8e-6 * 336**2)
+    assert largest_matrix([small]) == []
+    assert "There is no matrix" in largest_matrix([small, large])[0]
+    assert "does not rule out" in largest_matrix([measured(96, 31, 1.0, 1e4)])[0]
+
+
+def test_peak_memory_of_a_program_is_its_own() -> None:
+    from measure import watch_memory
+
+    ballast = np.ones(30_000_000)
+    sleep = Path(shutil.which("sleep") or "").resolve()
+    with watch_memory(sleep) as peak:
+        subprocess.run([sleep, "0.3"], check=True)
+    assert 0.1 < peak[0] < 20.0 < ballast.nbytes / 1e6
+
+
+def test_a_peer_that_did_not_end_has_no_ratio() -> None:
+    from peers import PeerCase, row_of
+
+    done = PeerCase("chain", 3, 256, 0.001, 0.1, 3.0, 4.0, 1e-12, 30.0, 0.012)
+    assert row_of(done) == ("chain", 3, "1", "100", "100", "30: met", "3.0", "4.0", "1e-12", "12")
+    cut = PeerCase("chain", 3, 256, 0.001, math.nan, 3.0, math.nan, math.nan, 30.0, None)
+    row = row_of(cut)
+    assert "limit" in str(row[3]) and "not known" in str(row[5]) and len(row) == len(row_of(done))
