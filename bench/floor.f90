@@ -16,12 +16,13 @@ module floor_system
    use fw_error, only: error_type
    use fw_forces, only: pair_mixed
    use fw_hbm, only: hbm_system
+   use fw_kinds, only: sp
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    use fw_lapack, only: dgemv
    use fw_lapack, only: zgemm
    use fw_lapack, only: zgemv
-   use fw_linalg, only: complex_lu_type
+   use fw_preconditioner_lu, only: preconditioner_lu_type
    implicit none (type, external)
    private
 
@@ -66,7 +67,7 @@ module floor_system
       real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :), jacobian(:, :)
       real(wp), allocatable :: basis(:, :), vector(:), weights(:)
       complex(wp), allocatable :: input(:), output(:), coupling(:, :), solved(:, :), square(:, :)
-      type(complex_lu_type) :: lu
+      type(preconditioner_lu_type) :: lu
    contains
       procedure :: set_frequency
       procedure :: residual
@@ -246,10 +247,11 @@ contains
       start = processor_time()
       call self%hbm_system%build_preconditioner()
       middle = processor_time()
-      call self%lu%reserve(self%n_active)
       do h = 1, self%fourier%n_retained
+         call self%lu%reserve(self%n_active, 1.0_wp)
          do j = 1, self%n_active
-            self%lu%matrix(:self%n_active, j) = self%active_stiffness(:self%n_active, j, h)
+            self%lu%matrix(:self%n_active, j) = cmplx(self%preconditioner(h)%scale* &
+               self%active_stiffness(:self%n_active, j, h), kind=sp)
          end do
          call self%lu%factor(singular)
       end do
@@ -303,7 +305,7 @@ contains
       middle = processor_time()
       self%square(:, 1) = one
       do h = 1, self%fourier%n_retained
-         call self%preconditioner(h)%solve(1, self%square(:, 1:1))
+         call self%preconditioner(h)%solve(self%square(:self%n_active, 1))
       end do
       call add(self, part_precondition, start, middle)
    end subroutine precondition

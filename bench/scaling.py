@@ -22,6 +22,12 @@ __all__ = ["Measured", "measure_scaling", "write_scaling"]
 
 PAIRS = (16, 48, 96, 192, 384, 768)
 HARMONICS = (1, 3, 7, 17, 31)
+#: Most unknowns that are measured: beyond, a frequency takes minutes.
+MOST_UNKNOWNS = 41000
+#: Mesh away from the flanks, for every size the same. Half the elements of the default there:
+#: 768 pairs on the default mesh take a quarter of an hour and 16 GB to generate.
+COARSE = {"blade-columns": 2, "post-columns": 1, "slot-columns": 2, "airfoil-rows": 4,
+          "disk-rows": 2}
 N_TIME = 128
 #: Instants and harmonics of the paper's table, the cost ratio that is wanted, and the paper's.
 PAPER_TIME, PAPER_HARMONICS, WANTED_RATIO, PAPER_RATIO = 105, (1, 17), 12.0, 521.0
@@ -29,8 +35,8 @@ PAPER_TIME, PAPER_HARMONICS, WANTED_RATIO, PAPER_RATIO = 105, (1, 17), 12.0, 521
 PEAK_SHIFT = -5e-4
 #: Spacing of the frequencies [Hz]; how many there are falls with the size of the problem.
 SPACING, MOST_POINTS, FEWEST_POINTS = 0.25, 9, 3
-#: Unknowns above which the fewest points do, and up to which the median of several runs counts.
-FEW_ABOVE, REPEATED_UP_TO, REPEATS = 40000, 6000, 3
+#: Unknowns up to which there are the most points, and a median of several runs.
+SMALL, REPEATS = 6000, 3
 #: Size of a real matrix of the order of the unknowns [MB] from where memory tells that none is.
 TELLING = 200.0
 
@@ -70,9 +76,15 @@ def measure_scaling(bench: Bench, step: Callable[[str], None]
     rows = []
     for pairs in sizes:
         step(f"{pairs} pairs")
-        rows += [measure_size(bench, pairs, n) for n in HARMONICS[:2 if bench.quick else None]]
+        rows += [measure_size(bench, pairs, n) for n in HARMONICS[:2 if bench.quick else None]
+                 if unknowns_of(pairs, n) <= MOST_UNKNOWNS]
     paper = [measure_size(bench, PAIRS[0], n, PAPER_TIME) for n in PAPER_HARMONICS]
     return rows, paper
+
+
+def unknowns_of(pairs: int, n_harmonics: int) -> int:
+    """Contact coordinates times coefficients; the modes are condensed."""
+    return 3 * pairs * (2 * n_harmonics + 1)
 
 
 def stuck_frequency(path: Path) -> float:
@@ -87,15 +99,15 @@ def stuck_frequency(path: Path) -> float:
 
 def measure_size(bench: Bench, pairs: int, n_harmonics: int, n_time: int = N_TIME) -> Measured:
     """A sweep down through the peak; the first frequency starts from nothing and is left out."""
-    path = sector_file(pairs, bench.folder)
+    path = sector_file(pairs, bench.folder, COARSE)
     stuck = stuck_frequency(path)
-    unknowns = 3 * pairs * (2 * n_harmonics + 1)
-    n_points = FEWEST_POINTS if unknowns > FEW_ABOVE or bench.quick else MOST_POINTS
+    small = unknowns_of(pairs, n_harmonics) <= SMALL and not bench.quick
+    n_points = MOST_POINTS if small else FEWEST_POINTS
     centre, half = stuck * (1.0 + PEAK_SHIFT), 0.5 * SPACING * (n_points - 1)
     sweep = {"start": centre + half, "end": centre - half, "n_points": n_points, "unit": "Hz"}
     groups = case(pairs, n_harmonics, sweep, "krylov", path)
     groups["harmonics"]["n_time"] = n_time
-    repeats = REPEATS if unknowns <= REPEATED_UP_TO and not bench.quick else 1
+    repeats = REPEATS if small else 1
     found = [bench.run_and_weigh(groups) for _ in range(repeats)]
     run, cost = sorted(found, key=lambda one: processor_seconds(*one))[repeats // 2]
     return Measured(pairs, n_harmonics, processor_seconds(run, cost),
@@ -122,12 +134,14 @@ def write_scaling(images: Path, rows: list[Measured], paper: list[Measured]) -> 
                "GMRES iterations", "time [ms]", "set-up [s]", "memory [MB]", "full matrix [MB]")
     return "\n".join([
         "## Scaling", "",
-        "Bladed-disk sector at 4400 rpm with finer and finer flanks (`python -m fretwear.sector "
-        f"--pairs N`), tip force 0.5 N, `n_time = {N_TIME}`, `linear = 'krylov'`, one thread; up "
-        f"to {MOST_POINTS} frequencies around the peak, {SPACING:g} Hz apart ({FEWEST_POINTS} "
-        f"above {FEW_ABOVE} unknowns). Steps, iterations and times are means of a frequency, times "
-        "in processor seconds without the first frequency, which starts from the linear solution; "
-        f"up to {REPEATED_UP_TO} unknowns medians of {REPEATS} runs. "
+        "Bladed-disk sector at 4400 rpm with finer and finer flanks and a mesh away from them that "
+        f"is coarser than the default (`python -m fretwear.sector --pairs N {coarse_options()}`), "
+        f"tip force 0.5 N, `n_time = {N_TIME}`, `linear = 'krylov'`, one thread; {MOST_POINTS} "
+        f"frequencies around the peak, {SPACING:g} Hz apart ({FEWEST_POINTS} above {SMALL} "
+        f"unknowns). Sizes of more than {MOST_UNKNOWNS} unknowns are left out: a frequency takes "
+        "minutes. Steps, iterations and times are means of a frequency, times in processor "
+        "seconds without the first frequency, which starts from the linear solution; "
+        f"up to {SMALL} unknowns medians of {REPEATS} runs. "
         "Set-up is everything that is done once: reading the model, modes, room. Memory is "
         "the peak of the process; a real matrix of the order of the unknowns would take the "
         "last column alone.",
@@ -145,6 +159,11 @@ def write_scaling(images: Path, rows: list[Measured], paper: list[Measured]) -> 
         "", *exponents(rows), "",
         "### Many harmonics against one", "", *over_harmonics(paper), "",
         "### Finer flanks", "", *finer_flanks(rows)])
+
+
+def coarse_options() -> str:
+    """The mesh away from the flanks, on the command line of the generator."""
+    return " ".join(f"--{key} {value}" for key, value in COARSE.items())
 
 
 def largest_matrix(rows: list[Measured]) -> list[str]:

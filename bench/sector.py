@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -159,14 +160,18 @@ def cross(bench: Bench, name: str, n_harmonics: int, groups: Groups) -> Crossing
     return Crossing(name, n_harmonics, left, times["lu"], times["krylov"])
 
 
-def sector_file(pairs: int, folder: Path) -> Path:
-    """The model with so many pairs, generated where it is no example."""
+def sector_file(pairs: int, folder: Path, coarse: Mapping[str, int] | None = None) -> Path:
+    """The model with so many pairs, generated where it is no example.
+
+    `coarse` holds parameters of the mesh away from the flanks, as `fretwear.sector` takes them.
+    """
     example = ROOT / "example" / "blade_sector" / f"sector_{pairs}.h5"
-    if example.exists():
+    if example.exists() and not coarse:
         return example
-    path = folder / f"sector_{pairs}.h5"
+    path = folder / f"sector_{pairs}{'_coarse' if coarse else ''}.h5"
     if not path.exists():
+        options = [f"--{key}={value}" for key, value in (coarse or {}).items()]
         subprocess.run([sys.executable, "-m", "fretwear.sector", "--pairs", str(pairs), "-q",
-                        "-o", path], check=True,
+                        *options, "-o", path], check=True,
                        env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
     return path

@@ -176,3 +176,20 @@ def test_a_peer_that_did_not_end_has_no_ratio() -> None:
     cut = PeerCase("chain", 3, 256, 0.001, math.nan, 3.0, math.nan, math.nan, 30.0, None)
     row = row_of(cut)
     assert "limit" in str(row[3]) and "not known" in str(row[5]) and len(row) == len(row_of(done))
+
+
+def test_scaling_asks_for_the_coarse_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sector
+    from scaling import COARSE, coarse_options
+
+    asked: list[list[str]] = []
+    monkeypatch.setattr(sector.subprocess, "run", lambda command, **_: asked.append(command))
+    path = sector.sector_file(48, tmp_path, COARSE)
+    assert path == tmp_path / "sector_48_coarse.h5"
+    assert [option.replace("=", " ") for option in map(str, asked[0]) if "=" in option] == [
+        f"--{option.strip()}" for option in coarse_options().split("--")[1:]]
+    # What is there already is not generated again, and an example serves where nothing is coarse.
+    path.touch()
+    assert sector.sector_file(48, tmp_path, COARSE) == path
+    assert sector.sector_file(48, tmp_path).parent.name == "blade_sector"
+    assert len(asked) == 1
