@@ -101,6 +101,7 @@ contains
       do h = 1, system%fourier%n_retained
          stiffness = system%structure%stiffness(:, :, h)
          force = system%structure%load(:, h)
+         if (system%fourier%harmonic(h) > 0) force = system%load_share*force
          held = .false.
          call close_pairs(system, closed, system%fourier%harmonic(h), stiffness, force, held, &
             q(:, h))

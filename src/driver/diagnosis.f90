@@ -23,51 +23,83 @@ contains
       type(hbm_system), intent(inout), target :: system
       type(solution_method), intent(inout) :: method
       character(:), allocatable, intent(out) :: reason
-      real(wp) :: x(system%n), lower, upper
-      character(8) :: percent
+      real(wp) :: x(system%n)
       logical :: done
-      integer :: k
 
       if (method%unbounded) then
          reason = 'the vibration grows without bound: the excitation meets a mode that neither '// &
                   'damping nor contact limits; give it damping or shift the frequency'
          return
       end if
+      ! The guess for the position at rest is one without the vibratory load.
+      call solve_share(system, method, 0.0_wp, x, done, only_set=.true.)
       call stuck_guess(system, x)
       call solve_share(system, method, 0.0_wp, x, done)
-      if (.not. done) then
+      if (done) then
+         call explain_vibration(system, method, x, reason)
+      else
          reason = 'the joint cannot carry its static load: no position at rest was found; it '// &
                   'needs more preload, friction or support, or a smaller static load'
-      else
-         lower = 0.0_wp
-         upper = 1.0_wp
-         call solve_share(system, method, upper, x, done)
-         if (done) then
-            reason = 'the vibration itself converges from its position at rest; try smaller '// &
-                     'steps, or another solver%kind or scheme'
-            return
-         end if
-         do k = 1, n_halvings
-            call solve_share(system, method, 0.5_wp*(lower + upper), x, done)
-            if (done) then
-               lower = 0.5_wp*(lower + upper)
-            else
-               upper = 0.5_wp*(lower + upper)
-            end if
-         end do
-         write (percent, '(f6.1, a)') 100.0_wp*lower, ' %'
-         reason = 'above '//trim(adjustl(percent))//' of the vibratory load no periodic '// &
-                  'vibration was found'
-         if (.not. held_without_friction(system)) then
-            reason = 'the joint cannot carry its static load while it slides, for only '// &
-                     'friction holds it: '//reason//'; it needs more preload, friction or support'
-         else
-            reason = reason//'; try another penalty_scale (0.3 or 3), more n_time, or a sweep '// &
-                     'that starts where the response is small; an undamped resonance needs damping'
-         end if
       end if
       call solve_share(system, method, 1.0_wp, x, done, only_set=.true.)
    end subroutine explain_failure
+
+   !> The largest share of the vibratory load that has a solution, from the position at rest on.
+   subroutine explain_vibration(system, method, x, reason)
+      type(hbm_system), intent(inout), target :: system
+      type(solution_method), intent(inout) :: method
+      !> Position at rest on entry.
+      real(wp), intent(inout), contiguous :: x(:)
+      character(:), allocatable, intent(out) :: reason
+      character(8) :: percent
+      real(wp) :: lower
+      logical :: done
+
+      call solve_share(system, method, 1.0_wp, x, done)
+      if (done) then
+         reason = 'the vibration itself converges from its position at rest; try smaller '// &
+                  'steps, or another solver%kind or scheme'
+         return
+      end if
+      call find_largest_share(system, method, x, lower)
+      write (percent, '(f6.1, a)') 100.0_wp*lower, ' %'
+      reason = 'above '//trim(adjustl(percent))//' of the vibratory load no periodic '// &
+               'vibration was found'
+      if (.not. held_without_friction(system)) then
+         reason = 'the joint cannot carry its static load while it slides, for only '// &
+                  'friction holds it: '//reason//'; it needs more preload, friction or support'
+      else if (system%rigid) then
+         reason = reason//'; try another penalty_scale (0.3 or 3), more n_time, or a sweep '// &
+                  'that starts where the response is small; an undamped resonance needs damping'
+      else
+         reason = reason//"; try law = 'dlft' where the contact is much stiffer than the "// &
+                  'structure, more n_time, or a sweep that starts where the response is small; '// &
+                  'an undamped resonance needs damping'
+      end if
+   end subroutine explain_vibration
+
+   !> By halves of the interval between a share that has a solution and one that has none.
+   subroutine find_largest_share(system, method, x, lower)
+      type(hbm_system), intent(inout), target :: system
+      type(solution_method), intent(inout) :: method
+      real(wp), intent(inout), contiguous :: x(:)
+      real(wp), intent(out) :: lower
+      real(wp) :: upper, middle
+      logical :: done
+      integer :: k
+
+      lower = 0.0_wp
+      upper = 1.0_wp
+      do k = 1, n_halvings
+         middle = 0.5_wp*(lower + upper)
+         call solve_share(system, method, middle, x, done)
+         if (done) then
+            lower = middle
+         else
+            upper = middle
+         end if
+      end do
+   end subroutine find_largest_share
 
    !> Solve under a share of the vibratory load, from x, which stays where that fails.
    subroutine solve_share(system, method, share, x, done, only_set)

@@ -25,6 +25,15 @@ def test_friction_limits_the_resonance_of_a_slider():
     assert end.verdict == "converged"
 
 
+def test_a_stiff_penalty_is_no_lack_of_support():
+    """The search for a position at rest began where the vibration would have been linear."""
+    joint = interface(2).with_(contact_stiffness=1e9)
+    end = runs.run(cases.make("test", "stiff", joint, law="penalty"))
+    assert end.verdict == "words"
+    assert "of the vibratory load" in end.text and "law = 'dlft'" in end.text
+    assert runs.run(cases.make("test", "rigid", joint)).verdict == "converged"
+
+
 @pytest.mark.parametrize("method", ["tcm", "tcm_least_squares"])
 def test_forces_of_a_collocation_balance_the_displacements(method):
     case = cases.make("test", method, interface(2, preload=0.5), n_harmonics=2, n_time=17,
