@@ -8,7 +8,8 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint docs clean
 .PHONY: fuzz
-.PHONY: bench bench-solvers bench-paper bench-time bench-scaling bench-peers bench-full paper
+.PHONY: bench bench-solvers bench-paper bench-time bench-scaling bench-limit bench-peers bench-full
+.PHONY: paper
 .PHONY: stress long faults
 
 BUILD := build/release
@@ -98,6 +99,9 @@ bench-time: build ## harmonic balance against integration in time
 # Models that are not there yet are generated into build/bench first; 768 pairs take long.
 bench-scaling: build ## time and memory of a frequency, 16 to 768 pairs and 1 to 31 harmonics
 	PYTHONPATH=python $(PYTHON) bench/run.py scaling
+
+bench-limit: build ## where the time goes against its floor, and what is skipped
+	PYTHONPATH=python $(PYTHON) bench/run.py limit skips
 
 # Another environment's Python where pyharm-os is installed: make bench-peers PEER_PYTHON=...
 PEER_PYTHON ?= $(PYTHON)

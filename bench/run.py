@@ -2,8 +2,8 @@
 
     python bench/run.py [PART ...] [--build build/release] [--quick] [-o docs]
 
-Parts: speed, solvers, paper, iterations, aliasing, time, scaling, peers, or all; without any,
-speed. A part replaces its section of the document and leaves the others.
+Parts: speed, solvers, paper, iterations, aliasing, time, scaling, limit, skips, peers, or all;
+without any, speed. A part replaces its section of the document and leaves the others.
 
 Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
 tries the scripts and measures nothing.
@@ -24,6 +24,7 @@ from document import ORDER, update_document
 from filtering import measure_filtering, write_filtering
 from integration import measure_integration, write_integration
 from iterations import measure_iterations, write_iterations
+from limit import measure_limit, write_limit
 from measure import ROOT, Bench, describe_machine
 from oscillators import measure_oscillators
 from paper import measure_methods, write_methods
@@ -31,6 +32,7 @@ from peers import measure_peers, write_peers
 from programs import build_programs, run_program
 from scaling import measure_scaling, write_scaling
 from sector import measure_crossing, measure_points, measure_sweeps, measure_threads
+from skips import measure_skips, write_skips
 from solvers import measure_solvers
 from solvers_report import write_solvers
 from speed_report import Measurements, write_speed
@@ -114,9 +116,19 @@ def scaling(job: Job) -> str:
     return write_scaling(job.images, *measure_scaling(job.bench, job.step))
 
 
+def limit(job: Job) -> str:
+    """Where the time goes, against the floor; threads."""
+    return write_limit(measure_limit(job.bench, job.program("floor")))
+
+
+def skips(job: Job) -> str:
+    """What is left out, and what that saves."""
+    return write_skips(*measure_skips(job.bench, job.program("floor")))
+
+
 PARTS = {"speed": speed, "solvers": solvers, "paper": paper, "iterations": iterations,
          "aliasing": aliasing, "time": integration,
-         "scaling": scaling, "peers": peers}
+         "scaling": scaling, "limit": limit, "skips": skips, "peers": peers}
 
 
 def main() -> None:

@@ -193,3 +193,33 @@ def test_scaling_asks_for_the_coarse_mesh(tmp_path: Path, monkeypatch: pytest.Mo
     assert sector.sector_file(48, tmp_path, COARSE) == path
     assert sector.sector_file(48, tmp_path).parent.name == "blade_sector"
     assert len(asked) == 1
+
+
+def test_the_floor_is_judged_without_what_runs_before_a_sweep() -> None:
+    from limit import CONSTRUCTION, Part, floor_part
+
+    parts = [Part("residual", 9, 1.4, 1.0), Part(CONSTRUCTION, 1, 9.0, 0.0)]
+    assert "met everywhere" in floor_part({(16, 3): parts})
+    slow = [Part("residual", 9, 3.0, 1.0), *parts[1:]]
+    assert "missed in 1 of 2 cases, by up to 2.00 times" in floor_part({(16, 3): parts,
+                                                                       (48, 3): slow})
+
+
+def test_skips_name_tests_that_exist() -> None:
+    import re
+
+    text = (BENCH / "skips.py").read_text(encoding="utf-8")
+    named = re.findall(r"(test_\w+\.(?:py|pf))(?:::(test_\w+))?", text)
+    assert len(named) > 9
+    for module, name in named:
+        (path,) = (BENCH.parent / "test").rglob(module)
+        assert not name or name in path.read_text(encoding="utf-8"), (module, name)
+
+
+def test_a_saving_is_the_time_without_over_that_with() -> None:
+    from skips import Saving, Spared, write_skips
+
+    text = write_skips([Saving("a skip", "a case", 0.1, 0.25, "test_a.py::b, test_c.pf")],
+                       [Spared("a thing", "a case", 2, 64, "test_d.pf")])
+    assert "| a skip | a case | 100 | 250 | 2.50 | `test_a.py::b`, `test_c.pf` |" in text
+    assert "| a thing | a case | 2 | 64 | 32.0 | `test_d.pf` |" in text

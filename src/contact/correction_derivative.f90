@@ -68,11 +68,13 @@ contains
       real(wp), intent(inout) :: rows(n_coef, 3, 2, n_time)
       !> Derivative of x at the start, then at the end (n_coef, 3, 2).
       real(wp), intent(inout) :: dx(n_coef, 3, 2)
-      integer :: turn, k
       real(wp) :: p, d(2), length
+      integer :: turn, k, at
 
       do turn = 1, n_turns
          do k = 1, n_time
+            ! The rows of turns before the last serve nobody: one place is enough for them.
+            at = merge(k, 1, turn == n_turns)
             p = max(-y(3, k), 0.0_wp)
             d = y(1:2, k) - x
             length = sqrt(d(1)**2 + d(2)**2)
@@ -80,13 +82,11 @@ contains
                if (turn == n_turns) call stick_rows(n_coef, base(:, k), present, dx, rows(:, :, &
                   :, k))
             else if (p <= 0.0_wp) then
-               rows(:, :, :, k) = 0.0_wp
-               call follow(n_coef, base(:, k), present, rows(:, :, :, k), dx)
+               call open_rows(n_coef, base(1, k), present, dx, rows(1, 1, 1, at))
                x = y(1:2, k)
             else
-               call slip_rows(n_coef, base(:, k), present, mu, p, d/length, length, dx, &
-                              rows(:, :, :, k))
-               call follow(n_coef, base(:, k), present, rows(:, :, :, k), dx)
+               call slip_rows(n_coef, base(1, k), present, mu, p, d/length, length, dx, &
+                              rows(1, 1, 1, at))
                x = y(1:2, k) - mu*p*d/length
             end if
             if (remembers) cycle
@@ -109,42 +109,65 @@ contains
       end do
    end subroutine stick_rows
 
+   !> Rows of an instant of slip, and dx = dy - rows in the same pass.
    pure subroutine slip_rows(n_coef, base, present, mu, p, e, length, dx, rows)
       integer, intent(in) :: n_coef
-      real(wp), intent(in) :: base(n_coef), dx(n_coef, 3, 2), mu, p, e(2), length
+      real(wp), intent(in) :: base(n_coef), mu, p, e(2), length
       logical, intent(in) :: present(3)
-      real(wp), intent(inout) :: rows(n_coef, 3, 2)
+      real(wp), intent(inout) :: dx(3*n_coef, 2), rows(3*n_coef, 2)
+      real(wp) :: turning(2), across
+      integer :: k, n
+
+      n = n_coef
+      turning = 0.0_wp
+      ! Turning of the slip direction: the part of dy - dx across e.
+      if (present(1) .and. present(2)) turning = (mu*p/length)*[-e(2), e(1)]
+      do k = 1, 3*n
+         across = e(2)*dx(k, 1) - e(1)*dx(k, 2)
+         rows(k, 1) = across*turning(1)
+         rows(k, 2) = across*turning(2)
+         dx(k, 1) = -rows(k, 1)
+         dx(k, 2) = -rows(k, 2)
+      end do
+      if (present(1)) call add_input(dx(:n, :), rows(:n, :), -e(2)*turning, [1.0_wp, 0.0_wp])
+      if (present(2)) then
+         call add_input(dx(n + 1:2*n, :), rows(n + 1:2*n, :), e(1)*turning, [0.0_wp, 1.0_wp])
+      end if
+      if (present(3)) then
+         call add_input(dx(2*n + 1:, :), rows(2*n + 1:, :), -mu*e, [0.0_wp, 0.0_wp])
+      end if
+
+   contains
+
+      !> Rows by one component of the prediction itself, where dy is `moves`.
+      pure subroutine add_input(dx, rows, factor, moves)
+         real(wp), intent(inout) :: dx(:, :), rows(:, :)
+         real(wp), intent(in) :: factor(2), moves(2)
+         integer :: c, i
+
+         do c = 1, 2
+            do i = 1, n_coef
+               rows(i, c) = rows(i, c) + factor(c)*base(i)
+               dx(i, c) = dx(i, c) + (moves(c) - factor(c))*base(i)
+            end do
+         end do
+      end subroutine add_input
+
+   end subroutine slip_rows
+
+   !> Rows of an instant of separation: dx = dy.
+   pure subroutine open_rows(n_coef, base, present, dx, rows)
+      integer, intent(in) :: n_coef
+      real(wp), intent(in) :: base(n_coef)
+      logical, intent(in) :: present(3)
+      real(wp), intent(inout) :: dx(n_coef, 3, 2), rows(n_coef, 3, 2)
       integer :: c
 
       rows = 0.0_wp
-      if (present(1) .and. present(2)) then
-         ! Turning of the slip direction: the part of dy - dx across e.
-         rows(:, :, 1) = e(2)*(e(1)*dx(:, :, 2) - e(2)*dx(:, :, 1))
-         rows(:, :, 2) = e(1)*(e(2)*dx(:, :, 1) - e(1)*dx(:, :, 2))
-         rows(:, 1, 1) = rows(:, 1, 1) + e(2)**2*base
-         rows(:, 2, 1) = rows(:, 2, 1) - e(1)*e(2)*base
-         rows(:, 1, 2) = rows(:, 1, 2) - e(1)*e(2)*base
-         rows(:, 2, 2) = rows(:, 2, 2) + e(1)**2*base
-         rows = (mu*p/length)*rows
-      end if
-      if (.not. present(3)) return
+      dx = 0.0_wp
       do c = 1, 2
-         rows(:, 3, c) = rows(:, 3, c) - (mu*e(c))*base
+         if (present(c)) dx(:, c, c) = base
       end do
-   end subroutine slip_rows
-
-   !> dx = dy - d lambda.
-   pure subroutine follow(n_coef, base, present, rows, dx)
-      integer, intent(in) :: n_coef
-      real(wp), intent(in) :: base(n_coef), rows(n_coef, 3, 2)
-      logical, intent(in) :: present(3)
-      real(wp), intent(inout) :: dx(n_coef, 3, 2)
-      integer :: c
-
-      dx = -rows
-      do c = 1, 2
-         if (present(c)) dx(:, c, c) = dx(:, c, c) + base
-      end do
-   end subroutine follow
+   end subroutine open_rows
 
 end module fw_correction_derivative

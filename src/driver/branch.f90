@@ -185,6 +185,7 @@ contains
       total%preconditioners = total%preconditioners + branch%preconditioners
       total%n_problems = total%n_problems + branch%n_problems
       total%share_skipped = total%share_skipped + branch%share_skipped
+      total%n_empty = total%n_empty + branch%n_empty
    end subroutine merge_work
 
 end module fw_branch

@@ -98,7 +98,7 @@ contains
          end if
          return
       end if
-      call writer%close(final_status(outcome%status), elapsed, error)
+      call writer%close(final_status(outcome%status), elapsed, error, summary%skipped)
       outcome%summary = summary%lines(elapsed)
    end subroutine run_case
 

@@ -63,6 +63,7 @@ contains
 
       self%kind = case%solver%kind
       self%newton%options = case%solver
+      self%newton%linear%keeps = case%solver%skips
       self%powell%options = case%solver
       self%kinsol%options = case%solver
       self%in_time = case%harmonics%method == method_hdhb

@@ -32,6 +32,8 @@ module fw_summary
       !> Largest amplitude of each observed quantity among converged points, and where [rad/s].
       real(wp), allocatable :: peak(:), peak_omega(:)
       type(string_type), allocatable :: work(:)
+      !> What the case did not need, in words.
+      type(string_type), allocatable :: skipped(:)
    contains
       procedure :: add
       procedure :: add_transient
@@ -54,7 +56,7 @@ contains
 
       self%name = case%model%observe_name
       allocate (self%peak(size(self%name)), self%peak_omega(size(self%name)), source=0.0_wp)
-      allocate (self%work(0))
+      allocate (self%work(0), self%skipped(0))
    end function new_summary
 
    !> Take a point into account.
@@ -108,22 +110,35 @@ contains
                         to_text(linear%krylov_iterations)//' Krylov iterations, '// &
                         to_text(linear%preconditioners)//' preconditioners')]
       if (.not. system%fourier%has_constant()) then
-         self%work = [self%work, line('skipped', 'even harmonics (half-wave symmetry)')]
+         call skip(self, 'even harmonics (half-wave symmetry)')
       end if
       if (system%joint%n_idle > 0) then
-         self%work = [self%work, line('skipped', to_text(system%joint%n_idle)// &
-                                      ' contact components that nothing moves')]
+         call skip(self, to_text(system%joint%n_idle)//' contact components that nothing moves')
       end if
       if (linear%n_problems > 0 .and. linear%share_skipped > 0.0_wp) then
-         self%work = [self%work, line('skipped', 'stuck pairs, '// &
-                      to_text(nint(100.0_wp*linear%share_skipped/real(linear%n_problems, wp)))// &
-                      ' % of the unknowns of the linear problems')]
+         call skip(self, 'stuck pairs, '// &
+                   to_text(nint(100.0_wp*linear%share_skipped/real(linear%n_problems, wp)))// &
+                   ' % of the unknowns of the linear problems')
       end if
       if (linear%n_problems == 0 .and. system%contact%n_pairs > 0 .and. &
           kind == solver_newton .and. self%n_converged == self%n_points) then
-         self%work = [self%work, line('skipped', 'every linear problem: the joint stays stuck')]
+         call skip(self, 'every linear problem: the joint stays stuck')
+      else if (linear%n_empty > 0) then
+         call skip(self, to_text(linear%n_empty)//' of '// &
+                   to_text(linear%n_empty + linear%n_problems)// &
+                   ' linear problems: the joint stays stuck')
       end if
    end subroutine describe_work
+
+   subroutine skip(self, words)
+      class(summary_type), intent(inout) :: self
+      character(*), intent(in) :: words
+      type(string_type) :: item
+
+      item%text = words
+      self%skipped = [self%skipped, item]
+      self%work = [self%work, line('skipped', words)]
+   end subroutine skip
 
    !> Points that only the pseudo-time fallback has solved.
    subroutine note_fallback(self, n_points)

@@ -22,6 +22,7 @@ module fw_result
    use fw_result_part, only: publish_part
    use fw_result_target, only: result_format
    use fw_result_rows, only: row_set
+   use fw_text, only: string_type
    use fw_version, only: version
    implicit none (type, external)
    private
@@ -150,28 +151,34 @@ contains
    end subroutine flush_file
 
    !> Complete the file and give it its name.
-   subroutine close(self, status, elapsed, error)
+   subroutine close(self, status, elapsed, error, skipped)
       class(result_writer), intent(inout) :: self
       !> 'complete', 'not converged', or what else became of the run.
       character(*), intent(in) :: status
       !> Time of the whole run [s].
       real(wp), intent(in) :: elapsed
       type(error_type), allocatable, intent(out) :: error
+      !> What the case did not need, in words.
+      type(string_type), intent(in), optional :: skipped(:)
 
       if (self%file%id < 0) return
       !$omp critical (fretwear_io)
-      call close_file(self, status, elapsed, error)
+      call close_file(self, status, elapsed, error, skipped)
       !$omp end critical (fretwear_io)
    end subroutine close
 
-   subroutine close_file(self, status, elapsed, error)
+   subroutine close_file(self, status, elapsed, error, skipped)
       class(result_writer), intent(inout) :: self
       character(*), intent(in) :: status
       real(wp), intent(in) :: elapsed
       type(error_type), allocatable, intent(out) :: error
+      type(string_type), intent(in), optional :: skipped(:)
       type(error_type), allocatable :: close_error
 
       call write_attribute(self%file, '/', 'elapsed', elapsed, error)
+      if (present(skipped) .and. .not. allocated(error)) then
+         if (size(skipped) > 0) call write_attribute(self%file, '/', 'skipped', skipped, error)
+      end if
       if (.not. allocated(error)) then
          call write_attribute(self%file, '/', 'status', trim(status), error)
       end if

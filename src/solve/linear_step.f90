@@ -48,6 +48,8 @@ module fw_linear_step
       !> Linear problems with unknowns left, and the sum of the shares that had left them.
       integer :: n_problems = 0
       real(wp) :: share_skipped = 0.0_wp
+      !> Linear problems without any unknown left.
+      integer :: n_empty = 0
    contains
       procedure :: solve
       procedure :: prepare
@@ -90,6 +92,8 @@ contains
             self%kept = self%keeps .and. self%worth_keeping .and. system%preconditioner_fits()
             if (.not. self%kept) call build(self, system)
          end if
+      else
+         self%n_empty = self%n_empty + 1
       end if
    end subroutine prepare
 

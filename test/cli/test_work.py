@@ -20,12 +20,12 @@ def work(done):
     return (steps, *map(int, counts.groups()))
 
 
-def sector(fw_run, n_pairs, n_harmonics, start, end, linear="auto", name="sector.h5"):
+def sector(fw_run, n_pairs, n_harmonics, start, end, linear="auto", name="sector.h5", more=""):
     fw_run.write(f"""&model source = 'hdf5', rotation_speed = 460.8, modal_damping = 1e-3
    file = '{ROOT / "example" / "blade_sector" / f"sector_{n_pairs}.h5"}' /
 &load harmonic_scale = 0.5 /
 &harmonics n_harmonics = {n_harmonics}, n_time = 128 /
-&solver linear = '{linear}', tolerance = 1e-10 /
+&solver {more} linear = '{linear}', tolerance = 1e-10 /
 &sweep start = {start}, end = {end}, n_points = 11, unit = 'Hz' /
 """, "sector.nml")
     return fw_run("-o", name, "sector.nml")
@@ -39,6 +39,21 @@ def test_work_on_the_sector(fw_run, n_pairs, n_harmonics, start, end, limits):
     counts = work(sector(fw_run, n_pairs, n_harmonics, start, end))
     assert counts[1] == 0, "GMRES everywhere"
     assert all(count <= ALLOWANCE * limit for count, limit in zip(counts, limits)), counts
+
+
+def test_without_skips_every_step_has_its_preconditioner(fw_run):
+    done = sector(fw_run, 16, 3, 1021, 1024, "krylov", more="skips = .false.,")
+    steps, _, _, preconditioners = work(done)
+    assert preconditioners == steps
+    assert "skipped" not in done.stdout
+
+
+def test_the_result_file_says_what_was_skipped(fw_run):
+    done = sector(fw_run, 16, 3, 1021, 1024)
+    with h5py.File(fw_run.directory / "sector.h5") as file:
+        said = list(file.attrs["skipped"])
+    assert said == re.findall(r"^skipped +(.*)$", done.stdout, re.MULTILINE)
+    assert len(said) == 1 and said[0].startswith("stuck pairs, 67 % of the unknowns")
 
 
 def test_small_problems_are_factored(fw_run):

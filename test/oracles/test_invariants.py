@@ -133,3 +133,36 @@ def test_parity_auto_is_all(tmp_path, builder, reference, name):
     difference = np.abs(results[0].coefficients - results[1].coefficients).max()
     assert difference < 1e-9 * np.abs(results[1].coefficients).max()
     assert np.abs(results[0].force - results[1].force).max() < 1e-9 * np.abs(results[1].force).max()
+
+
+def friction_chain(lateral):
+    """Two masses on elastic friction; each may move across the chain as well, where nothing acts,
+    and `lateral` says whether the contact feels it."""
+    stiffness = np.kron(np.eye(2), [[2.0, -1.0], [-1.0, 1.0]])
+    return {"case": {"analysis": "frf"},
+            "model": {"n_dof": 4, "mass": np.eye(4).ravel().tolist(),
+                      "stiffness": stiffness.ravel().tolist(),
+                      "damping": (0.05 * stiffness).ravel().tolist()},
+            "load": {"cosine": [0.0, 0.5, 0.0, 0.0]},
+            "contact": {"n_pairs": 2, "law": "penalty", "mu": [1.0, 1.0],
+                        "normal_load": [0.6, 0.6], "tangential_stiffness": [0.3, 0.3],
+                        "side_1": [1, 3 if lateral else 0, 0, 2, 4 if lateral else 0, 0]},
+            "harmonics": {"n_harmonics": 5, "n_time": 128},
+            "sweep": {"start": 0.9, "end": 0.6, "n_points": 16},
+            # Skips would leave out a direction that nothing moves.
+            "solver": {"tolerance": 1e-12, "skips": False}}
+
+
+def test_second_direction_that_nothing_moves(tmp_path):
+    """Marching one tangential direction is marching two of which one rests."""
+    one, two = (run_case(tmp_path, friction_chain(lateral)) for lateral in (False, True))
+    assert one.converged.all() and (one.fraction[:, :, 1] > 0.0).any()
+    assert np.abs(one.coefficients - two.coefficients).max() < 1e-9 * np.abs(one.coefficients).max()
+
+
+def test_stability_changes_no_answer(tmp_path):
+    plain = friction_chain(False)
+    asked = plain | {"sweep": plain["sweep"] | {"stability": True}}
+    # Components that nothing moves are kept for the multipliers: other sums, the same solution.
+    one, two = run_case(tmp_path, plain), run_case(tmp_path, asked)
+    assert np.abs(one.coefficients - two.coefficients).max() < 1e-9 * np.abs(one.coefficients).max()

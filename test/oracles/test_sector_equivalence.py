@@ -9,6 +9,8 @@ from oracle_runs import ROOT, run_case
 
 MODEL = ROOT / "example" / "blade_sector" / "sector_16.h5"
 SPEED = 460.8
+# A load that a few points near the resonance slip under.
+SMALL = 0.02
 # The solver stops at 1e-12 of the load; the resonance amplifies that a hundredfold.
 SAME = 1e-9
 # The damping of modes whose stiffness is round-off is the root of that; measured: 1.2e-8.
@@ -54,6 +56,29 @@ def test_same_answer(tmp_path, reference, groups):
         expected, found = getattr(reference, name), getattr(result, name)
         assert np.abs(found - expected).max() < SAME * np.abs(expected).max()
     assert np.abs(result.fraction - reference.fraction).max() < 0.5 / 128
+
+
+@pytest.mark.parametrize("output", [{"contact": False}, {"histories": True}])
+def test_what_is_not_asked_for_changes_nothing(tmp_path, reference, output):
+    result = run_case(tmp_path, sector(output={"observe": "tip", **output}))
+    assert np.array_equal(result.coefficients, reference.coefficients)
+
+
+def test_a_sweep_that_is_linear_in_part(tmp_path):
+    """Points where the joint stays stuck solve nothing, and the result file says so."""
+    found = []
+    for name, skips in (("with", True), ("without", False)):
+        groups = sector(skips=skips)
+        groups["load"]["harmonic_scale"] = SMALL
+        (tmp_path / name).mkdir()
+        found.append(run_case(tmp_path / name, groups))
+        with h5py.File(next((tmp_path / name).glob("*.h5"))) as file:
+            said = list(file.attrs.get("skipped", []))
+        assert skips == any("linear problems: the joint stays stuck" in words for words in said)
+    stuck = found[0].fraction[:, :, 0].min(axis=1) == 1.0
+    assert stuck.any() and not stuck.all()
+    scale = np.abs(found[1].coefficients).max()
+    assert np.abs(found[0].coefficients - found[1].coefficients).max() < SAME * scale
 
 
 def test_sweep_direction_does_not_matter(tmp_path, reference):
