@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write what faults do into a document: fault_report.py [--tries 100] [-o docs/robustness.md]
+"""Write what faults do into a document: fault_report.py [--tries 30] [-o docs/robustness.md]
 
 A line for each scenario of `faults`, put between the marks of the document. Ends with status 1
 where one went wrong.
@@ -44,7 +44,7 @@ def tables(tries, seed):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tries", type=int, default=100, help="of each scenario")
+    parser.add_argument("--tries", type=int, default=30, help="of each scenario")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("-o", "--output", type=Path, help="document whose table is replaced")
     arguments = parser.parse_args()

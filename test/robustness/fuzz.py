@@ -4,11 +4,11 @@
     fuzz.py --build BUILD [-n 100000] [--seed 1] [--jobs 2] [--state FOLDER] [--report FILE]
 
 Input k is a function of the seed and k alone, so that a failure is made again with `--only k`, and
-a run that was stopped goes on where it was. Namelists, model files and Matrix Market files are
-read and checked through the C interface, many in one process; every 20th of them goes through
-`fw_run --check` as well, which has to end alike, and every 50th is run. Command lines and model
-files with damaged bytes all go through the program, which tries such files in a process of their
-own: HDF5 itself does not survive all of them. What is demanded:
+a run that was stopped goes on where it was, after another try of what failed. Namelists, model
+files and Matrix Market files are read and checked through the C interface, many in one process;
+every 20th of them goes through `fw_run --check` as well, which has to end alike, and every 50th is
+run. Command lines and model files with damaged bytes all go through the program, which tries such
+files in a process of their own: HDF5 itself does not survive all of them. What is demanded:
 
 * a status of 0, 2, 3 or 5 (of a run also 4 and 6), and a message with every status but 0;
 * an end within 10 s of processor time, and 10 minutes of the clock (a run is told to stop after
@@ -274,6 +274,8 @@ def work(settings):
             earlier = {}
     done = earlier.get("done", [0]*settings.jobs)
     workers = [Worker(settings, k, done[k]) for k in range(settings.jobs)]
+    for k in sorted({k for k, *_ in earlier.pop("failures", [])}):
+        workers[0].one(k)
     for worker in workers:
         worker.start()
     try:

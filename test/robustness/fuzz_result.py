@@ -20,7 +20,7 @@ def sound():
         path = Path(name) / "sound.h5"
         (path.parent / "case.nml").write_text(WEAR)
         subprocess.run([PROGRAM, "-q", "-o", path, "case.nml"], cwd=name, check=True)
-        with h5py.File(path, "r+") as file:
+        with h5py.File(path, "r+", locking=False) as file:
             file["seconds"][:] = 0.0
             file.attrs["elapsed"] = 0.0
             file.attrs["namelist"] = file.attrs["namelist"].replace(name, "/folder")

@@ -94,7 +94,7 @@ def test_a_part_whose_lock_proves_nothing_is_left_alone(case):
 
 @pytest.mark.parametrize("name", faults.SCENARIOS)
 def test_at_random_moments(tmp_path, name):
-    """A few tries of each fault; `make faults` takes hundreds."""
+    """A few tries of each fault; `make faults` takes more."""
     tried, complaints = faults.campaign(name, tmp_path, tries=3)
     assert not complaints
     assert tried == 3 or name in faults.NEED_FILE_SYSTEM

@@ -20,6 +20,7 @@ import numpy as np
 import stress_cases as cases
 import stress_run as runs
 from stress_models import interface
+from stress_store import revision
 
 BEGIN, END = "<!-- long runs: begin -->", "<!-- long runs: end -->"
 # Growth that counts: of memory between the first tenth and the end [MB], and of the median time.
@@ -86,7 +87,8 @@ def main():
     parser.add_argument("--steps", type=int, default=5000)
     parser.add_argument("-o", "--output", type=Path, help="document whose table is replaced")
     arguments = parser.parse_args()
-    lines = ["| run | points | converged | MB after a tenth | MB at the end | ms a point, second "
+    lines = [f"At commit {revision()}.", "",
+             "| run | points | converged | MB after a tenth | MB at the end | ms a point, second "
              "tenth | ms a point, last tenth |", "|---" * 7 + "|"]
     bad = False
     for name, case in (("sweep", sweep(arguments.points)), ("wear", wear(arguments.steps))):
