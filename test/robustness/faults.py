@@ -130,7 +130,7 @@ SCENARIOS = {
     "kill -9 of a sweep":
         ("the earlier result or the whole new one; the next run gives the same numbers", Sweep,
          killed_sweep),
-    "kill -9 of a wear run, `--restart`, until it is complete":
+    "kill -9 of a wear run, up to three times, `--restart`":
         ("saved steps stay; bit for bit the same numbers", Wear, killed_wear),
     "SIGINT or SIGTERM to a wear run, `--restart`":
         ("status 6 and a result; bit for bit the same numbers", Wear, signalled_wear),
