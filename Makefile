@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz
 .PHONY: bench bench-solvers bench-paper bench-time bench-scaling bench-limit bench-peers bench-full
 .PHONY: paper
-.PHONY: stress long faults
+.PHONY: stress long faults verify
 
 BUILD := build/release
 RUN := build/run
@@ -69,7 +69,7 @@ lint: build/deps.stamp ## linters of the Fortran and the Python code, type check
 	@$(PYTHON) -m fortitude check --quiet
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs \
-	   test/robustness test/stress
+	   test/robustness test/stress test/verify
 
 docs: build/deps.stamp ## reference of library and Python package, in build/docs
 	@$(PYTHON) tools/build_docs.py build/docs
@@ -83,6 +83,9 @@ stress: build ## every case to its extremes, written to docs/robustness.md
 
 long: build ## memory and time of long runs, written to docs/robustness.md
 	$(PYTHON) test/stress/long_runs.py -o docs/robustness.md
+
+verify: build/deps.stamp ## tests in PARTS (all) of the builds in docs/robustness.md
+	$(PYTHON) test/verify/verify.py --python $(PYTHON) $(PARTS)
 
 bench: build ## error against run time, written to docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py speed
@@ -134,4 +137,4 @@ fuzz: build ## N hostile inputs (100000), written to docs/robustness/inputs.md
 	$(PYTHON) test/robustness/fuzz_report.py $(FUZZ)
 
 clean: ## remove everything built but the Python environment
-	rm -rf $(BUILD) build/debug build/docs build/wheel $(RUN) $(FUZZ)
+	rm -rf $(BUILD) build/debug build/docs build/wheel build/verify $(RUN) $(FUZZ)

@@ -386,6 +386,7 @@ contains
             call add_onset(self, j, 1.0_wp, n_retained, harmonic, column, by_tangential, by_normal)
          case (phase_backward)
             call add_onset(self, j, -1.0_wp, n_retained, harmonic, column, by_tangential, by_normal)
+         case default ! stuck or open: no slip has an onset
          end select
       end do
    end subroutine path_derivative

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Run every test and count each case: `N passed, N failed` (and skipped) is the last line.
 
-    run_tests.py --build BUILD_DIRECTORY [--python INTERPRETER]
+    run_tests.py --build BUILD_DIRECTORY [--python INTERPRETER] [TESTS...]
 
 Stages: the self-test of the stand-in, the unit tests (each .pf file in a process of its own under
-the stand-in), pytest over test/ and python/tests. A stage that crashes, or that counts no test,
-is a failed case of its own: silence never passes.
+the stand-in), pytest over test/ and python/tests, or over TESTS. A stage that crashes, or that
+counts no test, is a failed case of its own: silence never passes.
 """
 import argparse
 import os
@@ -76,10 +76,9 @@ def unit_stages(programs):
         yield fortran_stage(f"unit/{path.name}", [program, path.stem])
 
 
-def pytest_stage(python, build):
+def pytest_stage(python, build, tests):
     """pytest over the directories that hold tests; its own report is read, not its text."""
-    directories = [path for path in (ROOT / "test", ROOT / "python" / "tests")
-                   if any(path.rglob("test_*.py"))]
+    directories = [path for path in tests if any(path.rglob("test_*.py"))]
     if not directories:
         print("pytest: no test file yet")
         return Counter()
@@ -105,12 +104,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, required=True, help="directory of the CMake build")
     parser.add_argument("--python", default=sys.executable, help="interpreter that has pytest")
+    parser.add_argument("tests", type=Path, nargs="*", help="directories of pytest",
+                        default=[ROOT / "test", ROOT / "python" / "tests"])
     arguments = parser.parse_args()
     build = arguments.build.resolve()
     total = Counter()
     for counts in unit_stages(build / "test" / "support"):
         total += counts
-    total += pytest_stage(arguments.python, build)
+    total += pytest_stage(arguments.python, build, [path.resolve() for path in arguments.tests])
     line = f"{total['passed']} passed, {total['failed']} failed"
     if total["skipped"]:
         line += f", {total['skipped']} skipped"

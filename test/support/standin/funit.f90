@@ -46,6 +46,10 @@ module funit
       module procedure equal_text
    end interface assertEqual
 
+   interface assertRelativelyEqual
+      module procedure relatively_equal
+   end interface assertRelativelyEqual
+
    interface assertNotEqual
       module procedure not_equal_real
       module procedure not_equal_integer
@@ -208,7 +212,7 @@ contains
    end subroutine equal_complex_exact
 
    !> |found - expected| <= tolerance * |expected|, pFUnit's relative comparison.
-   subroutine assertRelativelyEqual(expected, found, tolerance, message, location)
+   subroutine relatively_equal(expected, found, tolerance, message, location)
       real(wp), intent(in) :: expected(..), found(..)
       real(wp), intent(in) :: tolerance
       character(*), intent(in), optional :: message
@@ -217,7 +221,7 @@ contains
       if (.not. conformable(shape(expected), shape(found), message, location)) return
       call compare(cmplx(flat(expected), kind=wp), cmplx(flat(found), kind=wp), &
          & tolerance*abs(flat(expected)), .false., message, location)
-   end subroutine assertRelativelyEqual
+   end subroutine relatively_equal
 
    !> Compare two lists; a list of one expected value or tolerance holds for all. The first
    !> difference is shown. Nothing is subtracted or ordered before NaN and equal values are out

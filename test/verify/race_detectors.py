@@ -1,0 +1,72 @@
+"""Separate handles in threads of their own under race detectors."""
+import os
+import re
+import tempfile
+from pathlib import Path
+
+from common import ROOT, build, report, run
+from optimisation import plain_build
+
+HERE = Path(__file__).resolve().parent
+MODEL = ROOT / "example" / "blade_sector" / "sector_16.h5"
+LEAST_CASES = 8
+
+
+def races(setting):
+    """Nine handles at the same time: as they are, and without what guards them.
+
+    The sections that OpenMP guards are locks of libgomp, which no detector sees: critical.c puts
+    mutexes in their place, or leaves them out for the proof that a race is found.
+    """
+    sanitized, _ = build(setting, "races", "-DFRETWEAR_SANITIZE=thread",
+                         "-DCMAKE_Fortran_FLAGS=-O1 -g", "-DFRETWEAR_PYTHON=OFF",
+                         "-DFRETWEAR_SHARED=OFF", "-DFRETWEAR_TESTS=OFF")
+    plain, _ = plain_build(setting)
+    lines = ["| detector | critical sections | handles | reports | differences |",
+             "|---|---|---|---|---|"]
+    clean = True
+    for name, directory, detector in (("thread sanitizer", sanitized, thread_sanitizer),
+                                      ("helgrind", plain, helgrind)):
+        for guarded in (True, False):
+            cases, reports, differences, text = watch(directory, guarded, detector)
+            good = (cases >= LEAST_CASES and (reports, differences) == (0, "0")) if guarded \
+                else reports > 0
+            if not good:
+                report(text)
+            clean = clean and good
+            lines.append(f"| {name} | {'as they are' if guarded else 'left out'} | {cases} | "
+                         f"{reports} | {differences} |")
+    return lines, clean
+
+
+def watch(directory, guarded, detector):
+    """Handles that ran, reports, differences from a run alone, and all that was said."""
+    with tempfile.TemporaryDirectory(prefix="fw_races_") as name:
+        folder = Path(name)
+        run(["cmake", "--install", directory, "--prefix", folder])
+        flags = run(["pkg-config", "--cflags", "--libs", "fretwear-static"], env=dict(
+            os.environ, PKG_CONFIG_PATH=str(next(folder.glob("**/pkgconfig"))))).stdout.split()
+        sources = [HERE / "critical.c", ROOT / "test" / "legacy" / "threads.c"]
+        text, reports = detector(
+            ["cc", "-g", "-std=c99", "-D_POSIX_C_SOURCE=200809L",
+             *([] if guarded else ["-DUNGUARDED"]), *sources, "-o", folder / "threads", *flags,
+             "-lpthread", "-lm"], [folder / "threads", MODEL, folder, "1"])
+    differences = re.search(r"^(\d+) differences$", text, re.MULTILINE)
+    return (len(re.findall(r"^case \d+: status", text, re.MULTILINE)), reports,
+            differences[1] if differences else "ended early", text)
+
+
+def thread_sanitizer(compile_command, command):
+    """What the program says, and the number of reports."""
+    run([*compile_command, "-fsanitize=thread"])
+    text = run(command, check=False, env=dict(os.environ, TSAN_OPTIONS="exitcode=0")).stdout
+    return text, len(re.findall(r"^WARNING: ThreadSanitizer", text, re.MULTILINE))
+
+
+def helgrind(compile_command, command):
+    """The same under valgrind, which knows the instructions of these kernels of OpenBLAS."""
+    run(compile_command)
+    text = run(["valgrind", "--tool=helgrind", *command], check=False,
+               env=dict(os.environ, OPENBLAS_CORETYPE="Nehalem")).stdout
+    found = re.search(r"ERROR SUMMARY: \d+ errors from (\d+) contexts", text)
+    return text, int(found[1]) if found else -1
