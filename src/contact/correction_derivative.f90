@@ -9,17 +9,20 @@
 !>
 !> starting from dx = 0 at the stated memory, through all turns of the march; or, where the limit
 !> of the march does not depend on its start, from the derivative dx of the limit itself,
-!> dx = M dx + N, with M and N the derivatives of a turn by its start and by the inputs.
+!> dx = M dx + N, with M and N the derivatives of a turn by its start and by the inputs. As
+!> lambda_t = y - x at every instant, the start adds -(d x_k/d x_0) dx to the rows of one march
+!> from dx = 0; no second one is needed.
 module fw_correction_derivative
    use fw_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: march_derivative, limit_derivative
+   public :: march_derivative, limit_derivative, add_start
 
 contains
 
-   !> One turn at the limit x: rows as march_derivative. (I - M)^-1 is given.
+   !> One turn at the limit x: rows as march_derivative, but without what the start of the turn
+   !> adds, which is for `add_start`. (I - M)^-1 is given.
    pure subroutine limit_derivative(n_time, n_coef, base, y, mu, touch, present, inverse, x, &
                                     rows, dx)
       integer, intent(in) :: n_time, n_coef
@@ -27,15 +30,16 @@ contains
       !> Distance from the friction cone within which the pair counts as slipping [force].
       real(wp), intent(in) :: mu, touch, inverse(2, 2)
       logical, intent(in) :: present(3)
-      real(wp), intent(inout) :: x(2)
+      real(wp), intent(in) :: x(2)
       real(wp), intent(inout) :: rows(n_coef, 3, 2, n_time)
-      real(wp), intent(inout) :: dx(n_coef, 3, 2)
-      real(wp) :: limit(2), first
+      !> Derivative of the limit.
+      real(wp), intent(out) :: dx(n_coef, 3, 2)
+      real(wp) :: after(2), first
       integer :: c, k
 
-      limit = x
+      after = x
       dx = 0.0_wp
-      call march_derivative(n_time, n_coef, 1, base, y, mu, touch, present, .true., x, rows, &
+      call march_derivative(n_time, n_coef, 1, base, y, mu, touch, present, .true., after, rows, &
                             dx)
       do c = 1, 3
          do k = 1, n_coef
@@ -44,10 +48,22 @@ contains
             dx(k, c, 2) = inverse(2, 1)*first + inverse(2, 2)*dx(k, c, 2)
          end do
       end do
-      x = limit
-      call march_derivative(n_time, n_coef, 1, base, y, mu, touch, present, .true., x, rows, &
-                            dx)
    end subroutine limit_derivative
+
+   !> Add to the rows of limit_derivative what the start of the turn adds.
+   pure subroutine add_start(n_inputs, n_time, by_start, dx, rows)
+      integer, intent(in) :: n_inputs, n_time
+      !> Derivative of the position at the instants by the one at the start, and of that.
+      real(wp), intent(in) :: by_start(2, 2, n_time), dx(n_inputs, 2)
+      real(wp), intent(inout) :: rows(n_inputs, 2, n_time)
+      integer :: c, k
+
+      do k = 1, n_time
+         do c = 1, 2
+            rows(:, c, k) = rows(:, c, k) - by_start(c, 1, k)*dx(:, 1) - by_start(c, 2, k)*dx(:, 2)
+         end do
+      end do
+   end subroutine add_start
 
    !> March one pair through n_turns turns; the rows of the last turn are returned.
    pure subroutine march_derivative(n_time, n_coef, n_turns, base, y, mu, touch, present, &

@@ -9,6 +9,7 @@ module fw_forces
    use fw_correction, only: march_turn_1d
    use fw_correction, only: march_turn_2d
    use fw_correction, only: project_turn
+   use fw_correction_derivative, only: add_start
    use fw_correction_derivative, only: limit_derivative
    use fw_correction_derivative, only: march_derivative
    use fw_event_contact, only: event_contact_type
@@ -325,9 +326,11 @@ contains
    subroutine linearize(self, fourier)
       class(forces_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
-      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :), y_n(:)
+      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :)
+      real(wp), allocatable :: by_start(:, :, :), weight(:, :, :)
       real(wp) :: x(2)
       integer :: i, nc
+      logical :: unique
 
       self%linear_state = self%state
       if (.not. any(self%state == pair_mixed)) return
@@ -339,18 +342,20 @@ contains
                                     self%jacobian, self%slip_derivative)
          return
       end if
-      !$omp parallel default(none) shared(self, fourier, nc) private(rows, dx, y, y_n, x, i) &
+      !$omp parallel default(none) shared(self, fourier, nc) &
+      !$omp private(rows, dx, y, by_start, weight, x, i, unique) &
       !$omp if(self%n_pairs >= pairs_for_threads)
       allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
-      allocate (y_n(fourier%n_time))
+      allocate (by_start(2, 2, fourier%n_time), weight(2, 2, nc))
       !$omp do schedule(dynamic)
       do i = 1, self%n_pairs
          if (self%state(i) /= pair_mixed) cycle
          y = self%prediction_time(i, :, :)
-         y_n = y(3, :)
-         call derive(self, fourier, i, y, x, rows, dx)
-         call project(self%jacobian(:, :, i), fourier, rows, y_n, self%present(3, i))
+         call derive(self, fourier, i, y, x, rows, dx, unique, by_start)
+         call project(self%jacobian(:, :, i), fourier, rows, y(3, :), self%present(3, i))
+         if (unique) call project_start(self%jacobian(:, :, i), fourier, dx, by_start, weight)
          if (.not. self%measures_slip) cycle
+         if (unique) call add_start(3*nc, fourier%n_time, by_start, dx, rows)
          call slip_gradient(fourier%n_time, nc, fourier%synthesis, y, self%mu(i), &
                             self%present(:, i), self%remembers, x, rows, self%slip_derivative(:, i))
       end do
@@ -358,9 +363,10 @@ contains
       !$omp end parallel
    end subroutine linearize
 
-   !> Derivative of the friction of a pair at the instants. A limit that is the only one has a
-   !> derivative of its own; any other carries that of the way to it.
-   subroutine derive(self, fourier, pair, y, x, rows, dx)
+   !> Derivative of the friction of a pair at the instants. A limit that is the only one (unique)
+   !> has a derivative of its own, dx, whose part in the rows is left to `project_start`; any other
+   !> carries that of the way to it.
+   subroutine derive(self, fourier, pair, y, x, rows, dx, unique, by_start)
       class(forces_type), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       integer, intent(in) :: pair
@@ -369,14 +375,16 @@ contains
       real(wp), intent(out) :: x(2)
       real(wp), intent(inout) :: rows(fourier%n_coefficients, 3, 2, fourier%n_time)
       real(wp), intent(inout) :: dx(fourier%n_coefficients, 3, 2)
+      logical, intent(out) :: unique
+      !> Of a unique limit: derivative of the position at the instants by that at the start.
+      real(wp), intent(inout) :: by_start(2, 2, fourier%n_time)
       real(wp) :: inverse(2, 2)
-      logical :: unique
 
       unique = .false.
       x = self%x(pair, :)
       if (self%settled(pair)) then
          call limit_is_unique(self%n_pairs, fourier%n_time, pair, self%prediction_time, &
-                              self%mu(pair), touch*self%scale(pair), x, unique, inverse)
+                              self%mu(pair), touch*self%scale(pair), x, unique, inverse, by_start)
       end if
       if (unique) then
          call limit_derivative(fourier%n_time, fourier%n_coefficients, fourier%synthesis, y, &
@@ -396,7 +404,7 @@ contains
       type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
       real(wp), intent(in) :: rows(3*fourier%n_coefficients, 2, fourier%n_time)
-      real(wp), intent(in) :: y_n(fourier%n_time)
+      real(wp), intent(in) :: y_n(:)
       logical, intent(in) :: has_normal
       integer :: nc, c, k, j
       real(wp) :: factor
@@ -426,6 +434,27 @@ contains
          jacobian(2*nc + j, 2*nc + j) = jacobian(2*nc + j, 2*nc + j) + 1.0_wp
       end do
    end subroutine project
+
+   !> What the start of a turn adds to the projected rows: of rank two.
+   subroutine project_start(jacobian, fourier, dx, by_start, weight)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
+      real(wp), intent(in) :: dx(3*fourier%n_coefficients, 2), by_start(2, 2, fourier%n_time)
+      !> Room.
+      real(wp), intent(inout) :: weight(2, 2, fourier%n_coefficients)
+      integer :: c, j, column, nc
+
+      nc = fourier%n_coefficients
+      call dgemm('N', 'T', 4, nc, fourier%n_time, -1.0_wp, by_start, 4, fourier%analysis, nc, &
+                 0.0_wp, weight, 4)
+      do c = 1, 2
+         do j = 1, nc
+            column = (c - 1)*nc + j
+            jacobian(:, column) = jacobian(:, column) + weight(c, 1, j)*dx(:, 1) &
+                                  + weight(c, 2, j)*dx(:, 2)
+         end do
+      end do
+   end subroutine project_start
 
    !> Whether a pair bears at every instant.
    elemental logical function always_closed(self, pair)

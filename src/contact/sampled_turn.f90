@@ -52,25 +52,30 @@ contains
    !> Whether the discs that hold the limit x determine it alone, without its start: every direction
    !> of x shrinks in a turn. `inverse` is (I - M)^-1 then. A pair that has shaken down into the
    !> corner between two discs touches them, and round-off must not decide whether they count.
-   pure subroutine limit_is_unique(n_pairs, n_time, pair, y, mu, touch, x, unique, inverse)
+   pure subroutine limit_is_unique(n_pairs, n_time, pair, y, mu, touch, x, unique, inverse, &
+                                   by_start)
       integer, intent(in) :: n_pairs, n_time, pair
       !> As settle_samples.
       real(wp), intent(in) :: y(n_pairs, 3, n_time), mu, touch, x(2)
       logical, intent(out) :: unique
       real(wp), intent(out) :: inverse(2, 2)
+      !> Derivative of the position at the instants by the one at the start.
+      real(wp), intent(out) :: by_start(2, 2, n_time)
       real(wp) :: after(2), m(2, 2)
 
-      call turn_map(n_pairs, n_time, pair, y, mu, touch, x, after, m)
+      call turn_map(n_pairs, n_time, pair, y, mu, touch, x, after, m, by_start)
       call invert(m, inverse, unique)
    end subroutine limit_is_unique
 
    !> One turn from x, and its derivative by x.
-   pure subroutine turn_map(n_pairs, n_time, pair, y, mu, touch, x, after, m)
+   pure subroutine turn_map(n_pairs, n_time, pair, y, mu, touch, x, after, m, by_start)
       integer, intent(in) :: n_pairs, n_time, pair
       real(wp), intent(in) :: y(n_pairs, 3, n_time), mu, x(2)
       !> Distance from a disc within which the position counts as held by it [force].
       real(wp), intent(in) :: touch
       real(wp), intent(out) :: after(2), m(2, 2)
+      !> m at every instant.
+      real(wp), intent(out), optional :: by_start(2, 2, n_time)
       real(wp) :: d(2), e(2), along(2), length, limit
       integer :: k
 
@@ -81,14 +86,16 @@ contains
          d(1) = y(pair, 1, k) - after(1)
          d(2) = y(pair, 2, k) - after(2)
          length = sqrt(d(1)**2 + d(2)**2)
-         if (length <= limit - touch) cycle
-         ! x = y - (mu p/|d|) d: what points along d is lost, the rest shrinks.
-         e = d/length
-         after(1) = y(pair, 1, k) - limit*e(1)
-         after(2) = y(pair, 2, k) - limit*e(2)
-         along = e(1)*m(1, :) + e(2)*m(2, :)
-         m(1, :) = (limit/length)*(m(1, :) - e(1)*along)
-         m(2, :) = (limit/length)*(m(2, :) - e(2)*along)
+         if (length > limit - touch) then
+            ! x = y - (mu p/|d|) d: what points along d is lost, the rest shrinks.
+            e = d/length
+            after(1) = y(pair, 1, k) - limit*e(1)
+            after(2) = y(pair, 2, k) - limit*e(2)
+            along = e(1)*m(1, :) + e(2)*m(2, :)
+            m(1, :) = (limit/length)*(m(1, :) - e(1)*along)
+            m(2, :) = (limit/length)*(m(2, :) - e(2)*along)
+         end if
+         if (present(by_start)) by_start(:, :, k) = m
       end do
    end subroutine turn_map
 
