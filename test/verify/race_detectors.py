@@ -13,29 +13,35 @@ LEAST_CASES = 8
 
 
 def races(setting):
-    """Nine handles at the same time: as they are, and without what guards them.
+    """Nine handles at the same time, their library watched by the thread sanitizer."""
+    directory, _ = build(setting, "races", "-DFRETWEAR_SANITIZE=thread",
+                         "-DCMAKE_Fortran_FLAGS=-O1 -g", "-DFRETWEAR_PYTHON=OFF",
+                         "-DFRETWEAR_SHARED=OFF", "-DFRETWEAR_TESTS=OFF")
+    return judge(directory, thread_sanitizer)
+
+
+def helgrind(setting):
+    """The same with the libraries below, which the sanitizer does not see; far slower."""
+    return judge(plain_build(setting)[0], under_helgrind)
+
+
+def judge(directory, detector):
+    """Handles as they are, and without what guards them.
 
     The sections that OpenMP guards are locks of libgomp, which no detector sees: critical.c puts
     mutexes in their place, or leaves them out for the proof that a race is found.
     """
-    sanitized, _ = build(setting, "races", "-DFRETWEAR_SANITIZE=thread",
-                         "-DCMAKE_Fortran_FLAGS=-O1 -g", "-DFRETWEAR_PYTHON=OFF",
-                         "-DFRETWEAR_SHARED=OFF", "-DFRETWEAR_TESTS=OFF")
-    plain, _ = plain_build(setting)
-    lines = ["| detector | critical sections | handles | reports | differences |",
-             "|---|---|---|---|---|"]
+    lines = ["| critical sections | handles | reports | differences |", "|---|---|---|---|"]
     clean = True
-    for name, directory, detector in (("thread sanitizer", sanitized, thread_sanitizer),
-                                      ("helgrind", plain, helgrind)):
-        for guarded in (True, False):
-            cases, reports, differences, text = watch(directory, guarded, detector)
-            good = (cases >= LEAST_CASES and (reports, differences) == (0, "0")) if guarded \
-                else reports > 0
-            if not good:
-                report(text)
-            clean = clean and good
-            lines.append(f"| {name} | {'as they are' if guarded else 'left out'} | {cases} | "
-                         f"{reports} | {differences} |")
+    for guarded in (True, False):
+        cases, reports, differences, text = watch(directory, guarded, detector)
+        good = (cases >= LEAST_CASES and (reports, differences) == (0, "0")) if guarded \
+            else reports > 0
+        if not good:
+            report(text)
+        clean = clean and good
+        lines.append(f"| {'as they are' if guarded else 'left out'} | {cases} | {reports} | "
+                     f"{differences} |")
     return lines, clean
 
 
@@ -63,7 +69,7 @@ def thread_sanitizer(compile_command, command):
     return text, len(re.findall(r"^WARNING: ThreadSanitizer", text, re.MULTILINE))
 
 
-def helgrind(compile_command, command):
+def under_helgrind(compile_command, command):
     """The same under valgrind, which knows the instructions of these kernels of OpenBLAS."""
     run(compile_command)
     text = run(["valgrind", "--tool=helgrind", *command], check=False,

@@ -11,7 +11,8 @@ clean. A part that was clean with the same sources is left out, unless --again i
     builds    all optimisation: every test, and the results of the examples beside those without
     memcheck  a point of the blade sector under valgrind
     flang     a second compiler on the sources without modules of gfortran
-    races     handles in threads of their own under race detectors
+    races     handles in threads of their own under the thread sanitizer
+    helgrind  the same under helgrind, which watches the libraries below as well
     coverage  no optimisation: tests of the program, and the lines of src that they run
 
 Ends with status 1 where a part is not clean.
@@ -36,7 +37,8 @@ from revision import revision
 
 PARTS = {"traps": memory.traps, "sanitize": memory.sanitize, "builds": optimisation.builds,
          "memcheck": memory.memcheck, "flang": second_compiler.flang,
-         "races": race_detectors.races, "coverage": line_coverage.coverage}
+         "races": race_detectors.races, "helgrind": race_detectors.helgrind,
+         "coverage": line_coverage.coverage}
 
 
 def main():
