@@ -75,7 +75,9 @@ def count_lines(directory):
     gcovr = shutil.which("gcovr") or Path(sys.executable).with_name("gcovr")
     report = directory / "coverage.csv"
     run([gcovr, "--root", ".", "--filter", "src/", "--merge-mode-functions", "separate",
-         "--gcov-ignore-errors", "no_working_dir_found", "--csv", report, directory])
+         "--gcov-ignore-errors", "no_working_dir_found",
+         "--gcov-ignore-parse-errors", "suspicious_hits.warn_once_per_file",
+         "--csv", report, directory])
     with report.open(encoding="utf-8", newline="") as file:
         return {Path(row["filename"]): (int(row["line_total"]), int(row["line_covered"]))
                 for row in csv.DictReader(file)}
