@@ -8,8 +8,8 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint docs clean
 .PHONY: fuzz
-.PHONY: bench bench-solvers bench-paper bench-time bench-scaling bench-limit bench-peers bench-full
-.PHONY: paper
+.PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
+.PHONY: bench-peers bench-full paper
 .PHONY: stress long faults verify
 
 BUILD := build/release
@@ -87,8 +87,11 @@ long: build ## memory and time of long runs, written to docs/robustness.md
 verify: build/deps.stamp ## tests in PARTS (all) of the builds in docs/robustness.md
 	$(PYTHON) test/verify/verify.py --python $(PYTHON) $(PARTS)
 
-bench: build ## error against run time, written to docs/benchmarks.md
+bench: build ## times of points and sweeps, written to docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py speed
+
+bench-precision: build ## error against run time of every method, and of wear
+	PYTHONPATH=python $(PYTHON) bench/run.py precision events
 
 bench-solvers: build ## every solver, flow and scheme from many starts
 	PYTHONPATH=python $(PYTHON) bench/run.py solvers

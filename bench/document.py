@@ -15,19 +15,19 @@ from layout import table
 __all__ = ["ORDER", "update_document"]
 
 #: Parts in the order of the document.
-ORDER = ("speed", "solvers", "paper", "iterations", "aliasing", "time",
+ORDER = ("speed", "precision", "events", "solvers", "paper", "iterations", "aliasing", "time",
          "scaling", "limit", "skips", "peers")
 #: What the head says; the rest of the description goes with each part.
 COMMON = ("processor", "compiler", "flags")
 HEAD = """# Benchmarks
 
-Written by bench/run.py: do not edit. `make bench` measures the speed, `make bench-solvers` the \
-solvers, `make bench-paper` the methods, `make bench-time` the comparison with integration in \
-time, `make bench-scaling` what finer flanks and more harmonics cost, `make bench-limit` how far \
-a sweep is from its floor and what is skipped, and `make bench-peers` another program; `make \
-bench-full` does it all. Each part says what it was measured on. Times are medians of repeated \
-runs, in one thread unless it is said otherwise, without reading the input; compare their \
-ratios."""
+Written by bench/run.py: do not edit. `make bench` measures the speed, `make bench-precision` \
+errors against run time, `make bench-solvers` the solvers, `make bench-paper` the methods, \
+`make bench-time` the comparison with integration in time, `make bench-scaling` what finer flanks \
+and more harmonics cost, `make bench-limit` how far a sweep is from its floor and what is \
+skipped, and `make bench-peers` another program; `make bench-full` does it all. Each part says \
+what it was measured on. Times are medians of repeated runs, in one thread unless it is said \
+otherwise, without reading the input; compare their ratios."""
 
 
 def update_document(path: Path, part: str, text: str, machine: dict[str, str],

@@ -53,6 +53,10 @@ class Run:
         Time of the whole run without reading the input [s].
     unknowns, unknowns_left : int
         Unknowns, and their mean number in the linear problems.
+    harmonics, instants : (n_points,)
+        What points chose that keep an accuracy; empty without one.
+    estimate : (n_points,)
+        Bound of the relative error that they claim.
     """
 
     omega: Floats
@@ -66,6 +70,9 @@ class Run:
     elapsed: float
     unknowns: int
     unknowns_left: int
+    harmonics: NDArray[np.int64]
+    instants: NDArray[np.int64]
+    estimate: Floats
 
     @property
     def usable(self) -> int:
@@ -220,7 +227,9 @@ def read_run(path: Path, summary: str) -> Run:
         return Run(file["omega"][()], file["seconds"][()], file["iterations"][()],
                    file["converged"][()].astype(bool), loose, file["coefficients"][()],
                    file["amplitude"][()], file["residual"][()], float(file.attrs["elapsed"]),
-                   unknowns, round(unknowns * (1.0 - share)))
+                   unknowns, round(unknowns * (1.0 - share)),
+                   *(file[name][()] if name in file else np.zeros(0)
+                     for name in ("harmonics", "instants", "error_estimate")))
 
 
 def write_namelist(path: Path, groups: Groups) -> None:

@@ -1,9 +1,7 @@
-"""Error against run time for oscillators whose exact periodic responses are known.
+"""Oscillators whose exact periodic responses are known (test/reference), as cases.
 
-The references (test/reference) were computed without harmonic balance: event by event, in closed
-form, or by shooting. The error is the relative L2 error of the first coordinate's Fourier
-coefficients up to the highest harmonic of the reference; harmonics that the solution does not
-carry count as zero.
+The references were computed without harmonic balance: event by event, in closed form, or by
+shooting.
 """
 
 from __future__ import annotations
@@ -13,14 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure import ROOT, Bench, Floats, Groups
+from measure import ROOT, Floats, Groups
 
-__all__ = ["HARMONICS", "INSTANTS", "Sample", "coulomb", "duffing_points", "measure_oscillators",
-           "relative_error", "single", "two_dof"]
-
-HARMONICS = (1, 3, 7, 15, 31)
-INSTANTS = (64, 256, 1024)
-
+__all__ = ["Case", "coulomb", "duffing_points", "load_cases", "relative_error", "single",
+           "two_dof"]
 
 @dataclass(frozen=True)
 class Case:
@@ -29,34 +23,6 @@ class Case:
     name: str
     groups: Groups
     reference: Floats
-
-
-@dataclass(frozen=True)
-class Sample:
-    """One solution: error and time [s]; seconds is NaN where it did not converge."""
-
-    case: str
-    n_harmonics: int
-    n_time: int
-    error: float
-    seconds: float
-
-
-def measure_oscillators(bench: Bench) -> list[Sample]:
-    """Every case on the grid of harmonics and instants."""
-    samples = []
-    for case in load_cases():
-        for n_harmonics in HARMONICS[:2] if bench.quick else HARMONICS:
-            for n_time in INSTANTS:
-                if n_time < 2 * n_harmonics + 1:
-                    continue
-                groups = case.groups | {"harmonics": {"n_harmonics": n_harmonics,
-                                                      "n_time": n_time}}
-                seconds, run = bench.repeat(groups, lambda run: float(run.seconds[0]), most=3)
-                error = relative_error(run.coefficients[0, :, 0], case.reference)
-                samples.append(Sample(case.name, n_harmonics, n_time, error,
-                                      seconds if run.converged[0] else float("nan")))
-    return samples
 
 
 def relative_error(coefficients: Floats, reference: Floats) -> float:
@@ -74,7 +40,8 @@ def relative_error(coefficients: Floats, reference: Floats) -> float:
 def load_cases() -> list[Case]:
     """One or two cases of each kind, none of them near a fold."""
     return [duffing(), jenkins("jenkins_F1.0_w1.2"), gap("gap_g0.0_F0.3_w1.35"),
-            two_dof("A_stickslip"), two_dof("E_separation"),
+            two_dof("A_stickslip"), two_dof("E_separation"), rigid(two_dof("E_separation")),
+            planar("A"),
             coulomb("c0.1_N0.4_w0.9", "dlft"), coulomb("c0.1_N0.4_w0.9", "dlft_velocity"),
             coulomb("ss_c0.1_N1.2_w0.4", "dlft"), coulomb("ss_c0.1_N1.2_w0.4", "dlft_velocity")]
 
@@ -142,6 +109,42 @@ def two_dof(key: str) -> Case:
     q = item["q1"]
     return Case("two dofs, " + key.split("_")[1].replace("stickslip", "stick and slip"), groups,
                 reference(q))
+
+
+def rigid(case: Case) -> Case:
+    """The same with rigid contact on massless nodes (dofs 3, 4) behind the contact springs."""
+    contact, model = case.groups["contact"], case.groups["model"]
+    springs = np.diag([contact["tangential_stiffness"], contact["normal_stiffness"]])
+
+    def extended(values: list[float], coupling: Floats) -> list[float]:
+        matrix = np.kron([[1.0, -1.0], [-1.0, 1.0]], coupling)
+        matrix[:2, :2] += np.reshape(values, (2, 2))
+        return flat(matrix.tolist())
+
+    groups = case.groups | {
+        "model": {"n_dof": 4, "mass": extended(model["mass"], 0.0 * springs),
+                  "stiffness": extended(model["stiffness"], springs),
+                  "damping": extended(model["damping"], 0.0 * springs)},
+        "load": {key: [*values, 0.0, 0.0] for key, values in case.groups["load"].items()},
+        "contact": {"n_pairs": 1, "law": "dlft", "side_1": [3, 0, -4], "mu": contact["mu"],
+                    "gap": contact["gap"]}}
+    return Case(f"{case.name}, rigid", groups, case.reference)
+
+
+def planar(key: str) -> Case:
+    """Elastic dry friction in two tangential directions."""
+    item = read("f_2dfriction")[key]
+    p = item["params"]
+    groups: Groups = {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": 2, "mass": [p["m"], 0, 0, p["m"]], "stiffness": [p["kx"], 0, 0, p["ky"]],
+                  "damping": [p["cx"], 0, 0, p["cy"]]},
+        "load": {"cosine": [p["Fx"], float(p["Fy"] * np.cos(p["phi"]))],
+                 "sine": [0.0, float(-p["Fy"] * np.sin(p["phi"]))]},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 2, 0], "mu": 1.0,
+                    "normal_load": p["muN"], "tangential_stiffness": p["kt"]},
+        "sweep": {"start": p["omega"]}}
+    return Case("planar friction", groups, np.array(item["x"]))
 
 
 def single(p: dict[str, float], force: float, omega: float) -> Groups:

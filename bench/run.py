@@ -2,8 +2,9 @@
 
     python bench/run.py [PART ...] [--build build/release] [--quick] [-o docs]
 
-Parts: speed, solvers, paper, iterations, aliasing, time, scaling, limit, skips, peers, or all;
-without any, speed. A part replaces its section of the document and leaves the others.
+Parts: speed, precision, events, solvers, paper, iterations, aliasing, time, scaling, limit, skips,
+peers, or all; without any, speed. A part replaces its section of the document and leaves the
+others.
 
 Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
 tries the scripts and measures nothing.
@@ -21,14 +22,17 @@ from pathlib import Path
 
 from aliasing import measure_aliasing, write_aliasing
 from document import ORDER, update_document
+from events import measure_events, write_events
 from filtering import measure_filtering, write_filtering
 from integration import measure_integration, write_integration
 from iterations import measure_iterations, write_iterations
 from limit import measure_limit, write_limit
 from measure import ROOT, Bench, describe_machine
-from oscillators import measure_oscillators
 from paper import measure_methods, write_methods
 from peers import measure_peers, write_peers
+from precision import measure_precision
+from precision_report import write_precision
+from precision_wear import measure_wear_precision, write_wear_precision
 from programs import build_programs, run_program
 from scaling import measure_scaling, write_scaling
 from sector import measure_crossing, measure_points, measure_sweeps, measure_threads
@@ -65,9 +69,8 @@ class Job:
 
 
 def speed(job: Job) -> str:
-    """Times of transforms, points, sweeps and threads; errors against time."""
+    """Times of transforms, points, sweeps and threads."""
     steps = {"transforms": lambda: run_program(job.program("transforms")),
-             "oscillators": lambda: measure_oscillators(job.bench),
              "linear solvers": lambda: measure_crossing(job.bench),
              "points of the sector": lambda: measure_points(job.bench),
              "threads": lambda: measure_threads(job.bench),
@@ -77,6 +80,19 @@ def speed(job: Job) -> str:
         job.step(title)
         found.append(measure())
     return write_speed(job.images, Measurements(*found))
+
+
+def precision(job: Job) -> str:
+    """Errors against time: responses, and worn profiles."""
+    responses = write_precision(job.images, measure_precision(job.bench, job.step))
+    job.step("wear")
+    return responses + "\n\n" + write_wear_precision(job.images,
+                                                     measure_wear_precision(job.bench))
+
+
+def events(job: Job) -> str:
+    """Convergence of events and instants in n_time."""
+    return write_events(job.images, measure_events(job.bench))
 
 
 def solvers(job: Job) -> str:
@@ -126,8 +142,8 @@ def skips(job: Job) -> str:
     return write_skips(*measure_skips(job.bench, job.program("floor")))
 
 
-PARTS = {"speed": speed, "solvers": solvers, "paper": paper, "iterations": iterations,
-         "aliasing": aliasing, "time": integration,
+PARTS = {"speed": speed, "precision": precision, "events": events, "solvers": solvers,
+         "paper": paper, "iterations": iterations, "aliasing": aliasing, "time": integration,
          "scaling": scaling, "limit": limit, "skips": skips, "peers": peers}
 
 

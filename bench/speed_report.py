@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
-
 from layout import finish, microseconds, milliseconds, new_figure, table
-from oscillators import HARMONICS, INSTANTS, Sample
 from sector import HARMONICS as SECTOR_HARMONICS
 from sector import LARGEST_LU, PAIRS, Crossing, PointTime, Sweep, ThreadTimes
 
@@ -25,7 +20,6 @@ class Measurements:
     """Everything that this part needs."""
 
     transforms: list[dict[str, str]]
-    oscillators: list[Sample]
     crossing: list[Crossing]
     points: list[PointTime]
     threads: list[ThreadTimes]
@@ -35,11 +29,10 @@ class Measurements:
 def write_speed(images: Path, data: Measurements) -> str:
     """Draw the pictures into a folder; the text of the part."""
     draw_points(images / "benchmark_points.png", data.points)
-    draw_errors(images / "benchmark_errors.png", data.oscillators)
     draw_transforms(images / "benchmark_transforms.png", data.transforms)
     draw_crossing(images / "benchmark_linear.png", data.crossing)
     parts = [sweeps_part(data.sweeps), points_part(data.points), threads_part(data.threads),
-             errors_part(data.oscillators), crossing_part(data.crossing),
+             crossing_part(data.crossing),
              transforms_part(data.transforms)]
     return "## Speed\n\n" + "\n\n".join(parts)
 
@@ -104,34 +97,6 @@ def threads_part(rows: list[ThreadTimes]) -> str:
                 "2 threads, passive [ms/point]", "speed-up"], lines)])
 
 
-def errors_part(samples: list[Sample]) -> str:
-    """Error against time of the oscillators."""
-    lines = ["### Error against run time", "",
-             "Relative L2 error of the Fourier coefficients of the first coordinate against "
-             "references that were computed without harmonic balance (test/reference), and the "
-             "time of the point from the first guess of a run. Rigid friction on a dof with mass "
-             "converges slowly with H under `dlft`, faster under `dlft_velocity`.", "",
-             "![Error against run time](images/benchmark_errors.png)"]
-    for case in dict.fromkeys(sample.case for sample in samples):
-        rows = []
-        for n_harmonics in HARMONICS:
-            found = {s.n_time: s for s in samples if (s.case, s.n_harmonics) == (case, n_harmonics)}
-            if found:
-                rows.append((n_harmonics, *(cell(found.get(n)) for n in INSTANTS)))
-        lines += ["", f"#### {case[0].upper() + case[1:]}", "",
-                  *table(["H", *(f"n_time = {n}" for n in INSTANTS)], rows)]
-    return "\n".join(lines)
-
-
-def cell(sample: Sample | None) -> str:
-    """Error and time of a solution."""
-    if sample is None:
-        return "too few instants"
-    if math.isnan(sample.seconds):
-        return "not converged"
-    return f"{sample.error:.1e}, {1e3 * sample.seconds:.3g} ms"
-
-
 def crossing_part(rows: list[Crossing]) -> str:
     """LU against GMRES."""
     # Less than a tenth is the noise of the measurement.
@@ -193,38 +158,6 @@ def draw_points(path: Path, points: list[PointTime]) -> None:
     axes.set_xticks(SECTOR_HARMONICS, [str(h) for h in SECTOR_HARMONICS], minor=False)
     axes.minorticks_off()
     finish(figure, axes, path)
-
-
-def draw_errors(path: Path, samples: list[Sample]) -> None:
-    """One panel for each oscillator."""
-    cases = list(dict.fromkeys(sample.case for sample in samples))
-    columns = 3
-    figure = Figure(figsize=(10.5, 3.1 * math.ceil(len(cases) / columns)), dpi=130,
-                    layout="constrained")
-    panels = figure.subplots(math.ceil(len(cases) / columns), columns, sharex=True, squeeze=False)
-    for axes, case in zip(panels.flat, cases):
-        for n_time, colour in zip(INSTANTS, ("#f58518", "#54a24b", "#1f4e79")):
-            found = [s for s in samples if (s.case, s.n_time) == (case, n_time)]
-            axes.plot([1e3 * s.seconds for s in found], [s.error for s in found], "o-",
-                      color=colour, markersize=4, label=f"n_time = {n_time}")
-            if n_time == INSTANTS[-1]:
-                for s in found:
-                    axes.annotate(f"{s.n_harmonics}", (1e3 * s.seconds, s.error), fontsize=8,
-                                  textcoords="offset points", xytext=(4, 3))
-        axes.set(xscale="log", yscale="log")
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.set_title(case[0].upper() + case[1:], fontsize=10)
-        axes.grid(alpha=0.3)
-    for axes in panels.flat[len(cases):]:
-        axes.set_axis_off()
-    for axes in panels[:, 0]:
-        axes.set_ylabel("relative error")
-    for axes in list(panels.flat)[max(0, len(cases) - columns):len(cases)]:
-        axes.tick_params(labelbottom=True)
-        axes.set_xlabel("time [ms]; labels: H")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3,
-                  frameon=False)
-    figure.savefig(path)
 
 
 def draw_transforms(path: Path, rows: list[dict[str, str]]) -> None:

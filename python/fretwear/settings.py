@@ -85,7 +85,7 @@ class Harmonics(TypedDict, total=False):
     n_time: int
     n_collocation: int
     filter_harmonics: int
-    sampling: Literal["uniform", "events"]
+    sampling: Literal["uniform", "events", "auto"]
     parity: Literal["auto", "all", "odd"]
     adaptive: bool
     adaptive_tolerance: float

@@ -105,7 +105,7 @@ def test_peak_ignores_points_that_failed() -> None:
     amplitude = np.array([[1.0], [9.0], [2.0]])
     ones = np.ones(3)
     run = Run(omega, ones, np.ones(3, dtype=np.int64), np.array([True, False, True]),
-              np.zeros(3, dtype=bool), np.zeros((3, 1, 1)), amplitude, ones, 1.0, 1, 1)
+              np.zeros(3, dtype=bool), np.zeros((3, 1, 1)), amplitude, ones, 1.0, 1, 1, ones, ones, ones)
     assert find_peak(run) == pytest.approx(12.0)
 
 
@@ -117,7 +117,7 @@ def test_the_difference_is_attributed(at_7: float, word: str) -> None:
     def integrated(amplitude: float) -> Run:
         one = np.ones(1)
         return Run(one, one, np.ones(1, dtype=np.int64), np.array([True]), np.array([False]),
-                   np.zeros((1, 1, 1)), np.array([[amplitude]]), one, 1.0, 1, 1)
+                   np.zeros((1, 1, 1)), np.array([[amplitude]]), one, 1.0, 1, 1, one, one, one)
 
     comparison = Comparison("2500", 1011.5, {(7, INSTANTS, 1.0): at_7,
                                              (7, MANY_INSTANTS, 1.0): at_7 + 1e-4},

@@ -6,7 +6,7 @@ module fw_harmonics_options
 
    public :: harmonics_options
    public :: method_words, method_hbm, method_tcm, method_tcm_least_squares, method_hdhb
-   public :: sampling_words, sampling_uniform, sampling_events
+   public :: sampling_words, sampling_uniform, sampling_events, sampling_auto
    public :: instants_per_event_wave, most_for_accuracy
    public :: parity_words, parity_auto, parity_all, parity_odd
 
@@ -15,8 +15,8 @@ module fw_harmonics_options
    integer, parameter :: method_hbm = 1, method_tcm = 2, method_tcm_least_squares = 3, &
                          method_hdhb = 4
 
-   character(*), parameter :: sampling_words(*) = [character(7) :: 'uniform', 'events']
-   integer, parameter :: sampling_uniform = 1, sampling_events = 2
+   character(*), parameter :: sampling_words(*) = [character(7) :: 'uniform', 'events', 'auto']
+   integer, parameter :: sampling_uniform = 1, sampling_events = 2, sampling_auto = 3
 
    !> Instants for each wave of the highest harmonic that isolate every event.
    integer, parameter :: instants_per_event_wave = 4
@@ -36,7 +36,7 @@ module fw_harmonics_options
       integer :: n_collocation = 0
       !> Highest harmonic that reaches the nonlinear springs of hdhb (0: no filter).
       integer :: filter_harmonics = 0
-      integer :: sampling = sampling_uniform
+      integer :: sampling = sampling_auto
       integer :: parity = parity_auto
       !> Add harmonics only where the solution needs them.
       logical :: adaptive = .false.

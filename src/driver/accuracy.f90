@@ -14,7 +14,6 @@ module fw_accuracy
    use fw_case, only: case_type
    use fw_contact_data, only: law_penalty
    use fw_error, only: error_type
-   use fw_harmonics_options, only: sampling_events
    use fw_kinds, only: wp
    use fw_level, only: harmonic_levels
    use fw_level, only: level_solver
@@ -82,9 +81,11 @@ contains
          self%factor_time = factor_instants
       end if
       call need(self, case, self%current, self%doublings, error)
-      if (allocated(error) .or. case%harmonics%sampling /= sampling_events) return
-      self%factor_time = merge(factor_planar, 0.0_wp, &
-                               self%level(self%current, 0)%system%contact%two_directions)
+      if (allocated(error)) return
+      associate (contact => self%level(self%current, self%doublings)%system%contact)
+         if (allocated(contact%events)) self%factor_time = merge(factor_planar, 0.0_wp, &
+                                                                 contact%two_directions)
+      end associate
    end subroutine start
 
    !> Whether one side of every contact component carries no mass.

@@ -3,6 +3,7 @@ module fw_problem
    use fw_kinds, only: wp
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
+   use fw_case, only: analysis_point
    use fw_case, only: analysis_wear
    use fw_condensation, only: condensation_type
    use fw_condensation, only: new_condensation
@@ -18,6 +19,7 @@ module fw_problem
    use fw_harmonics_options, only: method_tcm_least_squares
    use fw_harmonics_options, only: parity_all
    use fw_harmonics_options, only: parity_odd
+   use fw_harmonics_options, only: sampling_auto
    use fw_harmonics_options, only: sampling_events
    use fw_hbm, only: hbm_system
    use fw_hbm, only: new_hbm
@@ -40,6 +42,8 @@ module fw_problem
    integer, parameter :: fewest_instants = 64
    !> Instants at least where the events decide and instants only isolate them.
    integer, parameter :: fewest_for_events = 8, fewest_for_planar = 32
+   !> Pairs up to which events serve an accuracy in two tangential directions.
+   integer, parameter :: few_pairs = 16
 
 contains
 
@@ -75,7 +79,7 @@ contains
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
       call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
-      if (case%harmonics%sampling == sampling_events .and. case%contact%n_pairs > 0) then
+      if (locates_events(case, joint) .and. case%contact%n_pairs > 0) then
          call system%contact%resolve_events(system%fourier)
       end if
       system%reduced = case%solver%skips
@@ -185,7 +189,7 @@ contains
       if (case%harmonics%method == method_hdhb) return
       n_time = 2*h + 2
       if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
-      if (case%harmonics%sampling == sampling_events) then
+      if (locates_events(case, joint)) then
          n_time = max(n_time, least_events(case, any(all(joint%row(1:2, :) > 0, dim=1))))
       else if (case%contact%n_pairs > 0) then
          n_time = max(n_time, fewest_instants, instants_friction*h)
@@ -194,6 +198,29 @@ contains
       n_time = nint(n_time*2.0_wp**case%harmonics%doublings)
       n_time = n_time + modulo(n_time, 2)
    end function automatic_n_time
+
+   !> Whether events are located. Left to the program, they are where that is exact (one tangential
+   !> direction) and nothing asks for instants: as fast as sampling, faster from 7 harmonics on, and
+   !> more accurate (measured by bench/precision.py). With an accuracy to keep, also for few pairs
+   !> with two directions: for one or 16, fewer instants make up for what each costs; for 48 not.
+   pure logical function locates_events(case, joint)
+      type(case_type), intent(in) :: case
+      type(joint_type), intent(in) :: joint
+
+      logical :: planar
+
+      locates_events = case%harmonics%sampling == sampling_events
+      if (case%harmonics%sampling /= sampling_auto) return
+      planar = any(all(joint%row(1:2, :) > 0, dim=1))
+      if (case%harmonics%accuracy > 0.0_wp) then
+         locates_events = .not. planar .or. case%contact%n_pairs <= few_pairs
+         return
+      end if
+      locates_events = case%harmonics%method == method_hbm .and. case%harmonics%n_time == 0 .and. &
+                       any(case%analysis == [analysis_frf, analysis_point, analysis_wear]) .and. &
+                       .not. case%harmonics%adaptive .and. .not. case%output%histories .and. &
+                       .not. case%sweep%stability .and. .not. planar
+   end function locates_events
 
    !> Instants that isolate the events, twice the 2H+1 of a collocation, which then lie evenly; or
    !> cells of the quadrature over slip in two directions, four times as many.

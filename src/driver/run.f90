@@ -98,7 +98,8 @@ contains
          end if
          return
       end if
-      call writer%close(final_status(outcome%status), elapsed, error, summary%skipped)
+      call writer%close(final_status(outcome%status), elapsed, error, summary%skipped, &
+                        summary%sampling)
       outcome%summary = summary%lines(elapsed)
    end subroutine run_case
 

@@ -4,6 +4,8 @@ module fw_summary
    use fw_kinds, only: wp
    use fw_kinds, only: pi
    use fw_case, only: case_type
+   use fw_harmonics_options, only: sampling_events
+   use fw_harmonics_options, only: sampling_uniform
    use fw_hbm, only: hbm_system
    use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
@@ -34,6 +36,8 @@ module fw_summary
       type(string_type), allocatable :: work(:)
       !> What the case did not need, in words.
       type(string_type), allocatable :: skipped(:)
+      !> How contact was sampled; not allocated where the work is not described.
+      integer, allocatable :: sampling
    contains
       procedure :: add
       procedure :: add_transient
@@ -101,11 +105,14 @@ contains
       !> The solver of the case; the counts are those of Newton's method.
       integer, intent(in) :: kind
 
+      self%sampling = merge(sampling_events, sampling_uniform, allocated(system%contact%events))
       self%work = [line('unknowns', to_text(system%n)//' ('// &
          to_text(system%structure%n_coordinates)// &
                         ' coordinates, '//to_text(system%fourier%n_coefficients)// &
                            ' coefficients, '// &
-                        to_text(system%fourier%n_time)//' instants)'), &
+                        to_text(system%fourier%n_time)//' instants'// &
+                        trim(merge(', events located', repeat(' ', 16), &
+                                   self%sampling == sampling_events))//')'), &
                    line('linear solver', to_text(linear%factorizations)//' LU factorizations, '// &
                         to_text(linear%krylov_iterations)//' Krylov iterations, '// &
                         to_text(linear%preconditioners)//' preconditioners')]

@@ -13,7 +13,6 @@ module fw_read_options
    use fw_text, only: to_text
    use fw_time_options, only: time_options
    use fw_values, only: number_text
-   use fw_values, only: quoted_text
    use fw_wear_options, only: wear_options, wear_scheme_words, wear_law_words
    implicit none (type, external)
    private
@@ -72,7 +71,7 @@ contains
       end if
    end subroutine read_harmonics
 
-   !> With an accuracy n_harmonics is the most, and the events decide unless instants are to.
+   !> With an accuracy n_harmonics is the most.
    subroutine choose_for_accuracy(reader, options)
       type(reader_type), intent(inout) :: reader
       type(harmonics_options), intent(inout) :: options
@@ -84,11 +83,6 @@ contains
          call reader%refuse('harmonics', 'n_harmonics', '= '//to_text(options%n_harmonics)// &
                             ': with accuracy it is the most that may be used, at least 3; '// &
                             'leave it out for '//to_text(most_for_accuracy))
-      end if
-      if (.not. reader%given('harmonics', 'sampling') .and. options%method /= method_hdhb) then
-         options%sampling = sampling_events
-         call reader%amend('harmonics', 'sampling', &
-                           quoted_text(trim(sampling_words(options%sampling))))
       end if
       if (options%n_time > 0) then
          call reader%refuse('harmonics', 'n_time', '= '//to_text(options%n_time)//': with '// &

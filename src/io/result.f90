@@ -10,6 +10,7 @@ module fw_result
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
+   use fw_harmonics_options, only: sampling_words
    use fw_hdf5, only: hdf5_file
    use fw_hdf5, only: write_attribute
    use fw_hdf5, only: write_dataset
@@ -151,7 +152,7 @@ contains
    end subroutine flush_file
 
    !> Complete the file and give it its name.
-   subroutine close(self, status, elapsed, error, skipped)
+   subroutine close(self, status, elapsed, error, skipped, sampling)
       class(result_writer), intent(inout) :: self
       !> 'complete', 'not converged', or what else became of the run.
       character(*), intent(in) :: status
@@ -160,24 +161,30 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> What the case did not need, in words.
       type(string_type), intent(in), optional :: skipped(:)
+      !> How contact was sampled, left to the program or not; not present where none was.
+      integer, intent(in), optional :: sampling
 
       if (self%file%id < 0) return
       !$omp critical (fretwear_io)
-      call close_file(self, status, elapsed, error, skipped)
+      call close_file(self, status, elapsed, error, skipped, sampling)
       !$omp end critical (fretwear_io)
    end subroutine close
 
-   subroutine close_file(self, status, elapsed, error, skipped)
+   subroutine close_file(self, status, elapsed, error, skipped, sampling)
       class(result_writer), intent(inout) :: self
       character(*), intent(in) :: status
       real(wp), intent(in) :: elapsed
       type(error_type), allocatable, intent(out) :: error
       type(string_type), intent(in), optional :: skipped(:)
+      integer, intent(in), optional :: sampling
       type(error_type), allocatable :: close_error
 
       call write_attribute(self%file, '/', 'elapsed', elapsed, error)
       if (present(skipped) .and. .not. allocated(error)) then
          if (size(skipped) > 0) call write_attribute(self%file, '/', 'skipped', skipped, error)
+      end if
+      if (present(sampling) .and. .not. allocated(error)) then
+         call write_attribute(self%file, '/', 'sampling', trim(sampling_words(sampling)), error)
       end if
       if (.not. allocated(error)) then
          call write_attribute(self%file, '/', 'status', trim(status), error)
