@@ -105,7 +105,8 @@ def test_peak_ignores_points_that_failed() -> None:
     amplitude = np.array([[1.0], [9.0], [2.0]])
     ones = np.ones(3)
     run = Run(omega, ones, np.ones(3, dtype=np.int64), np.array([True, False, True]),
-              np.zeros(3, dtype=bool), np.zeros((3, 1, 1)), amplitude, ones, 1.0, 1, 1, ones, ones, ones)
+              np.zeros(3, dtype=bool), np.zeros((3, 1, 1)), amplitude, ones, 1.0, 1, 1, ones, ones,
+              ones)
     assert find_peak(run) == pytest.approx(12.0)
 
 
