@@ -9,7 +9,7 @@ from pathlib import Path
 
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from layout import COLOURS, finish, new_figure, table
+from layout import COLOURS, new_figure, table
 from measure import Bench
 from wear_runs import FAST, N_PAIRS, Scheme, WearRun, difference, rosenbrock, run_wear, stage_order
 
@@ -103,4 +103,6 @@ def draw(path: Path, points: list[WearPoint], names: list[str]) -> None:
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
-    finish(figure, axes, path)
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=8)
+    figure.savefig(path)
