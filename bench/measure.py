@@ -128,11 +128,15 @@ class Bench:
         return read_run(result, self.execute(groups, result, threads, wait)[0])
 
     def execute(self, groups: Groups, result: Path, threads: int = 1,
-                wait: str | None = None) -> tuple[str, float]:
-        """Run a case into a result file: what fw_run printed, and its processor time [s]."""
+                wait: str | None = None, blas_threads: int = 1) -> tuple[str, float]:
+        """Run a case into a result file: what fw_run printed, and its processor time [s].
+
+        The library uses no threads of BLAS; those that OpenBLAS starts wait for work all the same.
+        """
         namelist = result.with_suffix(".nml")
         write_namelist(namelist, groups)
-        environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
+        environment = os.environ | {"OMP_NUM_THREADS": str(threads),
+                                    "OPENBLAS_NUM_THREADS": str(blas_threads)}
         if wait:
             environment["OMP_WAIT_POLICY"] = wait
         before = processor_time()

@@ -239,7 +239,8 @@ def draw(path: Path, rows: list[Measured]) -> None:
     over_h.set(xlabel="harmonics H", ylabel="time of a frequency [s]")
     memory.set(xlabel="contact pairs", ylabel="memory of the process [MB]")
     for axes in (over_pairs, over_h):
-        axes.legend(frameon=False, fontsize=7)
+        axes.legend(frameon=False, fontsize=7, ncol=3, loc="lower center",
+                    bbox_to_anchor=(0.5, 1.0), columnspacing=1.0)
     figure.savefig(path)
 
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from layout import milliseconds, table
-from limit import downwards, processor
-from measure import Bench, Groups, write_namelist
+from limit import downwards
+from measure import Bench, Groups, Run, write_namelist
 from peers import chain, namelist
 from programs import run_program
 from sector import PAIRS, case, near_peak
 
 __all__ = ["Saving", "Spared", "measure_skips", "write_skips"]
 
-#: Points of cheap sweeps, so that reading the model is little beside them.
+#: Points of cheap sweeps, so that what is done once is little beside them.
 MANY = 401
 #: What stands against `accuracy`: as many harmonics as it may use, at every point.
 FIXED = {"n_harmonics": 53, "n_time": 1024}
@@ -25,7 +25,7 @@ FIXED = {"n_harmonics": 53, "n_time": 1024}
 
 @dataclass(frozen=True)
 class Saving:
-    """Processor time of a run with and without a skip [s], and the test of its equality."""
+    """Time of a run with and without a skip [s], and the test of its equality."""
 
     skip: str
     example: str
@@ -92,8 +92,13 @@ def linear_points(bench: Bench, example: str, groups: Groups, test: str) -> Spar
 
 
 def compare(bench: Bench, skip: str, example: str, on: Groups, off: Groups, test: str) -> Saving:
-    """Both runs, in turn."""
-    return Saving(skip, example, processor(bench, on), processor(bench, off), test)
+    """Both runs, one after the other, each without the reading of its input."""
+    return Saving(skip, example, bench.repeat(on, elapsed)[0], bench.repeat(off, elapsed)[0], test)
+
+
+def elapsed(run: Run) -> float:
+    """Time of a run without the reading of its input [s]."""
+    return run.elapsed
 
 
 def changed(groups: Groups, group: str, **keys: object) -> Groups:
@@ -153,8 +158,9 @@ def write_skips(savings: list[Saving], spared: list[Spared]) -> str:
               for row in spared]
     return "\n".join([
         "## What is skipped", "",
-        "Processor time of whole runs with and without the work that each skip leaves out, and the "
-        "tests that the answer is the same. The `skipped` lines of the summary and the attribute "
+        "Time of whole runs, without the reading of their input, with and without the work that "
+        "each skip leaves out, and the tests that the answer is the same. The `skipped` lines of "
+        "the summary and the attribute "
         "`skipped` of the result file say what a run left out; what is made only when asked for is "
         "in the result file or not.", "",
         *table(["left out", "case", "with the skip [ms]", "without [ms]", "ratio", "tests"], times),
