@@ -20,7 +20,7 @@ EXAMPLE := example/blade_sector
 CMAKE_OPTIONS ?=
 
 help: ## this list
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 22
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 24
 
 deps: build/deps.stamp ## install what is missing (system packages, build/venv)
 
@@ -77,12 +77,15 @@ docs: build/deps.stamp ## reference of library and Python package, in build/docs
 wheel: build/deps.stamp ## the package in a fresh environment, used as the README says
 	@tools/check_install.sh build/wheel
 
+# Adds up the counts of docs/robustness.md once they are there, whatever they say.
+OVERVIEW := trap '$(PYTHON) test/robustness/overview.py' EXIT;
+
 # Goes on where it was stopped; a changed program starts anew.
 stress: build ## every case to its extremes, written to docs/robustness.md
-	$(PYTHON) test/stress/stress.py --state build/stress -o docs/robustness.md
+	$(OVERVIEW) $(PYTHON) test/stress/stress.py --state build/stress -o docs/robustness.md
 
 long: build ## memory and time of long runs, written to docs/robustness.md
-	$(PYTHON) test/stress/long_runs.py -o docs/robustness.md
+	$(OVERVIEW) $(PYTHON) test/stress/long_runs.py -o docs/robustness.md
 
 verify: build/deps.stamp ## tests in PARTS (all) of the builds in docs/robustness.md
 	$(PYTHON) test/verify/verify.py --python $(PYTHON) $(PARTS)
@@ -121,7 +124,7 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) bench/gallery.py
 
 faults: build ## kills, signals, full disks, two runs at a time, written to docs/robustness.md
-	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \
+	$(OVERVIEW) PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \
 	   -o docs/robustness.md
 
 # Goes on where it was stopped; a changed program starts anew.
@@ -137,7 +140,8 @@ fuzz: build ## N hostile inputs (100000), written to docs/robustness/inputs.md
 	   --state $(FUZZ)/results --family "damaged result file"
 	OMP_NUM_THREADS=1 PYTHONPATH=python:$(BUILD)/python $(PYTHON) test/robustness/fuzz_python.py \
 	   -n $$(($(N)/5)) --report $(FUZZ)/python.json
-	$(PYTHON) test/robustness/fuzz_report.py $(FUZZ)
+	$(OVERVIEW) $(PYTHON) test/robustness/fuzz_report.py $(FUZZ)
 
 clean: ## remove everything built but the Python environment
-	rm -rf $(BUILD) build/debug build/docs build/wheel build/verify $(RUN) $(FUZZ)
+	rm -rf $(BUILD) build/debug build/docs build/wheel build/verify build/stress build/bench \
+	   $(RUN) $(FUZZ)

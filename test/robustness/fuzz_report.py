@@ -19,9 +19,9 @@ PYTHON_KINDS = ["other", "crash", "hang", "silent", "NaN"]
 TEXT = """# Hostile inputs
 
 Written by `make fuzz`. Input k follows from the seed ({seed}) and k alone;
-`test/robustness/fuzz.py --only k` makes it again, and a run that was stopped goes on where it was.
-{total} inputs of the {goal} that `make fuzz` is for, and {results} damaged results, were read at
-commit {revision}.
+`test/robustness/fuzz.py --only k` makes it again, and a run that was stopped goes on where it
+was, and tries again what had failed. {total} inputs of the {goal} that `make fuzz` is for, and
+{results} damaged results, were read at commit {revision}.
 
 Inputs are mutations of sound ones: namelists by group, key and value and by character; model files
 with other types, shapes, sizes, links and names, and with damaged bytes; Matrix Market files by
@@ -104,7 +104,8 @@ def main():
         results=sum(results["done"]), total_all=sum(sum(state["done"]) for state in states),
         revision=" and ".join(sorted({state["revision"] for state in states})),
         table="\n".join(table_of_inputs(states)),
-        ends=sum(sum(state["counts"].values()) for state in states), peak=inputs["peak_mb"],
+        ends=sum(n for state in states for key, n in state["counts"].items()
+                 if key.split("|")[2] in STATUSES), peak=inputs["peak_mb"],
         slowest=max(state["slowest"] for state in states), python=sum(python["counts"].values()),
         python_seed=python["seed"], python_table="\n".join(table_of_calls(python))))
 
