@@ -15,6 +15,7 @@ module fw_accuracy
    use fw_contact_data, only: law_penalty
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
    use fw_level, only: level_solver
    use fw_level, only: level_type
@@ -364,17 +365,15 @@ contains
       character(:), allocatable, intent(out) :: message
       character(12) :: wanted, reached, where
 
-      associate (level => self%level(self%current, self%doublings))
-         call summary%describe_work(level%system, level%solver%method%newton%linear, &
-                                    case%solver%kind)
-      end associate
+      call describe_levels(size(self%level), self%level, case%solver%kind, summary)
       call summary%describe_accuracy(self%worst, case%harmonics%accuracy)
       message = ''
       if (self%n_short == 0) return
       write (wanted, '(es9.2)') case%harmonics%accuracy
       write (reached, '(es9.2)') self%worst
       write (where, '(es11.4)') self%worst_omega
-      message = 'accuracy'//trim(wanted)//' is missed at '//to_text(self%n_short)//' points'
+      message = 'accuracy'//trim(wanted)//' is missed at '//to_text(self%n_short)// &
+                trim(merge(' point ', ' points', self%n_short == 1))
       if (self%worst > case%harmonics%accuracy) message = message//', by estimates up to '// &
          trim(adjustl(reached))//' (at '//trim(adjustl(where))//' rad/s)'
       message = message//': raise harmonics%n_harmonics, or ask for less'

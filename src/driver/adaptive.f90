@@ -6,6 +6,7 @@ module fw_adaptive
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_left_out, only: force_left_out
+   use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
    use fw_level, only: level_solver
    use fw_level, only: level_type
@@ -90,10 +91,7 @@ contains
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
 
-      associate (level => self%level(self%current))
-         call summary%describe_work(level%system, level%solver%method%newton%linear, &
-                                    case%solver%kind)
-      end associate
+      call describe_levels(size(self%level), self%level, case%solver%kind, summary)
       call summary%describe_harmonics(self%n_short, case%harmonics%adaptive_tolerance)
       message = ''
    end subroutine describe

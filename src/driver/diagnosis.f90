@@ -10,7 +10,7 @@ module fw_diagnosis
    implicit none (type, external)
    private
 
-   public :: explain_failure
+   public :: explain_failure, finer
 
    !> Halvings of the interval in which the largest share of the load is looked for that converges.
    integer, parameter :: n_halvings = 6
@@ -69,14 +69,24 @@ contains
          reason = 'the joint cannot carry its static load while it slides, for only '// &
                   'friction holds it: '//reason//'; it needs more preload, friction or support'
       else if (system%rigid) then
-         reason = reason//'; try another penalty_scale (0.3 or 3), more n_time, or a sweep '// &
-                  'that starts where the response is small; an undamped resonance needs damping'
+         reason = reason//'; try another penalty_scale (0.3 or 3), '//trim(finer(system))// &
+                  ', or a sweep that starts where the response is small; an undamped resonance '// &
+                  'needs damping'
       else
          reason = reason//"; try law = 'dlft' where the contact is much stiffer than the "// &
-                  'structure, more n_time, or a sweep that starts where the response is small; '// &
-                  'an undamped resonance needs damping'
+                  'structure, '//trim(finer(system))//', or a sweep that starts where the '// &
+                  'response is small; an undamped resonance needs damping'
       end if
    end subroutine explain_vibration
+
+   !> What resolves the contact better: located events do not depend on the instants.
+   pure function finer(system) result(advice)
+      type(hbm_system), intent(in) :: system
+      character(16) :: advice
+
+      advice = 'more n_time'
+      if (allocated(system%contact%events)) advice = 'more n_harmonics'
+   end function finer
 
    !> By halves of the interval between a share that has a solution and one that has none.
    subroutine find_largest_share(system, method, x, lower)

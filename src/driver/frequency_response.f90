@@ -7,6 +7,7 @@ module fw_frequency_response
    use fw_adaptive, only: adaptive_solver
    use fw_branch, only: run_branch
    use fw_diagnosis, only: explain_failure
+   use fw_diagnosis, only: finer
    use fw_error, only: error_type
    use fw_hbm, only: hbm_system
    use fw_level, only: level_solver
@@ -80,7 +81,7 @@ contains
       if (allocated(error) .or. observer%stop_requested) return
       if (summary%n_converged == summary%n_points) return
       reason = 'try a finer sweep, the other direction, another penalty_scale (0.3 or 3) or '// &
-               'more n_time for the points above'
+               trim(finer(system))//' for the points above'
       if (summary%n_converged == 0) call explain_failure(system, solver%method, reason)
       call observer%on_message('not converged: '//reason)
    end subroutine sweep

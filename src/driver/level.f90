@@ -7,6 +7,7 @@ module fw_level
    use fw_error, only: error_type
    use fw_hbm, only: hbm_system
    use fw_kinds, only: wp
+   use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
@@ -15,7 +16,7 @@ module fw_level
    implicit none (type, external)
    private
 
-   public :: level_type, level_solver, harmonic_levels
+   public :: level_type, level_solver, harmonic_levels, describe_levels
 
    !> From one number of harmonics to the next; numbers are odd, for the sake of odd-only balances.
    real(wp), parameter :: growth = 1.5_wp
@@ -89,6 +90,26 @@ contains
       end do
       levels = [levels, most]
    end function harmonic_levels
+
+   !> The work of all levels, with the unknowns of the largest that was needed.
+   subroutine describe_levels(n, levels, kind, summary)
+      integer, intent(in) :: n
+      type(level_type), intent(in) :: levels(n)
+      !> The solver of the case.
+      integer, intent(in) :: kind
+      type(summary_type), intent(inout) :: summary
+      type(linear_step_type) :: work
+      integer :: k, largest
+
+      largest = 0
+      do k = 1, n
+         if (.not. levels(k)%is_built) cycle
+         call work%add_work(levels(k)%solver%method%newton%linear)
+         if (largest == 0) largest = k
+         if (levels(k)%system%n > levels(largest)%system%n) largest = k
+      end do
+      call summary%describe_work(levels(largest)%system, work, kind)
+   end subroutine describe_levels
 
    !> Build the system, unless it is there.
    subroutine build(self, case, n_harmonics, error, doublings)

@@ -54,6 +54,7 @@ module fw_linear_step
       procedure :: solve
       procedure :: prepare
       procedure :: solve_prepared
+      procedure :: add_work
    end type linear_step_type
 
 contains
@@ -71,6 +72,19 @@ contains
       call self%prepare(system, done)
       if (done) call self%solve_prepared(system, r, tolerance, step, done)
    end subroutine solve
+
+   !> Count the work of another as done here.
+   pure subroutine add_work(self, other)
+      class(linear_step_type), intent(inout) :: self
+      type(linear_step_type), intent(in) :: other
+
+      self%factorizations = self%factorizations + other%factorizations
+      self%preconditioners = self%preconditioners + other%preconditioners
+      self%krylov_iterations = self%krylov_iterations + other%krylov_iterations
+      self%n_problems = self%n_problems + other%n_problems
+      self%share_skipped = self%share_skipped + other%share_skipped
+      self%n_empty = self%n_empty + other%n_empty
+   end subroutine add_work
 
    !> Linearize the system at its last point, and factor or build the preconditioner.
    subroutine prepare(self, system, done)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -50,6 +52,24 @@ def test_error_follows_the_tolerance(fw_run, text):
         for row, n in zip(few["coefficients"], few["harmonics"]):
             assert not row[2 * n + 1:].any()
     assert errors[2] < errors[1] < errors[0]
+
+
+@pytest.mark.parametrize("keys", ["adaptive = .true.", "accuracy = 1e-3"])
+def test_summary_counts_the_work_at_every_number_of_harmonics(fw_run, keys):
+    text = FRICTION.replace("adaptive = {adaptive} adaptive_tolerance = {tolerance}", keys)
+    if "accuracy" in keys:
+        text = text.replace("n_time = 1024", "")
+    fw_run.write(text.format(most=41) + "&solver linear = 'lu' /\n")
+    done = fw_run("case.nml")
+    assert done.returncode == 0, done.stderr
+    iterations = int(re.search(r"iterations +(\d+)", done.stdout)[1])
+    # A step has one factorization, but where nothing moves the contact: there it needs none.
+    assert int(re.search(r"(\d+) LU factorizations", done.stdout)[1]) >= 0.9 * iterations
+    with h5py.File(fw_run.directory / "case.h5") as file:
+        most = file["harmonics"][()].max()
+        assert len(np.unique(file["harmonics"][()])) > 1
+    coefficients = int(re.search(r"(\d+) coefficients", done.stdout)[1])
+    assert coefficients >= most  # odd harmonics only: H + 1
 
 
 def test_harmonics_where_they_are_needed(fw_run):
