@@ -4,6 +4,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from limits import limit
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
@@ -49,7 +50,7 @@ class Runner:
 
     def __call__(self, *arguments):
         return subprocess.run([PROGRAM, *map(str, arguments)], cwd=self.directory, text=True,
-                              capture_output=True, timeout=60, check=False)
+                              capture_output=True, timeout=limit(60), check=False)
 
     def refused(self, *arguments, status=3):
         """Run what must be refused; return the message."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from limits import limit
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / "example"
@@ -52,7 +53,7 @@ def results(tmp_path_factory):
             path = folder / (Path(name).stem + ".h5")
             process = subprocess.run(
                 [FW_RUN, "-q", "-o", str(path), str(EXAMPLE / name)],
-                capture_output=True, text=True, check=False, timeout=120, env=ENVIRONMENT)
+                capture_output=True, text=True, check=False, timeout=limit(120), env=ENVIRONMENT)
             assert process.returncode == 0, process.stderr
             done[name] = path
         return done[name]

@@ -5,6 +5,7 @@ an oscillator whose friction wears away.
 """
 import numpy as np
 import pytest
+from limits import limit
 from wear_cases import REFERENCE, joint, merged, oscillator, prescribed_slip, read, result, run, \
     shared_load
 
@@ -296,7 +297,7 @@ def test_effective_input_with_worn_reads_back(worn):
     import subprocess
 
     from wear_cases import PROGRAM
-    subprocess.run([PROGRAM, "-q", "again.nml"], cwd=folder, check=True, timeout=60)
+    subprocess.run([PROGRAM, "-q", "again.nml"], cwd=folder, check=True, timeout=limit(60))
     # The name of the result is part of the effective input.
     again = read(folder / "case.h5")
     assert again["coefficients"].tobytes() == first["coefficients"].tobytes()

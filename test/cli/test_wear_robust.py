@@ -7,6 +7,7 @@ import subprocess
 import h5py
 import numpy as np
 import pytest
+from limits import limit
 from wear_cases import PROGRAM, ROOT, merged, oscillator, prescribed_slip, result, run, shared_load
 
 N_PAIRS = 3
@@ -194,7 +195,7 @@ def test_pseudo_time_passes_kinks_of_the_sector(tmp_path, scheme, control):
          "--set", "sweep%start=1006.5", "--set", "sweep%n_points=1",
          "--set", "harmonics%n_harmonics=3", "--set", "wear%scheme='pseudo_time'",
          "--set", "wear%coefficient=1e-12", "--set", f"pseudo_time%scheme='{scheme}'",
-         "--set", control], capture_output=True, text=True, check=False, timeout=120)
+         "--set", control], capture_output=True, text=True, check=False, timeout=limit(120))
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "worn.h5") as file:
         assert file["wear"].attrs["steady_state"] == "reached"

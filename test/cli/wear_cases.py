@@ -2,12 +2,16 @@
 import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "test" / "support"))
+from limits import limit
+
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 REFERENCE = json.loads((ROOT / "test" / "reference" / "oracle_g_wear.json").read_text())
 # What depends on the clock or on the name of the run.
@@ -49,7 +53,7 @@ def run(folder, groups, *arguments, name="case", status=0):
     path = folder / f"{name}.nml"
     write_namelist(path, groups)
     done = subprocess.run([PROGRAM, "-q", *map(str, arguments), str(path)], cwd=folder, text=True,
-                          capture_output=True, timeout=120, check=False,
+                          capture_output=True, timeout=limit(120), check=False,
                           env={**os.environ, "OMP_WAIT_POLICY": "passive"})
     assert done.returncode == status, (done.returncode, done.stderr)
     return done

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT = ROOT / "docs" / "robustness.md"
 SOURCES = ("src", "app", "include", "cmake", "test", "python", "example", "CMakeLists.txt")
+#: Builds that look closer are slower than the one that limits of time of the tests are made for.
+SLOWER = "10"
 WARNING = re.compile(r"\bwarning:", re.IGNORECASE)
 
 
@@ -64,9 +67,13 @@ def run(command, check=True, **options):
 
 
 def run_tests(setting, directory, *tests, environment=None):
-    """The counts of run_tests.py on a build: of all tests, or of these directories of pytest."""
+    """The counts of run_tests.py on a build: of all tests, or of these directories of pytest.
+
+    `environment` holds variables on top of those of this process.
+    """
     done = run([setting.python, "test/support/run_tests.py", "--build", directory,
-                "--python", setting.python, *tests], check=False, env=environment)
+                "--python", setting.python, *tests], check=False,
+               env={**os.environ, "FW_SLOWER": SLOWER, **(environment or {})})
     found = re.search(r"(\d+) passed, (\d+) failed(?:, (\d+) skipped)?\s*\Z", done.stdout)
     if not found:
         print(done.stdout, flush=True)

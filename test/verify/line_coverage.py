@@ -39,7 +39,8 @@ def coverage(setting):
                          *(f"-DCMAKE_{kind}_LINKER_FLAGS=--coverage" for kind in flags))
     for path in directory.rglob("*.gcda"):  # of an earlier run
         path.unlink()
-    counts = run_tests(setting, directory, *TESTS)
+    # Programs of the tests that link the static library need the counters' library too.
+    counts = run_tests(setting, directory, *TESTS, environment={"LDFLAGS": "--coverage"})
     return summary(directory, counts)
 
 

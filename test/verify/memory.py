@@ -27,7 +27,7 @@ def sanitize(setting):
         setting, "sanitize", "-DFRETWEAR_SANITIZE=address,undefined",
         "-DCMAKE_Fortran_FLAGS=-O1 -g", "-DFRETWEAR_PYTHON=OFF", "-DFRETWEAR_SHARED=OFF")
     counts = run_tests(setting, directory, *OF_THE_PROGRAM,
-                       environment=dict(os.environ, UBSAN_OPTIONS="print_stacktrace=1"))
+                       environment={"UBSAN_OPTIONS": "print_stacktrace=1"})
     names = ", ".join(f"`{name}`" for name in OF_THE_PROGRAM)
     return [*HEAD, f"| unit tests, {names} | {warnings} | {counts.row()} |"], counts.good
 
