@@ -12,6 +12,7 @@ module fw_summary
    use fw_solver_options, only: solver_newton
    use fw_text, only: string_type
    use fw_text, only: to_text
+   use fw_text_list, only: append
    implicit none (type, external)
    private
 
@@ -106,16 +107,18 @@ contains
       integer, intent(in) :: kind
 
       self%sampling = merge(sampling_events, sampling_uniform, allocated(system%contact%events))
-      self%work = [line('unknowns', to_text(system%n)//' ('// &
-         to_text(system%structure%n_coordinates)// &
-                        ' coordinates, '//to_text(system%fourier%n_coefficients)// &
-                           ' coefficients, '// &
-                        to_text(system%fourier%n_time)//' instants'// &
-                        trim(merge(', events located', repeat(' ', 16), &
-                                   self%sampling == sampling_events))//')'), &
-                   line('linear solver', to_text(linear%factorizations)//' LU factorizations, '// &
-                        to_text(linear%krylov_iterations)//' Krylov iterations, '// &
-                        to_text(linear%preconditioners)//' preconditioners')]
+      deallocate (self%work)
+      allocate (self%work(0))
+      call add_line(self%work, 'unknowns', to_text(system%n)//' ('// &
+                    to_text(system%structure%n_coordinates)//' coordinates, '// &
+                    to_text(system%fourier%n_coefficients)//' coefficients, '// &
+                    to_text(system%fourier%n_time)//' instants'// &
+                    trim(merge(', events located', repeat(' ', 16), &
+                               self%sampling == sampling_events))//')')
+      call add_line(self%work, 'linear solver', &
+                    to_text(linear%factorizations)//' LU factorizations, '// &
+                    to_text(linear%krylov_iterations)//' Krylov iterations, '// &
+                    to_text(linear%preconditioners)//' preconditioners')
       if (.not. system%fourier%has_constant()) then
          call skip(self, 'even harmonics (half-wave symmetry)')
       end if
@@ -140,11 +143,9 @@ contains
    subroutine skip(self, words)
       class(summary_type), intent(inout) :: self
       character(*), intent(in) :: words
-      type(string_type) :: item
 
-      item%text = words
-      self%skipped = [self%skipped, item]
-      self%work = [self%work, line('skipped', words)]
+      call append(self%skipped, words)
+      call add_line(self%work, 'skipped', words)
    end subroutine skip
 
    !> Points that only the pseudo-time fallback has solved.
@@ -152,7 +153,7 @@ contains
       class(summary_type), intent(inout) :: self
       integer, intent(in) :: n_points
 
-      self%work = [self%work, line('fallback', 'pseudo-time served '//to_text(n_points)//' points')]
+      call add_line(self%work, 'fallback', 'pseudo-time served '//to_text(n_points)//' points')
    end subroutine note_fallback
 
    !> How many harmonics the points took.
@@ -163,13 +164,13 @@ contains
       real(wp), intent(in) :: tolerance
       character(10) :: text
 
-      self%work = [self%work, line('harmonics', to_text(self%harmonics(1))//' to '// &
-                                   to_text(self%harmonics(2)))]
+      call add_line(self%work, 'harmonics', to_text(self%harmonics(1))//' to '// &
+                    to_text(self%harmonics(2)))
       if (n_short == 0) return
       write (text, '(es8.1)') tolerance
-      self%work = [self%work, line('', 'too few at '//to_text(n_short)//' points, which leave '// &
-                                   'out more than '//trim(adjustl(text))//' of the force: '// &
-                                   'raise harmonics%n_harmonics')]
+      call add_line(self%work, '', 'too few at '//to_text(n_short)//' points, which leave '// &
+                    'out more than '//trim(adjustl(text))//' of the force: '// &
+                    'raise harmonics%n_harmonics')
    end subroutine describe_harmonics
 
    !> What the points took to be accurate.
@@ -181,12 +182,12 @@ contains
 
       write (text(1), '(es8.1)') worst
       write (text(2), '(es8.1)') accuracy
-      self%work = [self%work, &
-                   line('harmonics', to_text(self%harmonics(1))//' to '// &
-                        to_text(self%harmonics(2))), &
-                   line('instants', to_text(self%instants(1))//' to '//to_text(self%instants(2))), &
-                   line('error', 'at most '//trim(adjustl(text(1)))//' by estimate, '// &
-                        trim(adjustl(text(2)))//' asked for')]
+      call add_line(self%work, 'harmonics', to_text(self%harmonics(1))//' to '// &
+                    to_text(self%harmonics(2)))
+      call add_line(self%work, 'instants', to_text(self%instants(1))//' to '// &
+                    to_text(self%instants(2)))
+      call add_line(self%work, 'error', 'at most '//trim(adjustl(text(1)))//' by estimate, '// &
+                    trim(adjustl(text(2)))//' asked for')
    end subroutine describe_accuracy
 
    !> What became of the wear.
@@ -199,9 +200,10 @@ contains
       character(40) :: text
 
       write (text, '(es13.6, a, es13.6)') depth, ' after ', cycles
-      self%work = [self%work, line('steady state', steady_state), &
-                   line('largest depth', trim(adjustl(text))//' cycles'), &
-                   line('wear steps', to_text(n_steps)//', '//to_text(n_rejected)//' repeated')]
+      call add_line(self%work, 'steady state', steady_state)
+      call add_line(self%work, 'largest depth', trim(adjustl(text))//' cycles')
+      call add_line(self%work, 'wear steps', to_text(n_steps)//', '//to_text(n_rejected)// &
+                    ' repeated')
    end subroutine describe_wear
 
    !> The run that was continued.
@@ -211,7 +213,7 @@ contains
       integer, intent(in) :: n_steps
       character(*), intent(in) :: path
 
-      self%work = [self%work, line('continued', 'after '//to_text(n_steps)//' rows of '//path)]
+      call add_line(self%work, 'continued', 'after '//to_text(n_steps)//' rows of '//path)
    end subroutine note_restart
 
    !> What steps of half the size change.
@@ -223,8 +225,8 @@ contains
       character(16) :: text
 
       write (text, '(es9.2)') change
-      self%work = [self%work, line('steps halved', 'profile moves by '//trim(adjustl(text))// &
-                                   ' of the largest depth ('//to_text(n_steps)//' steps)')]
+      call add_line(self%work, 'steps halved', 'profile moves by '//trim(adjustl(text))// &
+                    ' of the largest depth ('//to_text(n_steps)//' steps)')
    end subroutine note_profile_change
 
    !> The table (seconds: elapsed time).
@@ -235,34 +237,40 @@ contains
       character(80) :: text
       integer :: i
 
-      table = [line('converged', to_text(self%n_converged)//' of '//to_text(self%n_points)// &
-         ' points'), &
-               line('iterations', to_text(self%iterations))]
+      allocate (table(0))
+      call add_line(table, 'converged', to_text(self%n_converged)//' of '// &
+                    to_text(self%n_points)//' points')
+      call add_line(table, 'iterations', to_text(self%iterations))
       do i = 1, merge(min(size(self%name), max_shown), 0, self%n_converged > 0)
          write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', &
             self%peak_omega(i), &
             ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'
-         table = [table, line('peak '//self%name(i)%text, trim(adjustl(text)))]
+         call add_line(table, 'peak '//self%name(i)%text, trim(adjustl(text)))
       end do
       if (size(self%name) > max_shown) then
-         table = [table, line('...', to_text(size(self%name) - max_shown)// &
-            ' more in the result file')]
+         call add_line(table, '...', to_text(size(self%name) - max_shown)// &
+                       ' more in the result file')
       end if
+      do i = 1, size(self%work)
+         call append(table, self%work(i)%text)
+      end do
       write (text, '(f20.3, a)') seconds, ' s'
-      table = [table, self%work, line('time', trim(adjustl(text)))]
+      call add_line(table, 'time', trim(adjustl(text)))
    end function lines
 
-   pure function line(label, value)
+   !> A line of the table. No function gives one: gfortran 12 loses the texts of results of such a
+   !> type within array constructors and expressions, which is memory.
+   pure subroutine add_line(table, label, value)
+      type(string_type), allocatable, intent(inout) :: table(:)
       character(*), intent(in) :: label, value
-      type(string_type) :: line
       character(18) :: column
 
       column = label
       if (len(label) >= len(column)) then
-         line%text = label//' '//value
+         call append(table, label//' '//value)
       else
-         line%text = column//value
+         call append(table, column//value)
       end if
-   end function line
+   end subroutine add_line
 
 end module fw_summary

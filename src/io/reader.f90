@@ -417,7 +417,7 @@ contains
    !> Unknown groups and keys go before the other problems: they often cause them.
    subroutine find_unknown(self)
       class(reader_type), intent(inout) :: self
-      type(string_type), allocatable :: others(:), groups(:)
+      type(string_type), allocatable :: others(:), groups(:), keys(:)
       integer :: i
 
       call move_alloc(self%problems, others)
@@ -435,8 +435,9 @@ contains
                if (allocated(entry%option)) call self%blame(i, 'there is no group &'// &
                                                    entry%group//near(entry%group, groups))
             else if (.not. self%records%has(entry%group, entry%key)) then
+               keys = self%records%keys(entry%group)
                call self%blame(i, '&'//entry%group//' has no key '//entry%key// &
-                               near(entry%key, self%records%keys(entry%group)))
+                               near(entry%key, keys))
             end if
          end associate
       end do

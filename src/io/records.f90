@@ -65,8 +65,13 @@ contains
    pure logical function has_group(self, group)
       class(record_list), intent(in) :: self
       character(*), intent(in) :: group
+      integer :: i
 
-      has_group = size(self%keys(group)) > 0
+      has_group = .false.
+      if (.not. allocated(self%records)) return
+      do i = 1, size(self%records)
+         has_group = has_group .or. self%records(i)%group == group
+      end do
    end function has_group
 
    !> The groups in the order of their first keys.
