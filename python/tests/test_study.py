@@ -210,7 +210,9 @@ def test_interrupted_and_taken_up_again(study: Study) -> None:
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "interrupted" in errors
-    kept = study.results()
+    # A run that ends while it is killed leaves a result without a record, and is repeated.
+    kept = {name: written for name, written in study.results().items()
+            if (study.folder / "study" / name).with_suffix(".json").exists()}
     assert 0 < len(kept) < 8
     assert not list((study.folder / "study").glob("*.part*"))
     found = study.table()

@@ -446,9 +446,8 @@ contains
    !> Per harmonic, the matrix with each G replaced by its mean over cosine and sine.
    module procedure build_preconditioner
       integer :: h
-      logical :: singular
 
-      !$omp parallel do default(none) shared(self) private(h, singular) schedule(dynamic) &
+      !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
       !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
          call self%preconditioner(h)%reserve(self%n_active, largest_diagonal(self, h))
@@ -461,7 +460,7 @@ contains
                m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
             end if
          end associate
-         call self%preconditioner(h)%factor(singular)
+         call self%preconditioner(h)%factor()
       end do
       !$omp end parallel do
       self%n_preconditioned = self%n_active

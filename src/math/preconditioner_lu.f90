@@ -12,6 +12,9 @@ module fw_preconditioner_lu
 
    public :: preconditioner_lu_type
 
+   !> Pivots below this, of entries of the order of one, are none: two of them in a row overflow.
+   real(sp), parameter :: smallest_pivot = sqrt(tiny(1.0_sp))
+
    !> The storage only grows, so that refactoring does not allocate.
    type :: preconditioner_lu_type
       integer :: n = 0
@@ -45,14 +48,16 @@ contains
       allocate (self%matrix(n, n), self%rhs(n), self%pivot(n))
    end subroutine reserve
 
-   !> Factor the matrix in place; singular is true where a pivot is exactly zero.
-   subroutine factor(self, singular)
+   !> Factor the matrix in place. A pivot of zero, where the matrix is singular, becomes one: what is
+   !> left preconditions still, and costs the iterative solver an iteration for each.
+   subroutine factor(self)
       class(preconditioner_lu_type), intent(inout) :: self
-      logical, intent(out) :: singular
-      integer :: info
+      integer :: i, info
 
       call cgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
-      singular = info /= 0
+      do i = 1, self%n
+         if (abs(self%matrix(i, i)) < smallest_pivot) self%matrix(i, i) = (1.0_sp, 0.0_sp)
+      end do
    end subroutine factor
 
    !> Solve in place for one right-hand side (n), to single precision.

@@ -68,10 +68,10 @@ def verify(setting, name, again):
     if known.get(name) == sources and not again:
         report(f"{name}: clean before, with the same sources")
         return True
-    start = time.monotonic()
+    commit, start = revision(), time.monotonic()
     lines, clean = PARTS[name](setting)
     minutes = (time.monotonic() - start) / 60.0
-    lines += ["", f"{'Clean' if clean else '**Not clean**'}: sources of {revision()}, "
+    lines += ["", f"{'Clean' if clean else '**Not clean**'}: sources of {commit}, "
               f"{minutes:.0f} minutes."]
     write_section(name, lines, DOCUMENT)
     report(f"{name}: {'clean' if clean else 'NOT CLEAN'}, {minutes:.0f} minutes")

@@ -1,5 +1,15 @@
 !> Counts allocations: the program's own malloc, calloc and realloc stand before those of the C
 !> library (glibc), count the call and hand it on. Works for every library that is linked.
+!>
+!> The malloc of a sanitizer has to stand before everything. There the linker leads the calls of the
+!> program here (--wrap), and those of shared libraries are not counted.
+#ifdef WRAPPED
+#define OWN '__wrap_'
+#define NEXT '__real_'
+#else
+#define OWN ''
+#define NEXT '__libc_'
+#endif
 module support_malloc
    use, intrinsic :: iso_c_binding, only: c_ptr
    use, intrinsic :: iso_c_binding, only: c_size_t
@@ -12,21 +22,21 @@ module support_malloc
    integer(int64) :: count = 0
 
    interface
-      type(c_ptr) function libc_malloc(size) bind(c, name='__libc_malloc')
+      type(c_ptr) function next_malloc(size) bind(c, name=NEXT//'malloc')
          import :: c_ptr, c_size_t
          integer(c_size_t), value :: size
-      end function libc_malloc
+      end function next_malloc
 
-      type(c_ptr) function libc_calloc(number, size) bind(c, name='__libc_calloc')
+      type(c_ptr) function next_calloc(number, size) bind(c, name=NEXT//'calloc')
          import :: c_ptr, c_size_t
          integer(c_size_t), value :: number, size
-      end function libc_calloc
+      end function next_calloc
 
-      type(c_ptr) function libc_realloc(old, size) bind(c, name='__libc_realloc')
+      type(c_ptr) function next_realloc(old, size) bind(c, name=NEXT//'realloc')
          import :: c_ptr, c_size_t
          type(c_ptr), value :: old
          integer(c_size_t), value :: size
-      end function libc_realloc
+      end function next_realloc
    end interface
 
 contains
@@ -37,29 +47,29 @@ contains
       allocation_count = count
    end function allocation_count
 
-   type(c_ptr) function malloc(size) bind(c, name='malloc')
+   type(c_ptr) function malloc(size) bind(c, name=OWN//'malloc')
       integer(c_size_t), value :: size
 
       !$omp atomic
       count = count + 1
-      malloc = libc_malloc(size)
+      malloc = next_malloc(size)
    end function malloc
 
-   type(c_ptr) function calloc(number, size) bind(c, name='calloc')
+   type(c_ptr) function calloc(number, size) bind(c, name=OWN//'calloc')
       integer(c_size_t), value :: number, size
 
       !$omp atomic
       count = count + 1
-      calloc = libc_calloc(number, size)
+      calloc = next_calloc(number, size)
    end function calloc
 
-   type(c_ptr) function realloc(old, size) bind(c, name='realloc')
+   type(c_ptr) function realloc(old, size) bind(c, name=OWN//'realloc')
       type(c_ptr), value :: old
       integer(c_size_t), value :: size
 
       !$omp atomic
       count = count + 1
-      realloc = libc_realloc(old, size)
+      realloc = next_realloc(old, size)
    end function realloc
 
 end module support_malloc
