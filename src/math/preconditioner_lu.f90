@@ -48,8 +48,8 @@ contains
       allocate (self%matrix(n, n), self%rhs(n), self%pivot(n))
    end subroutine reserve
 
-   !> Factor the matrix in place. A pivot of zero, where the matrix is singular, becomes one: what is
-   !> left preconditions still, and costs the iterative solver an iteration for each.
+   !> Factor the matrix in place. A pivot of zero, where the matrix is singular, becomes one: what
+   !> is left preconditions still, and costs the iterative solver an iteration for each.
    subroutine factor(self)
       class(preconditioner_lu_type), intent(inout) :: self
       integer :: i, info
