@@ -211,14 +211,17 @@ contains
    function near(name) result(text)
       character(*), intent(in) :: name
       character(:), allocatable :: text
+      character(*), parameter :: names(*) = [character(9) :: '--set', '--output', '--restart', &
+         '--check', '--quiet', '--verbose', '--help', '--version']
+      type(string_type) :: options(size(names))
+      integer :: i
 
       text = ''
       if (index(name, '--') == 1) then
-         text = nearest_word(name, [string_type('--set'), string_type('--output'), &
-                                    string_type('--restart'), &
-                                    string_type('--check'), string_type('--quiet'), &
-                                    string_type('--verbose'), string_type('--help'), &
-                                    string_type('--version')])
+         do i = 1, size(names)
+            options(i)%text = trim(names(i))
+         end do
+         text = nearest_word(name, options)
       end if
       if (len(text) > 0) then
          text = '; did you mean '//text//'?'
