@@ -126,6 +126,23 @@ def test_fortran_facade(prefix, package, reference, tmp_path):
     assert np.array_equal(found[:, 1:], reference[:, 3:3 + N_COEFFICIENTS])
 
 
+def test_a_whole_run_from_fortran_77(prefix, tmp_path):
+    libdir = Path(pkg_config(prefix)).parent
+    flags = run("pkg-config", "--libs", "fretwear", PKG_CONFIG_PATH=pkg_config(prefix)).split()
+    run("gfortran", "-std=legacy", "-Wall", HERE / "whole.f", "-o", "whole", *flags,
+        f"-Wl,-rpath,{libdir}", cwd=tmp_path)
+    output = run("./whole", cwd=tmp_path, text=f"{SECTOR / 'frf.nml'}\n")
+    found = {label: (int(status), answer.strip()) for label, status, answer in
+             (line.split("\t") for line in output.splitlines())}
+    title = re.search(r"title\s*=\s*'(.*)'", (SECTOR / "frf.nml").read_text())[1]
+    assert found["load"] == found["check"] == found["run"] == (OK, "")
+    assert found["points"] == (OK, "3")
+    assert found["title"] == (OK, title)
+    assert found["no such text"] == (USAGE, "as it was")
+    assert found["wrong"][0] == INPUT and "&contact mu(1) = -1: must be" in found["wrong"][1]
+    assert found["no such file"][0] == IO and "/does/not/exist.nml" in found["no such file"][1]
+
+
 def compile_c(source, prefix, directory):
     """A program of this directory against the shared library."""
     program = directory / source.stem
