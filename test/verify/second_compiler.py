@@ -92,7 +92,7 @@ def run_units(compiler, folder, chosen):
     assertions.write_text(without_assumed_rank(
         (SUPPORT / "standin" / "funit.f90").read_text(encoding="utf-8")), encoding="utf-8")
     stand_in = Source(assertions)
-    helpers = [Source(path) for path in sorted((ROOT / "test" / "unit").glob("*.f90"))]
+    helpers = [Source(path) for path in sorted((ROOT / "test" / "unit").glob("*.[fF]90"))]
     units = []
     for path in sorted((ROOT / "test" / "unit").glob("*.pf")):
         target = folder / f"{path.stem}.F90"
