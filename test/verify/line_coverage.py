@@ -17,7 +17,6 @@ REASONS = {
     "src/base/memory.f90": "memory that is refused",
     "src/balance/flow.f90": "scales of pseudo-time other than the default",
     "src/balance/guess.f90": "start without contact, a fallback",
-    "src/capi/fortran77.f90": "calls of one line that pass on to those of C",
     "src/driver/observer.f90": "empty procedures of the observer that ignores what it is told",
     "src/driver/point_solver.f90": "fallbacks after a solver has failed",
     "src/driver/point_values.f90": "values that callers may ask of a point one by one",
