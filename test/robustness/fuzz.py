@@ -20,7 +20,6 @@ import contextlib
 import json
 import os
 import random
-import resource
 import select
 import shutil
 import signal
@@ -42,6 +41,7 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "support"))
+from limited import limited  # noqa: E402
 from revision import revision  # noqa: E402
 
 FAMILIES = {"namelist": fuzz_namelist.create, "model file": fuzz_model.create,
@@ -57,12 +57,6 @@ MEGABYTES = 2048
 REFUSALS = (2, 3, 5)
 RUNTIME_WORDS = ("Fortran runtime", "SIGSEGV", "Backtrace", "HDF5-DIAG", "Traceback",
                  "Error allocating", "malloc", "free()", "terminate called", "ERROR STOP")
-
-
-def set_limits():
-    resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_TIME, PROCESSOR_TIME + 1))
-    resource.setrlimit(resource.RLIMIT_AS, (MEGABYTES << 20, MEGABYTES << 20))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 class Library:
@@ -111,9 +105,9 @@ class Library:
 
 def run_program(program, folder, arguments, seconds):
     """Exit status, both streams; a status of None means a hang."""
-    process = subprocess.Popen([program, *arguments], cwd=folder, stdin=subprocess.DEVNULL,
+    command = limited([program, *arguments], PROCESSOR_TIME, 1, MEGABYTES)
+    process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL,
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                               preexec_fn=set_limits,
                                env=dict(os.environ, OMP_NUM_THREADS="1"))
     try:
         out, errors = process.communicate(timeout=seconds)

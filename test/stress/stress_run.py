@@ -1,7 +1,6 @@
 """Run a case in a process of its own and say how it ended."""
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
@@ -13,11 +12,12 @@ import h5py
 import numpy as np
 import stress_check as check
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
+sys.path += [str(Path(__file__).resolve().parents[1] / name) for name in ("oracles", "support")]
+from limited import limited
 from oracle_runs import FW_RUN, write_namelist
 
 # Processor time that no case needs [s]; a busy machine only lengthens the wall clock.
-TIME_LIMIT = 60
+TIME_LIMIT, GRACE = 60, 5
 WALL_LIMIT = 600
 # Models above this go through a file: their matrices make long namelists.
 INLINE_DOFS = 12
@@ -92,10 +92,6 @@ def write_model(joint, path):
             file["contact/side_2"] = np.zeros_like(joint.side_1)
 
 
-def limit_time():
-    resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT + 5))
-
-
 def run(case, program=FW_RUN):
     """Outcome of a case, and the time that it took by the clock."""
     started = time.monotonic()
@@ -109,10 +105,9 @@ def run_once(case, program):
         folder = Path(name)
         write_case(case, folder)
         try:
-            done = subprocess.run([program, str(folder / "case.nml"), "-o", str(folder / "r.h5")],
-                                  capture_output=True, text=True, check=False,
-                                  timeout=WALL_LIMIT, preexec_fn=limit_time,
-                                  env=ENVIRONMENT)
+            command = [program, folder / "case.nml", "-o", folder / "r.h5"]
+            done = subprocess.run(limited(command, TIME_LIMIT, GRACE), capture_output=True,
+                                  text=True, check=False, timeout=WALL_LIMIT, env=ENVIRONMENT)
         except subprocess.TimeoutExpired:
             return Outcome(case, "hang", text=f"more than {WALL_LIMIT} s")
         return judge(case, done, folder / "r.h5")
