@@ -33,9 +33,9 @@ module fw_linear_step
       real(wp), allocatable :: rhs(:), solution(:)
       !> Whether `lu` holds the factors of the last derivative.
       logical :: factored = .false.
-      !> Iterations with the preconditioner when it was fresh, and whether those of the last
-      !> solution still were few enough to keep it.
-      integer :: fresh_iterations = 0
+      !> Iterations for a tenth of the residual with the preconditioner when it was fresh, and
+      !> whether those of the last solution still were few enough to keep it.
+      real(wp) :: fresh_rate = 0.0_wp
       logical :: worth_keeping = .false.
       !> Whether the preconditioner in use is one from before the last `prepare`.
       logical :: kept = .false.
@@ -126,10 +126,12 @@ contains
       class(nonlinear_system), intent(inout) :: system
       real(wp), intent(in) :: tolerance
       logical, intent(out) :: done
+      real(wp) :: decades
       integer :: limit, most
 
+      decades = -log10(tolerance)
       if (self%kept) then
-         limit = int(kept_factor*self%fresh_iterations) + kept_excess
+         limit = int(kept_factor*self%fresh_rate*decades) + kept_excess
          most = self%gmres%max_iterations
          self%gmres%max_iterations = min(most, 2*limit)
          call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
@@ -141,7 +143,7 @@ contains
       end if
       call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
       self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
-      self%fresh_iterations = self%gmres%iterations
+      self%fresh_rate = real(self%gmres%iterations, wp)/decades
       self%worth_keeping = done
    end subroutine iterate
 
