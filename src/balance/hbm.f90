@@ -70,6 +70,10 @@ module fw_hbm
       !> Coordinates for which the preconditioner was built (first n_preconditioned entries).
       integer :: n_preconditioned = 0
       integer, allocatable :: preconditioned(:)
+      !> Place there of each active coordinate, 0 for one that has become active since; prediction
+      !> stiffness of those.
+      integer, allocatable :: kept_place(:)
+      real(wp), allocatable :: unknown_stiffness(:)
    contains
       procedure :: set_parameter => set_frequency
       procedure :: set_frequency
@@ -179,7 +183,7 @@ contains
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       allocate (self%complex_in(m, nh), self%complex_out(m, nh), source=(0.0_wp, 0.0_wp))
       allocate (self%active_out(m, nc), self%used(m), self%place(m), self%preconditioned(m))
-      allocate (self%gathered(m))
+      allocate (self%gathered(m), self%kept_place(m), self%unknown_stiffness(m))
       allocate (self%pair_in(3*nc, contact%n_pairs), source=0.0_wp)
       allocate (self%pair_out(3*nc, contact%n_pairs), source=0.0_wp)
       allocate (self%preconditioner(nh))

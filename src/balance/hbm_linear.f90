@@ -19,6 +19,9 @@ submodule(fw_hbm) fw_hbm_linear
    !> Part of a residual whose effect on a step is far below the tolerance of linear solutions.
    real(wp), parameter :: negligible = 1.0e-9_wp
 
+   !> Share of the active coordinates that may have joined or left since a preconditioner was built.
+   real(wp), parameter :: most_changed = 0.05_wp
+
 contains
 
    module procedure linearize
@@ -67,7 +70,29 @@ contains
          self%place(j) = k
       end do
       self%n_used = k
+      call place_kept(self)
    end subroutine choose_active
+
+   !> Find the active coordinates in the preconditioner from before.
+   subroutine place_kept(self)
+      type(hbm_system), intent(inout) :: self
+      integer :: i, c, k, place
+
+      self%kept_place(:self%n_active) = 0
+      do k = 1, self%n_preconditioned
+         place = self%place(self%preconditioned(k))
+         if (place > 0 .and. place <= self%n_active) self%kept_place(place) = k
+      end do
+      ! Without rigid laws no coordinate joins or leaves, and pairs may share them.
+      if (.not. self%rigid) return
+      do i = 1, self%contact%n_pairs
+         do c = 1, 3
+            if (self%joint%row(c, i) == 0) cycle
+            place = self%place(self%coordinate_of(c, i))
+            if (place > 0) self%unknown_stiffness(place) = self%stiffness(i, c)
+         end do
+      end do
+   end subroutine place_kept
 
    !> Copy the rows and columns in use, so that products run over contiguous memory.
    subroutine gather_stiffness(self)
@@ -465,6 +490,7 @@ contains
       !$omp end parallel do
       self%n_preconditioned = self%n_active
       self%preconditioned(:self%n_active) = self%used(:self%n_active)
+      self%kept_place(:self%n_active) = [(h, h=1, self%n_active)]
       ! The shift belongs to one step of pseudo-time.
       if (allocated(self%shift)) self%n_preconditioned = 0
    end procedure build_preconditioner
@@ -481,12 +507,15 @@ contains
       end do
    end function largest_diagonal
 
+   !> So it does while few coordinates have left the active ones or joined them.
    module procedure preconditioner_fits
-      preconditioner_fits = self%n_preconditioned == self%n_active .and. .not. allocated(self%shift)
-      if (preconditioner_fits) then
-         preconditioner_fits = all(self%preconditioned(:self%n_active) == &
-                                   self%used(:self%n_active))
-      end if
+      integer :: n_known
+
+      preconditioner_fits = self%n_preconditioned > 0 .and. .not. allocated(self%shift)
+      if (.not. preconditioner_fits) return
+      n_known = count(self%kept_place(:self%n_active) > 0)
+      preconditioner_fits = self%n_active + self%n_preconditioned - 2*n_known &
+                            <= most_changed*self%n_active
    end procedure preconditioner_fits
 
    !> Mean over cosine and sine of a block of a transposed derivative, as a complex factor.
@@ -599,7 +628,7 @@ contains
       !$omp parallel do default(none) shared(self) private(h) &
       !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
-         call self%preconditioner(h)%solve(self%complex_in(:self%n_active, h))
+         call solve_kept(self, h)
       end do
       !$omp end parallel do
       do h = 1, self%fourier%n_retained
@@ -609,6 +638,28 @@ contains
             = -aimag(self%complex_in(:na, h))
       end do
    end procedure precondition
+
+   !> With the factors of one harmonic; coordinates that they do not know are taken as stuck.
+   subroutine solve_kept(self, h)
+      type(hbm_system), intent(inout) :: self
+      integer, intent(in) :: h
+      integer :: k
+
+      associate (in => self%complex_in(:, h), z => self%complex_out(:self%n_preconditioned, h))
+         z = zero
+         do k = 1, self%n_active
+            if (self%kept_place(k) > 0) then
+               z(self%kept_place(k)) = in(k)
+            else
+               in(k) = in(k)/self%unknown_stiffness(k)
+            end if
+         end do
+         call self%preconditioner(h)%solve(z)
+         do k = 1, self%n_active
+            if (self%kept_place(k) > 0) in(k) = z(self%kept_place(k))
+         end do
+      end associate
+   end subroutine solve_kept
 
    !> Column by column: few unknowns, or springs, or a check of the product.
    module procedure assemble
