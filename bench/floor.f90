@@ -22,6 +22,7 @@ module floor_system
    use fw_lapack, only: dgemv
    use fw_lapack, only: zgemm
    use fw_lapack, only: zgemv
+   use fw_linalg, only: complex_lu_type
    use fw_preconditioner_lu, only: preconditioner_lu_type
    implicit none (type, external)
    private
@@ -68,6 +69,7 @@ module floor_system
       real(wp), allocatable :: basis(:, :), vector(:), weights(:)
       complex(wp), allocatable :: input(:), output(:), coupling(:, :), solved(:, :), square(:, :)
       type(preconditioner_lu_type) :: lu
+      type(complex_lu_type) :: internal
    contains
       procedure :: set_frequency
       procedure :: residual
@@ -133,6 +135,8 @@ contains
       self%floor(part) = self%floor(part) + max(0.0_wp, now - middle - self%empty)
    end subroutine add
 
+   !> Floor: the internal block solved for its coupling, where damping fills it, and half of the
+   !> product, which is symmetric.
    subroutine set_frequency(self, parameter, error)
       class(measured_system), intent(inout) :: self
       real(wp), intent(in) :: parameter
@@ -147,12 +151,29 @@ contains
       n = size(self%coupling, 2)
       if (n > 0) then
          do h = 1, self%fourier%n_retained
-            call zgemm('N', 'N', m, m, n, -one, self%coupling, m, self%solved, n, one, &
+            if (allocated(self%structure%basis%c_ii)) call solve_internal(self, m, n)
+            call zgemm('N', 'N', m, (m + 1)/2, n, -one, self%coupling, m, self%solved, n, one, &
                        self%square, m)
          end do
       end if
       call add(self, part_condense, start, middle)
    end subroutine set_frequency
+
+   !> A matrix that elimination leaves as it is takes no less time than any other.
+   subroutine solve_internal(self, m, n)
+      type(measured_system), intent(inout) :: self
+      integer, intent(in) :: m, n
+      logical :: singular
+      integer :: j
+
+      call self%internal%reserve(n)
+      self%internal%matrix(:n, :n) = zero
+      do j = 1, n
+         self%internal%matrix(j, j) = one
+      end do
+      call self%internal%factor(singular)
+      call self%internal%solve(m, self%solved)
+   end subroutine solve_internal
 
    !> Floor: the product with Z_r, two transforms and the turns of the march.
    subroutine residual(self, x, r)

@@ -124,7 +124,8 @@ def floor_part(splits: dict[tuple[int, int], list[Part]]) -> str:
         "once more, alone: one turn of the derivative for each mixed pair, the marches that the "
         "pairs took, "
         "the transforms, the products with the matrices in use, the factorisations and solutions "
-        "of the preconditioner, the products of the condensation and of the Krylov basis. "
+        "of the preconditioner, the condensation (its internal block factored and solved, and half "
+        "of a product that is symmetric) and the products of the Krylov basis. "
         "Processor times.", "",
         *table(["pairs", "H", "sweep [ms]", "floor [ms]", "ratio"], rows), "", verdict])
 

@@ -31,7 +31,7 @@ module fw_newton
    !> Bounds of the relative residual asked of iterative linear solutions, and the factor between
    !> it and the square of the last decrease (Eisenstat and Walker 1996, choice 2): a step that the
    !> corners of the contact law will spoil need not be solved well.
-   real(wp), parameter :: loosest = 1.0e-2_wp, tightest = 1.0e-4_wp, forcing_factor = 0.9_wp
+   real(wp), parameter :: loosest = 1.0e-2_wp, tightest = 1.0e-4_wp, forcing_factor = 0.1_wp
    !> Part of the tolerance that the linear residual may take of the last step.
    real(wp), parameter :: last_step_share = 0.03_wp
    !> Steps without a new smallest residual after which the path counts as cycling.

@@ -32,8 +32,8 @@ def sector(fw_run, n_pairs, n_harmonics, start, end, linear="auto", name="sector
 
 
 @pytest.mark.parametrize(("n_pairs", "n_harmonics", "start", "end", "limits"), [
-    (16, 3, 1021, 1024, (41, 0, 197, 2)),
-    (48, 7, 1016, 1019, (65, 0, 374, 32)),
+    (16, 3, 1021, 1024, (41, 0, 192, 2)),
+    (48, 7, 1016, 1019, (64, 0, 391, 32)),
 ])
 def test_work_on_the_sector(fw_run, n_pairs, n_harmonics, start, end, limits):
     counts = work(sector(fw_run, n_pairs, n_harmonics, start, end))
