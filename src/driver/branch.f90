@@ -45,6 +45,9 @@ module fw_branch
       procedure :: take
    end type branch_recorder
 
+   !> Relative residual asked of the linear solutions of the first point.
+   real(wp), parameter :: first_forcing = 1.0e-4_wp
+
 contains
 
    !> The first point as in a natural sweep, then along the branch until a bound or max_points.
@@ -62,6 +65,8 @@ contains
       type(point_type) :: point
       real(wp), allocatable :: values(:)
 
+      ! What the first point leaves, the whole path inherits.
+      solver%method%newton%loosest = first_forcing
       call solver%solve(case, system, case%sweep%start, point, error)
       if (allocated(error)) return
       allocate (recorder%r(system%n))

@@ -21,6 +21,8 @@ module fw_newton
    type :: newton_solver
       type(solver_options) :: options
       type(linear_step_type) :: linear
+      !> Largest relative residual asked of iterative linear solutions.
+      real(wp) :: loosest = 1.0e-2_wp
       real(wp), allocatable :: r(:), step(:), trial(:)
    contains
       procedure :: solve
@@ -28,10 +30,10 @@ module fw_newton
 
    !> Shortest fraction of a step that is tried.
    integer, parameter :: max_halvings = 4
-   !> Bounds of the relative residual asked of iterative linear solutions, and the factor between
-   !> it and the square of the last decrease (Eisenstat and Walker 1996, choice 2): a step that the
+   !> Least relative residual asked of iterative linear solutions, and the factor between it and
+   !> the square of the last decrease (Eisenstat and Walker 1996, choice 2): a step that the
    !> corners of the contact law will spoil need not be solved well.
-   real(wp), parameter :: loosest = 1.0e-2_wp, tightest = 1.0e-4_wp, forcing_factor = 0.1_wp
+   real(wp), parameter :: tightest = 1.0e-4_wp, forcing_factor = 0.1_wp
    !> Part of the tolerance that the linear residual may take of the last step.
    real(wp), parameter :: last_step_share = 0.03_wp
    !> Steps without a new smallest residual after which the path counts as cycling.
@@ -54,7 +56,7 @@ contains
       call system%residual(x, self%r)
       norm = norm2(self%r)/system%reference
       best = norm
-      forcing = loosest
+      forcing = self%loosest
       stalled = 0
       do
          report%residual = norm
@@ -67,21 +69,20 @@ contains
          before = norm
          call search(self, system, x, norm, done)
          if (.not. done) exit
-         forcing = next_forcing(before, norm, self%options%tolerance)
+         forcing = min(self%loosest, next_forcing(before, norm, self%options%tolerance))
          stalled = stalled + 1
          if (norm < 0.99_wp*best) stalled = 0
          best = min(best, norm)
       end do
    end subroutine solve
 
-   !> Relative residual to ask of the next linear solution.
+   !> Relative residual that is worth asking of the next linear solution.
    pure real(wp) function next_forcing(before, norm, tolerance) result(forcing)
       !> Norms of the residual before and after the last step, and the one that is wanted.
       real(wp), intent(in) :: before, norm, tolerance
 
       forcing = max(forcing_factor*(norm/before)**2, &
                     last_step_share*tolerance/max(norm, tolerance), tightest)
-      forcing = min(forcing, loosest)
    end function next_forcing
 
    !> Halve the step until the residual decreases; if it never does, take the best of the trials,
