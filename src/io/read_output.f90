@@ -7,7 +7,8 @@ module fw_read_output
    use fw_namelist_data, only: value_type
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
-   use fw_text, only: string_type, nearest_word, to_text
+   use fw_reader_text, only: did_you_mean
+   use fw_text, only: string_type, to_text
    use fw_values, only: read_integer, quoted_text
    implicit none (type, external)
    private
@@ -117,7 +118,7 @@ contains
       else
          call reader%refuse('output', 'observe', '= '//quoted_text(value%text)// &
                             ': must be a dof number or a name of the model'// &
-                            near(value%text, names))
+                            did_you_mean(value%text, names))
       end if
    end subroutine choose
 
@@ -133,14 +134,5 @@ contains
          end if
       end do
    end subroutine refuse_repeated
-
-   function near(word, words) result(hint)
-      character(*), intent(in) :: word
-      type(string_type), intent(in) :: words(:)
-      character(:), allocatable :: hint
-
-      hint = nearest_word(word, words)
-      if (len(hint) > 0) hint = '; did you mean '//quoted_text(hint)//'?'
-   end function near
 
 end module fw_read_output

@@ -13,8 +13,8 @@ module fw_reader
                                stray_word, location, &
                                is_entry, last_entry, multiply_out
    use fw_records, only: record_list
-   use fw_reader_text, only: near, shown, to_strings, words_text, element_text, dims_text, &
-                             real_list, repeat_hint
+   use fw_reader_text, only: near, did_you_mean, shown, to_strings, words_text, element_text, &
+                             dims_text, real_list, repeat_hint
    use fw_text, only: string_type, lower_case, to_text, join
    use fw_text_list, only: append
    use fw_values, only: range_type, new_range, read_real, read_integer, read_logical, &
@@ -209,7 +209,8 @@ contains
             else if (found > 0) then
                choice = found
             else
-               call self%refuse_value(i, accepts//near(value%text, to_strings(words)))
+               call self%refuse_value(i, accepts//did_you_mean(lower_case(value%text), &
+                                                              to_strings(words)))
             end if
          end associate
       end if

@@ -7,12 +7,12 @@ module fw_reader_text
    implicit none (type, external)
    private
 
-   public :: near, shown, to_strings, words_text, element_text, dims_text, real_list
+   public :: near, did_you_mean, shown, to_strings, words_text, element_text, dims_text, real_list
    public :: repeat_hint, printable
 
 contains
 
-   !> `; did you mean ...?` where a word of the list is near.
+   !> `; did you mean ...?` where a name of the list is near, or all of a short list.
    pure function near(word, words) result(hint)
       character(*), intent(in) :: word
       type(string_type), intent(in) :: words(:)
@@ -25,6 +25,16 @@ contains
          hint = '; known are '//join(words, ', ')
       end if
    end function near
+
+   !> `; did you mean '...'?` where a text value of the list is near, or nothing.
+   pure function did_you_mean(word, words) result(hint)
+      character(*), intent(in) :: word
+      type(string_type), intent(in) :: words(:)
+      character(:), allocatable :: hint
+
+      hint = nearest_word(word, words)
+      if (len(hint) > 0) hint = '; did you mean '//quoted_text(hint)//'?'
+   end function did_you_mean
 
    pure function shown(value) result(text)
       type(value_type), intent(in) :: value

@@ -71,7 +71,7 @@ def with_model(fw_run):
     ("mu = 0.3", "mu 0.3",
      ["case.nml:11: &contact side_1 has 5 values", "if mu is a key, it lacks its ="]),
     ("mu = 0.3", "mu = 0.3 law = 'dltf'",
-     ["&contact law = 'dltf'", "'dlft'", "did you mean dlft?"]),
+     ["&contact law = 'dltf'", "'dlft'", "did you mean 'dlft'?"]),
     ("mu = 0.3", "mu = 0.3 law = 'penalty'", ["&contact tangential_stiffness is missing"]),
     ("mu = 0.3", "mu = 0.3 tangential_stiffness = 1",
      ["tangential_stiffness belongs to law = 'penalty'"]),
