@@ -69,6 +69,8 @@ module fw_hbm
       type(preconditioner_lu_type), allocatable :: preconditioner(:)
       !> Coordinates for which the preconditioner was built (first n_preconditioned entries).
       integer :: n_preconditioned = 0
+      !> Whether it was built with a shift.
+      logical :: preconditioned_shift = .false.
       integer, allocatable :: preconditioned(:)
       !> Place there of each active coordinate, 0 for one that has become active since; prediction
       !> stiffness of those.
@@ -90,7 +92,7 @@ module fw_hbm
       procedure :: assemble
    end type hbm_system
 
-   ! The linear problem of a Newton step.
+   ! The linear problem of a Newton step (fw_hbm_linear).
    interface
       module subroutine linearize(self, n_linear)
          class(hbm_system), intent(inout) :: self
@@ -121,9 +123,29 @@ module fw_hbm
          real(wp), intent(out), contiguous :: product(:)
       end subroutine apply
 
+      module subroutine assemble(self, matrix)
+         class(hbm_system), intent(inout) :: self
+         real(wp), intent(inout), contiguous :: matrix(:, :)
+      end subroutine assemble
+
+      !> complex_in = complex form of a vector of the active coordinates.
+      module subroutine active_to_complex(self, na, vector)
+         type(hbm_system), intent(inout) :: self
+         integer, intent(in) :: na
+         real(wp), intent(in) :: vector(na, *)
+      end subroutine active_to_complex
+   end interface
+
+   ! Its preconditioner (fw_hbm_preconditioner).
+   interface
       module subroutine build_preconditioner(self)
          class(hbm_system), intent(inout) :: self
       end subroutine build_preconditioner
+
+      !> Find the active coordinates in the preconditioner from before.
+      module subroutine place_kept(self)
+         type(hbm_system), intent(inout) :: self
+      end subroutine place_kept
 
       pure module logical function preconditioner_fits(self)
          class(hbm_system), intent(in) :: self
@@ -133,11 +155,6 @@ module fw_hbm
          class(hbm_system), intent(inout) :: self
          real(wp), intent(inout), contiguous :: vector(:)
       end subroutine precondition
-
-      module subroutine assemble(self, matrix)
-         class(hbm_system), intent(inout) :: self
-         real(wp), intent(inout), contiguous :: matrix(:, :)
-      end subroutine assemble
    end interface
 
 contains

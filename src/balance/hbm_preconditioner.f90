@@ -1,0 +1,229 @@
+!> The preconditioner of the linear problem of a Newton step: per harmonic, in single precision, for
+!> the coordinates that were active when it was built.
+submodule(fw_hbm) fw_hbm_preconditioner
+   use fw_forces, only: pair_mixed
+   use fw_forces, only: pair_open
+   use fw_forces, only: pair_stuck
+   use fw_kinds, only: sp
+   implicit none (type, external)
+
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+   !> Share of the active coordinates that may have joined or left since a preconditioner was built.
+   real(wp), parameter :: most_changed = 0.05_wp
+
+contains
+
+   !> Per harmonic, the matrix with each G replaced by its mean over cosine and sine.
+   module procedure build_preconditioner
+      integer :: h
+
+      !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
+      !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
+      do h = 1, self%fourier%n_retained
+         call self%preconditioner(h)%reserve(self%n_active, largest_diagonal(self, h))
+         associate (m => self%preconditioner(h)%matrix, na => self%n_active, &
+                    scale => self%preconditioner(h)%scale)
+            m(:na, :na) = cmplx(scale*self%active_stiffness(:na, :na, h), kind=sp)
+            call add_mean_springs(self, h, scale, m)
+            call add_mean_contact(self, h, scale, m)
+            if (allocated(self%shift)) then
+               m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
+            end if
+         end associate
+         call self%preconditioner(h)%factor()
+      end do
+      !$omp end parallel do
+      self%n_preconditioned = self%n_active
+      self%preconditioned(:self%n_active) = self%used(:self%n_active)
+      self%kept_place(:self%n_active) = [(h, h=1, self%n_active)]
+      self%preconditioned_shift = allocated(self%shift)
+   end procedure build_preconditioner
+
+   !> Largest diagonal entry of the stiffness in absolute value.
+   pure real(wp) function largest_diagonal(self, h)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h
+      integer :: j
+
+      largest_diagonal = 0.0_wp
+      do j = 1, self%n_active
+         largest_diagonal = max(largest_diagonal, abs(self%active_stiffness(j, j, h)))
+      end do
+   end function largest_diagonal
+
+   module procedure place_kept
+      integer :: i, c, k, place
+
+      self%kept_place(:self%n_active) = 0
+      do k = 1, self%n_preconditioned
+         place = self%place(self%preconditioned(k))
+         if (place > 0 .and. place <= self%n_active) self%kept_place(place) = k
+      end do
+      ! Without rigid laws no coordinate joins or leaves, and pairs may share them.
+      if (.not. self%rigid) return
+      do i = 1, self%contact%n_pairs
+         do c = 1, 3
+            if (self%joint%row(c, i) == 0) cycle
+            place = self%place(self%coordinate_of(c, i))
+            if (place > 0) self%unknown_stiffness(place) = self%stiffness(i, c)
+         end do
+      end do
+   end procedure place_kept
+
+   !> So it does while few coordinates have left the active ones or joined them.
+   module procedure preconditioner_fits
+      integer :: n_known
+
+      ! A shift belongs to one step of pseudo-time.
+      preconditioner_fits = self%n_preconditioned > 0 .and. .not. &
+                            (allocated(self%shift) .or. self%preconditioned_shift)
+      if (.not. preconditioner_fits) return
+      n_known = count(self%kept_place(:self%n_active) > 0)
+      preconditioner_fits = self%n_active + self%n_preconditioned - 2*n_known &
+                            <= most_changed*self%n_active
+   end procedure preconditioner_fits
+
+   !> Mean over cosine and sine of a block of a transposed derivative, as a complex factor.
+   pure complex(wp) function mean_block(block, harmonic, input, output) result(mean)
+      real(wp), intent(in) :: block(:, :)
+      integer, intent(in) :: harmonic
+      !> Columns of the cosine coefficient in the input and the output.
+      integer, intent(in) :: input, output
+
+      if (harmonic == 0) then
+         mean = cmplx(block(input, output), kind=wp)
+      else
+         mean = 0.5_wp*cmplx(block(input, output) + block(input + 1, output + 1), &
+                             block(input + 1, output) - block(input, output + 1), wp)
+      end if
+   end function mean_block
+
+   subroutine add_mean_springs(self, h, scale, m)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h
+      real(wp), intent(in) :: scale
+      complex(sp), intent(inout) :: m(:, :)
+      integer :: i, e, f, k
+      complex(wp) :: mean
+
+      k = self%fourier%column(h)
+      associate (r => self%joint%relative, row => self%joint%spring_row, place => self%place)
+         do i = 1, self%springs%n_springs
+            mean = scale*mean_block(self%springs%jacobian(:, :, i), self%fourier%harmonic(h), k, k)
+            do e = r%first(row(i)), r%first(row(i) + 1) - 1
+               do f = r%first(row(i)), r%first(row(i) + 1) - 1
+                  if (max(place(r%coordinate(e)), place(r%coordinate(f))) > self%n_active) cycle
+                  if (min(place(r%coordinate(e)), place(r%coordinate(f))) == 0) cycle
+                  m(place(r%coordinate(e)), place(r%coordinate(f))) = &
+                     m(place(r%coordinate(e)), place(r%coordinate(f))) + &
+                     cmplx(r%coefficient(e)*r%coefficient(f)*mean, kind=sp)
+               end do
+            end do
+         end do
+      end associate
+   end subroutine add_mean_springs
+
+   subroutine add_mean_contact(self, h, scale, m)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h
+      real(wp), intent(in) :: scale
+      complex(sp), intent(inout) :: m(:, :)
+      integer :: i, c_out, c_in, k, nc
+      complex(wp) :: mean
+
+      k = self%fourier%column(h)
+      nc = self%fourier%n_coefficients
+      do i = 1, self%contact%n_pairs
+         if (self%contact%linear_state(i) == pair_open) cycle
+         do c_out = 1, 3
+            if (self%joint%row(c_out, i) == 0) cycle
+            do c_in = 1, 3
+               if (self%joint%row(c_in, i) == 0) cycle
+               if (self%contact%linear_state(i) == pair_mixed) then
+                  mean = mean_block(self%contact%jacobian(:, :, i), self%fourier%harmonic(h), &
+                                    (c_in - 1)*nc + k, (c_out - 1)*nc + k)
+               else
+                  mean = merge(one, zero, c_in == c_out)
+               end if
+               call add_rows(self, h, i, c_out, c_in, scale*mean, m)
+            end do
+         end do
+      end do
+   end subroutine add_mean_contact
+
+   !> m(out, :) = m(out, :) + mean (eps e_in - A(in, :)), or + mean k e_in.
+   subroutine add_rows(self, h, pair, c_out, c_in, mean, m)
+      type(hbm_system), intent(in) :: self
+      integer, intent(in) :: h, pair, c_out, c_in
+      complex(wp), intent(in) :: mean
+      complex(sp), intent(inout) :: m(:, :)
+      integer :: e, f, p_out, p_in, n
+      complex(wp) :: factor
+
+      ! d/dtau is a factor i n of the complex coefficient uc - i us.
+      n = self%fourier%harmonic(h)
+      factor = one
+      if (self%velocity_level .and. c_in < 3) factor = cmplx(0.0_wp, n, wp)
+      if (n == 0 .and. self%contact%linear_state(pair) == pair_stuck) factor = one
+      associate (r => self%joint%relative, row => self%joint%row, na => self%n_active)
+         do e = r%first(row(c_out, pair)), r%first(row(c_out, pair) + 1) - 1
+            p_out = self%place(r%coordinate(e))
+            if (p_out == 0 .or. p_out > na) cycle
+            do f = r%first(row(c_in, pair)), r%first(row(c_in, pair) + 1) - 1
+               p_in = self%place(r%coordinate(f))
+               if (p_in == 0) cycle
+               if (self%rigid) then
+                  m(p_out, :na) = cmplx(m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h), &
+                                        kind=sp)
+               end if
+               if (p_in > na) cycle
+               m(p_out, p_in) = m(p_out, p_in) + &
+                                cmplx(r%coefficient(e)*r%coefficient(f)* &
+                                      self%stiffness(pair, c_in)*factor*mean, kind=sp)
+            end do
+         end do
+      end associate
+   end subroutine add_rows
+
+   module procedure precondition
+      integer :: h, k, na
+
+      na = self%n_active
+      call active_to_complex(self, na, vector)
+      !$omp parallel do default(none) shared(self) private(h) &
+      !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
+      do h = 1, self%fourier%n_retained
+         call solve_kept(self, h)
+      end do
+      !$omp end parallel do
+      do h = 1, self%fourier%n_retained
+         k = self%fourier%column(h)
+         vector((k - 1)*na + 1:k*na) = real(self%complex_in(:na, h), wp)
+         if (self%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
+            = -aimag(self%complex_in(:na, h))
+      end do
+   end procedure precondition
+
+   !> With the factors of one harmonic; coordinates that they do not know are taken as stuck.
+   subroutine solve_kept(self, h)
+      type(hbm_system), intent(inout) :: self
+      integer, intent(in) :: h
+      integer :: k
+
+      associate (in => self%complex_in(:, h), z => self%complex_out(:self%n_preconditioned, h))
+         z = zero
+         do k = 1, self%n_active
+            if (self%kept_place(k) > 0) then
+               z(self%kept_place(k)) = in(k)
+            else
+               in(k) = in(k)/self%unknown_stiffness(k)
+            end if
+         end do
+         call self%preconditioner(h)%solve(z)
+         do k = 1, self%n_active
+            if (self%kept_place(k) > 0) in(k) = z(self%kept_place(k))
+         end do
+      end associate
+   end subroutine solve_kept
+
+end submodule fw_hbm_preconditioner
