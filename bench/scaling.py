@@ -16,7 +16,7 @@ from scipy.linalg import eigh
 
 from layout import COLOURS, table
 from measure import Bench, Cost, Run
-from sector import FAST, case, sector_file
+from sector import COARSE, FAST, case, sector_file
 
 __all__ = ["Measured", "measure_scaling", "write_scaling"]
 
@@ -24,10 +24,6 @@ PAIRS = (16, 48, 96, 192, 384, 768)
 HARMONICS = (1, 3, 7, 17, 31)
 #: Most unknowns that are measured: beyond, a frequency takes minutes.
 MOST_UNKNOWNS = 41000
-#: Mesh away from the flanks, for every size the same. Half the elements of the default there:
-#: 768 pairs on the default mesh take a quarter of an hour and 16 GB to generate.
-COARSE = {"blade-columns": 2, "post-columns": 1, "slot-columns": 2, "airfoil-rows": 4,
-          "disk-rows": 2}
 N_TIME = 128
 #: Instants and harmonics of the paper's table, the cost ratio that is wanted, and the paper's.
 PAPER_TIME, PAPER_HARMONICS, WANTED_RATIO, PAPER_RATIO = 105, (1, 17), 12.0, 521.0

@@ -12,15 +12,22 @@ from pathlib import Path
 from measure import ROOT, Bench, Groups, Run
 from oscillators import two_dof
 
-__all__ = ["HARMONICS", "PAIRS", "Crossing", "PointTime", "Sweep", "ThreadTimes",
-           "measure_crossing", "measure_points", "measure_sweeps", "measure_threads"]
+__all__ = ["COARSE", "HARMONICS", "PAIRS", "THREADED", "Crossing", "PointTime", "Sweep",
+           "ThreadTimes", "measure_crossing", "measure_points", "measure_sweeps",
+           "measure_threads"]
 
 HARMONICS = (1, 3, 7, 17)
 PAIRS = (16, 48)
 #: Dense LU is left out beyond this many unknowns, to keep the whole measurement short.
 LARGEST_LU = 1100
 #: Peaks [Hz] at 4400 rpm, where the joint slips and every point is usable.
-PEAKS = {8: 1017.6, 16: 1022.7, 48: 1017.8}
+PEAKS = {8: 1017.6, 16: 1022.7, 48: 1017.8, 96: 1029.0}
+#: Pairs of the joint on which threads are measured: those of fewer than 64 stay in one.
+THREADED = 96
+#: Mesh away from the flanks, for every size the same. Half the elements of the default there:
+#: 768 pairs on the default mesh take a quarter of an hour and 16 GB to generate.
+COARSE = {"blade-columns": 2, "post-columns": 1, "slot-columns": 2, "airfoil-rows": 4,
+          "disk-rows": 2}
 HALF_WIDTH, N_NEAR = 2.0, 9
 SLOW, FAST = 261.8, 460.8
 WHOLE = {"start": 1000.0, "end": 1015.0, "n_points": 41, "unit": "Hz"}
@@ -43,7 +50,6 @@ class Sweep:
     """A sweep: time of the whole run [s] and how many points are usable."""
 
     title: str
-    threads: int
     seconds: float
     run: Run
 
@@ -106,12 +112,13 @@ def measure_points(bench: Bench) -> list[PointTime]:
 
 
 def measure_threads(bench: Bench) -> list[ThreadTimes]:
-    """Mean time of a point near the peak with one and two threads, 48 pairs."""
+    """Mean time of a point near the peak with one and two threads."""
     if len(os.sched_getaffinity(0)) < 2:
         return []
     rows = []
     for n_harmonics in (3,) if bench.quick else (3, 7, 17):
-        groups = case(48, n_harmonics, near_peak(48))
+        groups = case(THREADED, n_harmonics, near_peak(THREADED),
+                      file=sector_file(THREADED, bench.folder, COARSE))
         times = [bench.repeat(groups, lambda run: float(run.seconds.mean()), threads, 3, 4.0,
                               wait)[0]
                  for threads, wait in ((1, None), (2, None), (2, "passive"))]
@@ -120,17 +127,14 @@ def measure_threads(bench: Bench) -> list[ThreadTimes]:
 
 
 def measure_sweeps(bench: Bench) -> list[Sweep]:
-    """The two sweeps that have a target, up and down; two threads sleep while they wait."""
+    """The two sweeps that have a target, up and down."""
     down = WHOLE | {"start": WHOLE["end"], "end": WHOLE["start"]}
     sweeps = []
     for pairs, n_harmonics in ((48, 7), (16, 3)):
         for direction, sweep in (("down", down), ("up", WHOLE)):
-            for threads in (1, min(2, len(os.sched_getaffinity(0)))):
-                seconds, run = bench.repeat(case(pairs, n_harmonics, sweep, speed=SLOW),
-                                            lambda run: run.elapsed, threads, most=3,
-                                            wait="passive" if threads > 1 else None)
-                sweeps.append(Sweep(f"{pairs} pairs, H = {n_harmonics}, {direction}", threads,
-                                    seconds, run))
+            seconds, run = bench.repeat(case(pairs, n_harmonics, sweep, speed=SLOW),
+                                        lambda run: run.elapsed, most=3)
+            sweeps.append(Sweep(f"{pairs} pairs, H = {n_harmonics}, {direction}", seconds, run))
     return sweeps
 
 
