@@ -10,7 +10,6 @@ module fw_branch
    use fw_hbm, only: hbm_system
    use fw_hdhb, only: hdhb_system
    use fw_hdhb, only: new_hdhb
-   use fw_linear_step, only: linear_step_type
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_point, only: point_type
@@ -102,7 +101,7 @@ contains
       else
          call branch%trace(system, solver%x, recorder, error)
       end if
-      call merge_work(branch%linear, solver%method%newton%linear)
+      call solver%method%newton%linear%add_work(branch%linear)
       if (allocated(error)) return
       call observer%on_message('branch: '//branch%ending)
       if (branch%runs_away .and. case%contact%n_pairs > 0) then
@@ -180,17 +179,5 @@ contains
       call self%observer%on_point(self%n_points, 0, point)
       self%stop_requested = self%observer%stop_requested
    end subroutine publish
-
-   subroutine merge_work(branch, total)
-      type(linear_step_type), intent(in) :: branch
-      type(linear_step_type), intent(inout) :: total
-
-      total%factorizations = total%factorizations + branch%factorizations
-      total%krylov_iterations = total%krylov_iterations + branch%krylov_iterations
-      total%preconditioners = total%preconditioners + branch%preconditioners
-      total%n_problems = total%n_problems + branch%n_problems
-      total%share_skipped = total%share_skipped + branch%share_skipped
-      total%n_empty = total%n_empty + branch%n_empty
-   end subroutine merge_work
 
 end module fw_branch

@@ -118,7 +118,9 @@ contains
       call add_line(self%work, 'linear solver', &
                     to_text(linear%factorizations)//' LU factorizations, '// &
                     to_text(linear%krylov_iterations)//' Krylov iterations, '// &
-                    to_text(linear%preconditioners)//' preconditioners')
+                    to_text(linear%preconditioners)//' preconditioners'// &
+                    trim(merge(repeat(' ', 32), ', where Newton''s method was used', &
+                               kind == solver_newton)))
       if (.not. system%fourier%has_constant()) then
          call skip(self, 'even harmonics (half-wave symmetry)')
       end if
