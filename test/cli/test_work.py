@@ -63,15 +63,18 @@ def test_small_problems_are_factored(fw_run):
     assert steps <= 13
 
 
-def test_kept_preconditioners_change_no_answer(fw_run):
+# The pairs that slip change at every step of 48.
+@pytest.mark.parametrize(("n_pairs", "n_harmonics", "start", "end", "share"), [
+    (16, 3, 1021, 1024, 0.1), (48, 1, 1016, 1019, 0.5)])
+def test_kept_preconditioners_change_no_answer(fw_run, n_pairs, n_harmonics, start, end, share):
     """GMRES with preconditioners from other points against LU, through the resonance."""
     found = {}
     for linear in ("krylov", "lu"):
-        counts = work(sector(fw_run, 16, 3, 1021, 1024, linear, f"{linear}.h5"))
+        counts = work(sector(fw_run, n_pairs, n_harmonics, start, end, linear, f"{linear}.h5"))
         with h5py.File(fw_run.directory / f"{linear}.h5") as file:
             found[linear] = file["coefficients"][()]
         if linear == "krylov":
-            assert 0 < counts[3] < 0.7 * counts[0], "most preconditioners are kept"
+            assert 0 < counts[3] < share * counts[0], "most preconditioners are kept"
     scale = np.abs(found["lu"]).max()
     # Residuals of 1e-10 of the load, at a resonance of a damping of 0.1 %.
     assert np.abs(found["krylov"] - found["lu"]).max() < 1e-6 * scale
