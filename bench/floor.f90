@@ -263,7 +263,6 @@ contains
       class(measured_system), intent(inout) :: self
       real(wp) :: start, middle
       integer :: h, j
-      logical :: singular
 
       start = processor_time()
       call self%hbm_system%build_preconditioner()
@@ -274,7 +273,7 @@ contains
             self%lu%matrix(:self%n_active, j) = cmplx(self%preconditioner(h)%scale* &
                self%active_stiffness(:self%n_active, j, h), kind=sp)
          end do
-         call self%lu%factor(singular)
+         call self%lu%factor()
       end do
       call add(self, part_build, start, middle)
    end subroutine build_preconditioner
@@ -326,7 +325,8 @@ contains
       middle = processor_time()
       self%square(:, 1) = one
       do h = 1, self%fourier%n_retained
-         call self%preconditioner(h)%solve(self%square(:self%n_active, 1))
+         ! Of the order of its own factors, which may be kept from other active coordinates.
+         call self%preconditioner(h)%solve(self%square(:self%n_preconditioned, 1))
       end do
       call add(self, part_precondition, start, middle)
    end subroutine precondition

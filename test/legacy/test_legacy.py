@@ -126,6 +126,22 @@ def test_fortran_facade(prefix, package, reference, tmp_path):
     assert np.array_equal(found[:, 1:], reference[:, 3:3 + N_COEFFICIENTS])
 
 
+def test_the_floor_of_the_benchmarks(prefix, tmp_path):
+    """The measuring programs extend the library from within, so that each change of it concerns
+    them: all are built, and that which measures the most runs through a peak."""
+    run("cmake", "-S", ROOT / "bench", "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}")
+    run("cmake", "--build", tmp_path)
+    sweep = ("start=1024.7", "end=1020.7", "n_points=21")
+    case = tmp_path / "frf.nml"
+    case.write_text(run(prefix / "bin" / "fw_run", "--check", *(
+        word for change in sweep for word in ("--set", f"sweep%{change}")), SECTOR / "frf.nml"))
+    table = [line.split(",") for line in run(tmp_path / "floor", case).splitlines()]
+    calls = {line[0]: int(line[1]) for line in table[1:]}
+    assert table[0][:2] == ["part", "calls"]
+    assert calls["condensation"] < calls["derivative of the forces"] < calls["residual"]
+    assert 0 < calls["preconditioner: build"] < calls["derivative of the forces"]
+
+
 def test_a_whole_run_from_fortran_77(prefix, tmp_path):
     libdir = Path(pkg_config(prefix)).parent
     flags = run("pkg-config", "--libs", "fretwear", PKG_CONFIG_PATH=pkg_config(prefix)).split()
