@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from layout import COLOURS, table
+from layout import COLOURS, sentence, table
 from measure import Bench, Floats
 from oscillators import Case, jenkins, planar, rigid, two_dof
 
@@ -116,11 +116,6 @@ def order(limits: list[Limit], name: str, sampling: str) -> str:
     slope = np.polyfit(np.log([limit.n_time for limit in found]),
                        np.log([limit.error for limit in found]), 1)[0]
     return f"{-slope:.1f}"
-
-
-def sentence(name: str) -> str:
-    """With a capital."""
-    return name[0].upper() + name[1:]
 
 
 def draw(path: Path, limits: list[Limit], names: list[str]) -> None:

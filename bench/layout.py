@@ -9,7 +9,8 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "finish", "microseconds", "milliseconds", "new_figure", "table"]
+__all__ = ["COLOURS", "finish", "microseconds", "milliseconds", "new_figure", "sentence",
+           "table"]
 
 #: Lines of a picture, in this order; apart in brightness too.
 COLOURS = ("#1f4e79", "#c0392b", "#54a24b", "#f58518", "#7f4fa3", "#4c9aa8")
@@ -34,6 +35,11 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
         return "| " + " | ".join(str(cell) for cell in cells) + " |"
 
     return [line(header), line("---" for _ in header), *(line(row) for row in rows)]
+
+
+def sentence(name: str) -> str:
+    """With a capital."""
+    return name[0].upper() + name[1:]
 
 
 def milliseconds(seconds: float) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from layout import COLOURS, milliseconds, table
+from layout import COLOURS, milliseconds, sentence, table
 from precision import HARMONICS, SECTOR, SETTINGS, Kept, Precision, Sample
 
 __all__ = ["write_precision"]
@@ -174,11 +174,6 @@ def find(samples: Iterable[Sample], case: str, setting: str, n_harmonics: int) -
 def is_usable(sample: Sample | None) -> bool:
     """Whether it was computed and converged."""
     return sample is not None and not math.isnan(sample.seconds)
-
-
-def sentence(name: str) -> str:
-    """With a capital."""
-    return name[0].upper() + name[1:]
 
 
 def draw(path: Path, data: Precision, names: list[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 
-from layout import milliseconds, table
+from layout import milliseconds, sentence, table
 from solvers import (
     DUFFING_FREQUENCIES,
     DUFFING_SPREADS,
@@ -86,7 +86,7 @@ def problem_part(outcomes: list[Outcome], name: str) -> str:
         s = summarize(outcome)
         rows.append((outcome.solver.name, share(s.converged, s.total), count(s.iterations),
                      milliseconds(s.seconds), scientific(s.error), failures(s.failures)))
-    return "\n".join([f"### {name[0].upper() + name[1:]}", "", description(name), "",
+    return "\n".join([f"### {sentence(name)}", "", description(name), "",
                       *table(["solver", "converged", "iterations", "time [ms]", "error",
                               "failures"], rows)])
 
@@ -114,7 +114,7 @@ def claim_part(outcomes: list[Outcome], names: list[str]) -> str:
         both = newton.keys() & euler.keys()
         ratio = (statistics.median(euler[key].seconds / newton[key].seconds for key in both)
                  if both else math.nan)
-        rows.append((name[0].upper() + name[1:], len(newton), len(euler), len(both),
+        rows.append((sentence(name), len(newton), len(euler), len(both),
                      f"{ratio:.2g}" if both else "-"))
     return "\n".join([
         "### Is pseudo-time faster than Newton's method?", "",
