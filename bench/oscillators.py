@@ -13,8 +13,9 @@ import numpy as np
 
 from measure import ROOT, Floats, Groups
 
-__all__ = ["Case", "coulomb", "duffing_points", "load_cases", "relative_error", "single",
-           "two_dof"]
+__all__ = ["Case", "coulomb", "duffing_points", "jenkins", "load_cases", "planar",
+           "relative_error", "rigid", "single", "two_dof"]
+
 
 @dataclass(frozen=True)
 class Case:

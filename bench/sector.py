@@ -12,9 +12,9 @@ from pathlib import Path
 from measure import ROOT, Bench, Groups, Run
 from oscillators import two_dof
 
-__all__ = ["COARSE", "HARMONICS", "PAIRS", "THREADED", "Crossing", "PointTime", "Sweep",
-           "ThreadTimes", "measure_crossing", "measure_points", "measure_sweeps",
-           "measure_threads"]
+__all__ = ["COARSE", "FAST", "HARMONICS", "LARGEST_LU", "PAIRS", "THREADED", "Crossing",
+           "PointTime", "Sweep", "ThreadTimes", "case", "measure_crossing", "measure_points",
+           "measure_sweeps", "measure_threads", "near_peak", "sector_file"]
 
 HARMONICS = (1, 3, 7, 17)
 PAIRS = (16, 48)
