@@ -15,8 +15,8 @@ import faults
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test/support"))
 from revision import revision  # noqa: E402
+from sections import write_section  # noqa: E402
 
-BEGIN, END = "<!-- faults: begin -->", "<!-- faults: end -->"
 COLUMNS = {"crash": "crash", "hang": "hang", "silent": "silent", "half": "half file",
            "lost": "lost data", "numbers": "other numbers"}
 
@@ -50,11 +50,8 @@ def main():
     arguments = parser.parse_args()
     lines, wrong = tables(arguments.tries, arguments.seed)
     if arguments.output:
-        text = arguments.output.read_text()
-        before, rest = text.split(BEGIN)
         head = f"At commit {revision()}, moments of seed {arguments.seed}."
-        arguments.output.write_text(
-            before + "\n".join([BEGIN, head, "", *lines, END]) + rest.split(END)[1])
+        write_section("faults", [head, "", *lines], arguments.output)
     return int(wrong > 0)
 
 

@@ -4,9 +4,9 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "test/stress"), str(ROOT / "test/verify")]
-from common import DOCUMENT, write_section  # noqa: E402
+sys.path[:0] = [str(ROOT / "test/stress"), str(ROOT / "test/support")]
 from long_runs import MEMORY_GROWTH, TIME_GROWTH  # noqa: E402
+from sections import DOCUMENT, write_section  # noqa: E402
 
 INPUTS = DOCUMENT.parent / "robustness" / "inputs.md"
 KINDS = ["crash", "hang", "NaN", "false convergence", "lost data", "other"]

@@ -20,9 +20,11 @@ import numpy as np
 import stress_cases as cases
 import stress_run as runs
 from stress_models import interface
-from stress_store import revision
 
-BEGIN, END = "<!-- long runs: begin -->", "<!-- long runs: end -->"
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from revision import revision
+from sections import write_section
+
 # Growth that counts: of memory between the first tenth and the end [MB], and of the median time.
 MEMORY_GROWTH, TIME_GROWTH = 1.0, 1.5
 
@@ -97,10 +99,7 @@ def main():
         print(line, flush=True)
         bad = bad or grows
     if arguments.output:
-        text = arguments.output.read_text()
-        before, rest = text.split(BEGIN)
-        arguments.output.write_text(
-            before + "\n".join([BEGIN, *lines, END]) + rest.split(END)[1])
+        write_section("long runs", lines, arguments.output)
     return int(bad)
 
 

@@ -20,13 +20,14 @@ import stress_cases as cases
 import stress_run as runs
 from stress_store import Store
 
-ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from sections import write_section
+
 BAD = ("crash", "hang", "nan", "false", "silent")
 # The answer in other units is the same to this part of its largest coefficient.
 UNITS_AGREE = 1e-9
 # Cases of each family in the short form, spread over the whole list.
 SHORT = 12
-BEGIN, END = "<!-- stress suite: begin -->", "<!-- stress suite: end -->"
 
 
 def spread(items, number):
@@ -150,14 +151,12 @@ def write(path, results, short):
     ends = list(chain.from_iterable(results.values()))
     hours = sum(end.seconds for end in ends) / 3600
     revisions = ", ".join(sorted({end.revision for end in ends}))
-    body = [BEGIN, f"{len(ends)} cases{' (short form)' if short else ''} at commit {revisions}, "
+    body = [f"{len(ends)} cases{' (short form)' if short else ''} at commit {revisions}, "
             f"{hours:.2f} hours of runs by the clock.", "",
             *table_of_families(results), "",
             "Share converged by solver, fallbacks included:", "", *table_of_solvers(results), "",
-            "Cases that end in words:", "", *table_of_words(results), END]
-    text = path.read_text()
-    before, rest = text.split(BEGIN)
-    path.write_text(before + "\n".join(body) + rest.split(END)[1])
+            "Cases that end in words:", "", *table_of_words(results)]
+    write_section("stress suite", body, path)
 
 
 def main():

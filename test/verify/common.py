@@ -1,4 +1,4 @@
-"""Builds with other flags, the tests run with them, and sections of docs/robustness.md."""
+"""Builds with other flags, and the tests run with them."""
 from __future__ import annotations
 
 import hashlib
@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENT = ROOT / "docs" / "robustness.md"
 SOURCES = ("src", "app", "include", "cmake", "test", "python", "example", "CMakeLists.txt")
 #: Builds that look closer are slower than the one that limits of time of the tests are made for.
 SLOWER = "10"
@@ -92,14 +91,6 @@ def checksum():
             if path.is_file() and "__pycache__" not in path.parts:
                 total.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return total.hexdigest()[:16]
-
-
-def write_section(name, lines, document=DOCUMENT):
-    """Replace what stands between the two marks of a part of the document."""
-    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    before, rest = document.read_text(encoding="utf-8").split(begin)
-    after = rest.split(end)[1]
-    document.write_text("\n".join([before + begin, *lines, end]) + after, encoding="utf-8")
 
 
 def report(text):

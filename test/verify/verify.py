@@ -30,10 +30,11 @@ import memory
 import optimisation
 import race_detectors
 import second_compiler
-from common import DOCUMENT, ROOT, Setting, checksum, report, write_section
+from common import ROOT, Setting, checksum, report
 
 sys.path.insert(0, str(ROOT / "test" / "support"))
 from revision import revision
+from sections import write_section
 
 PARTS = {"traps": memory.traps, "sanitize": memory.sanitize, "builds": optimisation.builds,
          "memcheck": memory.memcheck, "flang": second_compiler.flang,
@@ -73,7 +74,7 @@ def verify(setting, name, again):
     minutes = (time.monotonic() - start) / 60.0
     lines += ["", f"{'Clean' if clean else '**Not clean**'}: sources of {commit}, "
               f"{minutes:.0f} minutes."]
-    write_section(name, lines, DOCUMENT)
+    write_section(name, lines)
     report(f"{name}: {'clean' if clean else 'NOT CLEAN'}, {minutes:.0f} minutes")
     if clean:
         store.write_text(json.dumps({**known, name: sources}))

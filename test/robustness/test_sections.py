@@ -1,0 +1,29 @@
+"""A command replaces its own section of docs/robustness.md and nothing else."""
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from sections import DOCUMENT, write_section
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verify"))
+from verify import PARTS
+
+NAMES = ["overview", "stress suite", "faults", "long runs", *PARTS]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_section_replaces_itself_and_nothing_else(tmp_path, name):
+    page = tmp_path / "page.md"
+    before = DOCUMENT.read_text(encoding="utf-8")
+    page.write_text(before, encoding="utf-8")
+    write_section(name, ["new", "lines"], page)
+    after = page.read_text(encoding="utf-8")
+    section = re.compile(rf"(<!-- {name}: begin -->\n)(.*?)(\n<!-- {name}: end -->)", re.DOTALL)
+    assert section.search(after)[2] == "new\nlines"
+    assert section.sub(r"\1\3", after) == section.sub(r"\1\3", before)
+
+
+def test_every_section_has_its_command():
+    marks = re.findall(r"<!-- (.*): begin -->", DOCUMENT.read_text(encoding="utf-8"))
+    assert sorted(marks) == sorted(NAMES)
