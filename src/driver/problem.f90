@@ -79,9 +79,7 @@ contains
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
       call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
-      if (locates_events(case, joint) .and. case%contact%n_pairs > 0) then
-         call system%contact%resolve_events(system%fourier)
-      end if
+      if (locates_events(case, joint)) call system%contact%resolve_events(system%fourier)
       system%reduced = case%solver%skips
       if (case%harmonics%filter_harmonics > 0) then
          system%springs%highest_harmonic = case%harmonics%filter_harmonics
@@ -190,7 +188,7 @@ contains
       n_time = 2*h + 2
       if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
       if (locates_events(case, joint)) then
-         n_time = max(n_time, least_events(case, any(all(joint%row(1:2, :) > 0, dim=1))))
+         n_time = max(n_time, least_events(case, is_planar(joint)))
       else if (case%contact%n_pairs > 0) then
          n_time = max(n_time, fewest_instants, instants_friction*h)
          if (any(joint%row(3, :) > 0)) n_time = max(n_time, instants_separation*h)
@@ -207,20 +205,24 @@ contains
       type(case_type), intent(in) :: case
       type(joint_type), intent(in) :: joint
 
-      logical :: planar
-
-      locates_events = case%harmonics%sampling == sampling_events
-      if (case%harmonics%sampling /= sampling_auto) return
-      planar = any(all(joint%row(1:2, :) > 0, dim=1))
+      locates_events = case%harmonics%sampling == sampling_events .and. case%contact%n_pairs > 0
+      if (case%harmonics%sampling /= sampling_auto .or. case%contact%n_pairs == 0) return
       if (case%harmonics%accuracy > 0.0_wp) then
-         locates_events = .not. planar .or. case%contact%n_pairs <= few_pairs
+         locates_events = .not. is_planar(joint) .or. case%contact%n_pairs <= few_pairs
          return
       end if
       locates_events = case%harmonics%method == method_hbm .and. case%harmonics%n_time == 0 .and. &
                        any(case%analysis == [analysis_frf, analysis_point, analysis_wear]) .and. &
                        .not. case%harmonics%adaptive .and. .not. case%output%histories .and. &
-                       .not. case%sweep%stability .and. .not. planar
+                       .not. case%sweep%stability .and. .not. is_planar(joint)
    end function locates_events
+
+   !> Whether a pair moves in two tangential directions.
+   pure logical function is_planar(joint)
+      type(joint_type), intent(in) :: joint
+
+      is_planar = any(all(joint%row(1:2, :) > 0, dim=1))
+   end function is_planar
 
    !> Instants that isolate the events, twice the 2H+1 of a collocation, which then lie evenly; or
    !> cells of the quadrature over slip in two directions, four times as many.

@@ -44,3 +44,15 @@ def test_the_summary_says_so(tmp_path, fw_run):
     assert "events located" in shown
     run(tmp_path, merged(POINT, {"harmonics": {"sampling": "uniform"}}))
     assert "events located" not in fw_run("case.nml").stdout
+
+
+@pytest.mark.parametrize(("power", "n_harmonics", "n_time"), [(2, 3, 12), (3, 1, 6), (3, 7, 30)])
+@pytest.mark.parametrize("sampling", ["auto", "events"])
+def test_springs_alone_have_no_events(tmp_path, fw_run, power, n_harmonics, n_time, sampling):
+    """(power + 1) H + 2 instants, made even, sample their forces without any error."""
+    run(tmp_path, {"case": {"analysis": "point"},
+                   "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+                   "spring": {"n_springs": 1, "side_1": 1, "coefficient": 0.1, "power": power},
+                   "load": {"cosine": 0.1}, "sweep": {"start": 0.7},
+                   "harmonics": {"n_harmonics": n_harmonics, "sampling": sampling}})
+    assert f" {n_time} instants)" in fw_run("case.nml").stdout
