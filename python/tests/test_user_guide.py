@@ -1,4 +1,4 @@
-"""The tables of keys in docs/user-guide.md against the reader and against the program."""
+"""The tables of keys and the summary in docs/user-guide.md against the reader and the program."""
 
 from __future__ import annotations
 
@@ -157,3 +157,19 @@ def test_the_settings_of_the_package_are_the_keys_of_the_reader() -> None:
     keys = {f"{'model' if group == 'structure' else group}%{key}"
             for group, kind in groups.items() for key in kind.__annotations__}
     assert keys == read_keys()
+
+
+def test_the_summary_is_that_of_the_example(tmp_path: Path) -> None:
+    """Line by line but for the time; numbers to a twentieth, for what compilers differ by."""
+    said = re.search(r"^    converged .*?(?=\n\n)", GUIDE, re.DOTALL | re.MULTILINE)
+    assert said
+    done = subprocess.run([PROGRAM, "-o", str(tmp_path / "frf.h5"),
+                           str(ROOT / "example" / "blade_sector" / "frf.nml")],
+                          capture_output=True, text=True, check=True)
+    number = re.compile(r"\d+(?:\.\d+)?(?:E[+-]\d+)?")
+    guide, program = said[0].splitlines(), done.stdout.splitlines()
+    assert len(guide) == len(program)
+    for expected, shown in zip(guide[:-1], program[:-1]):
+        assert number.sub("#", expected.strip()) == number.sub("#", shown)
+        assert list(map(float, number.findall(shown))) == pytest.approx(
+            list(map(float, number.findall(expected))), rel=0.05)
