@@ -518,8 +518,8 @@ contains
       if (.not. self%given(group, key)) then
          if (.not. is_true(required)) return
          message = ', '//dims_text(dims)//' of them'
-         if (repeats) message = ', one for all or '//dims_text(dims)
-         if (any(dims == 0)) message = ''
+         if (repeats) message = ', one for all or '//dims_text(dims)//' of them'
+         if (any(dims == 0) .or. all(dims == 1)) message = ''
          call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts//message)
          return
       end if

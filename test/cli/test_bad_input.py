@@ -65,7 +65,7 @@ def with_model(fw_run):
     ("cosine = 1 0", "cosine = 1 0 0", ["&load cosine has 3 values", "must be 2"]),
     ("start = 0.5", "start = 0", ["case.nml:19: &sweep start = 0", "above 0"]),
     ("end = 0.8", "", ["&sweep end is missing"]),
-    ("normal_load = 1", "", ["&contact normal_load is missing", "at least 0"]),
+    ("normal_load = 1", "", ["&contact normal_load is missing", "at least 0\n"]),
     ("'test'", "'test", ["case.nml:1: &case title", "not closed"]),
     ("n_points = 3 /", "n_points = 3", ["case.nml:18: &sweep is not closed", "/"]),
     ("mu = 0.3", "mu 0.3",
