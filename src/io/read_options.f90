@@ -54,7 +54,8 @@ contains
                             "its 2*n_harmonics + 1 instants; use 'hbm' or 'tcm', or 'uniform'")
       end if
       least = 2*options%n_harmonics + 1
-      if (options%n_time == 0) return
+      ! With an accuracy n_time has been refused already.
+      if (options%n_time == 0 .or. options%accuracy > 0.0_wp) return
       if (options%n_time < least) then
          call reader%refuse('harmonics', 'n_time', '= '//to_text(options%n_time)// &
                             ': must be at least 2*n_harmonics + 1 = '//to_text(least)// &

@@ -135,6 +135,12 @@ def test_accuracy_refuses_what_does_not_go_with_it(fw_run, setting, remedy):
     assert remedy in fw_run.refused("--set", setting, "case.nml")
 
 
+def test_instants_beside_an_accuracy_are_named_once(fw_run):
+    """The least n_time is of no use to one who has to leave it out."""
+    fw_run.write(ACCURATE.format(accuracy=1e-2, more="n_time = 64"))
+    assert len(fw_run.refused().splitlines()) == 1
+
+
 def test_refused_with_a_branch(fw_run):
     fw_run.write(STOP.format(most=3, adaptive=".true.", tolerance=1e-2))
     message = fw_run.refused("--set", "sweep%continuation='arclength'", "case.nml")
