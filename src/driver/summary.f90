@@ -105,6 +105,7 @@ contains
       type(linear_step_type), intent(in) :: linear
       !> The solver of the case; the counts are those of Newton's method.
       integer, intent(in) :: kind
+      integer :: percent
 
       self%sampling = merge(sampling_events, sampling_uniform, allocated(system%contact%events))
       deallocate (self%work)
@@ -127,9 +128,9 @@ contains
       if (system%joint%n_idle > 0) then
          call skip(self, to_text(system%joint%n_idle)//' contact components that nothing moves')
       end if
-      if (linear%n_problems > 0 .and. linear%share_skipped > 0.0_wp) then
-         call skip(self, 'stuck pairs, '// &
-                   to_text(nint(100.0_wp*linear%share_skipped/real(linear%n_problems, wp)))// &
+      percent = nint(100.0_wp*linear%share_skipped/real(max(linear%n_problems, 1), wp))
+      if (percent > 0) then
+         call skip(self, 'stuck pairs, '//to_text(percent)// &
                    ' % of the unknowns of the linear problems')
       end if
       if (linear%n_problems == 0 .and. system%contact%n_pairs > 0 .and. &

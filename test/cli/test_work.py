@@ -56,6 +56,24 @@ def test_the_result_file_says_what_was_skipped(fw_run):
     assert len(said) == 1 and said[0].startswith("stuck pairs, 67 % of the unknowns")
 
 
+def test_no_line_for_work_that_was_hardly_skipped(fw_run):
+    """A pair sticks at a few of the steps, which is less than half a per cent of the unknowns."""
+    fw_run.write("""&case analysis = 'wear' /
+&model n_dof = 4, mass = 1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1
+   stiffness = 2,-1,0,0, -1,2,0,0, 0,0,3,-1, 0,0,-1,3
+   damping = 0.02,0,0,0, 0,0.02,0,0, 0,0,0.02,0, 0,0,0,0.02 /
+&contact n_pairs = 2, law = 'penalty', tangential_stiffness = 2, normal_stiffness = 2
+   side_1 = 1,0,3, 2,0,4, mu = 0.4, area = 1 /
+&load static = 0,0,-1,-2, cosine = 1.3,0,0,0 /
+&harmonics n_harmonics = 5 /
+&sweep start = 1 /
+&wear coefficient = 1e-6, n_cycles = 1e5 /
+""")
+    done = fw_run("case.nml")
+    assert done.returncode == 0, done.stderr
+    assert "skipped" not in done.stdout
+
+
 def test_small_problems_are_factored(fw_run):
     steps, factorizations, krylov, preconditioners = work(fw_run("case.nml"))
     assert factorizations <= steps
