@@ -42,6 +42,8 @@ def plot_convergence(source: Source) -> Figure:
     panels[0].yaxis.get_major_locator().set_params(integer=True)
     if np.isfinite(residual).any():
         panels[1].set_yscale("log")
+        # A residual below round-off is zero by chance; its decades would squeeze the others.
+        panels[1].set_ylim(bottom=max(1e-18, 0.3 * np.nanmin(residual)))
     tolerance = namelist_values(result.namelist).get("solver%tolerance")
     if tolerance:
         panels[1].axhline(float(tolerance[0]), linestyle="--", color="0.4", linewidth=1.0,

@@ -103,6 +103,11 @@ def _at(result: Result, point: int) -> str:
     return f"point {point + 1}, {result.frequency[point]:.6g} Hz"
 
 
+def _highest(result: Result, point: int) -> int:
+    """The highest harmonic of a point; the file has zeros above it where points choose theirs."""
+    return int(result["harmonics"][point]) if "harmonics" in result else result.n_harmonics
+
+
 def plot_hysteresis(source: Source, point: int | None = None,
                     pairs: Sequence[int] | None = None) -> Figure:
     """Contact force against relative displacement, one panel a pair.
@@ -136,7 +141,7 @@ def plot_hysteresis(source: Source, point: int | None = None,
         axes.set_visible(False)
     figure.supxlabel(label("relative displacement", units_of(result, "amplitude")), fontsize=10)
     figure.supylabel(label("contact force", units_of(result, "contact/force")), fontsize=10)
-    kind = "" if cycle.sampled else f"\n(forces up to harmonic {result.n_harmonics})"
+    kind = "" if cycle.sampled else f"\n(forces up to harmonic {_highest(result, point)})"
     figure.suptitle(f"Hysteresis at {_at(result, point)}{kind}", fontsize=11)
     return figure
 
@@ -188,7 +193,8 @@ def plot_harmonics(source: Source, point: int | None = None, observe: str | None
     result = as_result(source)
     point = choose_point(result, None) if point is None else point
     column = result.index(observe)
-    size = [abs(result.harmonic(n, column)[point]) for n in range(result.n_harmonics + 1)]
+    highest = _highest(result, point)
+    size = [abs(result.harmonic(n, column)[point]) for n in range(highest + 1)]
     figure = new_figure(8.0, 3.6)
     axes = figure.subplots()
     shown = np.array(size)
@@ -197,7 +203,7 @@ def plot_harmonics(source: Source, point: int | None = None, observe: str | None
     axes.bar(np.flatnonzero(present), shown[present], color=CURVE, width=0.6)
     axes.set_yscale("log")
     axes.set_ylim(bottom=0.3 * shown[present].min())
-    axes.set_xlim(-0.6, result.n_harmonics + 0.6)
+    axes.set_xlim(-0.6, highest + 0.6)
     axes.locator_params(axis="x", integer=True)
     axes.set_xlabel("harmonic [1]")
     axes.set_ylabel(label(f"amplitude of {result.observed[column]}",

@@ -149,6 +149,18 @@ def test_harmonics(coarse: Result) -> None:
     assert heights == pytest.approx([abs(coarse.harmonic(n)[point]) for n in range(4)], rel=1e-12)
 
 
+def test_harmonics_end_where_those_of_the_point_do(examples: Path, tmp_path: Path) -> None:
+    """With an accuracy the file has room for more harmonics than a point takes."""
+    result = run(examples.parent / "gap" / "gap.nml", tmp_path / "gap.h5", "sweep%n_points=4",
+                 "harmonics%n_harmonics=53", "harmonics%n_time=0", "harmonics%accuracy=0.1")
+    point = result.peak()
+    highest = result["harmonics"][point]
+    assert highest < result.n_harmonics
+    (axes,) = plot_harmonics(result).axes
+    assert axes.get_xlim()[1] == pytest.approx(highest + 0.6)
+    assert f"harmonic {highest})" in plot_hysteresis(result).get_suptitle()
+
+
 def test_flanks_are_laid_out_by_position(coarse: Result) -> None:
     first, second = find_flanks(coarse)
     assert (first.name, second.name) == ("intrados", "extrados")
@@ -207,6 +219,16 @@ def test_convergence(coarse: Result) -> None:
     assert [line.get_ydata()[0] for line in residual.lines if line.get_label() == "tolerance"] == [
         1e-8]
     _labelled(figure)
+
+
+def test_a_residual_of_nothing_leaves_the_others_their_room(
+        coarse: Result, tmp_path: Path) -> None:
+    path = tmp_path / "vanished.h5"
+    path.write_bytes(Path(coarse.path).read_bytes())
+    with h5py.File(path, "r+") as file:
+        file["residual"][3] = 1e-140
+    _, residual, _ = plot_convergence(path).axes
+    assert residual.get_ylim()[0] == pytest.approx(1e-18)
 
 
 def test_kinds_that_fit(coarse: Result, worn: Result, examples: Path, tmp_path: Path) -> None:
