@@ -114,8 +114,8 @@ def floor_part(splits: dict[tuple[int, int], list[Part]]) -> str:
     verdict = f"Target: at most {TARGET:g} times the floor; met everywhere."
     if missed:
         verdict = (f"Target: at most {TARGET:g} times the floor; missed in {len(missed)} of "
-                   f"{len(rows)} cases, by up to {max(missed) / TARGET:.2f} times. The floor finds "
-                   "its matrices in the cache, because each kernel runs right after the part that "
+                   f"{len(rows)} cases, {max(missed):.2f} times at worst. The floor finds its "
+                   "matrices in the cache, because each kernel runs right after the part that "
                    "it stands for; a sweep brings each of them from memory.")
     return "\n".join([
         "## Close to the limit", "",

@@ -202,8 +202,8 @@ def test_the_floor_is_judged_without_what_runs_before_a_sweep() -> None:
     parts = [Part("residual", 9, 1.4, 1.0), Part(CONSTRUCTION, 1, 9.0, 0.0)]
     assert "met everywhere" in floor_part({(16, 3): parts})
     slow = [Part("residual", 9, 3.0, 1.0), *parts[1:]]
-    assert "missed in 1 of 2 cases, by up to 2.00 times" in floor_part({(16, 3): parts,
-                                                                       (48, 3): slow})
+    assert "missed in 1 of 2 cases, 3.00 times at worst" in floor_part({(16, 3): parts,
+                                                                        (48, 3): slow})
 
 
 def test_skips_name_tests_that_exist() -> None:
@@ -224,3 +224,14 @@ def test_a_saving_is_the_time_without_over_that_with() -> None:
                        [Spared("a thing", "a case", 2, 64, "test_d.pf")])
     assert "| a skip | a case | 100 | 250 | 2.50 | `test_a.py::b`, `test_c.pf` |" in text
     assert "| a thing | a case | 2 | 64 | 32.0 | `test_d.pf` |" in text
+
+
+def test_targets_are_collected_from_the_parts() -> None:
+    from document import targets
+
+    parts = ["## One\n\nTarget: at most 1.5; missed in 2 of 3 cases, 2.25 times at worst. More.",
+             "## Two\n\n### A, B and C\n\n| 16 | 2: met |\n| 48 | 2: missed by 0.5 |\n"
+             "| 96 | 2: missed by 1.25 |\n\n### None\n\nIt is met by nobody."]
+    lines = targets(parts)
+    assert lines[-2] == "| [One](#one) | 0 | 1 | in 2 of 3 cases, 2.25 times at worst |"
+    assert lines[-1] == "| [A, B and C](#a-b-and-c) | 1 | 2 | by 1.25 |"
