@@ -26,13 +26,15 @@ contains
       end if
    end function near
 
-   !> `; did you mean '...'?` where a text value of the list is near, or nothing.
+   !> `; did you mean '...'?` where a text value of the list is near, or nothing. Short words are
+   !> near to any other: they have to share a letter.
    pure function did_you_mean(word, words) result(hint)
       character(*), intent(in) :: word
       type(string_type), intent(in) :: words(:)
       character(:), allocatable :: hint
 
       hint = nearest_word(word, words)
+      if (scan(word, hint) == 0) hint = ''
       if (len(hint) > 0) hint = '; did you mean '//quoted_text(hint)//'?'
    end function did_you_mean
 
