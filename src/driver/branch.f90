@@ -11,6 +11,7 @@ module fw_branch
    use fw_hdhb, only: hdhb_system
    use fw_hdhb, only: new_hdhb
    use fw_newton, only: solver_report
+   use fw_newton, only: tight_forcing
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_point, only: served_by_arclength
@@ -44,9 +45,6 @@ module fw_branch
       procedure :: take
    end type branch_recorder
 
-   !> Relative residual asked of the linear solutions of the first point.
-   real(wp), parameter :: first_forcing = 1.0e-4_wp
-
 contains
 
    !> The first point as in a natural sweep, then along the branch until a bound or max_points.
@@ -65,7 +63,7 @@ contains
       real(wp), allocatable :: values(:)
 
       ! What the first point leaves, the whole path inherits.
-      solver%method%newton%loosest = first_forcing
+      solver%method%newton%loosest = tight_forcing
       call solver%solve(case, system, case%sweep%start, point, error)
       if (allocated(error)) return
       allocate (recorder%r(system%n))

@@ -8,7 +8,10 @@ module fw_newton
    implicit none (type, external)
    private
 
-   public :: newton_solver, solver_report
+   public :: newton_solver, solver_report, tight_forcing
+
+   !> Least relative residual that is asked of iterative linear solutions.
+   real(wp), parameter :: tight_forcing = 1.0e-4_wp
 
    !> What came of a solution.
    type :: solver_report
@@ -30,10 +33,10 @@ module fw_newton
 
    !> Shortest fraction of a step that is tried.
    integer, parameter :: max_halvings = 4
-   !> Least relative residual asked of iterative linear solutions, and the factor between it and
-   !> the square of the last decrease (Eisenstat and Walker 1996, choice 2): a step that the
-   !> corners of the contact law will spoil need not be solved well.
-   real(wp), parameter :: tightest = 1.0e-4_wp, forcing_factor = 0.1_wp
+   !> Factor between the relative residual asked of iterative linear solutions and the square of
+   !> the last decrease (Eisenstat and Walker 1996, choice 2): a step that the corners of the
+   !> contact law will spoil need not be solved well.
+   real(wp), parameter :: forcing_factor = 0.1_wp
    !> Part of the tolerance that the linear residual may take of the last step.
    real(wp), parameter :: last_step_share = 0.03_wp
    !> Steps without a new smallest residual after which the path counts as cycling.
@@ -82,7 +85,7 @@ contains
       real(wp), intent(in) :: before, norm, tolerance
 
       forcing = max(forcing_factor*(norm/before)**2, &
-                    last_step_share*tolerance/max(norm, tolerance), tightest)
+                    last_step_share*tolerance/max(norm, tolerance), tight_forcing)
    end function next_forcing
 
    !> Halve the step until the residual decreases; if it never does, take the best of the trials,

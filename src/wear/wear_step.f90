@@ -5,6 +5,7 @@ module fw_wear_step
    use fw_kinds, only: wp
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
+   use fw_newton, only: tight_forcing
    use fw_solver_options, only: scheme_rosenbrock
    use fw_wear_rosenbrock, only: rosenbrock_order
    use fw_wear_rosenbrock, only: rosenbrock_step
@@ -74,6 +75,8 @@ contains
 
       self%scheme = options%scheme
       self%newton = newton
+      ! The guesses of small steps are good: a looser solution only adds a step.
+      self%newton%loosest = tight_forcing
       self%controls_error = options%controls_error()
       self%order = options%order
       if (self%order == 0) self%order = automatic_order(options)
