@@ -31,6 +31,8 @@ PAPER_TIME, PAPER_HARMONICS, WANTED_RATIO, PAPER_RATIO = 105, (1, 17), 12.0, 521
 PEAK_SHIFT = -5e-4
 #: Spacing of the frequencies [Hz]; how many there are falls with the size of the problem.
 SPACING, MOST_POINTS, FEWEST_POINTS = 0.25, 9, 3
+#: Pairs and harmonics whose lines show where the growth comes from.
+MIDDLE = 192, 7
 #: Unknowns up to which there are the most points, and a median of several runs.
 SMALL, REPEATS = 6000, 3
 #: Size of a real matrix of the order of the unknowns [MB] from where memory tells that none is.
@@ -152,7 +154,7 @@ def write_scaling(images: Path, rows: list[Measured], paper: list[Measured]) -> 
         "Least-squares slopes of the logarithms over all sizes of a line; beside them the slope "
         "of one GMRES iteration, which is free of how many steps and iterations a size takes. "
         "Targets: linear in H, no worse than quadratic in the pairs.",
-        "", *exponents(rows), "",
+        "", *exponents(rows), *reasons(rows), "",
         "### Many harmonics against one", "", *over_harmonics(paper), "",
         "### Finer flanks", "", *finer_flanks(rows)])
 
@@ -195,6 +197,24 @@ def exponents(rows: list[Measured]) -> list[str]:
         lines += [*table((names[fixed], f"time over {over}", f"time of an iteration over {over}",
                           f"memory over {over}", "target of the time"), cells), ""]
     return lines[:-1]
+
+
+def reasons(rows: list[Measured]) -> list[str]:
+    """What of the growth is no work of an iteration."""
+    pairs = [r for r in rows if r.n_harmonics == MIDDLE[1]]
+    harmonics = [r for r in rows if r.pairs == MIDDLE[0]]
+    if len(pairs) < 2 or len(harmonics) < 2:
+        return []
+    (few, many), (low, high) = ((line[0], line[-1]) for line in (pairs, harmonics))
+    return [f"What is above the targets is the number of steps and iterations: from {few.pairs} to "
+            f"{many.pairs} pairs (H = {few.n_harmonics}) the Newton steps of a frequency grow from "
+            f"{few.newton:.1f} to {many.newton:.1f}, because more pairs change between stick and "
+            f"slip on the way, and the GMRES iterations of a step from "
+            f"{few.krylov / few.newton:.0f} to {many.krylov / many.newton:.0f}. From H = "
+            f"{low.n_harmonics} to {high.n_harmonics} ({low.pairs} pairs) the steps grow from "
+            f"{low.newton:.1f} to {high.newton:.1f}, and the iterations of a step from "
+            f"{low.krylov / low.newton:.0f} to {high.krylov / high.newton:.0f}: the preconditioner "
+            "takes each harmonic by itself, and slip couples them."]
 
 
 def over_harmonics(paper: list[Measured]) -> list[str]:
