@@ -123,8 +123,8 @@ contains
    end subroutine solve
 
    !> Newton from the best guesses known. Where all fail: pseudo-time; then from the last point on
-   !> the sweep by halves, or to the first point by raising the load; and at last from the solution
-   !> without contact, which may lie on another branch.
+   !> the sweep by halves, or to the first point by raising the load; Newton again, with LU where
+   !> GMRES failed; and at last from the solution without contact, which may lie on another branch.
    subroutine reach(self, case, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -138,11 +138,18 @@ contains
          call by_flow(self, case, case%pseudo_time, system, omega, report, iterations, error)
          return
       end if
+      self%method%newton%linear%lu_left_out = .false.
       call from_guesses(self, system, omega, report, iterations, error)
       if (allocated(error)) return
       if (report%converged .or. .not. case%solver%fallback) return
       if (self%point_failures < max_point_failures) then
          call by_other_ways(self, case, system, omega, report, iterations, error)
+         if (allocated(error) .or. report%converged) return
+      end if
+      if (self%method%newton%linear%lu_left_out) then
+         self%method%newton%linear%lu_follows = .true.
+         call from_guesses(self, system, omega, report, iterations, error)
+         self%method%newton%linear%lu_follows = .false.
          if (allocated(error) .or. report%converged) return
       end if
       call from_free_guess(self, system, omega, report, iterations)

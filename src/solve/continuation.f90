@@ -170,6 +170,7 @@ contains
       self%linear%kind = self%options%linear
       ! Derivatives near folds and runaway branches are too close to singular for old factors.
       self%linear%keeps = .false.
+      self%linear%lu_follows = .true.
       self%p_scale = max(abs(self%finish - self%start), tiny(1.0_wp))
       here%x = x
       here%p = self%start

@@ -17,8 +17,7 @@ module fw_linear_step
    !> Unknowns up to which LU is the faster; measured by bench/run.py (docs/benchmarks.md).
    integer, parameter :: lu_pays_up_to = 60
 
-   !> Unknowns up to which LU is tried where GMRES has failed: above, it costs more than the other
-   !> guesses that are left.
+   !> Unknowns up to which LU is tried where GMRES has failed: above, it costs too much.
    integer, parameter :: lu_possible_up_to = 600
 
    !> A kept preconditioner may cost this much more than a fresh one, in iterations: a build takes
@@ -39,6 +38,12 @@ module fw_linear_step
       logical :: worth_keeping = .false.
       !> Whether the preconditioner in use is one from before the last `prepare`.
       logical :: kept = .false.
+      !> Whether LU follows where GMRES has failed: along a branch, whose tangents have to be right
+      !> near folds, and in implicit steps of pseudo-time and wear. Of Newton's method at a point, an
+      !> exact step of an all but singular derivative leads far away.
+      logical :: lu_follows = .false.
+      !> Whether LU could have followed and did not.
+      logical :: lu_left_out = .false.
       !> Whether preconditioners are kept at all.
       logical :: keeps = .true.
       !> Work done so far.
@@ -163,13 +168,16 @@ contains
       self%solution = 0.0_wp
       if (n > 0 .and. .not. self%factored) then
          call iterate(self, system, tolerance, done)
-         ! A last resort that costs more, but only where GMRES has failed.
          if (.not. done .and. self%kind /= linear_krylov .and. n <= lu_possible_up_to) then
-            call factor(self, system, n, done)
+            if (self%lu_follows) then
+               call factor(self, system, n, done)
+               if (.not. done) return
+            else
+               self%lu_left_out = .true.
+            end if
          end if
          ! Without LU, Newton's method judges what GMRES has reached.
-         if (self%kind == linear_krylov .or. n > lu_possible_up_to) done = .true.
-         if (.not. done) return
+         done = .true.
       end if
       if (self%factored) then
          self%solution = self%rhs

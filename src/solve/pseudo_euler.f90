@@ -43,6 +43,9 @@ contains
 
       self%newton%options = self%solver
       self%newton%options%max_iterations = max_iterations
+      ! A shift keeps the derivative from being singular: a step that fails all the same is one
+      ! whose preconditioner does not serve.
+      self%newton%linear%lu_follows = .true.
       self%x_old = x
       self%step = self%options%step
       if (self%step <= 0.0_wp) self%step = first_step*self%scales%time

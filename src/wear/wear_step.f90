@@ -77,6 +77,8 @@ contains
       self%newton = newton
       ! The guesses of small steps are good: a looser solution only adds a step.
       self%newton%loosest = tight_forcing
+      ! The linearly implicit schemes have no Newton's method to judge a solution.
+      self%newton%linear%lu_follows = .true.
       self%controls_error = options%controls_error()
       self%order = options%order
       if (self%order == 0) self%order = automatic_order(options)
