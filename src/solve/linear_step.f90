@@ -39,8 +39,8 @@ module fw_linear_step
       !> Whether the preconditioner in use is one from before the last `prepare`.
       logical :: kept = .false.
       !> Whether LU follows where GMRES has failed: along a branch, whose tangents have to be right
-      !> near folds, and in implicit steps of pseudo-time and wear. Of Newton's method at a point, an
-      !> exact step of an all but singular derivative leads far away.
+      !> near folds, and in implicit steps of pseudo-time and wear. Of Newton's method at a point,
+      !> an exact step of an all but singular derivative leads far away.
       logical :: lu_follows = .false.
       !> Whether LU could have followed and did not.
       logical :: lu_left_out = .false.
