@@ -66,12 +66,12 @@ class Case:
         parts = sorted(self.folder.glob("x.h5.part*"), key=lambda path: (len(path.name), path.name))
         return parts[-1] if parts else None
 
-    def wait_for_points(self, process):
-        """Until it has told of some hundred points; then it waits for somebody to read on."""
+    def wait_for_points(self, process, point=SEEN):
+        """Until it has told of so many points; then it waits for somebody to read on."""
         for line in process.stderr:
-            if line.startswith(f"point {SEEN} of"):
+            if line.startswith(f"point {point} of"):
                 return
-        raise AssertionError(f"ended before point {SEEN}: {process.wait()}")
+        raise AssertionError(f"ended before point {point}: {process.wait()}")
 
     def kill(self, **options):
         process = self.start(**options)

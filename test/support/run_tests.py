@@ -10,6 +10,7 @@ counts no test, is a failed case of its own: silence never passes.
 import argparse
 import os
 import re
+import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -107,6 +108,8 @@ def main():
     parser.add_argument("tests", type=Path, nargs="*", help="directories of pytest",
                         default=[ROOT / "test", ROOT / "python" / "tests"])
     arguments = parser.parse_args()
+    # A shell starts what is in the background with SIGINT ignored, and tests of it inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     build = arguments.build.resolve()
     total = Counter()
     for counts in unit_stages(build / "test" / "support"):
