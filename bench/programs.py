@@ -16,10 +16,11 @@ __all__ = ["build_programs", "run_program"]
 def build_programs(build: Path, work: Path) -> Path:
     """Install the build and compile bench/*.f90 against it; the folder of the programs."""
     prefix, target = work / "install", work / "cmake"
+    # Anew: CMake does not see that modules of the installation have changed.
     for command in (["cmake", "--install", build, "--prefix", prefix],
                     ["cmake", "-S", ROOT / "bench", "-B", target, "-G", "Ninja",
                      f"-DCMAKE_PREFIX_PATH={prefix}"],
-                    ["cmake", "--build", target]):
+                    ["cmake", "--build", target, "--clean-first"]):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return target
 
