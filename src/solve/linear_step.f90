@@ -12,10 +12,11 @@ module fw_linear_step
    implicit none (type, external)
    private
 
-   public :: linear_step_type, lu_pays_up_to
+   public :: linear_step_type, lu_up_to
 
-   !> Unknowns up to which LU is the faster; measured by bench/run.py (docs/benchmarks.md).
-   integer, parameter :: lu_pays_up_to = 60
+   !> Unknowns up to which LU is taken. GMRES has become the faster from about half of them on
+   !> (docs/benchmarks.md); LU needs no preconditioner that serves.
+   integer, parameter :: lu_up_to = 60
 
    !> Unknowns up to which LU is tried where GMRES has failed: above, it costs too much.
    integer, parameter :: lu_possible_up_to = 600
@@ -105,7 +106,7 @@ contains
       if (n > 0) then
          self%n_problems = self%n_problems + 1
          self%share_skipped = self%share_skipped + 1.0_wp - real(n, wp)/real(system%n, wp)
-         if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_pays_up_to)) then
+         if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_up_to)) then
             call factor(self, system, n, done)
          else
             self%kept = self%keeps .and. self%worth_keeping .and. system%preconditioner_fits()
