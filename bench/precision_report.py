@@ -112,11 +112,11 @@ def law_part(samples: list[Sample]) -> list[str]:
             found = [find(samples, f"Coulomb, {kind}, {law}", EVENTS, n) for n in HARMONICS]
             rows.append((kind, f"`{law}`", *map(cell, found)))
         gains += gains_of_velocity(samples, kind)
-    gain = f"{min(gains):.0f} to {max(gains):.0f} times" if gains else "not measured to be"
+    gain = f"{min(gains):.0f} to {max(gains):.0f} times" if gains else "(not measured)"
     return ["### Laws of rigid friction", "",
             "On a dof with mass, events located: error and time [ms]. "
-            f"From {MANY} harmonics on `dlft_velocity` is {gain} as accurate; on massless nodes and "
-            "with a varying normal gap only `dlft` (or `penalty`, where the interface has a "
+            f"From {MANY} harmonics on `dlft_velocity` is {gain} as accurate; on massless nodes "
+            "and with a varying normal gap only `dlft` (or `penalty`, where the interface has a "
             "stiffness) serves.",
             "", *table(["motion", "law", *(f"H = {n}" for n in HARMONICS)], rows)]
 
