@@ -9,7 +9,7 @@ from pathlib import Path
 
 from matplotlib.ticker import LogLocator, NullLocator
 
-from fretwear.plot_style import PALETTE, tidy
+from fretwear.plot.style import PALETTE, tidy
 from gallery_text import beside, new_figure, percent, picture, save
 from layout import table
 from measure import Bench

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aliasing import draw_cycles, measure_cycles
-from fretwear.plot_style import PALETTE, tidy
+from fretwear.plot.style import PALETTE, tidy
 from gallery_text import beside, new_figure, percent, picture, save
 from iterations import draw_iterations, iterations_table, measure_iterations
 from layout import table

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from fretwear.plot_style import new_figure
+from fretwear.plot.style import new_figure
 from layout import table
 
 __all__ = ["beside", "new_figure", "percent", "picture", "save"]

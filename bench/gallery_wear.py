@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from fretwear.export import synthesis
 from fretwear.plot import plot_wear_evolution, plot_wear_maps
-from fretwear.plot_style import PALETTE, tidy
+from fretwear.plot.style import PALETTE, tidy
+from fretwear.rows import synthesis
 from gallery_text import beside, new_figure, percent, picture, save
 from layout import table
 from measure import Bench, Floats, Run

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-import numpy as np
-
+from ._namelist import literal
 from ._native import Session
 from .errors import InputError, OutputError
 from .model import Model
@@ -182,25 +181,5 @@ def _settings(groups: Mapping[str, Any]) -> Iterator[str]:
                              f"keys of the group, such as {group}={{'key': value}}")
         name = "model" if group == "structure" else group
         for key, value in keys.items():
-            yield f"{name}%{key}={_value(f'{group}[{key!r}]', value)}"
+            yield f"{name}%{key}={literal(value, f'{group}[{key!r}]')}"
 
-
-def _value(argument: str, value: object) -> str:
-    """A value as a namelist has it, every digit kept."""
-    if isinstance(value, np.generic):  # np.float64 is a float, but prints as an expression
-        value = value.item()
-    if isinstance(value, bool):
-        return ".true." if value else ".false."
-    if isinstance(value, (str, os.PathLike)):
-        return "'" + os.fspath(value).replace("'", "''") + "'"
-    if isinstance(value, (int, float)):
-        return repr(value)
-    if isinstance(value, np.ndarray):
-        if value.dtype.kind not in "iufb":
-            raise InputError(f"{argument}: its elements are of type {value.dtype}, must be numbers")
-        # Matrices stand row by row; they are symmetric.
-        return _value(argument, value.ravel().tolist())
-    if isinstance(value, (list, tuple)) and value:
-        return " ".join(_value(argument, item) for item in value)
-    raise InputError(f"{argument}: is {value!r}, must be a text, a number, a truth value, or a "
-                     "list or array of these")

@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .errors import InputError, OutputError
-from .export import choose_point, synthesis
-from .plot_response import Response, read_response
-from .plot_style import PALETTE, Floats, Source, as_result, label, new_figure, tidy, units_of
+from .plot.response import Response, read_response
+from .plot.style import PALETTE, Floats, Source, as_result, label, new_figure, tidy, units_of
 from .result import Result
+from .rows import choose_point, synthesis
 
 __all__ = ["Comparison", "Difference", "add_arguments", "compare", "main", "plot_comparison"]
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arguments import array, dofs, text
+from ._namelist import literal
 from ._native import Session
 from .errors import InputError, OutputError
 from .model_file import FORMAT, strings, write_model_file
@@ -356,14 +357,14 @@ class Model:
             session.give_matrix("position", np.asfortranarray(np.asarray(contact.position).T))
         if contact.patch is not None:
             session.give_texts("patch", contact.patch)
-        return [f"contact%{name}={_list(getattr(contact, name))}" for name in _IN_NAMELIST
+        return [f"contact%{name}={literal(getattr(contact, name))}" for name in _IN_NAMELIST
                 if getattr(contact, name) is not None]
 
     def _spring_settings(self) -> list[str]:
         if not self.springs:
             return []
         return [f"spring%n_springs={len(self.springs)}"] + [
-            f"spring%{name}={_list([getattr(spring, name) for spring in self.springs])}"
+            f"spring%{name}={literal([getattr(spring, name) for spring in self.springs])}"
             for name in ("side_1", "side_2", "coefficient", "power")]
 
 
@@ -413,11 +414,6 @@ def _read_only(values: Floats) -> Floats:
     view = values.view()
     view.flags.writeable = False
     return view
-
-
-def _list(values: ArrayLike) -> str:
-    """Values as a namelist has them, every digit kept."""
-    return " ".join(repr(value) for value in np.asarray(values).ravel().tolist())
 
 
 def _text(value: object) -> str:

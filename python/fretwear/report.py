@@ -14,9 +14,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .errors import InputError, OutputError
-from .export_recovery import namelist_values
+from .export.recovery import namelist_values
 from .plot import KINDS, Choices, fitting
-from .plot_style import units_of
+from .plot.style import units_of
 from .result import Result
 
 __all__ = ["add_arguments", "main", "render_report", "write_report"]

@@ -14,8 +14,8 @@ from program import run
 from fretwear import InputError
 from fretwear.cli import main
 from fretwear.export import export_mesh
-from fretwear.export_mesh import read_mesh
-from fretwear.export_recovery import recover_displacement
+from fretwear.export.mesh import read_mesh
+from fretwear.export.recovery import recover_displacement
 from fretwear.result import Result
 from fretwear.sector import FullModel, ReducedModel, write_model
 from fretwear.sector.assembly import Assembly

@@ -12,7 +12,6 @@ from program import run
 
 from fretwear import InputError
 from fretwear.cli import main
-from fretwear.export import pair_fields, synthesis
 from fretwear.plot import (
     KINDS,
     Choices,
@@ -27,9 +26,10 @@ from fretwear.plot import (
     plot_wear_evolution,
     plot_wear_maps,
 )
-from fretwear.plot_cycle import read_cycle
-from fretwear.plot_flanks import find_flanks
+from fretwear.plot.cycle import read_cycle
+from fretwear.plot.flanks import find_flanks
 from fretwear.result import Result
+from fretwear.rows import pair_fields, synthesis
 
 # What the forces of a result, known to 1e-8, leave of a displacement of 1e-3 mm.
 RECOVERED = 1e-7

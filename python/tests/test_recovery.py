@@ -11,7 +11,7 @@ import pytest
 from program import run
 
 from fretwear import InputError
-from fretwear.export_recovery import (
+from fretwear.export.recovery import (
     namelist_values,
     read_structure,
     recover_displacement,

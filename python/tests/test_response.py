@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fretwear import InputError
-from fretwear.plot_response import (
+from fretwear.plot.response import (
     friction_damping,
     half_power_damping,
     plot_response,

@@ -18,9 +18,9 @@ import pytest
 from fretwear.cli import main
 from fretwear.errors import FretwearError, InputError
 from fretwear.study import read_plan, read_table, run_study
-from fretwear.study_plan import override
-from fretwear.study_pool import run_jobs
-from fretwear.study_run import Job, identify, recorded, run_job
+from fretwear.study.plan import override
+from fretwear.study.pool import run_jobs
+from fretwear.study.run import Job, identify, recorded, run_job
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()

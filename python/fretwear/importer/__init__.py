@@ -10,9 +10,11 @@ from pathlib import Path
 
 from ..errors import InputError, OutputError
 from .build import ROLES, FullModel, Source, drop, gather, model_datasets, read_rows, save
-from .checks import Finding, check_model
+from .checks import check_model
+from .finding import Finding
 from .labels import Dofs, read_label_table
-from .matrices import FORMATS, MatrixFile, read_matrices
+from .matrices import FORMATS, read_matrices
+from .matrix_file import MatrixFile
 from .tables import Pairs, contact_rows, read_loads, read_pairs
 
 __all__ = ["FORMATS", "Dofs", "Finding", "FullModel", "MatrixFile", "Pairs", "Source",

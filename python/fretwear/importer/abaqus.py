@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from ..errors import InputError
 from .labels import Label
-from .matrices import MatrixFile, mirrored, one_triangle
+from .matrix_file import MatrixFile, mirrored, one_triangle
 
 __all__ = ["read_mtx"]
 

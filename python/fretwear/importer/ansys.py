@@ -14,7 +14,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from ..errors import InputError
-from .matrices import HELD, MatrixFile, mirrored, need
+from .matrix_file import HELD, MatrixFile, mirrored, need
 
 __all__ = ["read_full", "read_harwell_boeing"]
 

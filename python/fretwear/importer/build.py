@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..model_file import strings, write_model_file
 from ..reduction import reduce
-from .checks import Finding
+from .finding import Finding
 from .labels import Dofs
-from .matrices import HELD, MatrixFile, mirrored, one_triangle, read_matrices
+from .matrices import read_matrices
+from .matrix_file import HELD, MatrixFile, mirrored, one_triangle
 from .tables import LOADS, Pairs, contact_rows
 
 __all__ = ["ROLES", "FullModel", "Source", "drop", "gather", "model_datasets", "read_rows",

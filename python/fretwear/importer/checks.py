@@ -6,20 +6,17 @@ An error stops an import; a warning is likely a mistake; a note is what the user
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .build import FullModel
+from .finding import Finding
 from .spectrum import Spectrum, lowest_modes, negative_directions
 from .tables import DIRECTIONS, Pairs, contact_rows
 
-if TYPE_CHECKING:
-    from .build import FullModel
-
-__all__ = ["Finding", "check_model"]
+__all__ = ["check_model"]
 
 Floats = NDArray[np.float64]
 
@@ -36,27 +33,6 @@ _EDGE = (0.02, 4.0)
 _MODES_OF_ONE_BODY = 6
 _LARGE = 3000
 _FRICTION = 1.5
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing found.
-
-    Attributes
-    ----------
-    kind : {'error', 'warning', 'note'}
-    where : str
-        Matrix, entry, or line of a table.
-    text : str
-        What is there and what to do.
-    """
-
-    kind: str
-    where: str
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.kind}: {self.where}: {self.text}"
 
 
 Findings = Iterator[Finding]

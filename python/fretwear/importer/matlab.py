@@ -11,7 +11,7 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from .matrices import MatrixFile
+from .matrix_file import MatrixFile
 
 __all__ = ["read_mat"]
 

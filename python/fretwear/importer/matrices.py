@@ -15,47 +15,21 @@ abaqus             Abaqus .mtx                                  `abaqus`, no mai
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
 from ..errors import InputError, OutputError
-from .labels import Label
+from .abaqus import read_mtx
+from .ansys import read_full, read_harwell_boeing
+from .matlab import read_mat
+from .matrix_file import MatrixFile
+from .nastran import read_dmig, read_op4
 
-__all__ = ["FORMATS", "HELD", "MatrixFile", "mirrored", "need", "read_matrices"]
-
-#: A diagonal stiffness from which a degree of freedom counts as held: Abaqus writes 1e36.
-HELD = 1e30
-
-
-@dataclass(frozen=True)
-class MatrixFile:
-    """Matrices of one file.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    matrices : dict of str to sparse array
-        By their names in the file, in lower case.
-    labels : list of (node, component), optional
-        Of the rows of every square matrix, where the file names them.
-    notes : list of str
-        What the reader has done that the user should know.
-    """
-
-    path: Path
-    matrices: dict[str, sp.csr_array]
-    labels: list[Label] | None = None
-    notes: list[str] = field(default_factory=list)
-
+__all__ = ["FORMATS", "read_matrices"]
 
 def read_matrices(path: str | Path, format: str | None = None) -> MatrixFile:
     """Read every real matrix of a file.
@@ -103,29 +77,6 @@ def read_matrices(path: str | Path, format: str | None = None) -> MatrixFile:
     return found
 
 
-def need(module: str, package: str, purpose: str) -> ModuleType:
-    """Import an optional package, or say how to get it."""
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise InputError(f"{purpose} needs the package {package} ({error}); install it with "
-                         f"pip install {package}, or use another format") from None
-
-
-def mirrored(matrix: Any) -> sp.csr_array:
-    """The full symmetric matrix of which one triangle is stored."""
-    full = sp.coo_array(matrix)
-    off = full.row != full.col
-    row, col = np.concatenate((full.row, full.col[off])), np.concatenate((full.col, full.row[off]))
-    return sp.csr_array((np.concatenate((full.data, full.data[off])), (row, col)), full.shape)
-
-
-def one_triangle(matrix: sp.csr_array) -> bool:
-    """Whether entries stand on one side of the diagonal only."""
-    return (matrix.shape[0] == matrix.shape[1]
-            and bool(sp.tril(matrix, -1).nnz) != bool(sp.triu(matrix, 1).nnz))
-
-
 def _guess(path: Path, start: bytes) -> str:
     """Format by content, then by the ending of the name."""
     head = start.lstrip().upper()
@@ -159,21 +110,13 @@ def _matrix_market(path: Path) -> MatrixFile:
     return MatrixFile(path, {path.stem.lower(): sp.csr_array(scipy.io.mmread(path))})
 
 
-def _reader(module: str, function: str) -> Callable[[Path], MatrixFile]:
-    """A reader of a module that is imported when it is first needed."""
-    def read(path: Path) -> MatrixFile:
-        found: MatrixFile = getattr(importlib.import_module(module, __package__), function)(path)
-        return found
-    return read
-
-
 #: Readers by the name of their format.
 FORMATS: dict[str, Callable[[Path], MatrixFile]] = {
-    "op4": _reader(".nastran", "read_op4"),
-    "dmig": _reader(".nastran", "read_dmig"),
-    "mat": _reader(".matlab", "read_mat"),
+    "op4": read_op4,
+    "dmig": read_dmig,
+    "mat": read_mat,
     "matrix_market": _matrix_market,
-    "harwell_boeing": _reader(".ansys", "read_harwell_boeing"),
-    "full": _reader(".ansys", "read_full"),
-    "abaqus": _reader(".abaqus", "read_mtx"),
+    "harwell_boeing": read_harwell_boeing,
+    "full": read_full,
+    "abaqus": read_mtx,
 }

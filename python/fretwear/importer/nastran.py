@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from ..errors import InputError
 from .labels import Label
-from .matrices import MatrixFile, mirrored, need, one_triangle
+from .matrix_file import MatrixFile, mirrored, need, one_triangle
 
 __all__ = ["read_dmig", "read_op4"]
 

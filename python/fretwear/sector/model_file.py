@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..export_mesh import RecoveryMesh, mesh_datasets
+from ..mesh import RecoveryMesh, mesh_datasets
 from ..model_file import strings, write_model_file
 from .model import ReducedModel
 from .parameters import Discretisation, Geometry, Material, Retention, SectorParameters

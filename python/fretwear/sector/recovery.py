@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..export_mesh import RecoveryMesh
+from ..mesh import RecoveryMesh
 from .contact import flank_facets
 from .mesh import BLADE, DISK
 from .model import FullModel, observed_rows, reduced_system

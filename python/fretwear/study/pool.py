@@ -10,8 +10,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from typing import Any, TypeVar
 
-from .errors import InputError
-from .study_run import Job, Record, RunStopped, run_job
+from ..errors import InputError
+from .run import Job, Record, RunStopped, run_job
 
 __all__ = ["core_count", "each", "run_jobs"]
 

@@ -13,8 +13,9 @@ from typing import Any, Union
 import numpy as np
 from scipy.stats import qmc
 
-from .errors import InputError, OutputError
-from .study_quantities import check_quantity
+from .._namelist import literal
+from ..errors import InputError, OutputError
+from .quantities import check_quantity
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -57,7 +58,7 @@ class Plan:
     table : Path
         Results table to write, .parquet or .h5.
     quantities : list of str
-        Columns of the table, see `fretwear.study_quantities`.
+        Columns of the table, see `fretwear.study.quantities`.
     workers : int
         Runs at once; 0: as many as there are cores.
     scheduler : str
@@ -136,17 +137,7 @@ def read_plan(path: str | Path) -> Plan:
 
 def override(key: str, value: Setting) -> str:
     """Option --set of `fw_run`: KEY=VALUE in namelist syntax, reals to the last bit."""
-    return f"{key}={_text(value)}"
-
-
-def _text(value: Setting) -> str:
-    if isinstance(value, bool):
-        return ".true." if value else ".false."
-    if isinstance(value, str):
-        return "'" + value.replace("'", "''") + "'"
-    if isinstance(value, tuple):
-        return ", ".join(_text(part) for part in value)
-    return repr(value)
+    return f"{key}={literal(value, key)}"
 
 
 class _Reader:

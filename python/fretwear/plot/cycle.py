@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from .errors import InputError
-from .export import choose_point, synthesis
-from .export_recovery import relative_displacement
-from .plot_style import (
+from ..errors import InputError
+from ..export.recovery import relative_displacement
+from ..result import DIRECTIONS, Result
+from ..rows import choose_point, synthesis
+from .style import (
     CURVE,
     PALETTE,
     Floats,
@@ -24,7 +25,6 @@ from .plot_style import (
     tidy,
     units_of,
 )
-from .result import DIRECTIONS, Result
 
 __all__ = ["Cycle", "plot_cycle", "plot_harmonics", "plot_hysteresis", "read_cycle"]
 

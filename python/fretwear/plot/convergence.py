@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from .errors import InputError
-from .export_recovery import namelist_values
-from .plot_style import CURVE, FAILED, Source, as_result, label, new_figure, tidy
+from ..errors import InputError
+from ..export.recovery import namelist_values
+from .style import CURVE, FAILED, Source, as_result, label, new_figure, tidy
 
 __all__ = ["plot_convergence"]
 

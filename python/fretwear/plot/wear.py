@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from .errors import InputError
-from .export import choose_point, pair_fields
-from .plot_flanks import plot_maps
-from .plot_style import (
+from ..errors import InputError
+from ..result import Result
+from ..rows import choose_point, pair_fields
+from .flanks import plot_maps
+from .style import (
     CURVE,
     PALETTE,
     Source,
@@ -19,7 +20,6 @@ from .plot_style import (
     tidy,
     units_of,
 )
-from .result import Result
 
 __all__ = ["plot_wear_bars", "plot_wear_evolution", "plot_wear_maps"]
 

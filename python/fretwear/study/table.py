@@ -12,11 +12,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import FretwearError, InputError, OutputError
-from .result import Result
-from .study_plan import Plan, Setting
-from .study_quantities import Value, evaluate
-from .study_run import Record
+from ..errors import FretwearError, InputError, OutputError
+from ..result import Result
+from .plan import Plan, Setting
+from .quantities import Value, evaluate
+from .run import Record
 
 __all__ = ["build_table", "need_writer", "read_table", "write_table"]
 

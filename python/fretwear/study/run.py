@@ -21,8 +21,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from .errors import InputError
-from .study_plan import Setting, override
+from ..errors import InputError
+from .plan import Setting, override
 
 __all__ = ["Job", "Record", "RunStopped", "find_program", "identify", "recorded", "run_job"]
 

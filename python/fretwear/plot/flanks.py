@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .export import choose_point, pair_areas, pair_fields
-from .plot_style import Floats, Source, as_result, label, new_figure, units_of
-from .result import Result
+from ..errors import InputError
+from ..result import Result
+from ..rows import choose_point, pair_areas, pair_fields
+from .style import Floats, Source, as_result, label, new_figure, units_of
 
 __all__ = ["Flank", "find_flanks", "plot_flanks", "plot_maps"]
 

@@ -11,8 +11,8 @@ from typing import Optional, Union
 
 import numpy as np
 
-from .errors import InputError
-from .result import Result
+from ..errors import InputError
+from ..result import Result
 
 __all__ = ["QUANTITIES", "Value", "check_quantity", "evaluate"]
 

@@ -1,7 +1,6 @@
-"""Meshes on which the displacement of a reduced model can be shown.
+"""The group `/mesh` of a model file: a mesh, and how its points move with the reduced coordinates.
 
-A model file may hold the group `/mesh` (see docs/user-guide.md). A sector model without it says
-from which parameters it was generated; then the mesh is generated again.
+See docs/user-guide.md for its datasets.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, OutputError
+from .errors import InputError
 
-__all__ = ["RecoveryMesh", "mesh_datasets", "read_mesh"]
+__all__ = ["RecoveryMesh", "mesh_datasets", "mesh_of_group"]
 
 Floats = NDArray[np.floating]
 Ints = NDArray[np.integer]
@@ -64,31 +63,8 @@ def mesh_datasets(mesh: RecoveryMesh) -> dict[str, NDArray[Any]]:
     return found
 
 
-def read_mesh(path: Path) -> RecoveryMesh:
-    """Mesh of a model file, generated again for a sector model that does not hold it.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be read.
-    InputError
-        There is no mesh, or its datasets do not fit each other.
-    """
-    try:
-        with h5py.File(path, "r") as file:
-            n_dof = len(file["stiffness"])
-            if "mesh" in file:
-                return _from_group(file["mesh"], path, n_dof)
-            if "parameters" not in file.attrs:
-                raise InputError(f"{path}: holds no group /mesh, so there is nothing to show a "
-                                 "displacement on (docs/user-guide.md says what it holds)")
-            observe = file["observe/matrix"][()]
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be read: {error}") from None
-    return _regenerated(path, observe)
-
-
-def _from_group(group: h5py.Group, path: Path, n_dof: int) -> RecoveryMesh:
+def mesh_of_group(group: h5py.Group, path: Path, n_dof: int) -> RecoveryMesh:
+    """The mesh of a model file; raises InputError where its datasets do not fit each other."""
     arrays = {}
     for name in ("points", "cells", "body", "facets", "pair", "basis"):
         if name not in group:
@@ -106,18 +82,3 @@ def _from_group(group: h5py.Group, path: Path, n_dof: int) -> RecoveryMesh:
         if arrays[name].size and not 0 <= arrays[name].min() <= arrays[name].max() < n_points:
             raise InputError(f"{path}: dataset /mesh/{name} names points that do not exist")
     return RecoveryMesh(**arrays)
-
-
-def _regenerated(path: Path, observe: Floats) -> RecoveryMesh:
-    try:
-        from .sector import build_full, read_parameters
-        from .sector.recovery import recovery_mesh
-    except ImportError as error:
-        raise InputError(f"{path}: holds no group /mesh, and generating it again needs "
-                         f"scikit-fem ({error})") from None
-    mesh, tip = recovery_mesh(build_full(read_parameters(path)))
-    # Of the order of what another order of summation changes; another generator is far off.
-    if tip.shape != observe.shape or np.abs(tip - observe).max() > 1e-6 * np.abs(observe).max():
-        raise InputError(f"{path}: this version of the generator does not give its coordinates; "
-                         "write the model again, with --mesh")
-    return mesh

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .plot_style import (
+from ..errors import InputError
+from ..result import STATES
+from .style import (
     CURVE,
     FAILED,
     STATE_COLOURS,
@@ -23,7 +24,6 @@ from .plot_style import (
     tidy,
     units_of,
 )
-from .result import STATES
 
 __all__ = ["Response", "friction_damping", "half_power_damping", "plot_response",
            "read_response"]

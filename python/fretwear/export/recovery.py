@@ -19,8 +19,8 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from .errors import InputError, OutputError
-from .result import Result
+from ..errors import InputError, OutputError
+from ..result import Result
 
 __all__ = ["Structure", "model_path", "namelist_values", "read_structure",
            "recover_displacement", "relative_displacement"]

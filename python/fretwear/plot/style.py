@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .result import Result
+from ..result import Result
 
 __all__ = ["CURVE", "FAILED", "PALETTE", "STATE_COLOURS", "UNSTABLE", "Floats", "Source",
            "as_result", "label", "new_figure", "pair_name", "tidy", "units_of"]

@@ -1,0 +1,55 @@
+"""Values as a namelist has them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import numpy as np
+
+from .errors import InputError
+
+__all__ = ["literal", "write_namelist"]
+
+
+def literal(value: object, name: str = "value") -> str:
+    """A value in the syntax of a namelist, every digit kept.
+
+    Parameters
+    ----------
+    value : str, path, bool, int, float, or sequence or array of these
+        Matrices stand row by row; they are symmetric.
+    name : str, optional
+        What a message calls it.
+
+    Raises
+    ------
+    InputError
+        It is nothing that a namelist can hold.
+    """
+    if isinstance(value, np.generic):  # np.float64 is a float, but prints as an expression
+        value = value.item()
+    if isinstance(value, bool):
+        return ".true." if value else ".false."
+    if isinstance(value, (str, os.PathLike)):
+        return "'" + os.fspath(value).replace("'", "''") + "'"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind not in "iufb":
+            raise InputError(f"{name}: its elements are of type {value.dtype}, must be numbers")
+        return literal(value.ravel().tolist(), name)
+    if isinstance(value, (list, tuple)) and value:
+        return ", ".join(literal(item, name) for item in value)
+    raise InputError(f"{name}: is {value!r}, must be a text, a number, a truth value, or a list "
+                     "or array of these")
+
+
+def write_namelist(groups: Mapping[str, Mapping[str, object]]) -> str:
+    """The text of a namelist from its groups, such as ``{"case": {"analysis": "frf"}}``."""
+    lines = []
+    for group, keys in groups.items():
+        lines.append(f"&{group}")
+        lines += [f"   {key} = {literal(value, f'{group}%{key}')}" for key, value in keys.items()]
+        lines.append("/")
+    return "\n".join(lines) + "\n"

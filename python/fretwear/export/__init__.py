@@ -1,0 +1,13 @@
+"""Meshes with the deformation, contact state and wear of a result, for ParaView.
+
+`fretwear export` is in `fretwear.export.command`.
+"""
+
+from .command import add_arguments, main
+from .fields import Fields, export_mesh
+from .mesh import RecoveryMesh, mesh_datasets, read_mesh
+from .recovery import Structure, read_structure, recover_displacement, relative_displacement
+
+__all__ = ["Fields", "RecoveryMesh", "Structure", "add_arguments", "export_mesh", "main",
+           "mesh_datasets", "read_mesh", "read_structure", "recover_displacement",
+           "relative_displacement"]

@@ -1,0 +1,127 @@
+"""What one point of a result shows on the mesh of its model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..mesh import RecoveryMesh
+from ..result import Result
+from ..rows import choose_point, pair_fields, synthesis
+from .mesh import read_mesh
+from .recovery import model_path, recover_displacement
+
+if TYPE_CHECKING:
+    import meshio
+
+__all__ = ["Fields", "export_mesh"]
+
+Floats = NDArray[np.float64]
+
+#: Instants on which extremes over a period are looked for.
+_INSTANTS = 256
+
+
+def export_mesh(result: Result | str | Path, point: int | None = None,
+                phase: float | None = None) -> meshio.Mesh:
+    """Mesh of the model with the fields of one point of a result.
+
+    Parameters
+    ----------
+    result : Result or path
+        Result of a model file with a mesh, or of a generated sector.
+    point : int, optional
+        Solution point or wear step from 0; the largest amplitude, or the last wear step without.
+    phase : float, optional
+        Instant of `displacement` [degrees]; where the first observed quantity is largest without.
+
+    Returns
+    -------
+    meshio.Mesh
+        Hexahedra and the facets of the pairs. Point data: `displacement` (at the instant),
+        `displacement_static`, `displacement_cosine`, `displacement_sine` (first harmonic) and
+        `vibration`, the largest distance from the static position. Cell data: `body`, `pair`
+        (from 1; 0 on hexahedra), and `pair_fields`, NaN on hexahedra.
+
+    Raises
+    ------
+    InputError
+        No mesh belongs to the model, or the displacement cannot be recovered.
+    """
+    if not isinstance(result, Result):
+        result = Result(result)
+    return Fields(result, choose_point(result, None) if point is None else point).at(phase)
+
+
+class Fields:
+    """What one point of a result shows on the mesh of its model."""
+
+    def __init__(self, result: Result, point: int) -> None:
+        path = model_path(result)
+        if path is None:
+            raise InputError(f"{result.path}: inline models have no mesh to export")
+        self.result, self.point = result, point
+        self.mesh: RecoveryMesh = read_mesh(path)
+        self.pairs = pair_fields(result, point)
+        self.coefficients: Floats | None = None
+        if "contact/force" in result or "wear/depth" not in result:
+            recovered = recover_displacement(result, points=[point])[point]
+            if not np.isfinite(recovered).all():
+                raise InputError(f"{result.path}: point {point + 1} holds no solution")
+            shape = (len(recovered), *self.mesh.points.shape)
+            self.coefficients = (recovered @ self.mesh.basis.T).reshape(shape)
+
+    def _largest_instant(self) -> float:
+        """Where in the period the first observed quantity is largest [rad]."""
+        tau = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
+        observed = self.result.coefficients[self.point, :, 0]
+        return float(tau[np.argmax(np.abs(observed @ synthesis(len(observed), tau)))])
+
+    def _point_data(self, phase: float | None) -> dict[str, Floats]:
+        if self.coefficients is None:
+            return {}
+        c = self.coefficients
+        instant = self._largest_instant() if phase is None else np.radians(phase)
+        tau = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
+        moving = np.einsum("cpi,ct->tpi", c[1:], synthesis(len(c), tau)[1:])
+        return {
+            "displacement": np.einsum("cpi,c->pi", c,
+                                      synthesis(len(c), np.array([instant]))[:, 0]),
+            "displacement_static": c[0], "displacement_cosine": c[1], "displacement_sine": c[2],
+            "vibration": np.linalg.norm(moving, axis=2).max(axis=0)}
+
+    def at(self, phase: float | None) -> meshio.Mesh:
+        """Mesh with all fields at an instant [degrees]."""
+        try:
+            import meshio
+        except ImportError:
+            raise InputError("fretwear export needs meshio: pip install meshio") from None
+        mesh = self.mesh
+        nowhere = np.full(len(mesh.cells), np.nan)
+        # Facets belong to the body of a cell that has their corners.
+        owner = np.zeros(int(mesh.cells.max()) + 1, dtype=np.int32)
+        owner[mesh.cells] = mesh.body[:, None]
+        cell_data: dict[str, list[Any]] = {
+            "body": [mesh.body.astype(np.int32), owner[mesh.facets[:, 0]]],
+            "pair": [np.zeros(len(mesh.cells), dtype=np.int32), mesh.pair.astype(np.int32) + 1]}
+        for name, (values, _) in self.pairs.items():
+            cell_data[name] = [nowhere, values[mesh.pair]]
+        return meshio.Mesh(np.asarray(mesh.points, dtype=float),
+                           [("hexahedron", mesh.cells), ("quad", mesh.facets)],
+                           point_data=self._point_data(phase), cell_data=cell_data)
+
+    def summary(self) -> str:
+        """Fields with their units and largest values, one line each."""
+        length = self.result.units("amplitude")
+        lines = [f"{self.result.path}: point {self.point + 1}, {len(self.mesh.points)} points, "
+                 f"{len(self.mesh.cells)} hexahedra, {len(self.mesh.facets)} facets in contact"]
+        shown = {name: (np.linalg.norm(values, axis=1) if values.ndim == 2 else values, length)
+                 for name, values in self._point_data(None).items()}
+        for name, (values, units) in {**shown, **self.pairs}.items():
+            lines.append(f"  {name:20s} {np.nanmin(values):12.5g} to {np.nanmax(values):12.5g} "
+                         f"{units}")
+        return "\n".join(lines)

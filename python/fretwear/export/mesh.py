@@ -1,0 +1,56 @@
+"""Meshes on which the displacement of a reduced model can be shown.
+
+A model file may hold the group `/mesh`. A sector model without it says from which parameters it
+was generated; then the mesh is generated again.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..errors import InputError, OutputError
+from ..mesh import Floats, RecoveryMesh, mesh_datasets, mesh_of_group
+
+__all__ = ["RecoveryMesh", "mesh_datasets", "read_mesh"]
+
+
+def read_mesh(path: Path) -> RecoveryMesh:
+    """Mesh of a model file, generated again for a sector model that does not hold it.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read.
+    InputError
+        There is no mesh, or its datasets do not fit each other.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            n_dof = len(file["stiffness"])
+            if "mesh" in file:
+                return mesh_of_group(file["mesh"], path, n_dof)
+            if "parameters" not in file.attrs:
+                raise InputError(f"{path}: holds no group /mesh, so there is nothing to show a "
+                                 "displacement on (docs/user-guide.md says what it holds)")
+            observe = file["observe/matrix"][()]
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read: {error}") from None
+    return _regenerated(path, observe)
+
+
+def _regenerated(path: Path, observe: Floats) -> RecoveryMesh:
+    try:
+        from ..sector import build_full, read_parameters
+        from ..sector.recovery import recovery_mesh
+    except ImportError as error:
+        raise InputError(f"{path}: holds no group /mesh, and generating it again needs "
+                         f"scikit-fem ({error})") from None
+    mesh, tip = recovery_mesh(build_full(read_parameters(path)))
+    # Of the order of what another order of summation changes; another generator is far off.
+    if tip.shape != observe.shape or np.abs(tip - observe).max() > 1e-6 * np.abs(observe).max():
+        raise InputError(f"{path}: this version of the generator does not give its coordinates; "
+                         "write the model again, with --mesh")
+    return mesh

@@ -1,0 +1,26 @@
+"""Pictures of results: each function takes a result and returns a matplotlib figure.
+
+>>> from fretwear.plot import plot_response                                # doctest: +SKIP
+>>> plot_response("frf.h5").savefig("frf.png")                             # doctest: +SKIP
+
+`fretwear plot` is in `fretwear.plot.command`.
+"""
+
+from .command import add_arguments, main
+from .convergence import plot_convergence
+from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
+from .flanks import plot_flanks
+from .kinds import KINDS, Choices, Kind, fitting
+from .response import (
+    Response,
+    friction_damping,
+    half_power_damping,
+    plot_response,
+    read_response,
+)
+from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
+
+__all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
+           "half_power_damping", "main", "plot_convergence", "plot_cycle", "plot_flanks",
+           "plot_harmonics", "plot_hysteresis", "plot_response", "plot_wear_bars",
+           "plot_wear_evolution", "plot_wear_maps", "read_response"]

@@ -1,0 +1,77 @@
+"""`fretwear plot`: pictures of a result file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..errors import InputError, OutputError
+from ..result import Result
+from ..rows import choose_point
+from .kinds import KINDS, Choices, fitting
+
+__all__ = ["add_arguments", "main"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `fretwear plot`."""
+    parser.add_argument("result", help="result file")
+    parser.add_argument("-o", "--output", metavar="FILE",
+                        help="picture, its suffix is the format (png, svg, pdf); with several "
+                             "kinds FILE_kind.png and so on (default: RESULT_kind.png in the "
+                             "current folder)")
+    parser.add_argument("--kind", metavar="KIND,...",
+                        help=f"what to draw: {', '.join(KINDS)} (default: all that fits)")
+    parser.add_argument("--point", type=int, metavar="N",
+                        help="solution point or wear step, from 1; -1 is the last (default: the "
+                             "largest amplitude, or the last wear step)")
+    parser.add_argument("--pairs", metavar="N,...",
+                        help="pairs to draw, from 1 (default: those that dissipate most)")
+    parser.add_argument("--observe", metavar="NAME", help="observed quantity (default: the first)")
+    parser.add_argument("--linear", metavar="FILE",
+                        help="result with every pair stuck, drawn dashed in the response")
+    parser.add_argument("--modal-mass", type=float, metavar="M",
+                        help="modal mass at the observed quantity: damping from the dissipation")
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run `fretwear plot`."""
+    result = Result(options.result)
+    kinds = _kinds(result, options.kind)
+    choices = Choices(
+        None if options.point is None else choose_point(result, options.point),
+        _numbers(options.pairs), options.observe, options.linear, options.modal_mass)
+    target = Path(options.output or f"{result.path.stem}.png")
+    if not target.absolute().parent.is_dir():
+        raise OutputError(f"{target}: there is no folder {target.absolute().parent}")
+    for name in kinds:
+        alone = len(kinds) == 1 and options.output is not None
+        path = target if alone else target.with_name(f"{target.stem}_{name}{target.suffix}")
+        try:
+            KINDS[name].draw(result, choices).savefig(path)
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"{path}: {error}") from None  # such as a format not known
+        print(path)
+    return 0
+
+
+def _kinds(result: Result, text: str | None) -> list[str]:
+    if text is None:
+        return fitting(result)
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in KINDS:
+            raise InputError(f"--kind {name}: must be among {', '.join(KINDS)}")
+    return names
+
+
+def _numbers(text: str | None) -> list[int] | None:
+    """Pair numbers from 1 as indices from 0."""
+    if text is None:
+        return None
+    try:
+        return [int(word) - 1 for word in text.split(",")]
+    except ValueError:
+        raise InputError(f"--pairs {text}: must be numbers separated by commas") from None

@@ -1,0 +1,102 @@
+"""The kinds of pictures: what each shows, when a result has it, how it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from ..errors import InputError
+from ..export.recovery import model_path
+from ..result import Result
+from .convergence import plot_convergence
+from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
+from .flanks import plot_flanks
+from .response import plot_response
+from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
+
+__all__ = ["KINDS", "Choices", "Kind", "fitting"]
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user has chosen of a result.
+
+    Attributes
+    ----------
+    point : int or None
+        Point or wear step from 0.
+    pairs : list of int or None
+        Pairs from 0.
+    observe : str or None
+        Observed quantity.
+    linear : str or None
+        Result with every pair stuck.
+    modal_mass : float or None
+        See ``friction_damping``.
+    """
+
+    point: int | None = None
+    pairs: list[int] | None = None
+    observe: str | None = None
+    linear: str | None = None
+    modal_mass: float | None = None
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of picture: what it shows, when a result has it, and how to draw it."""
+
+    title: str
+    fits: Callable[[Result], bool]
+    draw: Callable[[Result, Choices], Figure]
+
+
+def _has(*names: str) -> Callable[[Result], bool]:
+    return lambda result: all(name in result for name in names)
+
+
+def _has_cycle(result: Result) -> bool:
+    """Whether the period of the pairs is stored or can be recovered."""
+    if "contact/force" not in result:
+        return False
+    # A wear analysis has one row of both for each of its steps.
+    if "wear/depth" in result and len(result.depth) != result.n_points:
+        return False
+    try:
+        return "history/force" in result or model_path(result) is None or (
+            "spring%n_springs" not in result.namelist)
+    except InputError:
+        return False
+
+
+#: Every kind of picture, in the order in which a report shows them.
+KINDS: dict[str, Kind] = {
+    "response": Kind(
+        "Frequency response", lambda r: r.n_points > 1 and "wear/depth" not in r,
+        lambda r, c: plot_response(r, c.observe, linear=c.linear, modal_mass=c.modal_mass)),
+    "cycle": Kind(
+        "One cycle", lambda r: "coefficients" in r and r.n_points > 0 and (
+            "contact/force" not in r or _has_cycle(r)),
+        lambda r, c: plot_cycle(r, c.point, c.pairs, c.observe)),
+    "hysteresis": Kind("Hysteresis loops", _has_cycle,
+                       lambda r, c: plot_hysteresis(r, c.point, c.pairs)),
+    "harmonics": Kind("Harmonics", lambda r: "coefficients" in r and r.n_points > 0,
+                      lambda r, c: plot_harmonics(r, c.point, c.observe)),
+    "flanks": Kind("Contact on the flanks", _has("contact/position", "contact/fraction"),
+                   lambda r, c: plot_flanks(r, c.point)),
+    "wear_maps": Kind("Wear on the flanks", _has("contact/position", "wear/depth"),
+                      lambda r, c: plot_wear_maps(r, c.point)),
+    "wear_bars": Kind("Wear depth of the pairs", _has("wear/depth"),
+                      lambda r, c: plot_wear_bars(r, c.point)),
+    "wear_evolution": Kind("Wear over the cycles", _has("wear/depth", "wear/cycles"),
+                           lambda r, c: plot_wear_evolution(r)),
+    "convergence": Kind("Convergence", lambda r: r.n_points > 0 and "iterations" in r,
+                        lambda r, c: plot_convergence(r)),
+}
+
+
+def fitting(result: Result) -> list[str]:
+    """Kinds of pictures for which a result has the data."""
+    return [name for name, kind in KINDS.items() if kind.fits(result)]
