@@ -23,35 +23,17 @@ module fw_continuation
    implicit none (type, external)
    private
 
-   public :: arclength_type, branch_observer
+   public :: arclength_type, branch_point
 
-   !> Receives the points of a branch in order.
-   type, abstract :: branch_observer
-      !> Set by `take` to end the branch there.
-      logical :: stop_requested = .false.
-   contains
-      procedure(take_point), deferred :: take
-   end type branch_observer
-
-   abstract interface
-      !> A point of the branch, converged but perhaps for the last; the system may stand at
-      !> another p. `fold` marks the points where p turns.
-      subroutine take_point(self, x, p, report, fold, error)
-         import :: branch_observer, wp, solver_report, error_type
-         class(branch_observer), intent(inout) :: self
-         real(wp), intent(in), contiguous :: x(:)
-         real(wp), intent(in) :: p
-         type(solver_report), intent(in) :: report
-         logical, intent(in) :: fold
-         type(error_type), allocatable, intent(out) :: error
-      end subroutine take_point
-   end interface
-
-   !> A point of the branch with its unit tangent.
+   !> A point of the branch with its unit tangent (dx/ds, dp/ds).
    type :: branch_point
       real(wp), allocatable :: x(:), t(:)
       real(wp) :: p = 0.0_wp
       real(wp) :: t_p = 0.0_wp
+      !> How it was found; all converged but perhaps for one on a bound.
+      type(solver_report) :: report
+      !> Whether p turns here.
+      logical :: fold = .false.
    end type branch_point
 
    type :: arclength_type
@@ -76,8 +58,15 @@ module fw_continuation
       logical :: runs_away = .false.
       !> Whether the orientation is looked at; without, the smaller angle between tangents decides.
       logical :: oriented = .true.
+      ! Where the branch has come to, the point after a fold that waits, and the step.
+      type(branch_point) :: here, waiting
+      logical :: waits = .false.
+      logical :: ended = .false.
+      real(wp) :: ds = 0.0_wp
+      integer :: n_points = 0, n_constant = 0
    contains
-      procedure :: trace
+      procedure :: begin
+      procedure :: next
    end type arclength_type
 
    !> Corrector iterations: more than the last is a failure; the others steer the step.
@@ -106,63 +95,11 @@ module fw_continuation
 
 contains
 
-   !> Follow the branch from a converged x at p = start until finish, in either direction of p.
-   subroutine trace(self, system, x, observer, error)
+   !> Start at a converged x at p = start, towards finish; that point is the first of max_points.
+   subroutine begin(self, system, x, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       real(wp), intent(in), contiguous :: x(:)
-      class(branch_observer), intent(inout) :: observer
-      type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: here, next
-      type(solver_report) :: report
-      real(wp) :: ds
-      integer :: k, n_constant
-      logical :: done
-
-      n_constant = 0
-      self%oriented = system%n <= orientation_up_to
-      call begin(self, system, x, here, error)
-      ds = self%step
-      do k = 2, self%max_points
-         if (allocated(error)) return
-         call advance(self, system, here, ds, next, report, done, error)
-         if (allocated(error)) return
-         if (.not. done) then
-            self%ending = 'the corrector failed at the smallest step'
-            return
-         end if
-         if (here%t_p*next%t_p < 0.0_wp) call report_fold(self, system, here, next, ds, observer, &
-            error)
-         if (allocated(error)) return
-         if ((next%p - self%start)*(next%p - self%finish) > 0.0_wp) then
-            call land(self, system, here, next, observer, error)
-            return
-         end if
-         call observer%take(next%x, next%p, report, .false., error)
-         if (allocated(error)) return
-         if (observer%stop_requested) then
-            self%ending = 'stopped by the user'
-            return
-         end if
-         if (report%iterations <= quick) ds = min(1.4_wp*ds, largest_growth*self%step)
-         if (report%iterations >= slow) ds = 0.6_wp*ds
-         here = next
-         n_constant = merge(n_constant + 1, 0, stands(self, here))
-         self%runs_away = n_constant >= max_constant
-         if (self%runs_away) then
-            self%ending = 'its points run away at a constant parameter'
-            return
-         end if
-      end do
-      self%ending = 'max_points was reached'
-   end subroutine trace
-
-   !> The first point and its tangent, towards finish.
-   subroutine begin(self, system, x, here, error)
-      class(arclength_type), intent(inout) :: self
-      class(parameter_system), intent(inout) :: system
-      real(wp), intent(in), contiguous :: x(:)
-      type(branch_point), intent(out) :: here
       type(error_type), allocatable, intent(out) :: error
       type(branch_point) :: towards_finish
       logical :: done
@@ -171,17 +108,98 @@ contains
       ! Derivatives near folds and runaway branches are too close to singular for old factors.
       self%linear%keeps = .false.
       self%linear%lu_follows = .true.
+      self%oriented = system%n <= orientation_up_to
       self%p_scale = max(abs(self%finish - self%start), tiny(1.0_wp))
-      here%x = x
-      here%p = self%start
       self%x_scale = max(self%x_scale, norm2(x), tiny(1.0_wp))
-      allocate (here%t(size(x)), source=0.0_wp)
-      here%t_p = sign(self%p_scale, self%finish - self%start)
-      towards_finish = here
-      call system%set_parameter(here%p, error)
+      self%ds = self%step
+      self%n_points = 1
+      self%n_constant = 0
+      self%ended = .false.
+      self%waits = .false.
+      towards_finish%x = x
+      towards_finish%p = self%start
+      allocate (towards_finish%t(size(x)), source=0.0_wp)
+      towards_finish%t_p = sign(self%p_scale, self%finish - self%start)
+      self%here = towards_finish
+      call system%set_parameter(self%start, error)
       if (allocated(error)) return
-      call find_tangent(self, system, towards_finish, here, done)
+      call find_tangent(self, system, towards_finish, self%here, done)
    end subroutine begin
+
+   !> The next point, in either direction of p; the system may stand at another p then. `more` is
+   !> false where there is none: the branch has ended, for the reason in `ending`.
+   subroutine next(self, system, point, more, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(out) :: point
+      logical, intent(out) :: more
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: ahead, turn
+      real(wp) :: ds
+      logical :: done
+
+      more = .true.
+      if (self%waits) then
+         call settle(self, system, self%waiting, point, error)
+         return
+      end if
+      if (self%n_points >= self%max_points) call end_branch(self, 'max_points was reached')
+      more = .not. self%ended
+      if (.not. more) return
+      ds = self%ds
+      call advance(self, system, self%here, ds, ahead, done, error)
+      if (allocated(error)) return
+      self%ds = ds
+      if (.not. done) then
+         call end_branch(self, 'the corrector failed at the smallest step')
+         more = .false.
+         return
+      end if
+      if (self%here%t_p*ahead%t_p < 0.0_wp) then
+         call find_fold(self, system, self%here, ahead, ds, turn, error)
+         if (allocated(error)) return
+         if (turn%fold) then
+            self%waiting = ahead
+            self%waits = .true.
+            point = turn
+            return
+         end if
+      end if
+      call settle(self, system, ahead, point, error)
+   end subroutine next
+
+   !> A step has come to `ahead`: it is the next point, unless a bound lies before it.
+   subroutine settle(self, system, ahead, point, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: ahead
+      type(branch_point), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      self%waits = .false.
+      self%n_points = self%n_points + 1
+      if ((ahead%p - self%start)*(ahead%p - self%finish) > 0.0_wp) then
+         call land(self, system, self%here, ahead, point, error)
+         return
+      end if
+      point = ahead
+      if (point%report%iterations <= quick) self%ds = min(1.4_wp*self%ds, &
+         largest_growth*self%step)
+      if (point%report%iterations >= slow) self%ds = 0.6_wp*self%ds
+      self%here = point
+      self%n_constant = merge(self%n_constant + 1, 0, stands(self, point))
+      self%runs_away = self%n_constant >= max_constant
+      if (self%runs_away) call end_branch(self, 'its points run away at a constant parameter')
+   end subroutine settle
+
+   subroutine end_branch(self, reason)
+      class(arclength_type), intent(inout) :: self
+      character(*), intent(in) :: reason
+
+      if (self%ended) return
+      self%ending = reason
+      self%ended = .true.
+   end subroutine end_branch
 
    !> Unit tangent (dx/dp, 1) at a point, in the direction of another one's.
    subroutine find_tangent(self, system, previous, point, done)
@@ -214,13 +232,12 @@ contains
    end function inner
 
    !> Take a step, halving it until the corrector converges.
-   subroutine advance(self, system, here, ds, next, report, done, error)
+   subroutine advance(self, system, here, ds, next, done, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here
       real(wp), intent(inout) :: ds
       type(branch_point), intent(out) :: next
-      type(solver_report), intent(out) :: report
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
       integer :: orientation
@@ -228,28 +245,28 @@ contains
       self%x_scale = max(self%x_scale, norm2(here%x))
       orientation = 0
       do
-         call correct(self, system, here, ds, next, report, error)
+         call correct(self, system, here, ds, next, error)
          if (allocated(error)) return
-         done = report%converged
+         done = next%report%converged
          if (done) call look_ahead(self, system, here, ds, orientation, next, done, error)
          if (allocated(error) .or. done) return
          if (ds < turn_below*self%step .and. self%oriented) then
-            call turn_at_kink(self, system, here, ds, orientation, next, report, error)
+            call turn_at_kink(self, system, here, ds, orientation, next, error)
             if (allocated(error)) return
-            done = report%converged
+            done = next%report%converged
             if (done) return
          end if
          if (ds < smallest_share*self%step) exit
          ds = 0.5_wp*ds
       end do
-      call leap(self, system, here, orientation, ds, next, report, error)
-      done = report%converged
+      call leap(self, system, here, orientation, ds, next, error)
+      done = next%report%converged
    end subroutine advance
 
    !> A step in p alone, beyond a place where many pieces meet or where the derivative has no bound
    !> (a pair whose slip of a period vanishes): Newton's method with its line search from `here`,
    !> first close by, then further away; ahead, then on the other side, where the branch may turn.
-   subroutine leap(self, system, here, orientation, ds, next, report, error)
+   subroutine leap(self, system, here, orientation, ds, next, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here
@@ -257,32 +274,30 @@ contains
       !> Distance of the point that was reached.
       real(wp), intent(inout) :: ds
       type(branch_point), intent(out) :: next
-      type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
       integer :: k, side
 
       do side = 1, merge(-1, 1, self%oriented), -2
          do k = -max_leap, 0
             call leap_to(self, system, here, side*sign(2.0_wp**k*self%step*self%p_scale, &
-               here%t_p), orientation, next, report, error)
+               here%t_p), orientation, next, error)
             if (allocated(error)) return
-            if (report%converged) exit
+            if (next%report%converged) exit
          end do
-         if (report%converged) exit
+         if (next%report%converged) exit
       end do
-      if (report%converged) ds = sqrt(inner(self, next%x - here%x, next%p - here%p, &
+      if (next%report%converged) ds = sqrt(inner(self, next%x - here%x, next%p - here%p, &
          next%x - here%x, next%p - here%p))
    end subroutine leap
 
    !> The point at p + dp, if the branch goes on there in the direction of dp.
-   subroutine leap_to(self, system, here, dp, orientation, next, report, error)
+   subroutine leap_to(self, system, here, dp, orientation, next, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here
       real(wp), intent(in) :: dp
       integer, intent(inout) :: orientation
       type(branch_point), intent(out) :: next
-      type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
       type(newton_solver) :: newton
       integer :: its_orientation
@@ -293,10 +308,10 @@ contains
       next%p = here%p + dp
       call system%set_parameter(next%p, error)
       if (allocated(error)) return
-      call newton%solve(system, next%x, report)
-      if (.not. report%converged) return
+      call newton%solve(system, next%x, next%report)
+      if (.not. next%report%converged) return
       call find_tangent(self, system, here, next, done)
-      report%converged = done
+      next%report%converged = done
       if (.not. done) return
       ! Beyond a sharp turn the angle with the last tangent says nothing.
       if (next%t_p*dp < 0.0_wp) call reverse(next)
@@ -304,12 +319,12 @@ contains
       if (orientation == 0) call find_orientation(self, system, here, orientation, error)
       if (allocated(error)) return
       call find_orientation(self, system, next, its_orientation, error)
-      report%converged = .not. differ(its_orientation, orientation)
+      next%report%converged = .not. differ(its_orientation, orientation)
    end subroutine leap_to
 
    !> Step along the tangent of the piece just beyond `here`, in the direction that keeps the
    !> orientation of the branch.
-   subroutine turn_at_kink(self, system, here, ds, orientation, next, report, error)
+   subroutine turn_at_kink(self, system, here, ds, orientation, next, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here
@@ -317,7 +332,6 @@ contains
       !> Orientation at `here`; 0 where it is not known yet.
       integer, intent(inout) :: orientation
       type(branch_point), intent(out) :: next
-      type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
       type(branch_point) :: beyond
       integer :: its_orientation
@@ -337,11 +351,11 @@ contains
       ! Of a tangent with no orientation, the corrector has tried the direction of `here`.
       if (stands(self, beyond) .or. differ(its_orientation, orientation)) call reverse(beyond)
       ! From the piece beyond: a plane across its tangent may meet the piece of `here` as well.
-      call correct(self, system, beyond, ds, next, report, error)
-      if (allocated(error) .or. .not. report%converged) return
+      call correct(self, system, beyond, ds, next, error)
+      if (allocated(error) .or. .not. next%report%converged) return
       ! A point with the other orientation lies on the way back.
       call find_orientation(self, system, next, its_orientation, error)
-      report%converged = .not. differ(its_orientation, orientation)
+      next%report%converged = .not. differ(its_orientation, orientation)
    end subroutine turn_at_kink
 
    !> A point with the other orientation: where the branch turns sharply, the tangent that makes the
@@ -426,13 +440,12 @@ contains
    end function differ
 
    !> Newton's method on R = 0 with the distance along the tangent fixed to ds.
-   subroutine correct(self, system, here, ds, next, report, error)
+   subroutine correct(self, system, here, ds, next, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here
       real(wp), intent(in) :: ds
       type(branch_point), intent(out) :: next
-      type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: r(:), step(:)
       real(wp) :: dp, best
@@ -448,27 +461,27 @@ contains
          call system%set_parameter(next%p, error)
          if (allocated(error)) return
          call system%residual(next%x, r)
-         report%residual = norm2(r)/system%reference
-         report%converged = report%residual <= self%options%tolerance
-         if (report%converged .or. report%iterations == max_corrections) exit
-         if (.not. ieee_is_finite(report%residual)) exit
+         next%report%residual = norm2(r)/system%reference
+         next%report%converged = next%report%residual <= self%options%tolerance
+         if (next%report%converged .or. next%report%iterations == max_corrections) exit
+         if (.not. ieee_is_finite(next%report%residual)) exit
          stalled = stalled + 1
-         if (report%residual < 0.9_wp*best) stalled = 0
-         best = min(best, report%residual)
-         if (stalled >= patience .or. report%residual > 1.0e3_wp*best) exit
+         if (next%report%residual < 0.9_wp*best) stalled = 0
+         best = min(best, next%report%residual)
+         if (stalled >= patience .or. next%report%residual > 1.0e3_wp*best) exit
          if (ds < turn_below*self%step .and. self%oriented) then
             call bordered_step(self, system, here, next, r, step, dp, done)
          else
             call combined_step(self, system, here, next, r, step, dp, done)
          end if
          if (.not. done) exit
-         report%iterations = report%iterations + 1
+         next%report%iterations = next%report%iterations + 1
          next%x = next%x + step
          next%p = next%p + dp
       end do
-      if (report%converged) then
+      if (next%report%converged) then
          call find_tangent(self, system, here, next, done)
-         report%converged = done
+         next%report%converged = done
       end if
    end subroutine correct
 
@@ -515,15 +528,14 @@ contains
 
    !> Between two points whose tangents differ in the sign of dp/ds lies a fold: regula falsi
    !> (Illinois) on that sign.
-   subroutine report_fold(self, system, here, next, ds, observer, error)
+   subroutine find_fold(self, system, here, next, ds, middle, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here, next
       real(wp), intent(in) :: ds
-      class(branch_observer), intent(inout) :: observer
+      !> `fold` is false where it is not found.
+      type(branch_point), intent(out) :: middle
       type(error_type), allocatable, intent(out) :: error
-      type(branch_point) :: middle
-      type(solver_report) :: report
       real(wp) :: low, high, at_low, at_high, s, p_before
       integer :: k
 
@@ -534,9 +546,9 @@ contains
       p_before = huge(1.0_wp)
       do k = 1, max_fold_steps
          s = (low*at_high - high*at_low)/(at_high - at_low)
-         call correct(self, system, here, s, middle, report, error)
+         call correct(self, system, here, s, middle, error)
          if (allocated(error)) return
-         if (.not. report%converged) return
+         if (.not. middle%report%converged) return
          if (abs(middle%p - p_before) <= fold_tolerance*abs(middle%p)) exit
          p_before = middle%p
          if (middle%t_p*at_low > 0.0_wp) then
@@ -549,45 +561,46 @@ contains
             at_low = 0.5_wp*at_low
          end if
       end do
-      call observer%take(middle%x, middle%p, report, .true., error)
-   end subroutine report_fold
+      middle%fold = .true.
+   end subroutine find_fold
 
    !> The branch leaves the interval: its last point lies exactly on the bound.
-   subroutine land(self, system, here, next, observer, error)
+   subroutine land(self, system, here, next, point, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here, next
-      class(branch_observer), intent(inout) :: observer
+      type(branch_point), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
-      real(wp), allocatable :: x(:), r(:), step(:)
+      real(wp), allocatable :: r(:), step(:)
       real(wp) :: bound, share
       logical :: done
 
       bound = merge(self%start, self%finish, (next%p - self%start)*(self%finish - &
          self%start) < 0.0_wp)
       share = (bound - here%p)/(next%p - here%p)
-      x = here%x + share*(next%x - here%x)
+      point = next
+      point%p = bound
+      point%report = solver_report()
+      point%x = here%x + share*(next%x - here%x)
       allocate (r(system%n), step(system%n))
       call system%set_parameter(bound, error)
       if (allocated(error)) return
       do
-         call system%residual(x, r)
-         report%residual = norm2(r)/system%reference
-         report%converged = report%residual <= self%options%tolerance
-         if (report%converged .or. report%iterations == max_corrections) exit
+         call system%residual(point%x, r)
+         point%report%residual = norm2(r)/system%reference
+         point%report%converged = point%report%residual <= self%options%tolerance
+         if (point%report%converged .or. point%report%iterations == max_corrections) exit
          call self%linear%solve(system, r, forcing, step, done)
          if (.not. done) exit
-         x = x + step
-         report%iterations = report%iterations + 1
+         point%x = point%x + step
+         point%report%iterations = point%report%iterations + 1
       end do
       if (abs(bound - self%start) <= 0.0_wp) then
-         self%ending = 'it returned to the start of the sweep; the end was not reached'
+         call end_branch(self, 'it returned to the start of the sweep; the end was not reached')
       else
-         self%ending = 'followed to the end of the sweep'
-         self%complete = report%converged
+         call end_branch(self, 'followed to the end of the sweep')
+         self%complete = point%report%converged
       end if
-      call observer%take(x, bound, report, .false., error)
    end subroutine land
 
 end module fw_continuation
