@@ -99,7 +99,7 @@ contains
             end do
          case (flow_preconditioned)
             p = balance%structure%stiffness(:, :, h)
-            call add_closed_joint(balance, p)
+            call add_closed_joint(balance, h, p)
          case default
             p = omega**2*b%m_qq
             if (n > 0) p = cmplx(0.0_wp, 2.0_wp*n, wp)*p
@@ -108,25 +108,18 @@ contains
    end subroutine fill_flow
 
    !> Prediction stiffness of every component of every pair.
-   subroutine add_closed_joint(balance, p)
+   subroutine add_closed_joint(balance, h, p)
       type(hbm_system), intent(in) :: balance
+      integer, intent(in) :: h
       complex(wp), intent(inout) :: p(:, :)
-      integer :: i, c, e, f, row
+      integer :: i, c
 
-      associate (r => balance%joint%relative)
-         do i = 1, balance%contact%n_pairs
-            do c = 1, 3
-               row = balance%joint%row(c, i)
-               if (row == 0) cycle
-               do e = r%first(row), r%first(row + 1) - 1
-                  do f = r%first(row), r%first(row + 1) - 1
-                     p(r%coordinate(e), r%coordinate(f)) = p(r%coordinate(e), r%coordinate(f)) + &
-                        r%coefficient(e)*r%coefficient(f)*balance%stiffness(i, c)
-                  end do
-               end do
-            end do
+      do i = 1, balance%contact%n_pairs
+         do c = 1, 3
+            if (balance%joint%row(c, i) == 0) cycle
+            call balance%incidence%add_block(balance%joint%row(c, i), h, balance%stiffness(i, c), p)
          end do
-      end associate
+      end do
    end subroutine add_closed_joint
 
    !> Factors of P for the explicit schemes, massless directions made regular.

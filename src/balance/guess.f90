@@ -59,27 +59,21 @@ contains
       complex(wp), allocatable :: stiffness(:, :)
       logical :: free(system%structure%n_coordinates)
       integer, allocatable :: kept(:)
-      integer :: i, j, e, f, row
+      integer :: i, j, row
 
       held = .true.
       if (.not. system%fourier%has_constant()) return
       free = .true.
       stiffness = system%structure%stiffness(:, :, 1)
-      associate (r => system%joint%relative)
-         do i = 1, system%contact%n_pairs
-            row = system%joint%row(3, i)
-            if (row == 0) cycle
-            do e = r%first(row), r%first(row + 1) - 1
-               if (system%rigid) free(r%coordinate(e)) = .false.
-               if (system%rigid) cycle
-               do f = r%first(row), r%first(row + 1) - 1
-                  stiffness(r%coordinate(e), r%coordinate(f)) = &
-                     stiffness(r%coordinate(e), r%coordinate(f)) + &
-                     r%coefficient(e)*r%coefficient(f)*system%stiffness(i, 3)
-               end do
-            end do
-         end do
-      end associate
+      do i = 1, system%contact%n_pairs
+         row = system%joint%row(3, i)
+         if (row == 0) cycle
+         if (system%rigid) then
+            free(system%incidence%coordinate_of(row)) = .false.
+         else
+            call system%incidence%add_block(row, 1, system%stiffness(i, 3), stiffness)
+         end if
+      end do
       kept = pack([(j, j=1, size(free))], free)
       held = is_positive_definite(real(stiffness(kept, kept), wp))
    end function held_without_friction
@@ -103,8 +97,7 @@ contains
          force = system%structure%load(:, h)
          if (system%fourier%harmonic(h) > 0) force = system%load_share*force
          held = .false.
-         call close_pairs(system, closed, system%fourier%harmonic(h), stiffness, force, held, &
-            q(:, h))
+         call close_pairs(system, closed, h, stiffness, force, held, q(:, h))
          call solve_free(stiffness, force, held, q(:, h))
          if (system%fourier%harmonic(h) == 0) call mean_tension(system, q(:, h), tension)
       end do
@@ -112,41 +105,35 @@ contains
    end subroutine linear_solution
 
    !> Rigid pairs hold their coordinates (at minus the gap); elastic ones add their stiffness.
-   subroutine close_pairs(system, closed, harmonic, stiffness, force, held, q)
+   subroutine close_pairs(system, closed, h, stiffness, force, held, q)
       type(hbm_system), intent(in) :: system
       logical, intent(in) :: closed(:)
-      integer, intent(in) :: harmonic
+      integer, intent(in) :: h
       complex(wp), intent(inout) :: stiffness(:, :), force(:), q(:)
       logical, intent(inout) :: held(:)
-      integer :: i, c, e, f, row
+      integer :: i, c, j, row
       real(wp) :: gap
 
-      associate (r => system%joint%relative)
-         do i = 1, size(closed)
-            if (.not. closed(i)) cycle
-            do c = 1, 3
-               row = system%joint%row(c, i)
-               if (row == 0) cycle
-               ! Without friction or load a pair holds nothing tangentially.
-               if (c < 3 .and. .not. system%contact%mu(i) > 0.0_wp) cycle
-               gap = merge(system%gap(i) + system%depth(i), 0.0_wp, c == 3 .and. harmonic == 0)
-               do e = r%first(row), r%first(row + 1) - 1
-                  if (system%rigid) then
-                     held(r%coordinate(e)) = .true.
-                     q(r%coordinate(e)) = -gap
-                     cycle
-                  end if
-                  force(r%coordinate(e)) = force(r%coordinate(e)) - &
-                                           r%coefficient(e)*system%stiffness(i, c)*gap
-                  do f = r%first(row), r%first(row + 1) - 1
-                     stiffness(r%coordinate(e), r%coordinate(f)) = &
-                        stiffness(r%coordinate(e), r%coordinate(f)) + &
-                        r%coefficient(e)*r%coefficient(f)*system%stiffness(i, c)
-                  end do
-               end do
-            end do
+      do i = 1, size(closed)
+         if (.not. closed(i)) cycle
+         do c = 1, 3
+            row = system%joint%row(c, i)
+            if (row == 0) cycle
+            ! Without friction or load a pair holds nothing tangentially.
+            if (c < 3 .and. .not. system%contact%mu(i) > 0.0_wp) cycle
+            gap = 0.0_wp
+            if (c == 3 .and. system%fourier%harmonic(h) == 0) gap = system%gap(i) + system%depth(i)
+            if (system%rigid) then
+               j = system%incidence%coordinate_of(row)
+               held(j) = .true.
+               q(j) = -gap
+            else
+               call system%incidence%scatter_harmonic( &
+                  row, h, cmplx(-system%stiffness(i, c)*gap, kind=wp), force)
+               call system%incidence%add_block(row, h, system%stiffness(i, c), stiffness)
+            end if
          end do
-      end associate
+      end do
    end subroutine close_pairs
 
    !> Solve for the coordinates that are not held.
@@ -178,26 +165,22 @@ contains
       type(hbm_system), intent(in) :: system
       complex(wp), intent(in) :: q(:)
       real(wp), intent(out) :: tension(:)
-      integer :: i, row, first, last
+      real(wp) :: opening(size(tension))
+      integer :: i, j, row
 
       tension = 0.0_wp
-      associate (r => system%joint%relative)
-         do i = 1, size(tension)
-            row = system%joint%row(3, i)
-            if (row == 0) cycle
-            first = r%first(row)
-            last = r%first(row + 1) - 1
-            if (system%rigid) then
-               tension(i) = system%load(r%coordinate(first), 1) - &
-                            real(sum(system%structure%stiffness(r%coordinate(first), :, 1)*q), wp)
-            else
-               tension(i) = system%stiffness(i, 3)* &
-                            (sum(r%coefficient(first:last)*real(q(r%coordinate(first:last)), &
-                               wp)) + &
-                             system%gap(i) + system%depth(i))
-            end if
-         end do
-      end associate
+      call system%incidence%gather(system%joint%row(3, :), size(q), 1, real(q, wp), opening)
+      do i = 1, size(tension)
+         row = system%joint%row(3, i)
+         if (row == 0) cycle
+         if (system%rigid) then
+            j = system%incidence%coordinate_of(row)
+            tension(i) = system%load(j, 1) - &
+                         real(sum(system%structure%stiffness(j, :, 1)*q), wp)
+         else
+            tension(i) = system%stiffness(i, 3)*(opening(i) + system%gap(i) + system%depth(i))
+         end if
+      end do
    end subroutine mean_tension
 
    subroutine to_real_vector(system, q, x)

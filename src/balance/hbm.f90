@@ -17,6 +17,8 @@ module fw_hbm
    use fw_forces, only: new_forces
    use fw_forces, only: pair_stuck
    use fw_fourier, only: fourier_type
+   use fw_incidence, only: incidence_type
+   use fw_incidence, only: new_incidence
    use fw_joint, only: joint_type
    use fw_lapack, only: zgemv
    use fw_polynomial, only: springs_type
@@ -31,6 +33,8 @@ module fw_hbm
 
    type, extends(parameter_system) :: hbm_system
       type(joint_type) :: joint
+      !> B, from the coordinates to the rows of the joint.
+      type(incidence_type) :: incidence
       type(condensation_type) :: structure
       type(fourier_type) :: fourier
       type(forces_type) :: contact
@@ -171,6 +175,7 @@ contains
       integer :: m, nc, nh
 
       self%joint = joint
+      call new_incidence(joint%relative, structure%n_coordinates, self%incidence)
       self%structure = structure
       self%fourier = fourier
       self%rigid = contact%law /= law_penalty
@@ -271,9 +276,7 @@ contains
       class(hbm_system), intent(in) :: self
       integer, intent(in) :: component, pair
 
-      associate (r => self%joint%relative)
-         coordinate = r%coordinate(r%first(self%joint%row(component, pair)))
-      end associate
+      coordinate = self%incidence%coordinate_of(self%joint%row(component, pair))
    end function coordinate_of
 
    !> Bring matrices and loads to a frequency.
@@ -358,22 +361,11 @@ contains
       class(hbm_system), intent(inout) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
-      integer :: i, e
 
-      associate (r => self%joint%relative, s => self%springs)
-         s%elongation = 0.0_wp
-         do i = 1, s%n_springs
-            do e = r%first(self%joint%spring_row(i)), r%first(self%joint%spring_row(i) + 1) - 1
-               s%elongation(i, :) = s%elongation(i, :) + r%coefficient(e)*q(r%coordinate(e), :)
-            end do
-         end do
-         call s%evaluate(self%fourier)
-         do i = 1, s%n_springs
-            do e = r%first(self%joint%spring_row(i)), r%first(self%joint%spring_row(i) + 1) - 1
-               self%balance(r%coordinate(e), :) = self%balance(r%coordinate(e), :) - &
-                                                  r%coefficient(e)*s%force(i, :)
-            end do
-         end do
+      associate (rows => self%joint%spring_row)
+         call self%incidence%gather(rows, m, nc, q, self%springs%elongation)
+         call self%springs%evaluate(self%fourier)
+         call self%incidence%scatter(rows, m, nc, -1.0_wp, self%springs%force, self%balance)
       end associate
    end subroutine add_springs
 
@@ -382,21 +374,12 @@ contains
       class(hbm_system), intent(inout) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
-      integer :: i, c, e, row, j
+      integer :: j
 
-      associate (r => self%joint%relative, y => self%contact%prediction)
+      associate (y => self%contact%prediction)
+         call self%incidence%gather(self%joint%pair_rows, m, nc, q, y)
          do j = 1, nc
-            do c = 1, 3
-               do i = 1, self%contact%n_pairs
-                  row = self%joint%row(c, i)
-                  y(i, c, j) = 0.0_wp
-                  if (row == 0) cycle
-                  do e = r%first(row), r%first(row + 1) - 1
-                     y(i, c, j) = y(i, c, j) + &
-                                  self%stiffness(i, c)*r%coefficient(e)*q(r%coordinate(e), j)
-                  end do
-               end do
-            end do
+            y(:, :, j) = self%stiffness*y(:, :, j)
          end do
          if (self%velocity_level) call tangential_rates(self, y)
          if (self%rigid) call add_balance(self, y)
@@ -469,23 +452,9 @@ contains
       class(hbm_system), intent(inout) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(out) :: r(m, nc)
-      integer :: i, c, e, row, j
 
       r = -self%balance
-      associate (rel => self%joint%relative)
-         do j = 1, nc
-            do c = 1, 3
-               do i = 1, self%contact%n_pairs
-                  row = self%joint%row(c, i)
-                  if (row == 0) cycle
-                  do e = rel%first(row), rel%first(row + 1) - 1
-                     r(rel%coordinate(e), j) = r(rel%coordinate(e), j) + &
-                                               rel%coefficient(e)*self%contact%force(i, c, j)
-                  end do
-               end do
-            end do
-         end do
-      end associate
+      call self%incidence%scatter(self%joint%pair_rows, m, nc, 1.0_wp, self%contact%force, r)
    end subroutine collect
 
    !> U_n = uc_n - i us_n of each retained harmonic (n_rows, n_retained).

@@ -154,8 +154,10 @@ contains
          self%complex_out(:self%n_used, h) = self%complex_out(self%used(:self%n_used), h)
       end do
       call outputs_to_real(self)
-      if (self%springs%n_springs > 0) call spring_product(self, m, self%balance, spread_out=.true.)
-      call contact_product(self, m, self%balance, spread_out=.true.)
+      associate (all => self%incidence%identity)
+         if (self%springs%n_springs > 0) call spring_product(self, all, m, self%balance)
+         call contact_product(self, all, m, self%balance)
+      end associate
       rhs = rhs - self%active_out(:self%n_active, :)
    end subroutine reduce_shaped
 
@@ -254,8 +256,8 @@ contains
       end do
       !$omp end parallel do
       call outputs_to_real(self)
-      if (self%springs%n_springs > 0) call spring_product(self, na, vector, spread_out=.false.)
-      if (self%contact%n_pairs > 0) call contact_product(self, na, vector, spread_out=.false.)
+      if (self%springs%n_springs > 0) call spring_product(self, self%place, na, vector)
+      if (self%contact%n_pairs > 0) call contact_product(self, self%place, na, vector)
       if (allocated(self%shift)) call add_shift(self)
       do k = 1, self%fourier%n_coefficients
          product((k - 1)*na + 1:k*na) = self%active_out(:na, k)
@@ -306,52 +308,44 @@ contains
    end subroutine outputs_to_real
 
    !> active_out = active_out + derivative of the springs times vector.
-   subroutine spring_product(self, n_rows, vector, spread_out)
+   subroutine spring_product(self, map, n_mapped, vector)
       type(hbm_system), intent(inout) :: self
-      integer, intent(in) :: n_rows
-      real(wp), intent(in) :: vector(n_rows, *)
-      !> The vector holds all coordinates, not just the active ones.
-      logical, intent(in) :: spread_out
-      integer :: i, e, k, nc, place
+      !> Places of the coordinates in the vector, and its rows.
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      real(wp), intent(in) :: vector(n_mapped, *)
+      integer :: i, k
 
-      nc = self%fourier%n_coefficients
-      associate (r => self%joint%relative, s => self%springs, row => self%joint%spring_row)
+      associate (s => self%springs, rows => self%joint%spring_row)
          do i = 1, s%n_springs
             ! The spring's own workspaces are free between evaluations.
-            s%elongation(i, :) = 0.0_wp
-            do e = r%first(row(i)), r%first(row(i) + 1) - 1
-               place = merge(r%coordinate(e), self%place(r%coordinate(e)), spread_out)
-               if (place == 0 .or. place > n_rows) cycle
-               s%elongation(i, :) = s%elongation(i, :) + r%coefficient(e)*vector(place, :nc)
-            end do
-            do k = 1, nc
+            call self%incidence%gather_row(rows(i), map, n_mapped, 1.0_wp, vector, &
+                                           s%elongation(i, :))
+            do k = 1, self%fourier%n_coefficients
                s%force(i, k) = dot_product(s%jacobian(:, k, i), s%elongation(i, :))
             end do
-            do e = r%first(row(i)), r%first(row(i) + 1) - 1
-               place = self%place(r%coordinate(e))
-               if (place == 0) cycle
-               self%active_out(place, :) = self%active_out(place, :) + &
-                  r%coefficient(e)*s%force(i, :)
-            end do
+            call self%incidence%scatter_row(rows(i), self%place, self%n_used, &
+                                            size(self%active_out, 1), 1.0_wp, s%force(i, :), &
+                                            self%active_out)
          end do
       end associate
    end subroutine spring_product
 
    !> active_out = active_out + B^T G (eps B v - B A v), A v being in active_out.
-   subroutine contact_product(self, n_rows, vector, spread_out)
+   subroutine contact_product(self, map, n_mapped, vector)
       type(hbm_system), intent(inout) :: self
-      integer, intent(in) :: n_rows
-      real(wp), intent(in) :: vector(n_rows, *)
-      !> The vector holds all coordinates, not just the active ones.
-      logical, intent(in) :: spread_out
+      !> Places of the coordinates in the vector, and its rows.
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      real(wp), intent(in) :: vector(n_mapped, *)
       integer :: i, n
 
       n = 3*self%fourier%n_coefficients
-      !$omp parallel do default(none) shared(self, n_rows, vector, spread_out, n) private(i) &
+      !$omp parallel do default(none) shared(self, map, n_mapped, vector, n) private(i) &
       !$omp schedule(static) if(self%contact%n_pairs >= pairs_for_threads)
       do i = 1, self%contact%n_pairs
          if (self%contact%linear_state(i) == pair_open) cycle
-         call gather_inputs(self, i, n_rows, vector, spread_out, self%pair_in(:, i))
+         call gather_inputs(self, i, map, n_mapped, vector, self%pair_in(:, i))
          if (self%contact%linear_state(i) == pair_mixed) then
             call dgemv('T', n, n, 1.0_wp, self%contact%jacobian(1, 1, i), n, self%pair_in(1, i), &
                1, &
@@ -365,35 +359,31 @@ contains
    end subroutine contact_product
 
    !> Derivative of the prediction of a pair: eps B v - B A v, or k B v.
-   subroutine gather_inputs(self, pair, n_rows, vector, spread_out, inputs)
+   subroutine gather_inputs(self, pair, map, n_mapped, vector, inputs)
       type(hbm_system), intent(in) :: self
-      integer, intent(in) :: pair, n_rows
-      real(wp), intent(in) :: vector(n_rows, *)
-      logical, intent(in) :: spread_out
+      integer, intent(in) :: pair
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      real(wp), intent(in) :: vector(n_mapped, *)
       real(wp), intent(out) :: inputs(self%fourier%n_coefficients, 3)
-      integer :: c, e, row, nc, place
+      integer :: c, row, place
 
-      nc = self%fourier%n_coefficients
-      inputs = 0.0_wp
-      associate (r => self%joint%relative)
-         do c = 1, 3
-            row = self%joint%row(c, pair)
-            if (row == 0) cycle
-            do e = r%first(row), r%first(row + 1) - 1
-               place = merge(r%coordinate(e), self%place(r%coordinate(e)), spread_out)
-               if (place == 0 .or. place > n_rows) cycle
-               inputs(:, c) = inputs(:, c) + self%stiffness(pair, &
-                  c)*r%coefficient(e)*vector(place, :nc)
-            end do
-            if (.not. self%rigid) cycle
-            if (c < 3 .and. self%velocity_level) then
-               call differentiate_inputs(self, self%contact%linear_state(pair) == pair_stuck, &
-                                         inputs(:, c))
-            end if
-            place = self%place(r%coordinate(r%first(row)))
-            if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
-         end do
-      end associate
+      do c = 1, 3
+         row = self%joint%row(c, pair)
+         if (row == 0) then
+            inputs(:, c) = 0.0_wp
+            cycle
+         end if
+         call self%incidence%gather_row(row, map, n_mapped, self%stiffness(pair, c), vector, &
+                                        inputs(:, c))
+         if (.not. self%rigid) cycle
+         if (c < 3 .and. self%velocity_level) then
+            call differentiate_inputs(self, self%contact%linear_state(pair) == pair_stuck, &
+                                      inputs(:, c))
+         end if
+         place = self%place(self%incidence%coordinate_of(row))
+         if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
+      end do
    end subroutine gather_inputs
 
    !> Derivative by tau in place; the mean of a stuck pair stays, see hold_stuck_means.
@@ -420,24 +410,19 @@ contains
    !> Pairs may share coordinates (penalty), so that this stays in one thread.
    subroutine add_outputs(self)
       type(hbm_system), intent(inout) :: self
-      integer :: i, c, e, row, nc, place
+      integer :: i, c, nc
 
       nc = self%fourier%n_coefficients
-      associate (r => self%joint%relative)
-         do i = 1, self%contact%n_pairs
-            if (self%contact%linear_state(i) == pair_open) cycle
-            do c = 1, 3
-               row = self%joint%row(c, i)
-               if (row == 0) cycle
-               do e = r%first(row), r%first(row + 1) - 1
-                  place = self%place(r%coordinate(e))
-                  if (place == 0 .or. place > self%n_active) cycle
-                  self%active_out(place, :) = self%active_out(place, :) + r%coefficient(e)* &
-                                              self%pair_out((c - 1)*nc + 1:c*nc, i)
-               end do
-            end do
+      do i = 1, self%contact%n_pairs
+         if (self%contact%linear_state(i) == pair_open) cycle
+         do c = 1, 3
+            if (self%joint%row(c, i) == 0) cycle
+            call self%incidence%scatter_row(self%joint%row(c, i), self%place, self%n_active, &
+                                            size(self%active_out, 1), 1.0_wp, &
+                                            self%pair_out((c - 1)*nc + 1:c*nc, i), &
+                                            self%active_out)
          end do
-      end associate
+      end do
    end subroutine add_outputs
 
    !> Column by column: few unknowns, or springs, or a check of the product.

@@ -103,22 +103,15 @@ contains
       integer, intent(in) :: h
       real(wp), intent(in) :: scale
       complex(sp), intent(inout) :: m(:, :)
-      integer :: i, e, f, k
+      integer :: i, k
       complex(wp) :: mean
 
       k = self%fourier%column(h)
-      associate (r => self%joint%relative, row => self%joint%spring_row, place => self%place)
+      associate (row => self%joint%spring_row)
          do i = 1, self%springs%n_springs
             mean = scale*mean_block(self%springs%jacobian(:, :, i), self%fourier%harmonic(h), k, k)
-            do e = r%first(row(i)), r%first(row(i) + 1) - 1
-               do f = r%first(row(i)), r%first(row(i) + 1) - 1
-                  if (max(place(r%coordinate(e)), place(r%coordinate(f))) > self%n_active) cycle
-                  if (min(place(r%coordinate(e)), place(r%coordinate(f))) == 0) cycle
-                  m(place(r%coordinate(e)), place(r%coordinate(f))) = &
-                     m(place(r%coordinate(e)), place(r%coordinate(f))) + &
-                     cmplx(r%coefficient(e)*r%coefficient(f)*mean, kind=sp)
-               end do
-            end do
+            call self%incidence%add_mapped_block(row(i), row(i), h, self%place, self%n_active, &
+                                                 mean, m)
          end do
       end associate
    end subroutine add_mean_springs
@@ -157,7 +150,7 @@ contains
       integer, intent(in) :: h, pair, c_out, c_in
       complex(wp), intent(in) :: mean
       complex(sp), intent(inout) :: m(:, :)
-      integer :: e, f, p_out, p_in, n
+      integer :: p_out, p_in, n
       complex(wp) :: factor
 
       ! d/dtau is a factor i n of the complex coefficient uc - i us.
@@ -165,23 +158,17 @@ contains
       factor = one
       if (self%velocity_level .and. c_in < 3) factor = cmplx(0.0_wp, n, wp)
       if (n == 0 .and. self%contact%linear_state(pair) == pair_stuck) factor = one
-      associate (r => self%joint%relative, row => self%joint%row, na => self%n_active)
-         do e = r%first(row(c_out, pair)), r%first(row(c_out, pair) + 1) - 1
-            p_out = self%place(r%coordinate(e))
-            if (p_out == 0 .or. p_out > na) cycle
-            do f = r%first(row(c_in, pair)), r%first(row(c_in, pair) + 1) - 1
-               p_in = self%place(r%coordinate(f))
-               if (p_in == 0) cycle
-               if (self%rigid) then
-                  m(p_out, :na) = cmplx(m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h), &
-                                        kind=sp)
-               end if
-               if (p_in > na) cycle
-               m(p_out, p_in) = m(p_out, p_in) + &
-                                cmplx(r%coefficient(e)*r%coefficient(f)* &
-                                      self%stiffness(pair, c_in)*factor*mean, kind=sp)
-            end do
-         end do
+      associate (row => self%joint%row, na => self%n_active)
+         if (self%rigid) then
+            p_out = self%place(self%coordinate_of(c_out, pair))
+            p_in = self%place(self%coordinate_of(c_in, pair))
+            if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then
+               m(p_out, :na) = cmplx(m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h), &
+                                     kind=sp)
+            end if
+         end if
+         call self%incidence%add_mapped_block(row(c_out, pair), row(c_in, pair), h, self%place, &
+                                              na, self%stiffness(pair, c_in)*factor*mean, m)
       end associate
    end subroutine add_rows
 

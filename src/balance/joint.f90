@@ -22,6 +22,8 @@ module fw_joint
       type(relative_type) :: relative
       !> Row of each component of each pair, 0 where it is absent or can never move (3, n_pairs).
       integer, allocatable :: row(:, :)
+      !> The same in the order of forces: all first components, then the others (3 n_pairs).
+      integer, allocatable :: pair_rows(:)
       !> Row of each spring (n_springs).
       integer, allocatable :: spring_row(:)
       !> Components that nothing ever moves (3, n_pairs), and how many of them were dropped.
@@ -65,6 +67,7 @@ contains
             side_2 = [side_2, contact%side_2(c, i)]
          end do
       end do
+      self%pair_rows = reshape(transpose(self%row), [3*contact%n_pairs])
       self%spring_row = [(n_rows + i, i=1, springs%n_springs)]
       if (springs%n_springs > 0) then
          side_1 = [side_1, springs%side_1]

@@ -127,27 +127,19 @@ contains
       integer, intent(in) :: m
       real(wp), intent(in) :: q(m, *)
       type(point_type), intent(inout) :: point
-      real(wp) :: u_c, u_s
-      integer :: i, c, e, h, k, row
+      real(wp) :: u(system%contact%n_pairs, 3, system%fourier%n_coefficients)
+      integer :: i, h, k
 
       allocate (point%dissipation(system%contact%n_pairs), source=0.0_wp)
-      associate (r => system%joint%relative, f => system%contact%force)
-         do i = 1, system%contact%n_pairs
-            do c = 1, 3
-               row = system%joint%row(c, i)
-               if (row == 0) cycle
-               do h = 1, system%fourier%n_retained
-                  if (system%fourier%harmonic(h) == 0) cycle
-                  k = system%fourier%column(h)
-                  u_c = 0.0_wp
-                  u_s = 0.0_wp
-                  do e = r%first(row), r%first(row + 1) - 1
-                     u_c = u_c + r%coefficient(e)*q(r%coordinate(e), k)
-                     u_s = u_s + r%coefficient(e)*q(r%coordinate(e), k + 1)
-                  end do
-                  point%dissipation(i) = point%dissipation(i) + pi*system%fourier%harmonic(h)* &
-                                         (f(i, c, k)*u_s - f(i, c, k + 1)*u_c)
-               end do
+      call system%incidence%gather(system%joint%pair_rows, m, system%fourier%n_coefficients, &
+                                   q, u)
+      associate (f => system%contact%force)
+         do h = 1, system%fourier%n_retained
+            if (system%fourier%harmonic(h) == 0) cycle
+            k = system%fourier%column(h)
+            do i = 1, system%contact%n_pairs
+               point%dissipation(i) = point%dissipation(i) + pi*system%fourier%harmonic(h)* &
+                                      sum(f(i, :, k)*u(i, :, k + 1) - f(i, :, k + 1)*u(i, :, k))
             end do
          end do
       end associate
@@ -162,27 +154,17 @@ contains
       type(point_type), intent(inout) :: point
       type(fourier_type) :: all_harmonics
       real(wp), allocatable :: slip(:, :), slip_time(:, :)
-      integer :: c, e, i, k, n_pairs, n_time, row
+      integer :: k, n_pairs, n_time
 
       n_pairs = system%contact%n_pairs
       n_time = system%fourier%n_time
       all_harmonics = new_fourier(n_harmonics, n_time)
       point%history = matmul(transpose(all_harmonics%synthesis), point%coefficients)
       if (n_pairs == 0) return
-      allocate (slip(3*n_pairs, system%fourier%n_coefficients), source=0.0_wp)
+      allocate (slip(3*n_pairs, system%fourier%n_coefficients))
       allocate (slip_time(3*n_pairs, n_time))
-      associate (r => system%joint%relative)
-         do i = 1, n_pairs
-            do c = 1, 3
-               row = system%joint%row(c, i)
-               if (row == 0) cycle
-               do e = r%first(row), r%first(row + 1) - 1
-                  slip(3*(i - 1) + c, :) = slip(3*(i - 1) + c, :) + &
-                     r%coefficient(e)*q(r%coordinate(e), :system%fourier%n_coefficients)
-               end do
-            end do
-         end do
-      end associate
+      call system%incidence%gather(reshape(system%joint%row, [3*n_pairs]), m, &
+                                   system%fourier%n_coefficients, q, slip)
       slip_time = matmul(slip, system%fourier%synthesis)
       point%slip_history = reshape(slip_time, [3, n_pairs, n_time])
       call system%contact%sample()

@@ -9,6 +9,8 @@
 !> mixed units do not decide what counts as massless.
 module fw_stability_basis
    use fw_error, only: error_type
+   use fw_incidence, only: incidence_type
+   use fw_incidence, only: new_incidence
    use fw_kinds, only: wp
    use fw_linalg, only: diagonalize
    use fw_linalg, only: lu_type
@@ -155,7 +157,8 @@ contains
       real(wp), allocatable, intent(out) :: rows(:, :)
       type(lu_type) :: lu
       real(wp), allocatable :: weights(:)
-      integer :: row, e, m, j
+      type(incidence_type) :: incidence
+      integer :: row, m
       logical :: singular
 
       m = relative%n_coordinates
@@ -166,12 +169,9 @@ contains
       ! The elimination that made c has scaled its pivots to one: it is never singular.
       call lu%factor(singular)
       allocate (weights(m))
+      call new_incidence(relative, m, incidence)
       do row = 1, relative%n_rows
-         weights = 0.0_wp
-         do e = relative%first(row), relative%first(row + 1) - 1
-            j = relative%coordinate(e)
-            weights(j) = weights(j) + relative%coefficient(e)
-         end do
+         call incidence%weights_of(row, weights)
          call lu%solve(weights)
          rows(relative%pivot, row) = weights
          rows(relative%free, row) = matmul(weights, relative%r)

@@ -68,24 +68,18 @@ contains
       integer, intent(in) :: m, n_harmonics
       real(wp), intent(in) :: q(m, *)
       real(wp), allocatable, intent(out) :: rows(:, :)
-      integer :: row, e, h, n, column
+      real(wp) :: u(system%fourier%n_coefficients)
+      integer :: row, h, n, k
 
-      associate (r => system%joint%relative, f => system%fourier)
-         allocate (rows(coefficient_count(n_harmonics), r%n_rows), source=0.0_wp)
-         do row = 1, r%n_rows
-            do e = r%first(row), r%first(row + 1) - 1
-               do h = 1, f%n_retained
-                  n = f%harmonic(h)
-                  column = f%column(h)
-                  associate (weight => r%coefficient(e), j => r%coordinate(e))
-                     if (n == 0) then
-                        rows(1, row) = rows(1, row) + weight*q(j, column)
-                     else
-                        rows(2*n:2*n + 1, row) = rows(2*n:2*n + 1, row) + &
-                                                 weight*q(j, column:column + 1)
-                     end if
-                  end associate
-               end do
+      associate (b => system%incidence, f => system%fourier)
+         allocate (rows(coefficient_count(n_harmonics), b%n_rows), source=0.0_wp)
+         do row = 1, b%n_rows
+            call b%gather_row(row, b%identity, m, 1.0_wp, q, u)
+            do h = 1, f%n_retained
+               n = f%harmonic(h)
+               k = f%column(h)
+               if (n == 0) rows(1, row) = u(k)
+               if (n > 0) rows(2*n:2*n + 1, row) = u(k:k + 1)
             end do
          end do
       end associate

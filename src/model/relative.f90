@@ -16,9 +16,9 @@ module fw_relative
       !> Rows given, and independent coordinates among them.
       integer :: n_rows = 0
       integer :: n_coordinates = 0
-      !> Row r is sum_e coefficient(e) q(coordinate(e)), e = first(r) .. first(r+1)-1.
-      integer, allocatable :: first(:), coordinate(:)
-      real(wp), allocatable :: coefficient(:)
+      !> Row r is sum_e row_weight(e) q(row_coordinate(e)), e = row_start(r) .. row_start(r+1)-1.
+      integer, allocatable :: row_start(:), row_coordinate(:)
+      real(wp), allocatable :: row_weight(:)
       !> Dofs that are eliminated (n_coordinates) and the others.
       integer, allocatable :: pivot(:), free(:)
       !> u(pivot) = c q - r eta  (n_coordinates, n_coordinates) and (n_coordinates, n_free).
@@ -47,10 +47,10 @@ contains
       most = min(n_rows, n_dof) ! rows that can be independent
       allocate (echelon(most, n_dof), source=0.0_wp)
       allocate (self%c(most, most), source=0.0_wp)
-      allocate (self%pivot(most), self%first(n_rows + 1), row(n_dof), combination(most))
-      allocate (self%coordinate(0), self%coefficient(0), self%independent(n_rows))
+      allocate (self%pivot(most), self%row_start(n_rows + 1), row(n_dof), combination(most))
+      allocate (self%row_coordinate(0), self%row_weight(0), self%independent(n_rows))
       m = 0
-      self%first(1) = 1
+      self%row_start(1) = 1
       do r = 1, n_rows
          row = 0.0_wp
          call add_side(row, side_1(r), 1.0_wp)
@@ -59,12 +59,12 @@ contains
          self%independent(r) = maxval(abs(row)) > negligible
          if (self%independent(r)) then
             call append(self, m, echelon, row, combination)
-            self%coordinate = [self%coordinate, m]
-            self%coefficient = [self%coefficient, 1.0_wp]
+            self%row_coordinate = [self%row_coordinate, m]
+            self%row_weight = [self%row_weight, 1.0_wp]
          else
             call express(self, m, combination)
          end if
-         self%first(r + 1) = size(self%coordinate) + 1
+         self%row_start(r + 1) = size(self%row_coordinate) + 1
       end do
       call finish(self, m, echelon)
    end subroutine new_relative
@@ -135,8 +135,8 @@ contains
       do j = 1, m
          weight = dot_product(combination(:m), self%c(:m, j))
          if (abs(weight) <= negligible) cycle
-         self%coordinate = [self%coordinate, j]
-         self%coefficient = [self%coefficient, weight]
+         self%row_coordinate = [self%row_coordinate, j]
+         self%row_weight = [self%row_weight, weight]
       end do
    end subroutine express
 

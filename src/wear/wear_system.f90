@@ -229,22 +229,19 @@ contains
    subroutine settle_depths(self, r)
       type(wear_system), intent(inout) :: self
       real(wp), intent(in) :: r(:)
-      integer :: i, e, row, n
+      integer :: i, m, n, row
 
+      m = self%structure%n_coordinates
       n = self%n_vibration()
       self%adjusted = r(:n)
       if (.not. self%fourier%has_constant()) return
-      associate (rel => self%joint%relative)
-         do i = 1, self%contact%n_pairs
-            row = self%joint%row(3, i)
-            if (row == 0 .or. self%contact%linear_state(i) /= pair_stuck) cycle
-            do e = rel%first(row), rel%first(row + 1) - 1
-               associate (entry => self%adjusted(rel%coordinate(e)))
-                  entry = entry - rel%coefficient(e)*self%stiffness(i, 3)/self%weight(i)*r(n + i)
-               end associate
-            end do
-         end do
-      end associate
+      do i = 1, self%contact%n_pairs
+         row = self%joint%row(3, i)
+         if (row == 0 .or. self%contact%linear_state(i) /= pair_stuck) cycle
+         call self%incidence%scatter_row(row, self%incidence%identity, m, m, &
+                                         -self%stiffness(i, 3)/self%weight(i), r(n + i:n + i), &
+                                         self%adjusted)
+      end do
    end subroutine settle_depths
 
    subroutine expand(self, r, solution, step)
@@ -296,26 +293,17 @@ contains
       integer, intent(in) :: pair
       real(wp), intent(in) :: depth
       real(wp), intent(inout) :: product(:)
-      integer :: c, e, k, nc, place, row
+      integer :: c, nc
 
       if (self%joint%row(3, pair) == 0) return
       nc = self%fourier%n_coefficients
-      associate (rel => self%joint%relative)
-         do c = 1, 3
-            row = self%joint%row(c, pair)
-            if (row == 0) cycle
-            do e = rel%first(row), rel%first(row + 1) - 1
-               place = self%place(rel%coordinate(e))
-               if (place == 0 .or. place > self%n_active) cycle
-               do k = 1, nc
-                  associate (entry => product((k - 1)*self%n_active + place))
-                     entry = entry + rel%coefficient(e)*self%stiffness(pair, 3)*depth* &
-                             self%contact%jacobian(2*nc + 1, (c - 1)*nc + k, pair)
-                  end associate
-               end do
-            end do
-         end do
-      end associate
+      do c = 1, 3
+         if (self%joint%row(c, pair) == 0) cycle
+         call self%incidence%scatter_row( &
+            self%joint%row(c, pair), self%place, self%n_active, self%n_active, &
+            self%stiffness(pair, 3)*depth, &
+            self%contact%jacobian(2*nc + 1, (c - 1)*nc + 1:c*nc, pair), product)
+      end do
    end subroutine add_depth_column
 
    subroutine build_preconditioner(self)
@@ -395,39 +383,33 @@ contains
       complex(wp), intent(in) :: z(:, :)
       real(wp), intent(inout) :: rows(:, :)
       complex(wp) :: input(n_right), turn
-      integer :: c, e, i, j, k, n, nc, place, row
+      integer :: c, i, j, k, n, nc, place, row
 
       nc = self%fourier%n_coefficients
       n = self%fourier%harmonic(h)
       if (self%rigid) call zgemm('N', 'N', self%n_used, n_right, self%n_active, one, &
                                  self%active_stiffness(1, 1, h), size(self%active_stiffness, 1), &
                                  z, size(z, 1), zero, self%product, size(self%product, 1))
-      associate (rel => self%joint%relative)
-         do j = 1, self%n_wearing
-            i = self%wearing(j)
-            do c = 1, 3
-               row = self%joint%row(c, i)
-               if (row == 0) cycle
-               ! d/dtau is a factor i n of the complex coefficient.
-               turn = one
-               if (self%velocity_level .and. c < 3) turn = cmplx(0.0_wp, n, wp)
-               input = zero
-               do e = rel%first(row), rel%first(row + 1) - 1
-                  place = self%place(rel%coordinate(e))
-                  if (place == 0 .or. place > self%n_active) cycle
-                  input = input + turn*self%stiffness(i, c)*rel%coefficient(e)*z(place, :n_right)
-               end do
-               place = self%place(rel%coordinate(rel%first(row)))
-               if (self%rigid .and. place > 0) input = input - self%product(place, :n_right)
-               k = (c - 1)*nc + self%fourier%column(h)
-               associate (g => self%contact%slip_derivative(:, i), &
-                          scale => self%weight(i)*self%cycles*self%factor(i))
-                  rows(j, :n_right) = rows(j, :n_right) + scale*g(k)*real(input, wp)
-                  if (n > 0) rows(j, :n_right) = rows(j, :n_right) - scale*g(k + 1)*aimag(input)
-               end associate
-            end do
+      do j = 1, self%n_wearing
+         i = self%wearing(j)
+         do c = 1, 3
+            row = self%joint%row(c, i)
+            if (row == 0) cycle
+            ! d/dtau is a factor i n of the complex coefficient.
+            turn = one
+            if (self%velocity_level .and. c < 3) turn = cmplx(0.0_wp, n, wp)
+            call self%incidence%gather_harmonic(row, h, self%place, self%n_active, &
+                                                turn*self%stiffness(i, c), z, input)
+            place = self%place(self%incidence%coordinate_of(row))
+            if (self%rigid .and. place > 0) input = input - self%product(place, :n_right)
+            k = (c - 1)*nc + self%fourier%column(h)
+            associate (g => self%contact%slip_derivative(:, i), &
+                       scale => self%weight(i)*self%cycles*self%factor(i))
+               rows(j, :n_right) = rows(j, :n_right) + scale*g(k)*real(input, wp)
+               if (n > 0) rows(j, :n_right) = rows(j, :n_right) - scale*g(k + 1)*aimag(input)
+            end associate
          end do
-      end associate
+      end do
    end subroutine subtract_rows
 
    subroutine precondition(self, vector)

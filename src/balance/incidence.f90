@@ -1,0 +1,244 @@
+!> Relative displacements of pairs and springs from coordinates, and their forces back:
+!>
+!>   u_r = B q,     r <- r + B^T f,     Z <- Z + B^T k B.
+!>
+!> The only loops over B are here. A row of B has few entries, one where the row itself is a
+!> coordinate. Every procedure takes all coefficients of a row at once, or says which harmonic is
+!> meant: weights that differ from harmonic to harmonic and are complex (sectors of a cyclic
+!> structure) need no other calls. Vectors are (coordinate, coefficient).
+!>
+!> Vectors of some of the coordinates come with a map (n_coordinates): the place of each coordinate
+!> in the vector. Places 0 and those beyond the vector do not count. `identity` is the map of all.
+module fw_incidence
+   use fw_kinds, only: sp
+   use fw_kinds, only: wp
+   use fw_relative, only: relative_type
+   implicit none (type, external)
+   private
+
+   public :: incidence_type, new_incidence
+
+   type :: incidence_type
+      integer :: n_rows = 0
+      integer, allocatable :: identity(:)
+      !> Row r is sum_e weight(e) q(coordinate(e)), e = first(r) .. first(r+1)-1.
+      integer, allocatable, private :: first(:), coordinate(:)
+      real(wp), allocatable, private :: weight(:)
+   contains
+      procedure :: coordinate_of
+      procedure :: weights_of
+      procedure :: gather
+      procedure :: scatter
+      procedure :: gather_row
+      procedure :: scatter_row
+      procedure :: gather_harmonic
+      procedure :: scatter_harmonic
+      procedure :: add_block
+      procedure :: add_mapped_block
+   end type incidence_type
+
+contains
+
+   !> The rows of relative coordinates, in a vector of n_coordinates: these are the first of them.
+   pure subroutine new_incidence(relative, n_coordinates, self)
+      type(relative_type), intent(in) :: relative
+      integer, intent(in) :: n_coordinates
+      type(incidence_type), intent(out) :: self
+      integer :: j
+
+      self%n_rows = relative%n_rows
+      self%first = relative%row_start
+      self%coordinate = relative%row_coordinate
+      self%weight = relative%row_weight
+      self%identity = [(j, j=1, n_coordinates)]
+   end subroutine new_incidence
+
+   !> The coordinate that a row is; of a row that depends on others, the first of its coordinates.
+   pure integer function coordinate_of(self, row) result(coordinate)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row
+
+      coordinate = self%coordinate(self%first(row))
+   end function coordinate_of
+
+   !> A row of B in full.
+   pure subroutine weights_of(self, row, weights)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row
+      real(wp), intent(out) :: weights(:)
+      integer :: e
+
+      weights = 0.0_wp
+      do e = self%first(row), self%first(row + 1) - 1
+         weights(self%coordinate(e)) = weights(self%coordinate(e)) + self%weight(e)
+      end do
+   end subroutine weights_of
+
+   !> values = B q for rows in the order given; 0 where a row is 0.
+   pure subroutine gather(self, rows, n_coordinates, n_columns, q, values)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: rows(:)
+      integer, intent(in) :: n_coordinates, n_columns
+      real(wp), intent(in) :: q(n_coordinates, n_columns)
+      real(wp), intent(out) :: values(size(rows), n_columns)
+      integer :: i, e, k
+
+      do k = 1, n_columns
+         do i = 1, size(rows)
+            values(i, k) = 0.0_wp
+            if (rows(i) == 0) cycle
+            do e = self%first(rows(i)), self%first(rows(i) + 1) - 1
+               values(i, k) = values(i, k) + self%weight(e)*q(self%coordinate(e), k)
+            end do
+         end do
+      end do
+   end subroutine gather
+
+   !> q = q + factor B^T values.
+   pure subroutine scatter(self, rows, n_coordinates, n_columns, factor, values, q)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: rows(:)
+      integer, intent(in) :: n_coordinates, n_columns
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: values(size(rows), n_columns)
+      real(wp), intent(inout) :: q(n_coordinates, n_columns)
+      integer :: i, e, k
+
+      do k = 1, n_columns
+         do i = 1, size(rows)
+            if (rows(i) == 0) cycle
+            do e = self%first(rows(i)), self%first(rows(i) + 1) - 1
+               q(self%coordinate(e), k) = q(self%coordinate(e), k) + &
+                                          factor*self%weight(e)*values(i, k)
+            end do
+         end do
+      end do
+   end subroutine scatter
+
+   !> values = factor B q for one row and the first size(values) coefficients.
+   pure subroutine gather_row(self, row, map, n_mapped, factor, q, values)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: q(n_mapped, *)
+      real(wp), intent(out) :: values(:)
+      integer :: e, k, place
+
+      values = 0.0_wp
+      do e = self%first(row), self%first(row + 1) - 1
+         place = map(self%coordinate(e))
+         if (place == 0 .or. place > n_mapped) cycle
+         do k = 1, size(values)
+            values(k) = values(k) + factor*self%weight(e)*q(place, k)
+         end do
+      end do
+   end subroutine gather_row
+
+   !> q = q + factor B^T values for one row and the first size(values) coefficients. Memory of q
+   !> may have more rows (n_stored) than there are places.
+   pure subroutine scatter_row(self, row, map, n_mapped, n_stored, factor, values, q)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped, n_stored
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: values(:)
+      real(wp), intent(inout) :: q(n_stored, *)
+      integer :: e, k, place
+
+      do e = self%first(row), self%first(row + 1) - 1
+         place = map(self%coordinate(e))
+         if (place == 0 .or. place > n_mapped) cycle
+         do k = 1, size(values)
+            q(place, k) = q(place, k) + factor*self%weight(e)*values(k)
+         end do
+      end do
+   end subroutine scatter_row
+
+   !> values = factor B_n q for one row, complex amplitudes of harmonic h in columns.
+   pure subroutine gather_harmonic(self, row, h, map, n_mapped, factor, q, values)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row, h
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      complex(wp), intent(in) :: factor
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp), intent(out) :: values(:)
+      integer :: e, place
+
+      values = (0.0_wp, 0.0_wp)
+      do e = self%first(row), self%first(row + 1) - 1
+         place = map(self%coordinate(e))
+         if (place == 0 .or. place > n_mapped) cycle
+         values = values + factor*harmonic_weight(self, e, h)*q(place, :size(values))
+      end do
+   end subroutine gather_harmonic
+
+   !> q = q + B_n^H value for one row, complex amplitudes of harmonic h.
+   pure subroutine scatter_harmonic(self, row, h, value, q)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row, h
+      complex(wp), intent(in) :: value
+      complex(wp), intent(inout) :: q(:)
+      integer :: e
+
+      do e = self%first(row), self%first(row + 1) - 1
+         q(self%coordinate(e)) = q(self%coordinate(e)) + &
+                                 conjg(harmonic_weight(self, e, h))*value
+      end do
+   end subroutine scatter_harmonic
+
+   !> matrix = matrix + B_n^H k B_n for one row and harmonic h.
+   pure subroutine add_block(self, row, h, stiffness, matrix)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row, h
+      real(wp), intent(in) :: stiffness
+      complex(wp), intent(inout) :: matrix(:, :)
+      integer :: e, f
+
+      do f = self%first(row), self%first(row + 1) - 1
+         do e = self%first(row), self%first(row + 1) - 1
+            associate (entry => matrix(self%coordinate(e), self%coordinate(f)))
+               entry = entry + conjg(harmonic_weight(self, e, h))*harmonic_weight(self, f, h)* &
+                       stiffness
+            end associate
+         end do
+      end do
+   end subroutine add_block
+
+   !> matrix = matrix + B_n^H k B_n with the rows of an output and of an input, both mapped.
+   pure subroutine add_mapped_block(self, row_out, row_in, h, map, n_mapped, stiffness, matrix)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row_out, row_in, h
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      complex(wp), intent(in) :: stiffness
+      complex(sp), intent(inout) :: matrix(:, :)
+      integer :: e, f, i, j
+
+      do f = self%first(row_in), self%first(row_in + 1) - 1
+         j = map(self%coordinate(f))
+         if (j == 0 .or. j > n_mapped) cycle
+         do e = self%first(row_out), self%first(row_out + 1) - 1
+            i = map(self%coordinate(e))
+            if (i == 0 .or. i > n_mapped) cycle
+            matrix(i, j) = matrix(i, j) + cmplx(conjg(harmonic_weight(self, e, h))* &
+                                                harmonic_weight(self, f, h)*stiffness, kind=sp)
+         end do
+      end do
+   end subroutine add_mapped_block
+
+   !> Weight of an entry in a harmonic: the same real one in all, as long as nothing turns from
+   !> harmonic to harmonic.
+   pure complex(wp) function harmonic_weight(self, e, h) result(weight)
+      type(incidence_type), intent(in) :: self
+      integer, intent(in) :: e, h
+
+      associate (unused => h)
+      end associate
+      weight = cmplx(self%weight(e), kind=wp)
+   end function harmonic_weight
+
+end module fw_incidence
