@@ -127,7 +127,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
 /* Results of a point (from 0; -1 is the last one) by the name of their dataset in a result file,
    in its layout: the last index runs fastest. fw_size says how many values there are; fw_get
    copies them to a buffer with room for n, and leaves one that is too small as it is.
-   1: "omega", "converged", "iterations", "residual", "seconds", "fold"
+   1: "omega", "converged", "iterations", "residual", "seconds", "served_by", "fold"; with
+   accuracy or adaptive "harmonics", "instants", "error_estimate"
    (2H+1, n_observed):    "coefficients", in the order (0, c1, s1, c2, s2, ...)
    (n_observed):          "amplitude", largest magnitude over the period
    (2H+1, n_pairs, 3):    "contact/force", components (t1, t2, n)
@@ -135,7 +136,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    (n_pairs):             "contact/dissipation", energy per cycle
    "history/observed", "history/force", "history/relative_displacement",
    "floquet/multipliers", "floquet/stable": where the case asks for them.
-   "wear/cycles" (1), "wear/depth" and "wear/rate" (n_pairs): of the steps of a wear run. */
+   "wear/cycles" (1), "wear/depth", "wear/rate" and "wear/energy" (n_pairs), "wear/volume"
+   (n_patches): of the steps of a wear run. */
 int fw_size(fw_handle handle, const char *name, int point, size_t *n);
 int fw_get(fw_handle handle, const char *name, int point, size_t n, double *values);
 

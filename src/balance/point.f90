@@ -56,6 +56,9 @@ module fw_point
       !> Of a step of wear: cycles so far, depth [length] and depth per cycle (n_pairs).
       real(wp) :: cycles = 0.0_wp
       real(wp), allocatable :: depth(:), wear_rate(:)
+      !> Friction energy that the worn depth stands for (n_pairs) [force * length], and the worn
+      !> volume of every patch (n_patches) [length**3].
+      real(wp), allocatable :: wear_energy(:), wear_volume(:)
       !> Observed quantities over one period, only when asked for (n_time, n_observed).
       real(wp), allocatable :: history(:, :)
       !> Contact forces and relative displacements over one period, only when asked for

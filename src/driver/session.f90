@@ -332,7 +332,7 @@ contains
                     write_file=self%case%output%names_file)
    end subroutine run
 
-   !> Values of a point by the name of their dataset in a result file; see fw_point_values.
+   !> Values of a point by the name of their dataset in a result file; see fw_point_quantities.
    subroutine get(self, name, index, values, error)
       class(session_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -348,8 +348,7 @@ contains
          call fatal_error(error, 'point '//to_text(index)//': there are '// &
                           to_text(self%points%n)//' points', status_usage)
       else
-         call get_point_values(self%points%item(k)%point, name, &
-                               self%case%harmonics%n_harmonics, values, error)
+         call get_point_values(self%points%item(k)%point, name, self%case, values, error)
       end if
    end subroutine get
 

@@ -8,6 +8,7 @@ module fw_wear_response
    use fw_hbm, only: hbm_system
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
+   use fw_patches, only: patch_volumes
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
@@ -26,7 +27,9 @@ module fw_wear_response
    use fw_wear_march, only: wear_observer
    use fw_wear_options, only: wear_energy
    use fw_wear_options, only: wear_pseudo_time
-   use fw_wear_rows, only: wear_row_set
+   use fw_wear_rows, only: start_wear
+   use fw_wear_rows, only: state_halved
+   use fw_wear_rows, only: state_outcome
    use fw_wear_step, only: new_wear_stepper
    use fw_wear_step, only: wear_state
    use fw_wear_system, only: new_wear_system
@@ -52,7 +55,6 @@ module fw_wear_response
       class(observer_type), pointer :: observer => null()
       type(result_writer), pointer :: writer => null()
       type(summary_type), pointer :: summary => null()
-      type(wear_row_set) :: rows
       type(restart_row_set) :: restart_rows
       integer :: n_rows = 0
       integer(int64) :: clock = 0_int64
@@ -108,7 +110,6 @@ contains
          call compare_halved(run%recorder, run%system, run%march, run%first, run%first_omega, &
                               run%state, error)
       end if
-      call run%recorder%rows%close()
       call run%recorder%restart_rows%close()
    end subroutine run_wear
 
@@ -126,9 +127,8 @@ contains
       recorder%writer => writer
       recorder%summary => summary
       call system_clock(recorder%clock)
-      call recorder%rows%create(writer%file, case%contact, case%model%unit_system, &
-                                cycles_units(case), error)
-      if (.not. allocated(error)) call recorder%rows%state_outcome(writer%file, &
+      call start_wear(writer%file, case%contact, cycles_units(case), error)
+      if (.not. allocated(error)) call state_outcome(writer%file, &
          steady_words(steady_not_reached), 'incomplete', error)
    end subroutine start_recorder
 
@@ -213,8 +213,8 @@ contains
                                     march%n_rejected, run%state%cycles, &
                                     depth_of(run%system, run%state))
          if (restart%n_rows > 0) call summary%note_restart(restart%n_rows, restart%path)
-         call recorder%rows%state_outcome(recorder%writer%file, &
-                                          trim(steady_words(march%steady)), march%ending, error)
+         call state_outcome(recorder%writer%file, trim(steady_words(march%steady)), &
+                            march%ending, error)
       end associate
    end subroutine report_end
 
@@ -257,7 +257,6 @@ contains
       call source%open_read(restart%path, error)
       !$omp end critical (fretwear_io)
       associate (file => recorder%writer%file, n => restart%n_rows)
-         if (.not. allocated(error)) call recorder%rows%copy(file, source, n, error)
          if (.not. allocated(error)) call recorder%restart_rows%copy(file, source, n, error)
          if (.not. allocated(error)) call recorder%writer%copy_points(source, n, error)
       end associate
@@ -308,8 +307,8 @@ contains
       change = maxval(abs(end_state%x(n + 1:) - state%x(n + 1:)))
       if (change > 0.0_wp) change = change/max(maxval(state%x(n + 1:)), tiny(1.0_wp))
       call recorder%summary%note_profile_change(change, halved%n_steps)
-      call recorder%rows%state_halved(recorder%writer%file, end_state%x(n + 1:), change, &
-                                      recorder%case%model%unit_system, error)
+      call state_halved(recorder%writer%file, end_state%x(n + 1:), change, &
+                        recorder%case%model%unit_system, error)
    end subroutine compare_halved
 
    subroutine pass_by(self, march, system, state, iterations, go_on, error)
@@ -393,6 +392,8 @@ contains
       point%cycles = state%cycles
       point%depth = state%x(n + 1:)
       point%wear_rate = state%rate
+      point%wear_energy = friction_energy(self%case, point%depth)
+      point%wear_volume = patch_volumes(self%case%contact, point%depth)
       point%iterations = iterations
       point%residual = state%residual
       point%converged = is_lasting(system%hbm_system)
@@ -406,10 +407,7 @@ contains
       call system_clock(clock, rate)
       point%seconds = real(clock - self%clock, wp)/real(rate, wp)
       self%clock = clock
-      call self%rows%append(self%writer%file, state%cycles, state%x(n + 1:), state%rate, &
-                            friction_energy(self%case, state%x(n + 1:)), error)
-      if (.not. allocated(error)) call self%restart_rows%append(self%writer%file, march, &
-                                                   state%x(:n), point%converged, error)
+      call self%restart_rows%append(self%writer%file, march, state%x(:n), point%converged, error)
       if (allocated(error)) return
       call self%writer%add_point(point, error)
       if (allocated(error)) return

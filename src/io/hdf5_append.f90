@@ -76,7 +76,9 @@ module fw_hdf5_append
          append_integer, append_logical
       procedure, private :: append_real_0, append_real_1, append_real_2, append_real_3
       procedure, private :: append_integer, append_logical
-      procedure, private :: append_flat, append_raw, grow
+      !> One row of reals whose elements follow one another.
+      procedure :: append_flat
+      procedure, private :: append_raw, grow
    end type growing_dataset
 
 contains
@@ -265,6 +267,7 @@ contains
    subroutine append_flat(self, file, dims, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
+      !> Shape of the row.
       integer, intent(in) :: dims(:)
       real(wp), intent(in), target :: values(product(dims))
       type(error_type), allocatable, intent(out) :: error

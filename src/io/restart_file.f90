@@ -26,8 +26,11 @@ module fw_restart_file
    use fw_restart_rows, only: n_controls
    use fw_restart_rows, only: pair_constants
    use fw_restart_rows, only: pair_keys
+   use fw_result_rows, only: row_names
    use fw_result_target, only: is_result
+   use fw_text, only: string_type
    use fw_text, only: to_text
+   use fw_text_list, only: append
    use fw_values, only: number_text
    use fw_wear_march, only: wear_march
    use fw_wear_step, only: wear_state
@@ -43,10 +46,8 @@ module fw_restart_file
       'model%file', 'contact%worn', 'contact%worn_step', 'wear%n_cycles', 'wear%max_steps', &
       'wear%check_steps', 'output%file']
 
-   !> The datasets that grow by a row a step; a killed run may have some a row longer than others.
-   character(*), parameter :: row_names(*) = [character(29) :: '/omega', '/coefficients', &
-      '/amplitude', '/converged', '/iterations', '/residual', '/seconds', '/wear/cycles', &
-      '/wear/depth', '/wear/rate', '/wear/energy', '/wear/volume', '/restart/vibration', &
+   !> The datasets of a step besides those of every point.
+   character(*), parameter :: own_names(*) = [character(21) :: '/restart/vibration', &
       '/restart/checked_rate', '/restart/control']
 
    !> Model matrices and loads count as the same where they give the same first vibration, within
@@ -100,7 +101,7 @@ contains
       call file%open_read(path, error)
       if (.not. allocated(error)) call check_kind(file, error)
       if (.not. allocated(error)) call check_case(file, case, error)
-      if (.not. allocated(error)) call count_rows(file, self%n_rows, error)
+      if (.not. allocated(error)) call count_rows(file, case, self%n_rows, error)
       if (.not. allocated(error)) call read_rows(file, case%contact%n_pairs, self, error)
       call file%close(ignored)
       !$omp end critical (fretwear_io)
@@ -159,17 +160,25 @@ contains
       end do
    end subroutine check_case
 
-   !> Steps that every dataset holds.
-   subroutine count_rows(file, n_rows, error)
+   !> Steps that every dataset holds: a killed run may have left some a row longer than others.
+   subroutine count_rows(file, case, n_rows, error)
       type(hdf5_file), intent(in) :: file
+      type(case_type), intent(in) :: case
       integer, intent(out) :: n_rows
       type(error_type), allocatable, intent(out) :: error
+      type(string_type), allocatable :: names(:)
       integer(hsize_t), allocatable :: dims(:)
       integer :: i
 
       n_rows = huge(1)
-      do i = 1, size(row_names)
-         call get_shape(file, trim(row_names(i)), dims, error)
+      call row_names(case, names)
+      do i = 1, size(own_names)
+         call append(names, trim(own_names(i)))
+      end do
+      do i = 1, size(names)
+         ! An earlier version may have known fewer quantities.
+         if (.not. file%exists(names(i)%text)) cycle
+         call get_shape(file, names(i)%text, dims, error)
          if (allocated(error)) return
          n_rows = min(n_rows, int(dims(size(dims))))
       end do

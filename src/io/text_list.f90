@@ -4,7 +4,7 @@ module fw_text_list
    implicit none (type, external)
    private
 
-   public :: append
+   public :: append, words_of
 
 contains
 
@@ -24,5 +24,26 @@ contains
       longer(size(longer))%text = text
       call move_alloc(longer, list)
    end subroutine append
+
+   !> The words of a text, in order.
+   pure function words_of(text, separator) result(words)
+      character(*), intent(in) :: text
+      character, intent(in) :: separator
+      type(string_type), allocatable :: words(:)
+      integer :: first, i, last, n
+
+      n = 1
+      do i = 1, len_trim(text)
+         if (text(i:i) == separator) n = n + 1
+      end do
+      allocate (words(n))
+      first = 1
+      do i = 1, n
+         last = index(text(first:), separator)
+         if (last == 0 .or. i == n) last = len_trim(text) - first + 2
+         words(i)%text = text(first:first + last - 2)
+         first = first + last
+      end do
+   end function words_of
 
 end module fw_text_list

@@ -1,0 +1,454 @@
+!> Every quantity of a solution point, declared once: what it is called, its unit and dimensions,
+!> when a result holds it, and where its numbers are in a point. The rows of the result file, their
+!> labels, what a caller may ask of a point and what a continued run copies all follow from here.
+!>
+!> A new quantity is one line in `point_quantities`, naming the procedure that gives its numbers.
+module fw_point_quantities
+   use fw_case, only: analysis_frf
+   use fw_case, only: analysis_point
+   use fw_case, only: analysis_wear
+   use fw_case, only: case_type
+   use fw_hdf5, only: growing_integer
+   use fw_hdf5, only: growing_logical
+   use fw_hdf5, only: growing_real
+   use fw_kinds, only: wp
+   use fw_patches, only: count_patches
+   use fw_point, only: point_type
+   use fw_point, only: served_words
+   use fw_solver_options, only: continuation_arclength
+   use fw_text, only: string_type
+   use fw_text_list, only: words_of
+   implicit none (type, external)
+   private
+
+   public :: quantity_type, point_quantities, unknown_size
+
+   !> Size of a dimension that only the numbers themselves tell.
+   integer, parameter :: unknown_size = -1
+
+   type :: quantity_type
+      !> Name of the dataset, without the slash in front.
+      character(32) :: name
+      !> Kind of the elements: growing_real, growing_integer or growing_logical.
+      integer :: kind_of = growing_real
+      !> A unit, or the quantity (in angle brackets) whose unit is that of the model.
+      character(16) :: unit
+      !> Names of the dimensions in the order of h5py, separated by blanks. The first is 'point';
+      !> where it is 'step', only points that know the quantity have a row.
+      character(32) :: dimensions
+      character(64) :: long_name
+      !> What an integer reads as where it is not known.
+      integer :: missing = 0
+      !> Whether the integers are places, from 0, in the words for what gave a solution.
+      logical :: is_served_by = .false.
+      procedure(get_values), pointer, nopass :: get => null()
+      procedure(is_wanted), pointer, nopass :: exists => null()
+   contains
+      procedure :: row_shape
+      procedure :: row
+   end type quantity_type
+
+   abstract interface
+      !> The numbers of a point, laid out as h5py shows them (the last index runs fastest); not
+      !> allocated where they are not known. A flag is 1 or 0.
+      subroutine get_values(point, values)
+         import :: point_type, wp
+         implicit none (type, external)
+         type(point_type), intent(in) :: point
+         real(wp), allocatable, intent(out) :: values(:)
+      end subroutine get_values
+
+      !> Whether the result of a case holds the quantity.
+      pure logical function is_wanted(case)
+         import :: case_type
+         implicit none (type, external)
+         type(case_type), intent(in) :: case
+      end function is_wanted
+   end interface
+
+contains
+
+   !> The table. Rows of a file are created and appended in its order.
+   subroutine point_quantities(list)
+      type(quantity_type), allocatable, intent(out) :: list(:)
+      integer, parameter :: r = growing_real, i = growing_integer, l = growing_logical
+
+      allocate (list(0))
+      call add('omega', r, 'rad/s', 'point', 'angular frequency of the excitation', omega, always)
+      call add('coefficients', r, '<length>', 'point coefficient observed', &
+               'Fourier coefficients 0, c1, s1, ... of observed quantities', coefficients, always)
+      call add('amplitude', r, '<length>', 'point observed', &
+               'largest magnitude over the period', amplitude, always)
+      call add('converged', l, '', 'point', 'whether the point converged', converged, always)
+      call add('iterations', i, '1', 'point', 'iterations of the solver', iterations, always)
+      call add('residual', r, '1', 'point', 'residual over vibratory load', residual, always)
+      call add('seconds', r, 's', 'point', 'time spent on the point', seconds, always)
+      call add('served_by', i, '', 'point', 'what gave the solution, an index into names', &
+               served_by, is_response)
+      list(size(list))%is_served_by = .true.
+      call add('fold', l, '', 'point', 'whether the branch turns here', fold, follows_branch)
+      call add('harmonics', i, '1', 'point', 'harmonics of the balance', harmonics, has_levels)
+      call add('instants', i, '1', 'point', 'instants of the period', instants, is_accurate)
+      call add('error_estimate', r, '1', 'point', 'bound of the relative error of the response', &
+               error_estimate, is_accurate)
+      call add('floquet/stable', i, '', 'point', '1 stable, 0 unstable, -1 not known', stable, &
+               asks_stability)
+      list(size(list))%missing = -1
+      call add('floquet/multipliers', r, '1', 'point multiplier part', &
+               'Floquet multipliers, real and imaginary part', multipliers, asks_stability)
+      call add('contact/force', r, '<force>', 'point coefficient pair direction', &
+               'Fourier coefficients of the contact forces t1, t2, n', force, shows_contact)
+      call add('contact/fraction', r, '1', 'point pair state', &
+               'share of the period in stick, slip, open', fraction, shows_contact)
+      call add('contact/dissipation', r, '<energy>', 'point pair', &
+               'friction energy per cycle', dissipation, shows_contact)
+      call add('history/observed', r, '<length>', 'point instant observed', &
+               'observed quantities over one period', history, always)
+      call add('history/force', r, '<force>', 'point instant pair direction', &
+               'contact forces t1, t2, n over one period', force_history, always)
+      call add('history/relative_displacement', r, '<length>', 'point instant pair direction', &
+               'relative displacement t1, t2, n over one period', slip_history, always)
+      call add('wear/cycles', r, '1', 'step', 'cycles of vibration', cycles, wears)
+      call add('wear/depth', r, '<length>', 'step pair', 'wear depth', depth, wears)
+      call add('wear/rate', r, '<length>', 'step pair', 'wear depth per cycle', wear_rate, wears)
+      call add('wear/energy', r, '<energy>', 'step pair', 'accumulated friction energy', &
+               wear_energy, wears)
+      call add('wear/volume', r, '<volume>', 'step patch', 'worn volume of the patch', &
+               wear_volume, wears)
+
+   contains
+
+      subroutine add(name, kind_of, unit, dimensions, long_name, get, exists)
+         character(*), intent(in) :: name, unit, dimensions, long_name
+         integer, intent(in) :: kind_of
+         procedure(get_values) :: get
+         procedure(is_wanted) :: exists
+         type(quantity_type) :: quantity
+
+         quantity%name = name
+         quantity%kind_of = kind_of
+         quantity%unit = unit
+         quantity%dimensions = dimensions
+         quantity%long_name = long_name
+         quantity%get => get
+         quantity%exists => exists
+         list = [list, quantity]
+      end subroutine add
+
+   end subroutine point_quantities
+
+   !> Shape of a row in Fortran, the order of h5py reversed; unknown_size where only the numbers
+   !> tell.
+   function row_shape(self, case) result(sizes)
+      class(quantity_type), intent(in) :: self
+      type(case_type), intent(in) :: case
+      integer, allocatable :: sizes(:)
+      type(string_type), allocatable :: words(:)
+      integer :: i, n
+
+      words = words_of(trim(self%dimensions), ' ')
+      n = size(words)
+      allocate (sizes(n - 1))
+      do i = 2, n
+         sizes(n - i + 1) = size_of(words(i)%text, case)
+      end do
+   end function row_shape
+
+   !> How long a dimension is in the result of a case.
+   pure integer function size_of(dimension, case) result(n)
+      character(*), intent(in) :: dimension
+      type(case_type), intent(in) :: case
+
+      select case (dimension)
+      case ('observed')
+         n = 0
+         if (allocated(case%model%observe_matrix)) n = size(case%model%observe_matrix, 1)
+      case ('coefficient')
+         n = 2*case%harmonics%n_harmonics + 1
+      case ('pair')
+         n = case%contact%n_pairs
+      case ('patch')
+         n = count_patches(case%contact)
+      case ('direction', 'state')
+         n = 3
+      case ('part')
+         n = 2
+      case default ! instants, multipliers
+         n = unknown_size
+      end select
+   end function size_of
+
+   !> The numbers of a point as a row of the result; not allocated where they are not known.
+   !> Harmonics that the point does not carry are zero: coefficients run slowest.
+   subroutine row(self, point, case, values)
+      class(quantity_type), intent(in) :: self
+      type(point_type), intent(in) :: point
+      type(case_type), intent(in) :: case
+      real(wp), allocatable, intent(out) :: values(:)
+      real(wp), allocatable :: carried(:)
+      integer :: n
+
+      call self%get(point, carried)
+      if (.not. allocated(carried)) return
+      n = size(carried)
+      if (index(self%dimensions, 'coefficient') > 0) n = max(n, product(self%row_shape(case)))
+      allocate (values(n), source=0.0_wp)
+      values(:size(carried)) = carried
+   end subroutine row
+
+   ! ---------------------------------------------------------------- when a result holds it
+
+   pure logical function always(case)
+      type(case_type), intent(in) :: case
+
+      associate (unused => case)
+      end associate
+      always = .true.
+   end function always
+
+   pure logical function is_response(case)
+      type(case_type), intent(in) :: case
+
+      is_response = case%analysis == analysis_frf .or. case%analysis == analysis_point
+   end function is_response
+
+   pure logical function follows_branch(case)
+      type(case_type), intent(in) :: case
+
+      follows_branch = case%sweep%continuation == continuation_arclength
+   end function follows_branch
+
+   !> Whether harmonics differ from point to point.
+   pure logical function has_levels(case)
+      type(case_type), intent(in) :: case
+
+      has_levels = case%harmonics%adaptive .or. is_accurate(case)
+   end function has_levels
+
+   pure logical function is_accurate(case)
+      type(case_type), intent(in) :: case
+
+      is_accurate = case%harmonics%accuracy > 0.0_wp .and. .not. case%harmonics%adaptive
+   end function is_accurate
+
+   pure logical function asks_stability(case)
+      type(case_type), intent(in) :: case
+
+      asks_stability = case%sweep%stability
+   end function asks_stability
+
+   pure logical function shows_contact(case)
+      type(case_type), intent(in) :: case
+
+      shows_contact = case%output%contact .and. case%contact%n_pairs > 0
+   end function shows_contact
+
+   pure logical function wears(case)
+      type(case_type), intent(in) :: case
+
+      wears = case%analysis == analysis_wear
+   end function wears
+
+   ! ---------------------------------------------------------------- where its numbers are
+
+   subroutine omega(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%omega]
+   end subroutine omega
+
+   subroutine coefficients(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%coefficients)) values = by_rows(point%coefficients)
+   end subroutine coefficients
+
+   subroutine amplitude(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%amplitude)) values = point%amplitude
+   end subroutine amplitude
+
+   subroutine converged(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [flag(point%converged)]
+   end subroutine converged
+
+   subroutine iterations(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [real(point%iterations, wp)]
+   end subroutine iterations
+
+   subroutine residual(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%residual]
+   end subroutine residual
+
+   subroutine seconds(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%seconds]
+   end subroutine seconds
+
+   subroutine served_by(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [real(point%served_by, wp)]
+   end subroutine served_by
+
+   subroutine fold(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [flag(point%fold)]
+   end subroutine fold
+
+   subroutine harmonics(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [real(point%n_harmonics, wp)]
+   end subroutine harmonics
+
+   subroutine instants(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [real(point%n_time, wp)]
+   end subroutine instants
+
+   subroutine error_estimate(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (point%converged .and. point%error_estimate < huge(1.0_wp)) then
+         values = [point%error_estimate]
+      end if
+   end subroutine error_estimate
+
+   subroutine stable(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%multipliers)) values = [flag(point%stable)]
+   end subroutine stable
+
+   subroutine multipliers(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+      integer :: n
+
+      if (.not. allocated(point%multipliers)) return
+      n = size(point%multipliers)
+      allocate (values(2*n))
+      values(1::2) = real(point%multipliers, wp)
+      values(2::2) = aimag(point%multipliers)
+   end subroutine multipliers
+
+   subroutine force(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%force)) values = reshape(point%force, [size(point%force)])
+   end subroutine force
+
+   subroutine fraction(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%fraction)) values = reshape(point%fraction, [size(point%fraction)])
+   end subroutine fraction
+
+   subroutine dissipation(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%dissipation)) values = point%dissipation
+   end subroutine dissipation
+
+   subroutine history(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%history)) values = by_rows(point%history)
+   end subroutine history
+
+   subroutine force_history(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%force_history)) then
+         values = reshape(point%force_history, [size(point%force_history)])
+      end if
+   end subroutine force_history
+
+   subroutine slip_history(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%slip_history)) then
+         values = reshape(point%slip_history, [size(point%slip_history)])
+      end if
+   end subroutine slip_history
+
+   subroutine cycles(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%depth)) values = [point%cycles]
+   end subroutine cycles
+
+   subroutine depth(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%depth)) values = point%depth
+   end subroutine depth
+
+   subroutine wear_rate(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%wear_rate)) values = point%wear_rate
+   end subroutine wear_rate
+
+   subroutine wear_energy(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%wear_energy)) values = point%wear_energy
+   end subroutine wear_energy
+
+   subroutine wear_volume(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%wear_volume)) values = point%wear_volume
+   end subroutine wear_volume
+
+   !> The elements of a matrix with the second index running fastest.
+   pure function by_rows(array) result(flat)
+      real(wp), intent(in) :: array(:, :)
+      real(wp) :: flat(size(array))
+
+      flat = reshape(transpose(array), [size(array)])
+   end function by_rows
+
+   pure real(wp) function flag(is_true)
+      logical, intent(in) :: is_true
+
+      flag = merge(1.0_wp, 0.0_wp, is_true)
+   end function flag
+
+end module fw_point_quantities
