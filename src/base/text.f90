@@ -4,15 +4,13 @@
 !> length of the latter in static memory, which two threads would share, and numbers are put into
 !> texts in every layer.
 module fw_text
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
+   use fw_number_field, only: integer_field
+   use fw_number_field, only: real_field
    implicit none (type, external)
    private
 
    public :: to_text, lower_case, nearest_word, join, string_type
-
-   !> Room for any number.
-   integer, parameter :: field_length = 32
 
    !> A text of its own length, for lists of texts.
    type :: string_type
@@ -49,28 +47,6 @@ contains
 
       text = merge('.true. ', '.false.', flag)
    end function logical_to_text
-
-   pure function integer_field(number) result(field)
-      integer, intent(in) :: number
-      character(field_length) :: field
-
-      write (field, '(i0)') number
-   end function integer_field
-
-   pure function real_field(number) result(field)
-      real(wp), intent(in) :: number
-      character(field_length) :: field
-      real(wp) :: back
-      integer :: status
-
-      write (field, '(g0.6)') number
-      field = adjustl(field)
-      if (.not. ieee_is_finite(number)) return
-      read (field, *, iostat=status) back
-      if (status == 0 .and. abs(back - number) <= 0.0_wp) return
-      write (field, '(es24.16e3)') number
-      field = adjustl(field)
-   end function real_field
 
    pure function lower_case(text) result(lower)
       character(*), intent(in) :: text
