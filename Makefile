@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint docs clean
-.PHONY: fuzz
+.PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full paper
 .PHONY: stress long faults verify
@@ -77,6 +77,9 @@ docs: build/deps.stamp ## reference of library and Python package, in build/docs
 wheel: build/deps.stamp ## the package in a fresh environment, used as the README says
 	@tools/check_install.sh build/wheel
 
+ways: build/deps.stamp ## the other ways to build: CMake alone, fpm, pip
+	@tools/check_builds.sh build/ways $(PYTHON)
+
 # Adds up the counts of docs/robustness.md once they are there, whatever they say.
 OVERVIEW := trap '$(PYTHON) test/robustness/overview.py' EXIT;
 
@@ -143,5 +146,6 @@ fuzz: build ## N hostile inputs (100000), written to docs/robustness/inputs.md
 	$(OVERVIEW) $(PYTHON) test/robustness/fuzz_report.py $(FUZZ)
 
 clean: ## remove everything built but the Python environment
-	rm -rf $(BUILD) build/debug build/docs build/wheel build/verify build/stress build/bench \
+	rm -rf $(BUILD) build/debug build/docs build/wheel build/ways build/verify build/stress \
+	   build/bench build/gfortran_* build/cache.toml build/compile_commands.json \
 	   $(RUN) $(FUZZ)

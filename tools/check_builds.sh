@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# The ways to build that README.md names beside `make`, each from nothing and each with an example
+# whose number is known: CMake alone, fpm for speed, pip.
+#
+#     tools/check_builds.sh WORK_DIRECTORY PYTHON
+set -euo pipefail
+mkdir -p "$1"
+work=$(cd "$1" && pwd)
+python=$2
+example=example/jenkins/jenkins.nml
+expected='peak u1 *9.784333E+00'
+
+# The program that follows has to find the peak of the example.
+finds_the_peak() {
+   "$@" -q -o "$work/result.h5" "$example" >"$work/said"
+   grep -q "$expected" "$work/said" || {
+      echo "$1: no line '$expected' in:" >&2
+      cat "$work/said" >&2
+      return 1
+   }
+}
+
+started=$SECONDS
+rm -rf "${work:?}/cmake"
+cmake -S . -B "$work/cmake" -G Ninja >"$work/log"
+cmake --build "$work/cmake" >>"$work/log" || { tail -n 30 "$work/log"; exit 1; }
+finds_the_peak "$work/cmake/fw_run"
+echo "CMake: $((SECONDS - started)) s"
+
+started=$SECONDS
+"$python" -m fpm build --profile release >"$work/log" 2>&1 || { tail -n 30 "$work/log"; exit 1; }
+finds_the_peak "$python" -m fpm run --profile release fw_run --
+echo "fpm: $((SECONDS - started)) s"
+
+started=$SECONDS
+tools/check_install.sh "$work/wheel"
+echo "pip: $((SECONDS - started)) s"
