@@ -351,7 +351,7 @@ program floor
    use fw_newton, only: solver_report
    use fw_point, only: point_type
    use fw_problem, only: build_system
-   use fw_problem, only: sweep_frequency
+   use fw_sweep, only: sweep_frequency
    use fw_read_case, only: read_case
    use fw_recovery, only: recover_point
    use fw_text, only: string_type

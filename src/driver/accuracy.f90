@@ -17,9 +17,11 @@ module fw_accuracy
    use fw_kinds, only: wp
    use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
-   use fw_level, only: level_solver
    use fw_level, only: level_type
    use fw_point, only: point_type
+   use fw_run_state, only: run_state
+   use fw_strategy, only: point_request
+   use fw_strategy, only: point_strategy
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -46,7 +48,7 @@ module fw_accuracy
    !> Where no coarser solution was found.
    real(wp), parameter :: unknown = huge(1.0_wp)
 
-   type, extends(level_solver) :: accuracy_solver
+   type, extends(point_strategy) :: accuracy_solver
       !> Numbers of harmonics to choose from, ascending.
       integer, allocatable :: n_harmonics(:)
       !> The level in use.
@@ -126,10 +128,10 @@ contains
    end subroutine need
 
    !> Solve at a frequency; the point says at which level, and how accurately.
-   subroutine solve(self, case, omega, point, error)
+   subroutine solve(self, case, request, point, error)
       class(accuracy_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      real(wp), intent(in) :: omega
+      type(point_request), intent(in) :: request
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: best
@@ -143,13 +145,16 @@ contains
       at_best = [self%current, self%doublings]
       seconds = 0.0_wp
       do
-         call answer(self, case, omega, point, error)
+         associate (level => self%level(self%current, self%doublings))
+            call level%solve(case, request, point, error)
+         end associate
          if (allocated(error)) return
          iterations = iterations + point%iterations
          seconds = seconds + point%seconds
          errors = [unknown, 0.0_wp]
          if (point%converged) then
-            call estimate(self, case, omega, point%coefficients, errors, iterations, seconds, error)
+            call estimate(self, case, request%omega, point%coefficients, errors, iterations, &
+                          seconds, error)
             if (allocated(error)) return
             point%error_estimate = total(errors)
             best = point
@@ -176,22 +181,6 @@ contains
       call coarsen(self, case, errors, error)
    end subroutine solve
 
-   !> The solution at the present level.
-   subroutine answer(self, case, omega, point, error)
-      class(accuracy_solver), intent(inout) :: self
-      type(case_type), intent(in) :: case
-      real(wp), intent(in) :: omega
-      type(point_type), intent(out) :: point
-      type(error_type), allocatable, intent(out) :: error
-
-      associate (level => self%level(self%current, self%doublings))
-         level%case%solver%fallback = case%solver%fallback
-         level%case%sweep%stability = case%sweep%stability
-         level%case%output%contact = case%output%contact
-         call level%solve(omega, point, error)
-      end associate
-   end subroutine answer
-
    !> A coarser solution to compare with, from the present one: nothing is asked of it but its
    !> observed coefficients, and fallbacks would look too far away.
    subroutine check(self, case, omega, k, doublings, iterations, seconds, error)
@@ -208,11 +197,9 @@ contains
       call need(self, case, k, doublings, error)
       if (allocated(error)) return
       associate (level => self%level(k, doublings))
-         level%case%solver%fallback = .false.
-         level%case%sweep%stability = .false.
-         level%case%output%contact = .false.
          call level%take_over(self%level(self%current, self%doublings))
-         call level%solve(omega, point, error)
+         call level%solve(case, point_request(omega=omega, fallback=.false., &
+                                              histories=case%output%histories), point, error)
       end associate
       if (allocated(error)) return
       iterations = iterations + point%iterations
@@ -358,14 +345,16 @@ contains
       if (point%error_estimate > case%harmonics%accuracy) self%n_short = self%n_short + 1
    end subroutine note
 
-   subroutine describe(self, case, summary, message)
-      class(accuracy_solver), intent(in) :: self
+   subroutine describe(self, case, state, summary, message)
+      class(accuracy_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
+      type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
       character(12) :: wanted, reached, where
 
-      call describe_levels(size(self%level), self%level, case%solver%kind, summary)
+      call describe_levels(size(self%level), self%level, case%solver%kind, &
+                           state%all_converged(), summary)
       call summary%describe_accuracy(self%worst, case%harmonics%accuracy)
       message = ''
       if (self%n_short == 0) return

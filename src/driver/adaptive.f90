@@ -8,9 +8,11 @@ module fw_adaptive
    use fw_left_out, only: force_left_out
    use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
-   use fw_level, only: level_solver
    use fw_level, only: level_type
    use fw_point, only: point_type
+   use fw_run_state, only: run_state
+   use fw_strategy, only: point_request
+   use fw_strategy, only: point_strategy
    use fw_summary, only: summary_type
    implicit none (type, external)
    private
@@ -20,7 +22,7 @@ module fw_adaptive
    !> Harmonics are given up only where fewer leave out this part of the tolerance.
    real(wp), parameter :: with_margin = 0.5_wp
 
-   type, extends(level_solver) :: adaptive_solver
+   type, extends(point_strategy) :: adaptive_solver
       !> Numbers of harmonics to choose from, ascending.
       integer, allocatable :: n_harmonics(:)
       !> The one in use.
@@ -48,10 +50,10 @@ contains
    end subroutine start
 
    !> Solve at a frequency; the point says how many harmonics it took.
-   subroutine solve(self, case, omega, point, error)
+   subroutine solve(self, case, request, point, error)
       class(adaptive_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
-      real(wp), intent(in) :: omega
+      type(point_request), intent(in) :: request
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(level_type), pointer :: level
@@ -62,7 +64,7 @@ contains
       seconds = 0.0_wp
       do
          level => self%level(self%current)
-         call level%solve(omega, point, error)
+         call level%solve(case, request, point, error)
          if (allocated(error)) return
          iterations = iterations + point%iterations
          seconds = seconds + point%seconds
@@ -85,13 +87,15 @@ contains
       end if
    end subroutine solve
 
-   subroutine describe(self, case, summary, message)
-      class(adaptive_solver), intent(in) :: self
+   subroutine describe(self, case, state, summary, message)
+      class(adaptive_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
+      type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
 
-      call describe_levels(size(self%level), self%level, case%solver%kind, summary)
+      call describe_levels(size(self%level), self%level, case%solver%kind, &
+                           state%all_converged(), summary)
       call summary%describe_harmonics(self%n_short, case%harmonics%adaptive_tolerance)
       message = ''
    end subroutine describe

@@ -14,17 +14,17 @@ module fw_branch
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_point, only: served_by_arclength
-   use fw_point_solver, only: point_solver
+   use fw_level, only: level_type
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
-   use fw_result, only: result_writer
    use fw_solution, only: find_stability
    use fw_solution, only: is_lasting
-   use fw_summary, only: summary_type
+   use fw_strategy, only: new_request
+   use fw_sweep, only: point_source
    implicit none (type, external)
    private
 
-   public :: branch_type, run_branch
+   public :: branch_type, branch_source
 
    !> First step where n_points leaves the choice: this part of the interval.
    integer, parameter :: default_steps = 100
@@ -44,44 +44,76 @@ module fw_branch
       procedure :: closing_words
    end type branch_type
 
+   !> The same as a source of a sweep.
+   type, extends(point_source) :: branch_source
+      type(branch_type) :: branch
+      !> Solves the first point.
+      type(level_type), pointer :: level => null()
+      logical :: has_begun = .false., has_no_start = .false.
+   contains
+      procedure :: next => next_on_branch
+      procedure :: is_covered
+      procedure :: finish
+   end type branch_source
+
 contains
 
    !> The first point as in a natural sweep, then along the branch until a bound or max_points.
-   subroutine run_branch(case, system, solver, observer, writer, summary, error)
+   subroutine next_on_branch(self, case, observer, point, more, error)
+      class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(inout), target :: system
-      type(point_solver), intent(inout) :: solver
       class(observer_type), intent(inout) :: observer
-      type(result_writer), intent(inout) :: writer
-      type(summary_type), intent(inout) :: summary
+      type(point_type), intent(out) :: point
+      logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
-      type(branch_type) :: branch
-      type(point_type) :: point
-      integer :: n_points
-      logical :: more
+
+      if (.not. self%has_begun) then
+         call solve_first(self, case, observer, point, error)
+         more = .true.
+      else if (self%has_no_start) then
+         more = .false.
+      else
+         call self%branch%next(case, point, more, error)
+      end if
+   end subroutine next_on_branch
+
+   subroutine solve_first(self, case, observer, point, error)
+      class(branch_source), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
 
       ! What the first point leaves, the whole path inherits.
-      solver%method%newton%loosest = tight_forcing
-      call solver%solve(case, system, case%sweep%start, point, error)
+      self%level%solver%method%newton%loosest = tight_forcing
+      call self%level%solve(case, new_request(case, case%sweep%start), point, error)
       if (allocated(error)) return
-      n_points = 0
-      call publish(point, n_points, observer, writer, summary, error)
-      if (allocated(error)) return
-      if (.not. point%converged) then
+      self%has_begun = .true.
+      self%has_no_start = .not. point%converged
+      if (point%converged) then
+         call self%branch%begin(case, self%level%system, self%level%solver%x, error)
+      else
          call observer%on_message('the first point did not converge: no branch to follow')
-         return
       end if
-      call branch%begin(case, system, solver%x, error)
-      do while (.not. (allocated(error) .or. observer%stop_requested))
-         call branch%next(case, point, more, error)
-         if (allocated(error) .or. .not. more) exit
-         call publish(point, n_points, observer, writer, summary, error)
-      end do
-      call solver%method%newton%linear%add_work(branch%curve%linear)
-      if (allocated(error)) return
-      call observer%on_message(branch%closing_words(case))
-      if (.not. branch%curve%complete) call summary%mark_incomplete()
-   end subroutine run_branch
+   end subroutine solve_first
+
+   !> A branch that never began has nothing left to follow.
+   pure logical function is_covered(self)
+      class(branch_source), intent(in) :: self
+
+      is_covered = self%has_no_start .or. self%branch%curve%complete
+   end function is_covered
+
+   !> Why the branch ended, once it has; its work joins that of the first point.
+   subroutine finish(self, case, observer)
+      class(branch_source), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+
+      if (.not. self%has_begun .or. self%has_no_start) return
+      call self%level%solver%method%newton%linear%add_work(self%branch%curve%linear)
+      call observer%on_message(self%branch%closing_words(case))
+   end subroutine finish
 
    !> Start at a converged point x of the system at sweep%start, which counts as the first of
    !> sweep%max_points. The system has to outlive the branch.
@@ -202,21 +234,5 @@ contains
          call find_stability(self%system, case%model, coefficients, point, error)
       end if
    end subroutine describe
-
-   subroutine publish(point, n_points, observer, writer, summary, error)
-      type(point_type), intent(in) :: point
-      integer, intent(inout) :: n_points
-      class(observer_type), intent(inout) :: observer
-      type(result_writer), intent(inout) :: writer
-      type(summary_type), intent(inout) :: summary
-      type(error_type), allocatable, intent(out) :: error
-
-      call writer%add_point(point, error)
-      if (allocated(error)) return
-      n_points = n_points + 1
-      call summary%add(point)
-      ! How many points a branch takes is not known beforehand.
-      call observer%on_point(n_points, 0, point)
-   end subroutine publish
 
 end module fw_branch

@@ -8,6 +8,7 @@ module fw_point_solver
    use fw_error, only: error_type
    use fw_guess, only: free_guess
    use fw_guess, only: stuck_guess
+   use fw_harmonics_options, only: harmonics_options
    use fw_hbm, only: hbm_system
    use fw_newton, only: solver_report
    use fw_point, only: point_type
@@ -24,6 +25,7 @@ module fw_point_solver
    use fw_recovery, only: recover_point
    use fw_solution, only: find_stability
    use fw_solution, only: solution_method
+   use fw_strategy, only: point_request
    use fw_solver_options, only: pseudo_time_options
    use fw_solver_options, only: solver_kinsol
    use fw_solver_options, only: solver_powell
@@ -70,30 +72,33 @@ module fw_point_solver
 
 contains
 
-   subroutine start(self, case, n)
+   subroutine start(self, case, harmonics, n)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
+      !> Of the system: those of the case, or of a level.
+      type(harmonics_options), intent(in) :: harmonics
+      !> Unknowns of the system.
       integer, intent(in) :: n
 
-      call self%method%start(case)
+      call self%method%start(case, harmonics)
       allocate (self%x(n), self%last(n), self%before(n), self%r(n), source=0.0_wp)
    end subroutine start
 
    !> Solve at a frequency; not converging is an outcome, marked in the point.
-   subroutine solve(self, case, system, omega, point, error)
+   subroutine solve(self, case, system, request, point, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(hbm_system), intent(inout), target :: system
-      real(wp), intent(in) :: omega
+      type(point_request), intent(in) :: request
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
-      self%omega_wanted = omega
+      self%omega_wanted = request%omega
       self%best_residual = huge(1.0_wp)
-      call reach(self, case, system, omega, report, point%iterations, error)
+      call reach(self, case, system, request, report, point%iterations, error)
       if (allocated(error)) return
       self%point_failures = merge(0, self%point_failures + 1, report%converged)
       if (report%converged) point%served_by = self%served_by
@@ -103,15 +108,15 @@ contains
       end if
       ! Forces and states of this very point: the last trial may have been another.
       call system%residual(self%x, self%r)
-      point%omega = omega
+      point%omega = request%omega
       point%converged = report%converged
       point%residual = report%residual
-      call recover_point(system, self%x, case%harmonics%n_harmonics, case%output%contact, point)
-      if (case%output%histories) then
+      call recover_point(system, self%x, self%method%harmonics%n_harmonics, request%contact, point)
+      if (request%histories) then
          call recover_histories(system, size(system%balance, 1), self%x, &
-            case%harmonics%n_harmonics, point)
+            self%method%harmonics%n_harmonics, point)
       end if
-      if (report%converged .and. case%sweep%stability) then
+      if (report%converged .and. request%stability) then
          call find_stability(system, case%model, self%x, point, error)
          if (allocated(error)) return
       end if
@@ -125,34 +130,35 @@ contains
    !> Newton from the best guesses known. Where all fail: pseudo-time; then from the last point on
    !> the sweep by halves, or to the first point by raising the load; Newton again, with LU where
    !> GMRES failed; and at last from the solution without contact, which may lie on another branch.
-   subroutine reach(self, case, system, omega, report, iterations, error)
+   subroutine reach(self, case, system, request, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(hbm_system), intent(inout), target :: system
-      real(wp), intent(in) :: omega
+      type(point_request), intent(in) :: request
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
 
       if (case%solver%kind == solver_pseudo_time) then
-         call by_flow(self, case, case%pseudo_time, system, omega, report, iterations, error)
+         call by_flow(self, case, case%pseudo_time, system, request%omega, report, iterations, &
+                      error)
          return
       end if
       self%method%newton%linear%lu_left_out = .false.
-      call from_guesses(self, system, omega, report, iterations, error)
+      call from_guesses(self, system, request%omega, report, iterations, error)
       if (allocated(error)) return
-      if (report%converged .or. .not. case%solver%fallback) return
+      if (report%converged .or. .not. request%fallback) return
       if (self%point_failures < max_point_failures) then
-         call by_other_ways(self, case, system, omega, report, iterations, error)
+         call by_other_ways(self, case, system, request%omega, report, iterations, error)
          if (allocated(error) .or. report%converged) return
       end if
       if (self%method%newton%linear%lu_left_out) then
          self%method%newton%linear%lu_follows = .true.
-         call from_guesses(self, system, omega, report, iterations, error)
+         call from_guesses(self, system, request%omega, report, iterations, error)
          self%method%newton%linear%lu_follows = .false.
          if (allocated(error) .or. report%converged) return
       end if
-      call from_free_guess(self, system, omega, report, iterations)
+      call from_free_guess(self, system, request%omega, report, iterations)
    end subroutine reach
 
    !> Ways that cost many solutions: pseudo-time, then smaller steps of the frequency or the load.

@@ -13,6 +13,7 @@ module fw_problem
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
    use fw_fourier, only: fft_pays
+   use fw_harmonics_options, only: harmonics_options
    use fw_harmonics_options, only: method_hbm
    use fw_harmonics_options, only: method_hdhb
    use fw_harmonics_options, only: method_tcm
@@ -28,13 +29,12 @@ module fw_problem
    use fw_memory, only: require_memory
    use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_powell
-   use fw_solver_options, only: sweep_options
    use fw_text, only: to_text
    use fw_wear_options, only: follow_range
    implicit none (type, external)
    private
 
-   public :: build_system, sweep_frequency
+   public :: build_system
 
    !> Instants per harmonic below which the sampling error exceeds that of the truncation: with
    !> friction alone, and where pairs may separate or the normal load varies.
@@ -48,23 +48,28 @@ module fw_problem
 contains
 
    !> Build the system of a case at the first frequency of its sweep.
-   subroutine build_system(case, system, error, keep_all)
+   subroutine build_system(case, system, error, keep_all, of_level)
       type(case_type), intent(in) :: case
       type(hbm_system), intent(out) :: system
       type(error_type), allocatable, intent(out) :: error
       !> Condense nothing (pseudo-time flows live on the whole structure).
       logical, intent(in), optional :: keep_all
+      !> Harmonics instead of those of the case.
+      type(harmonics_options), intent(in), optional :: of_level
+      type(harmonics_options) :: harmonics
       logical :: skip_idle
       type(joint_type) :: joint
       type(fourier_type) :: fourier
       type(condensation_type) :: structure
       real(wp) :: range(2)
 
+      harmonics = case%harmonics
+      if (present(of_level)) harmonics = of_level
       ! A perturbation moves what no load moves.
       skip_idle = case%solver%skips .and. .not. case%sweep%stability
       call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
-      call choose_harmonics(case, joint, fourier, error)
+      call choose_harmonics(case, harmonics, joint, fourier, error)
       if (allocated(error)) return
       range = case%sweep%start
       if (case%analysis == analysis_frf) then
@@ -79,10 +84,12 @@ contains
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
       call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
-      if (locates_events(case, joint)) call system%contact%resolve_events(system%fourier)
+      if (locates_events(case, harmonics, joint)) then
+         call system%contact%resolve_events(system%fourier)
+      end if
       system%reduced = case%solver%skips
-      if (case%harmonics%filter_harmonics > 0) then
-         system%springs%highest_harmonic = case%harmonics%filter_harmonics
+      if (harmonics%filter_harmonics > 0) then
+         system%springs%highest_harmonic = harmonics%filter_harmonics
       end if
       if (case%contact%n_pairs > 0 .and. fft_pays(fourier%n_coefficients)) then
          call system%fourier%prepare_fft(3*case%contact%n_pairs)
@@ -91,25 +98,26 @@ contains
 
    !> Only odd harmonics where the symmetry is exact, and keeps so at the instants: their number
    !> must be even.
-   subroutine choose_harmonics(case, joint, fourier, error)
+   subroutine choose_harmonics(case, harmonics, joint, fourier, error)
       type(case_type), intent(in) :: case
+      type(harmonics_options), intent(in) :: harmonics
       type(joint_type), intent(in) :: joint
       type(fourier_type), intent(out) :: fourier
       type(error_type), allocatable, intent(out) :: error
       logical :: odd_only
       integer :: n_time
 
-      n_time = case%harmonics%n_time
-      if (n_time == 0) n_time = automatic_n_time(case, joint)
+      n_time = harmonics%n_time
+      if (n_time == 0) n_time = automatic_n_time(case, harmonics, joint)
       ! Only the projection keeps the symmetry of the instants; collocation at an odd number of
       ! them does not.
       odd_only = joint%half_wave_symmetric .and. modulo(n_time, 2) == 0 .and. &
-                 case%harmonics%method == method_hbm
-      select case (case%harmonics%parity)
+                 harmonics%method == method_hbm
+      select case (harmonics%parity)
       case (parity_all)
          odd_only = .false.
       case (parity_odd)
-         if (case%harmonics%method /= method_hbm) then
+         if (harmonics%method /= method_hbm) then
             call fatal_error(error, '&harmonics parity = ''odd'' needs method = ''hbm''', &
                status_input)
             return
@@ -128,29 +136,30 @@ contains
          odd_only = .true.
       case default ! by what the model keeps
       end select
-      call check_memory(case, n_time, error)
+      call check_memory(case, harmonics, n_time, error)
       if (allocated(error)) return
-      fourier = new_fourier(case%harmonics%n_harmonics, n_time, odd_only)
-      select case (case%harmonics%method)
+      fourier = new_fourier(harmonics%n_harmonics, n_time, odd_only)
+      select case (harmonics%method)
       case (method_tcm)
          call fourier%collocate(fourier%n_coefficients)
       case (method_tcm_least_squares)
-         call fourier%collocate(least_squares_points(case, fourier))
+         call fourier%collocate(least_squares_points(case, harmonics, fourier))
       case default ! the equations are those of the harmonics
       end select
    end subroutine choose_harmonics
 
    !> Room for what grows with the square of the harmonics: transforms, derivatives of the
    !> histories and of the pairs, and the Jacobian where it is asked for.
-   subroutine check_memory(case, n_time, error)
+   subroutine check_memory(case, harmonics, n_time, error)
       type(case_type), intent(in) :: case
+      type(harmonics_options), intent(in) :: harmonics
       integer, intent(in) :: n_time
       type(error_type), allocatable, intent(out) :: error
       !> Copies of the transforms, and derivatives of the three components with their scratch.
       real(wp), parameter :: transforms = 4.0_wp, derivatives = 6.0_wp
       real(wp) :: nc, n_pairs, n_reals
 
-      nc = 2.0_wp*case%harmonics%n_harmonics + 1.0_wp
+      nc = 2.0_wp*harmonics%n_harmonics + 1.0_wp
       n_pairs = real(case%contact%n_pairs, wp)
       n_reals = transforms*nc*n_time + nc*case%model%n_dof
       if (case%contact%n_pairs > 0) then
@@ -160,40 +169,42 @@ contains
          end if
       end if
       call require_memory(n_reals, '&harmonics n_harmonics = '// &
-                          to_text(case%harmonics%n_harmonics)//' with '//to_text(n_time)// &
+                          to_text(harmonics%n_harmonics)//' with '//to_text(n_time)// &
                           ' instants', 'take fewer harmonics or instants', error)
    end subroutine check_memory
 
    !> Instants of the equations in the least-squares variant: twice the unknowns, where the user
    !> leaves the choice.
-   pure integer function least_squares_points(case, fourier) result(n_points)
+   pure integer function least_squares_points(case, harmonics, fourier) result(n_points)
       type(case_type), intent(in) :: case
+      type(harmonics_options), intent(in) :: harmonics
       type(fourier_type), intent(in) :: fourier
 
-      n_points = case%harmonics%n_collocation
+      n_points = harmonics%n_collocation
       if (n_points == 0) n_points = 2*fourier%n_coefficients
       n_points = min(max(n_points, fourier%n_coefficients), fourier%n_time)
    end function least_squares_points
 
    !> Instants per period where the input leaves the choice. Polynomials are sampled without any
    !> error from (power + 1) H + 1 instants on; for contact see the parameters above.
-   pure integer function automatic_n_time(case, joint) result(n_time)
+   pure integer function automatic_n_time(case, harmonics, joint) result(n_time)
       type(case_type), intent(in) :: case
+      type(harmonics_options), intent(in) :: harmonics
       type(joint_type), intent(in) :: joint
       integer :: h
 
-      h = case%harmonics%n_harmonics
+      h = harmonics%n_harmonics
       n_time = 2*h + 1
-      if (case%harmonics%method == method_hdhb) return
+      if (harmonics%method == method_hdhb) return
       n_time = 2*h + 2
       if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
-      if (locates_events(case, joint)) then
-         n_time = max(n_time, least_events(case, is_planar(joint)))
+      if (locates_events(case, harmonics, joint)) then
+         n_time = max(n_time, least_events(case, harmonics, is_planar(joint)))
       else if (case%contact%n_pairs > 0) then
          n_time = max(n_time, fewest_instants, instants_friction*h)
          if (any(joint%row(3, :) > 0)) n_time = max(n_time, instants_separation*h)
       end if
-      n_time = nint(n_time*2.0_wp**case%harmonics%doublings)
+      n_time = nint(n_time*2.0_wp**harmonics%doublings)
       n_time = n_time + modulo(n_time, 2)
    end function automatic_n_time
 
@@ -201,19 +212,20 @@ contains
    !> direction) and nothing asks for instants: as fast as sampling, faster from 7 harmonics on, and
    !> more accurate (measured by bench/precision.py). With an accuracy to keep, also for few pairs
    !> with two directions: for one or 16, fewer instants make up for what each costs; for 48 not.
-   pure logical function locates_events(case, joint)
+   pure logical function locates_events(case, harmonics, joint)
       type(case_type), intent(in) :: case
+      type(harmonics_options), intent(in) :: harmonics
       type(joint_type), intent(in) :: joint
 
-      locates_events = case%harmonics%sampling == sampling_events .and. case%contact%n_pairs > 0
-      if (case%harmonics%sampling /= sampling_auto .or. case%contact%n_pairs == 0) return
-      if (case%harmonics%accuracy > 0.0_wp) then
+      locates_events = harmonics%sampling == sampling_events .and. case%contact%n_pairs > 0
+      if (harmonics%sampling /= sampling_auto .or. case%contact%n_pairs == 0) return
+      if (harmonics%accuracy > 0.0_wp) then
          locates_events = .not. is_planar(joint) .or. case%contact%n_pairs <= few_pairs
          return
       end if
-      locates_events = case%harmonics%method == method_hbm .and. case%harmonics%n_time == 0 .and. &
+      locates_events = harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &
                        any(case%analysis == [analysis_frf, analysis_point, analysis_wear]) .and. &
-                       .not. case%harmonics%adaptive .and. .not. case%output%histories .and. &
+                       .not. harmonics%adaptive .and. .not. case%output%histories .and. &
                        .not. case%sweep%stability .and. .not. is_planar(joint)
    end function locates_events
 
@@ -226,29 +238,18 @@ contains
 
    !> Instants that isolate the events, twice the 2H+1 of a collocation, which then lie evenly; or
    !> cells of the quadrature over slip in two directions, four times as many.
-   pure integer function least_events(case, planar) result(n_time)
+   pure integer function least_events(case, harmonics, planar) result(n_time)
       type(case_type), intent(in) :: case
+      type(harmonics_options), intent(in) :: harmonics
       !> Whether a pair has two tangential directions.
       logical, intent(in) :: planar
       integer :: n_points
 
-      n_time = max(fewest_for_events, 2*(2*case%harmonics%n_harmonics + 1))
-      if (planar) n_time = max(fewest_for_planar, 4*(2*case%harmonics%n_harmonics + 1))
-      n_points = case%harmonics%n_collocation
-      if (case%harmonics%method /= method_tcm_least_squares .or. n_points == 0) return
+      n_time = max(fewest_for_events, 2*(2*harmonics%n_harmonics + 1))
+      if (planar) n_time = max(fewest_for_planar, 4*(2*harmonics%n_harmonics + 1))
+      n_points = harmonics%n_collocation
+      if (harmonics%method /= method_tcm_least_squares .or. n_points == 0) return
       n_time = n_points*((n_time + n_points - 1)/n_points)
    end function least_events
-
-   !> Point k of a sweep: evenly spaced from start to end, both exact [rad/s].
-   pure real(wp) function sweep_frequency(sweep, k, n_points) result(omega)
-      type(sweep_options), intent(in) :: sweep
-      integer, intent(in) :: k, n_points
-      real(wp) :: share
-
-      omega = sweep%start
-      if (n_points == 1) return
-      share = real(k - 1, wp)/real(n_points - 1, wp)
-      omega = (1.0_wp - share)*sweep%start + share*sweep%end
-   end function sweep_frequency
 
 end module fw_problem

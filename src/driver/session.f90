@@ -10,8 +10,6 @@ module fw_session
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_usage
-   use fw_frequency_response, only: solve_frequency
-   use fw_hbm, only: hbm_system
    use fw_kinds, only: wp
    use fw_memory_model, only: memory_model_type
    use fw_namelist, only: parse_override
@@ -20,16 +18,16 @@ module fw_session
    use fw_outcome, only: outcome_type
    use fw_paths, only: read_text_file
    use fw_point, only: point_type
-   use fw_point_solver, only: point_solver
    use fw_point_values, only: get_point_values
-   use fw_problem, only: build_system
-   use fw_problem, only: sweep_frequency
+   use fw_one_level, only: one_level
    use fw_read_case, only: read_case_text
    use fw_run, only: check_case
    use fw_run, only: run_case
    use fw_session_points, only: point_list
    use fw_session_points, only: point_recorder
    use fw_solver_options, only: continuation_natural
+   use fw_strategy, only: new_request
+   use fw_sweep, only: sweep_frequency
    use fw_text, only: string_type
    use fw_text, only: to_text
    use fw_text_list, only: append
@@ -56,8 +54,7 @@ module fw_session
       !> The case agrees with what was given.
       logical, private :: is_read = .false.
       !> Only between `start` and the next change.
-      type(hbm_system), allocatable, private :: system
-      type(point_solver), allocatable, private :: solver
+      type(one_level), allocatable, private :: strategy
    contains
       procedure :: load_file
       procedure :: load_text
@@ -246,15 +243,11 @@ contains
       end if
       call forget_system(self)
       call self%points%clear()
-      allocate (self%system, self%solver)
+      allocate (self%strategy)
       call threads%enter(self%case%threads)
-      call build_system(self%case, self%system, error)
+      call self%strategy%start(self%case, error)
       call threads%leave()
-      if (allocated(error)) then
-         call forget_system(self)
-      else
-         call self%solver%start(self%case, self%system%n)
-      end if
+      if (allocated(error)) call forget_system(self)
    end subroutine start
 
    !> Frequencies of the sweep of the case (0: not known beforehand, or the case was not read).
@@ -296,7 +289,7 @@ contains
       type(thread_scope) :: threads
       type(point_type) :: point
 
-      if (.not. allocated(self%solver)) then
+      if (.not. allocated(self%strategy)) then
          call fatal_error(error, 'a step needs a start: nothing was started since the last '// &
                           'change of the case', status_usage)
       else if (.not. (omega > 0.0_wp .and. omega <= huge(omega))) then
@@ -308,9 +301,10 @@ contains
       recorder%list => self%points
       recorder%observer => observer
       call threads%enter(self%case%threads)
-      call solve_frequency(self%case, self%system, self%solver, omega, recorder, point, error)
+      call self%strategy%solve(self%case, new_request(self%case, omega), point, error)
       call threads%leave()
       if (allocated(error)) return
+      if (allocated(self%strategy%note)) call recorder%on_message(self%strategy%note)
       call recorder%on_point(self%points%n + 1, 0, point)
    end subroutine solve
 
@@ -372,8 +366,7 @@ contains
    subroutine forget_system(self)
       class(session_type), intent(inout) :: self
 
-      if (allocated(self%system)) deallocate (self%system)
-      if (allocated(self%solver)) deallocate (self%solver)
+      if (allocated(self%strategy)) deallocate (self%strategy)
    end subroutine forget_system
 
 end module fw_session

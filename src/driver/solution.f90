@@ -8,6 +8,7 @@ module fw_solution
    use fw_flow, only: flow_system
    use fw_flow, only: new_flow
    use fw_guess, only: held_without_contact
+   use fw_harmonics_options, only: harmonics_options
    use fw_harmonics_options, only: method_hdhb
    use fw_hbm, only: hbm_system
    use fw_hdhb, only: hdhb_system
@@ -41,6 +42,8 @@ module fw_solution
       type(kinsol_solver) :: kinsol
       !> The solver that the case asks for.
       integer :: kind = 0
+      !> Of the system that is solved.
+      type(harmonics_options) :: harmonics
       !> Unknowns are values at the instants (hdhb).
       logical :: in_time = .false.
       !> The balance with nothing condensed, made when a flow is first needed.
@@ -57,16 +60,18 @@ module fw_solution
 
 contains
 
-   subroutine start(self, case)
+   subroutine start(self, case, harmonics)
       class(solution_method), intent(inout) :: self
       type(case_type), intent(in) :: case
+      type(harmonics_options), intent(in) :: harmonics
 
       self%kind = case%solver%kind
       self%newton%options = case%solver
       self%newton%linear%keeps = case%solver%skips
       self%powell%options = case%solver
       self%kinsol%options = case%solver
-      self%in_time = case%harmonics%method == method_hdhb
+      self%harmonics = harmonics
+      self%in_time = harmonics%method == method_hdhb
    end subroutine start
 
    !> From the guess in the coefficients x. What does not count as converged: forces whose march
@@ -169,7 +174,7 @@ contains
 
       if (.not. allocated(self%whole)) then
          allocate (self%whole)
-         call build_system(case, self%whole, error, keep_all=.true.)
+         call build_system(case, self%whole, error, keep_all=.true., of_level=self%harmonics)
          if (allocated(error)) return
       end if
       call self%whole%set_frequency(system%structure%omega, error)

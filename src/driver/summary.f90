@@ -9,6 +9,7 @@ module fw_summary
    use fw_hbm, only: hbm_system
    use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
+   use fw_run_state, only: run_state
    use fw_solver_options, only: solver_newton
    use fw_text, only: string_type
    use fw_text, only: to_text
@@ -22,15 +23,11 @@ module fw_summary
    integer, parameter :: max_shown = 6
 
    type :: summary_type
-      integer :: n_points = 0
-      integer :: n_converged = 0
       integer :: iterations = 0
       !> Fewest and most harmonics of a point, where they adapt.
       integer :: harmonics(2) = [huge(0), 0]
       !> Fewest and most instants of a point, where they are chosen.
       integer :: instants(2) = [huge(0), 0]
-      !> The run ended before it had covered what was asked for.
-      logical :: incomplete = .false.
       type(string_type), allocatable :: name(:)
       !> Largest amplitude of each observed quantity among converged points, and where [rad/s].
       real(wp), allocatable :: peak(:), peak_omega(:)
@@ -42,7 +39,6 @@ module fw_summary
    contains
       procedure :: add
       procedure :: add_transient
-      procedure :: mark_incomplete
       procedure :: describe_work
       procedure :: note_fallback
       procedure :: describe_harmonics
@@ -70,13 +66,11 @@ contains
       type(point_type), intent(in) :: point
       integer :: i
 
-      self%n_points = self%n_points + 1
       self%iterations = self%iterations + point%iterations
       self%harmonics = [min(self%harmonics(1), point%n_harmonics), &
                         max(self%harmonics(2), point%n_harmonics)]
       self%instants = [min(self%instants(1), point%n_time), max(self%instants(2), point%n_time)]
       if (.not. point%converged) return
-      self%n_converged = self%n_converged + 1
       do i = 1, size(self%peak)
          if (point%amplitude(i) < self%peak(i)) cycle
          self%peak(i) = point%amplitude(i)
@@ -92,19 +86,15 @@ contains
       self%iterations = self%iterations + point%iterations
    end subroutine add_transient
 
-   subroutine mark_incomplete(self)
-      class(summary_type), intent(inout) :: self
-
-      self%incomplete = .true.
-   end subroutine mark_incomplete
-
    !> What the linear solver did, and what the case did not need.
-   subroutine describe_work(self, system, linear, kind)
+   subroutine describe_work(self, system, linear, kind, all_converged)
       class(summary_type), intent(inout) :: self
       type(hbm_system), intent(in) :: system
       type(linear_step_type), intent(in) :: linear
       !> The solver of the case; the counts are those of Newton's method.
       integer, intent(in) :: kind
+      !> Whether every point converged.
+      logical, intent(in) :: all_converged
       integer :: percent
 
       self%sampling = merge(sampling_events, sampling_uniform, allocated(system%contact%events))
@@ -134,7 +124,7 @@ contains
                    ' % of the unknowns of the linear problems')
       end if
       if (linear%n_problems == 0 .and. system%contact%n_pairs > 0 .and. &
-          kind == solver_newton .and. self%n_converged == self%n_points) then
+          kind == solver_newton .and. all_converged) then
          call skip(self, 'every linear problem: the joint stays stuck')
       else if (linear%n_empty > 0) then
          call skip(self, to_text(linear%n_empty)//' of '// &
@@ -233,18 +223,19 @@ contains
    end subroutine note_profile_change
 
    !> The table (seconds: elapsed time).
-   function lines(self, seconds) result(table)
+   function lines(self, state, seconds) result(table)
       class(summary_type), intent(in) :: self
+      type(run_state), intent(in) :: state
       real(wp), intent(in) :: seconds
       type(string_type), allocatable :: table(:)
       character(80) :: text
       integer :: i
 
       allocate (table(0))
-      call add_line(table, 'converged', to_text(self%n_converged)//' of '// &
-                    to_text(self%n_points)//' points')
+      call add_line(table, 'converged', to_text(state%n_converged)//' of '// &
+                    to_text(state%n_points)//' points')
       call add_line(table, 'iterations', to_text(self%iterations))
-      do i = 1, merge(min(size(self%name), max_shown), 0, self%n_converged > 0)
+      do i = 1, merge(min(size(self%name), max_shown), 0, state%n_converged > 0)
          write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', &
             self%peak_omega(i), &
             ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'

@@ -16,13 +16,14 @@ module fw_time_response
    use fw_guess, only: stuck_guess
    use fw_harmonics_options, only: method_hbm
    use fw_hbm, only: hbm_system
-   use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
-   use fw_problem, only: sweep_frequency
    use fw_recovery, only: recover_point
-   use fw_result, only: result_writer
+   use fw_run_state, only: run_state
+   use fw_strategy, only: new_request
+   use fw_strategy, only: point_request
+   use fw_strategy, only: point_strategy
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    use fw_time_solution, only: integrate_in_time
@@ -32,56 +33,55 @@ module fw_time_response
    implicit none (type, external)
    private
 
-   public :: run_time_response
+   public :: time_strategy
 
    !> Tightest relative change from period to period that is asked for: changes of state that move
    !> by one of the smallest steps keep it from vanishing.
    real(wp), parameter :: tightest_change = 1.0e-8_wp
 
-contains
-
-   !> Integrate at every frequency of the sweep, in the order given; each point is written as soon
-   !> as it is known.
-   subroutine run_time_response(case, observer, writer, summary, error)
-      type(case_type), intent(in) :: case
-      class(observer_type), intent(inout) :: observer
-      type(result_writer), intent(inout) :: writer
-      type(summary_type), intent(inout) :: summary
-      type(error_type), allocatable, intent(out) :: error
+   type, extends(point_strategy) :: time_strategy
+      !> The case of which the harmonic balance gives the initial states, and its system.
       type(case_type) :: start_case
       type(hbm_system) :: system
       type(point_solver) :: solver
       type(time_structure) :: structure
-      type(point_type) :: point
-      integer :: k, n_points
+   contains
+      procedure :: start
+      procedure :: solve
+      procedure :: describe
+   end type time_strategy
+
+contains
+
+   !> The harmonic balance that gives initial states, and the structure that is integrated.
+   subroutine start(self, case, error)
+      class(time_strategy), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
 
       call check_steps(case, error)
       if (allocated(error)) return
-      n_points = 1
-      if (case%sweep%end > 0.0_wp) n_points = case%sweep%n_points
-      start_case = case_of_start(case, n_points)
-      call build_system(start_case, system, error)
+      self%start_case = case_of_start(case)
+      call build_system(self%start_case, self%system, error)
       if (allocated(error)) return
-      call solver%start(start_case, system%n)
-      call new_time_structure(case%model, case%contact, case%springs, system%joint%row > 0, &
-                              structure, error)
-      if (allocated(error)) return
-      call observer%on_start(case%title, n_points)
-      do k = 1, n_points
-         call solve_point(case, start_case, system, solver, structure, &
-                          sweep_frequency(start_case%sweep, k, n_points), observer, point, error)
-         if (allocated(error)) exit
-         call writer%add_point(point, error)
-         if (allocated(error)) exit
-         call summary%add(point)
-         call observer%on_point(k, n_points, point)
-         if (observer%stop_requested .and. k < n_points) then
-            call summary%mark_incomplete()
-            exit
-         end if
-      end do
-      call observer%on_end()
-   end subroutine run_time_response
+      call self%solver%start(self%start_case, self%start_case%harmonics, self%system%n)
+      call new_time_structure(case%model, case%contact, case%springs, self%system%joint%row > 0, &
+                              self%structure, error)
+   end subroutine start
+
+   !> Nothing that the summary shows.
+   subroutine describe(self, case, state, summary, message)
+      class(time_strategy), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(run_state), intent(in) :: state
+      type(summary_type), intent(inout) :: summary
+      character(:), allocatable, intent(out) :: message
+
+      associate (unused => self, unused_case => case, unused_state => state, &
+                 unused_summary => summary)
+      end associate
+      message = ''
+   end subroutine describe
 
    !> The coefficients of the result need instants.
    subroutine check_steps(case, error)
@@ -99,9 +99,8 @@ contains
 
    !> The case of which the harmonic balance solution gives the initial state: all dofs are
    !> observed.
-   function case_of_start(case, n_points) result(start)
+   function case_of_start(case) result(start)
       type(case_type), intent(in) :: case
-      integer, intent(in) :: n_points
       type(case_type) :: start
       integer :: i
 
@@ -110,7 +109,7 @@ contains
       start%harmonics%method = method_hbm
       start%output%contact = .false.
       start%output%histories = .false.
-      if (n_points == 1) start%sweep%end = case%sweep%start
+      if (case%sweep%end <= 0.0_wp .or. case%sweep%n_points == 1) start%sweep%end = case%sweep%start
       deallocate (start%model%observe_matrix)
       allocate (start%model%observe_matrix(case%model%n_dof, case%model%n_dof), source=0.0_wp)
       do i = 1, case%model%n_dof
@@ -119,69 +118,64 @@ contains
    end function case_of_start
 
    !> Initial state, integration, time spent.
-   subroutine solve_point(case, start_case, system, solver, structure, omega, observer, point, &
-                          error)
-      type(case_type), intent(in) :: case, start_case
-      type(hbm_system), intent(inout), target :: system
-      type(point_solver), intent(inout) :: solver
-      type(time_structure), intent(in) :: structure
-      real(wp), intent(in) :: omega
-      class(observer_type), intent(inout) :: observer
+   subroutine solve(self, case, request, point, error)
+      class(time_strategy), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(time_state) :: state
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
-      call initial_state(start_case, system, solver, structure, omega, observer, state, error)
+      if (allocated(self%note)) deallocate (self%note)
+      call initial_state(self, request, state, error)
       if (allocated(error)) return
-      call integrate_in_time(structure, case%model%observe_matrix, omega, case%time, &
+      call integrate_in_time(self%structure, case%model%observe_matrix, request%omega, case%time, &
                              max(case%solver%tolerance, tightest_change), state, &
                              case%harmonics%n_harmonics, point, error)
       if (allocated(error)) return
-      if (.not. case%output%histories) then
+      if (.not. request%histories) then
          deallocate (point%history)
          if (allocated(point%force_history)) deallocate (point%force_history, point%slip_history)
       end if
-      if (.not. case%output%contact .and. allocated(point%force)) then
+      if (.not. request%contact .and. allocated(point%force)) then
          deallocate (point%force, point%fraction, point%dissipation)
       end if
       call system_clock(clock_end)
       point%seconds = real(clock_end - clock, wp)/real(rate, wp)
-   end subroutine solve_point
+   end subroutine solve
 
    !> Displacements and velocities at t = 0 of the harmonic balance solution, and where its pairs
    !> stick.
-   subroutine initial_state(case, system, solver, structure, omega, observer, state, error)
-      type(case_type), intent(in) :: case
-      type(hbm_system), intent(inout), target :: system
-      type(point_solver), intent(inout) :: solver
-      type(time_structure), intent(in) :: structure
-      real(wp), intent(in) :: omega
-      class(observer_type), intent(inout) :: observer
+   subroutine initial_state(self, request, state, error)
+      type(time_strategy), intent(inout), target :: self
+      type(point_request), intent(in) :: request
       type(time_state), intent(out) :: state
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: balance
-      integer :: h
+      integer :: h, n_harmonics
 
-      call solver%solve(case, system, omega, balance, error)
+      n_harmonics = self%start_case%harmonics%n_harmonics
+      call self%solver%solve(self%start_case, self%system, &
+                             new_request(self%start_case, request%omega), balance, error)
       if (allocated(error)) return
       if (.not. balance%converged) then
-         call observer%on_message('harmonic balance did not converge: the integration in time '// &
-                                  'starts from the stuck response')
-         call stuck_guess(system, solver%x)
+         self%note = 'harmonic balance did not converge: the integration in time starts from '// &
+                     'the stuck response'
+         call stuck_guess(self%system, self%solver%x)
          deallocate (balance%coefficients, balance%amplitude)
-         call recover_point(system, solver%x, case%harmonics%n_harmonics, .false., balance)
+         call recover_point(self%system, self%solver%x, n_harmonics, .false., balance)
       end if
       associate (c => balance%coefficients)
          state%displacement = c(1, :)
          allocate (state%velocity(size(c, 2)), source=0.0_wp)
-         do h = 1, case%harmonics%n_harmonics
+         do h = 1, n_harmonics
             state%displacement = state%displacement + c(2*h, :)
-            state%velocity = state%velocity + real(h, wp)*omega*c(2*h + 1, :)
+            state%velocity = state%velocity + real(h, wp)*request%omega*c(2*h + 1, :)
          end do
       end associate
-      call take_corrected(case, system, structure, balance%converged, state)
+      call take_corrected(self%start_case, self%system, self%structure, balance%converged, state)
    end subroutine initial_state
 
    !> Corrected positions: those of the march where there is one, the displacements themselves

@@ -20,6 +20,8 @@ module fw_wear_response
    use fw_restart_rows, only: restart_row_set
    use fw_result, only: result_writer
    use fw_solution, only: is_lasting
+   use fw_run_state, only: run_state
+   use fw_strategy, only: new_request
    use fw_summary, only: summary_type
    use fw_wear_march, only: steady_not_reached
    use fw_wear_march, only: steady_words
@@ -55,6 +57,7 @@ module fw_wear_response
       class(observer_type), pointer :: observer => null()
       type(result_writer), pointer :: writer => null()
       type(summary_type), pointer :: summary => null()
+      type(run_state), pointer :: state => null()
       type(restart_row_set) :: restart_rows
       integer :: n_rows = 0
       integer(int64) :: clock = 0_int64
@@ -78,25 +81,26 @@ contains
 
    !> The vibration of the unworn joint, then the march; every accepted step is written as soon as
    !> it is known.
-   subroutine run_wear(case, restart, observer, writer, summary, error)
+   subroutine run_wear(case, restart, observer, writer, summary, state, error)
       type(case_type), intent(in), target :: case
       !> The run to be continued; without steps where there is none.
       type(restart_type), intent(in) :: restart
       class(observer_type), intent(inout), target :: observer
       type(result_writer), intent(inout), target :: writer
       type(summary_type), intent(inout), target :: summary
+      type(run_state), intent(inout), target :: state
       type(error_type), allocatable, intent(out) :: error
       type(wear_run), target :: run
       type(point_type) :: point
 
       call build_system(case, run%balance, error)
       if (.not. allocated(error)) then
-         call start_recorder(run%recorder, case, observer, writer, summary, error)
+         call start_recorder(run%recorder, case, observer, writer, summary, state, error)
       end if
       if (allocated(error)) return
       call observer%on_start(case%title, 0)
-      call run%solver%start(case, run%balance%n)
-      call run%solver%solve(case, run%balance, case%sweep%start, point, error)
+      call run%solver%start(case, case%harmonics, run%balance%n)
+      call run%solver%solve(case, run%balance, new_request(case, case%sweep%start), point, error)
       if (allocated(error)) return
       if (point%converged) then
          call start_march(run, case, point, error)
@@ -114,15 +118,17 @@ contains
    end subroutine run_wear
 
    !> The rows of a result that is incomplete until the run says otherwise.
-   subroutine start_recorder(recorder, case, observer, writer, summary, error)
+   subroutine start_recorder(recorder, case, observer, writer, summary, state, error)
       type(wear_recorder), intent(inout) :: recorder
       type(case_type), intent(in), target :: case
       class(observer_type), intent(inout), target :: observer
       type(result_writer), intent(inout), target :: writer
       type(summary_type), intent(inout), target :: summary
+      type(run_state), intent(inout), target :: state
       type(error_type), allocatable, intent(out) :: error
 
       recorder%case => case
+      recorder%state => state
       recorder%observer => observer
       recorder%writer => writer
       recorder%summary => summary
@@ -195,6 +201,7 @@ contains
       run%march%ending = 'nothing was worn: '//reason
       call run%recorder%writer%add_point(point, error)
       call run%recorder%summary%add(point)
+      call run%recorder%state%note(point)
       call run%recorder%observer%on_point(1, 0, point)
    end subroutine give_up_unworn
 
@@ -206,9 +213,11 @@ contains
 
       associate (march => run%march, recorder => run%recorder, summary => run%recorder%summary)
          call recorder%observer%on_message('wear: '//march%ending)
-         if (.not. march%complete) call summary%mark_incomplete()
+         if (.not. march%complete) recorder%state%is_incomplete = .true.
+         recorder%state%was_stopped = recorder%observer%stop_requested
          call summary%describe_work(run%balance, march%stepper%newton%linear, &
-                                    recorder%case%solver%kind)
+                                    recorder%case%solver%kind, &
+                                    recorder%state%all_converged())
          call summary%describe_wear(trim(steady_words(march%steady)), march%n_steps, &
                                     march%n_rejected, run%state%cycles, &
                                     depth_of(run%system, run%state))
@@ -426,6 +435,7 @@ contains
          call self%summary%add_transient(point)
       else
          call self%summary%add(point)
+         call self%state%note(point)
       end if
    end subroutine count_point
 

@@ -1,0 +1,74 @@
+!> Points with the harmonics of the case, each started from what is known of those before.
+module fw_one_level
+   use fw_case, only: case_type
+   use fw_diagnosis, only: explain_failure
+   use fw_diagnosis, only: finer
+   use fw_error, only: error_type
+   use fw_level, only: level_type
+   use fw_point, only: point_type
+   use fw_run_state, only: run_state
+   use fw_strategy, only: point_request
+   use fw_strategy, only: point_strategy
+   use fw_summary, only: summary_type
+   implicit none (type, external)
+   private
+
+   public :: one_level
+
+   type, extends(point_strategy) :: one_level
+      type(level_type) :: level
+   contains
+      procedure :: start
+      procedure :: solve
+      procedure :: describe
+   end type one_level
+
+contains
+
+   subroutine start(self, case, error)
+      class(one_level), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%level%build(case, case%harmonics%n_harmonics, error)
+   end subroutine start
+
+   subroutine solve(self, case, request, point, error)
+      class(one_level), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(self%note)) deallocate (self%note)
+      call self%level%solve(case, request, point, error)
+      if (allocated(error)) return
+      associate (method => self%level%solver%method)
+         if (.not. point%converged .and. allocated(method%message)) then
+            self%note = 'pseudo-time: '//method%message
+         end if
+      end associate
+   end subroutine solve
+
+   !> The work done, and why points failed.
+   subroutine describe(self, case, state, summary, message)
+      class(one_level), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(run_state), intent(in) :: state
+      type(summary_type), intent(inout) :: summary
+      character(:), allocatable, intent(out) :: message
+
+      message = ''
+      associate (system => self%level%system, solver => self%level%solver)
+         call summary%describe_work(system, solver%method%newton%linear, case%solver%kind, &
+                                    state%all_converged())
+         if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
+         if (state%was_stopped .or. state%all_converged()) return
+         message = 'try a finer sweep, the other direction, another penalty_scale (0.3 or 3) '// &
+                   'or '//trim(finer(system))//' for the points above'
+         if (state%n_converged == 0) call explain_failure(system, solver%method, message)
+         message = 'not converged: '//message
+      end associate
+   end subroutine describe
+
+end module fw_one_level

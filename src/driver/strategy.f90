@@ -1,0 +1,85 @@
+!> How the point at a frequency is solved: with the harmonics of the case, with as many as it needs,
+!> to a given accuracy, or by integration in time.
+module fw_strategy
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_point, only: point_type
+   use fw_run_state, only: run_state
+   use fw_summary, only: summary_type
+   implicit none (type, external)
+   private
+
+   public :: point_strategy, point_request, new_request
+
+   !> What is asked of a point.
+   type :: point_request
+      !> [rad/s]
+      real(wp) :: omega = 0.0_wp
+      !> Look for other ways where the first fails.
+      logical :: fallback = .true.
+      !> Floquet multipliers; contact forces, states and energies; histories over the period.
+      logical :: stability = .false., contact = .false., histories = .false.
+   end type point_request
+
+   type, abstract :: point_strategy
+      !> What is worth telling of the last point; not allocated where nothing is.
+      character(:), allocatable :: note
+   contains
+      procedure(start_strategy), deferred :: start
+      procedure(solve_point), deferred :: solve
+      procedure(describe_work), deferred :: describe
+   end type point_strategy
+
+   abstract interface
+      !> Build what every point needs.
+      subroutine start_strategy(self, case, error)
+         import :: point_strategy, case_type, error_type
+         implicit none (type, external)
+         class(point_strategy), intent(inout) :: self
+         type(case_type), intent(in) :: case
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine start_strategy
+
+      !> Solve from what is known of the points before; not converging is an outcome, marked in the
+      !> point.
+      subroutine solve_point(self, case, request, point, error)
+         import :: point_strategy, case_type, point_request, point_type, error_type
+         implicit none (type, external)
+         class(point_strategy), intent(inout), target :: self
+         type(case_type), intent(in) :: case
+         type(point_request), intent(in) :: request
+         type(point_type), intent(out) :: point
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine solve_point
+
+      !> What was chosen and done over all points; `message` where they miss what was asked, and
+      !> why.
+      subroutine describe_work(self, case, state, summary, message)
+         import :: point_strategy, case_type, run_state, summary_type
+         implicit none (type, external)
+         class(point_strategy), intent(inout), target :: self
+         type(case_type), intent(in) :: case
+         type(run_state), intent(in) :: state
+         type(summary_type), intent(inout) :: summary
+         character(:), allocatable, intent(out) :: message
+      end subroutine describe_work
+   end interface
+
+contains
+
+   !> What a case asks of its points.
+   pure function new_request(case, omega) result(request)
+      type(case_type), intent(in) :: case
+      !> [rad/s]
+      real(wp), intent(in) :: omega
+      type(point_request) :: request
+
+      request%omega = omega
+      request%fallback = case%solver%fallback
+      request%stability = case%sweep%stability
+      request%contact = case%output%contact
+      request%histories = case%output%histories
+   end function new_request
+
+end module fw_strategy

@@ -1,0 +1,144 @@
+!> The one loop over the points of a run: a source gives them one after the other, sinks take them.
+module fw_sweep
+   use fw_case, only: analysis_frf
+   use fw_case, only: analysis_time
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_observer, only: observer_type
+   use fw_point, only: point_type
+   use fw_run_state, only: run_state
+   use fw_sinks, only: sink_list
+   use fw_solver_options, only: sweep_options
+   use fw_strategy, only: new_request
+   use fw_strategy, only: point_strategy
+   implicit none (type, external)
+   private
+
+   public :: point_source, frequency_source, run_sweep, sweep_frequency, sweep_frequencies
+
+   type, abstract :: point_source
+   contains
+      procedure(next_point), deferred :: next
+      procedure(is_covered), deferred :: is_covered
+      procedure :: finish
+   end type point_source
+
+   abstract interface
+      !> The next point; `more` is false where there is none.
+      subroutine next_point(self, case, observer, point, more, error)
+         import :: point_source, case_type, observer_type, point_type, error_type
+         implicit none (type, external)
+         class(point_source), intent(inout) :: self
+         type(case_type), intent(in) :: case
+         !> Told what is worth knowing on the way.
+         class(observer_type), intent(inout) :: observer
+         type(point_type), intent(out) :: point
+         logical, intent(out) :: more
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine next_point
+
+      !> Whether everything that was asked for has been given.
+      pure logical function is_covered(self)
+         import :: point_source
+         implicit none (type, external)
+         class(point_source), intent(in) :: self
+      end function is_covered
+   end interface
+
+   !> Given frequencies, in their order.
+   type, extends(point_source) :: frequency_source
+      !> (n_points) [rad/s]
+      real(wp), allocatable :: omega(:)
+      !> Points given so far.
+      integer :: n_given = 0
+      class(point_strategy), pointer :: strategy => null()
+   contains
+      procedure :: next => next_frequency
+      procedure :: is_covered => all_given
+   end type frequency_source
+
+contains
+
+   !> Until the source has no more, something fails, or the observer asks for the end.
+   subroutine run_sweep(case, source, sinks, observer, state, error)
+      type(case_type), intent(in) :: case
+      class(point_source), intent(inout) :: source
+      type(sink_list), intent(inout) :: sinks
+      class(observer_type), intent(inout) :: observer
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: point
+      logical :: more
+
+      do while (.not. observer%stop_requested)
+         call source%next(case, observer, point, more, error)
+         if (allocated(error) .or. .not. more) exit
+         call sinks%take(point, error)
+         if (allocated(error)) exit
+         call state%note(point)
+      end do
+      if (.not. allocated(error)) call source%finish(case, observer)
+      state%was_stopped = observer%stop_requested
+      state%is_incomplete = state%is_incomplete .or. .not. source%is_covered()
+   end subroutine run_sweep
+
+   !> After the last point: what is worth telling of the whole; nothing unless a source has more.
+   subroutine finish(self, case, observer)
+      class(point_source), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+
+      associate (unused => self, unused_case => case, unused_observer => observer)
+      end associate
+   end subroutine finish
+
+   subroutine next_frequency(self, case, observer, point, more, error)
+      class(frequency_source), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+      type(point_type), intent(out) :: point
+      logical, intent(out) :: more
+      type(error_type), allocatable, intent(out) :: error
+
+      more = self%n_given < size(self%omega)
+      if (.not. more) return
+      call self%strategy%solve(case, new_request(case, self%omega(self%n_given + 1)), point, error)
+      if (allocated(error)) return
+      if (allocated(self%strategy%note)) call observer%on_message(self%strategy%note)
+      self%n_given = self%n_given + 1
+   end subroutine next_frequency
+
+   pure logical function all_given(self)
+      class(frequency_source), intent(in) :: self
+
+      all_given = self%n_given == size(self%omega)
+   end function all_given
+
+   !> The frequencies that a case asks for [rad/s].
+   pure function sweep_frequencies(case) result(omega)
+      type(case_type), intent(in) :: case
+      real(wp), allocatable :: omega(:)
+      integer :: k, n_points
+
+      n_points = 1
+      if (case%analysis == analysis_frf) n_points = case%sweep%n_points
+      if (case%analysis == analysis_time .and. case%sweep%end > 0.0_wp) then
+         n_points = case%sweep%n_points
+      end if
+      omega = [(sweep_frequency(case%sweep, k, n_points), k=1, n_points)]
+   end function sweep_frequencies
+
+   !> Point k of a sweep: evenly spaced from start to end, both exact [rad/s].
+   pure real(wp) function sweep_frequency(sweep, k, n_points) result(omega)
+      type(sweep_options), intent(in) :: sweep
+      integer, intent(in) :: k, n_points
+      real(wp) :: share
+
+      omega = sweep%start
+      if (n_points == 1) return
+      share = real(k - 1, wp)/real(n_points - 1, wp)
+      omega = (1.0_wp - share)*sweep%start + share*sweep%end
+   end function sweep_frequency
+
+end module fw_sweep
