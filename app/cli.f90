@@ -18,6 +18,8 @@ module fw_cli
       !> `group%key=value` each, in the order given.
       type(string_type), allocatable :: overrides(:)
       logical :: check = .false.
+      !> Show the keys of the namelist, all or those of the group `input`, for a program or not.
+      logical :: keys = .false., keys_as_json = .false.
       logical :: quiet = .false.
       logical :: verbose = .false.
       logical :: help = .false.
@@ -67,7 +69,7 @@ contains
          if (allocated(error)) return
          i = i + 1
       end do
-      if (options%help .or. options%version) return
+      if (options%help .or. options%version .or. options%keys) return
       if (options%quiet .and. options%verbose) then
          call fatal_error(error, '-q and -v exclude each other'//hint, status_usage)
       else if (.not. allocated(options%input)) then
@@ -105,6 +107,13 @@ contains
       equals = index(name, '=')
       if (equals > 0) name = name(:equals - 1)
       select case (name)
+      case ('--keys')
+         options%keys = .true.
+         options%keys_as_json = arguments(i)%text == '--keys=json'
+         if (equals > 0 .and. .not. options%keys_as_json) then
+            call fatal_error(error, '--keys may be followed by =json and by nothing else'//hint, &
+                             status_usage)
+         end if
       case ('--set', '--output', '--restart')
          if (equals > 0) then
             call take_value(name, arguments(i)%text(equals + 1:), options, error)
@@ -212,7 +221,7 @@ contains
       character(*), intent(in) :: name
       character(:), allocatable :: text
       character(*), parameter :: names(*) = [character(9) :: '--set', '--output', '--restart', &
-         '--check', '--quiet', '--verbose', '--help', '--version']
+         '--keys', '--check', '--quiet', '--verbose', '--help', '--version']
       type(string_type) :: options(size(names))
       integer :: i
 

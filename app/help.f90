@@ -23,6 +23,8 @@ contains
          '                         beside it)', &
          '  --restart FILE         go on with the wear run of this result file, also of one that', &
          '                         was killed (FILE.part)', &
+         '  --keys [GROUP]         what every key accepts and means, its unit and its default;', &
+         '                         --keys=json for programs', &
          '  --check                validate, print the effective input, run nothing', &
          '  -q                     errors only', &
          '  -v                     iterations and residual of every point', &
@@ -44,7 +46,7 @@ contains
          '  &wear         fretting wear', &
          '  &time         time integration', &
          '  &output       result file, observed quantities', &
-         'All keys with their values and what each accepts: fw_run --check case.nml', &
+         'All keys with what each means: fw_run --keys; as a case has them: fw_run --check', &
          '', &
          'Examples:', &
          '  fw_run case.nml', &

@@ -6,9 +6,10 @@ program fw_run_program
    use fw_error, only: error_type, status_ok
    use fw_help, only: write_help
    use fw_interrupt, only: catch_interrupts
+   use fw_key_text, only: write_keys
    use fw_outcome, only: outcome_type
    use fw_progress, only: progress_type, new_progress
-   use fw_read_case, only: read_case
+   use fw_read_case, only: case_input, read_input
    use fw_reader_text, only: printable
    use fw_restart_trial, only: try_restart
    use fw_run, only: check_case, run_case
@@ -36,6 +37,8 @@ contains
       if (.not. allocated(error)) then
          if (options%help) then
             call write_help(output_unit)
+         else if (options%keys) then
+            call show_keys(options, error)
          else if (options%version) then
             write (output_unit, '(a)') 'fw_run '//version
          else
@@ -45,20 +48,36 @@ contains
       if (allocated(error)) call report(error, status)
    end subroutine main
 
+   !> The keys of all groups, or of one.
+   subroutine show_keys(options, error)
+      type(cli_options), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(options%input)) then
+         call write_keys(output_unit, options%input, options%keys_as_json, error)
+      else
+         call write_keys(output_unit, '', options%keys_as_json, error)
+      end if
+   end subroutine show_keys
+
    !> Validate, then either show the effective input or compute.
    subroutine run(options, status, error)
       type(cli_options), intent(in) :: options
       integer, intent(inout) :: status
       type(error_type), allocatable, intent(out) :: error
+      type(case_input) :: input
       type(case_type) :: case
       type(outcome_type) :: outcome
       type(progress_type) :: progress
       type(thread_scope) :: threads
       integer :: i
 
+      input%path = options%input
+      input%overrides = options%overrides
+      input%tries_files = .true.
       ! Damping and checks of a model must not depend on the threads of the BLAS either.
       call threads%enter(0)
-      call read_case(options%input, options%overrides, case, error, tries_files=.true.)
+      call read_input(input, case, error)
       call threads%leave()
       if (allocated(error)) return
       if (allocated(options%restart)) case%restart = options%restart

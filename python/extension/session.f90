@@ -12,7 +12,8 @@ module fw_python_session
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
    use fw_point, only: point_type
-   use fw_read_case, only: read_case_text
+   use fw_read_case, only: case_input
+   use fw_read_case, only: read_input
    use fw_run, only: check_case
    use fw_run, only: run_case
    use fw_text, only: join
@@ -82,16 +83,20 @@ contains
       integer, intent(out) :: status
       type(error_type), allocatable :: error
       type(thread_scope) :: threads
+      type(case_input) :: input
 
+      input%text = text
+      input%path = path
+      input%overrides = overrides
+      input%origin = origin
       if (allocated(self%case)) deallocate (self%case)
       allocate (self%case)
       ! Damping and checks of a model must not depend on the threads of the BLAS either.
       call threads%enter(0)
       if (allocated(self%model)) then
-         call read_case_text(text, path, overrides, self%case, error, memory_model=self%model, &
-                             origin=origin)
+         call read_input(input, self%case, error, self%model)
       else
-         call read_case_text(text, path, overrides, self%case, error, origin=origin)
+         call read_input(input, self%case, error)
       end if
       call threads%leave()
       call conclude(self, error, status)

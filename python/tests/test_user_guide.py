@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -27,19 +28,17 @@ IN_WORDS = {"case%title", "case%analysis", "model%n_dof", "model%mass", "model%s
 
 
 def read_keys() -> set[str]:
-    """Every group%key that the sources of the reader ask for.
+    """Every group%key that the program declares, which is what its reader takes."""
+    shown = subprocess.run([PROGRAM, "--keys=json"], check=True, capture_output=True, text=True)
+    return {f"{group}%{key}" for group, content in json.loads(shown.stdout).items()
+            for key in content["keys"]}
 
-    The getter names both, or names the group in a local procedure that is called with keys.
-    """
-    found = set()
-    for path in sorted((ROOT / "src" / "io").glob("read_*.f90")):
-        for procedure in re.split(r"^   end subroutine", path.read_text(), flags=re.MULTILINE):
-            found |= {f"{group}%{key}" for group, key in re.findall(
-                r"reader%get\w*\('(\w+)', *'(\w+)'", procedure)}
-            for group in set(re.findall(r"reader%get\w*\('(\w+)', *key\b", procedure)):
-                found |= {f"{group}%{key}" for key in re.findall(
-                    r"call read_\w+\('(\w+)'", procedure)}
-    return found
+
+def test_no_key_is_read_that_is_not_listed() -> None:
+    """Names in the sources stand in the call that declares the key."""
+    declared = {key for path in (ROOT / "src").rglob("*.f90") for key in re.findall(
+        r"\b(?:load_)?key\('(\w+)'", path.read_text())}
+    assert declared == {name.split("%")[1] for name in read_keys()}
 
 
 def table_rows() -> dict[str, dict[str, str]]:

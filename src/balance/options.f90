@@ -1,5 +1,12 @@
 !> Options of the balance formulations (group &harmonics). Defaults live here and nowhere else.
 module fw_harmonics_options
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: above
+   use fw_key_range, only: at_least
+   use fw_key_range, only: below
+   use fw_key_range, only: from_to
+   use fw_key_range, only: operator(.and.)
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -46,6 +53,45 @@ module fw_harmonics_options
       real(wp) :: accuracy = 0.0_wp
       !> Doublings of an automatic n_time, below 0 halvings; no input, but set where accuracy asks.
       integer :: doublings = 0
+   contains
+      procedure :: bind_keys
    end type harmonics_options
+
+contains
+
+   !> The keys of group &harmonics.
+   subroutine bind_keys(self, keys)
+      class(harmonics_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%open('harmonics', 'method, number of harmonics, instants per period')
+      call keys%bind_word(key('method', 'how the equations are weighted: Galerkin, '// &
+                              'collocation, least squares, or unknowns at the instants'), &
+                          self%method, method_words)
+      call keys%bind(key('n_harmonics', 'H, the highest harmonic; with accuracy the most that '// &
+                         'may be used', from_to(1, 10000), absent='53 with accuracy'), &
+                     self%n_harmonics)
+      call keys%bind(key('n_time', 'instants of a period, at least 2H+1; 0: chosen', &
+                         from_to(0, 1000000)), self%n_time)
+      call keys%bind(key('n_collocation', 'instants of the equations; 0: twice the '// &
+                         'coefficients', at_least(0), only="method = 'tcm_least_squares'"), &
+                     self%n_collocation)
+      call keys%bind(key('filter_harmonics', 'harmonics above this one do not reach nonlinear '// &
+                         'springs; 0: no filter', at_least(0), only="method = 'hdhb'"), &
+                     self%filter_harmonics)
+      call keys%bind_word(key('sampling', 'decide stick, slip and separation at the instants, '// &
+                              'or locate them on the series'), self%sampling, sampling_words)
+      call keys%bind_word(key('parity', 'which harmonics are kept; auto leaves even ones out '// &
+                              'where that is exact'), self%parity, parity_words)
+      call keys%bind(key('adaptive', 'as many harmonics as each point needs, up to '// &
+                         'n_harmonics', only='natural sweeps and points'), self%adaptive)
+      call keys%bind(key('adaptive_tolerance', 'part of the contact and spring forces that '// &
+                         'may be left out', above(0.0_wp), only='adaptive'), &
+                     self%adaptive_tolerance)
+      call keys%bind(key('accuracy', 'relative error of the response for which harmonics and '// &
+                         'instants are chosen; 0: as given', at_least(0.0_wp) .and. &
+                         below(1.0_wp), only="method = 'hbm', natural sweeps and points"), &
+                     self%accuracy)
+   end subroutine bind_keys
 
 end module fw_harmonics_options

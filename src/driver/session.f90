@@ -20,7 +20,8 @@ module fw_session
    use fw_point, only: point_type
    use fw_point_values, only: get_point_values
    use fw_one_level, only: one_level
-   use fw_read_case, only: read_case_text
+   use fw_read_case, only: case_input
+   use fw_read_case, only: read_input
    use fw_run, only: check_case
    use fw_run, only: run_case
    use fw_session_points, only: point_list
@@ -187,6 +188,7 @@ contains
       !> Everything that is wrong in the input.
       type(error_type), allocatable, intent(out) :: error
       type(thread_scope) :: threads
+      type(case_input) :: input
 
       if (self%is_read) return
       call self%points%clear()
@@ -195,14 +197,16 @@ contains
       if (.not. allocated(self%keys)) allocate (self%keys(0))
       if (allocated(self%model)) call self%model%check(error)
       if (allocated(error)) return
+      input%path = self%path
+      input%overrides = self%keys
+      input%text = self%text
+      input%origin = key_origin
       ! Damping and checks of a model must not depend on the threads of the BLAS.
       call threads%enter(0)
       if (allocated(self%model)) then
-         call read_case_text(self%text, self%path, self%keys, self%case, error, &
-                             self%model%parts, key_origin)
+         call read_input(input, self%case, error, self%model%parts)
       else
-         call read_case_text(self%text, self%path, self%keys, self%case, error, &
-                             origin=key_origin)
+         call read_input(input, self%case, error)
       end if
       call threads%leave()
       self%is_read = .not. allocated(error)

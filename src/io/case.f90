@@ -1,7 +1,9 @@
 !> A case: everything that one run needs, validated. Composed of the option types of the layers
 !> that use them; see each for its defaults.
 module fw_case
-   use fw_kinds, only: wp
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: from_to
    use fw_model, only: model_type
    use fw_contact_data, only: contact_type, spring_type
    use fw_harmonics_options, only: harmonics_options
@@ -28,6 +30,8 @@ module fw_case
       logical :: histories = .false.
       !> Write the contact forces, states and dissipation.
       logical :: contact = .true.
+   contains
+      procedure :: bind_keys => bind_output_keys
    end type output_options
 
    type :: case_type
@@ -52,6 +56,37 @@ module fw_case
       !> Result file of a wear run that is to be continued; not allocated to start anew. No key of
       !> the namelist.
       character(:), allocatable :: restart
+   contains
+      procedure :: bind_keys => bind_case_keys
    end type case_type
+
+contains
+
+   !> The keys of group &case.
+   subroutine bind_case_keys(self, keys)
+      class(case_type), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%open('case', 'title, kind of analysis, threads')
+      call keys%bind(key('title', 'stands in the result file', &
+                         absent='title of the model file, or name of the namelist'), self%title)
+      call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, or '// &
+                              'integration in time'), self%analysis, analysis_words)
+      call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
+                         from_to(0, 1024)), self%threads)
+   end subroutine bind_case_keys
+
+   !> The keys of group &output but for what is observed.
+   subroutine bind_output_keys(self, keys)
+      class(output_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%open('output', 'result file, observed quantities')
+      call keys%bind(key('file', 'result file, relative to the namelist', &
+                         absent='name of the namelist with .h5'), self%file)
+      call keys%bind(key('histories', 'write one period of every quantity at every point; '// &
+                         'large'), self%histories)
+      call keys%bind(key('contact', 'write contact forces, states and dissipation'), self%contact)
+   end subroutine bind_output_keys
 
 end module fw_case

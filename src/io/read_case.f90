@@ -4,98 +4,148 @@ module fw_read_case
    use fw_case, only: case_type, analysis_wear
    use fw_error, only: error_type
    use fw_model_file, only: file_model_type
+   use fw_model_keys, only: model_options
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
-   use fw_read_model, only: read_model, read_loads, finish_model, model_options
-   use fw_read_options, only: read_case_group, read_harmonics, read_sweep, read_solver, &
-                              read_pseudo_time, read_wear, read_time
+   use fw_read_model, only: read_model, read_loads, finish_model
+   use fw_read_options, only: read_harmonics, read_sweep
    use fw_read_output, only: read_output, read_observed
    use fw_read_worn, only: read_worn
    use fw_reader, only: reader_type, new_reader
    use fw_reader_text, only: printable
+   use fw_records, only: record_list
    use fw_text, only: string_type
    use fw_text_list, only: append
    use fw_values, only: quoted_text
    implicit none (type, external)
    private
 
-   public :: read_case, read_case_text
+   public :: case_input, read_case, read_case_text, read_input, list_keys
+
+   !> What a case is read from. To be filled one by one: gfortran 12 loses texts that a structure
+   !> constructor is given.
+   type :: case_input
+      !> Of the namelist: for messages, for relative files in it, and for the default name of the
+      !> result file.
+      character(:), allocatable :: path
+      !> `group%key=value` each, as after --set.
+      type(string_type), allocatable :: overrides(:)
+      !> The namelist; where it is not allocated, the file of that path.
+      character(:), allocatable :: text
+      !> What messages put before an override (default: '--set').
+      character(:), allocatable :: origin
+      !> Try model files in a process of their own first: for programs of one thread.
+      logical :: tries_files = .false.
+   end type case_input
 
 contains
 
    !> Read a case from a namelist file.
-   subroutine read_case(path, overrides, case, error, tries_files)
+   subroutine read_case(path, overrides, case, error)
       character(*), intent(in) :: path
       !> `group%key=value` each, as after --set.
       type(string_type), intent(in) :: overrides(:)
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
-      !> Try model files in a process of their own first (default: no).
-      logical, intent(in), optional :: tries_files
-      character(:), allocatable :: text
+      type(case_input) :: input
 
-      call read_text_file(path, text, error)
-      if (allocated(error)) return
-      call read_case_text(text, path, overrides, case, error, tries_files=tries_files)
+      input%path = path
+      input%overrides = overrides
+      call read_input(input, case, error)
    end subroutine read_case
 
-   !> Read a case from namelist text. The handling of texts serves one thread at a time (gfortran
-   !> keeps the lengths of texts that functions return in static memory), and so does HDF5: every
-   !> reading waits for its turn.
-   subroutine read_case_text(text, path, overrides, case, error, memory_model, origin, &
-                             tries_files)
-      character(*), intent(in) :: text
-      !> Path for messages, for relative files and for the default name of the result file.
-      character(*), intent(in) :: path
-      type(string_type), intent(in) :: overrides(:)
-      type(case_type), intent(out) :: case
-      type(error_type), allocatable, intent(out) :: error
-      !> The model where the calling program gives it, with mass and stiffness.
-      type(file_model_type), intent(in), optional :: memory_model
-      !> What messages put before an override (default: '--set').
-      character(*), intent(in), optional :: origin
-      !> As of read_case.
-      logical, intent(in), optional :: tries_files
-
-      !$omp critical (fretwear_io)
-      call read_groups(text, path, overrides, case, error, memory_model, origin, tries_files)
-      if (allocated(error)) error%message = printable(error%message)
-      !$omp end critical (fretwear_io)
-   end subroutine read_case_text
-
-   !> The same, with messages that may hold any byte of the text.
-   subroutine read_groups(text, path, overrides, case, error, memory_model, origin, tries_files)
+   !> Read a case from namelist text.
+   subroutine read_case_text(text, path, overrides, case, error)
       character(*), intent(in) :: text, path
       type(string_type), intent(in) :: overrides(:)
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
-      character(*), intent(in), optional :: origin
-      logical, intent(in), optional :: tries_files
-      type(reader_type) :: reader
-      type(file_model_type) :: raw
+      type(case_input) :: input
 
-      call new_reader(reader, text, path, overrides, error, origin)
+      input%path = path
+      input%overrides = overrides
+      input%text = text
+      call read_input(input, case, error)
+   end subroutine read_case_text
+
+   !> Read a case. The handling of texts serves one thread at a time (gfortran keeps the lengths of
+   !> texts that functions return in static memory), and so does HDF5: every reading waits for its
+   !> turn.
+   subroutine read_input(input, case, error, memory_model)
+      type(case_input), intent(in) :: input
+      type(case_type), intent(out) :: case
+      type(error_type), allocatable, intent(out) :: error
+      !> The model where the calling program gives it, with mass and stiffness.
+      type(file_model_type), intent(in), optional :: memory_model
+
+      !$omp critical (fretwear_io)
+      call read_groups(input, case, error, memory_model)
+      if (allocated(error)) error%message = printable(error%message)
+      !$omp end critical (fretwear_io)
+   end subroutine read_input
+
+   !> The same, with messages that may hold any byte of the text.
+   subroutine read_groups(input, case, error, memory_model)
+      type(case_input), intent(in) :: input
+      type(case_type), intent(inout) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(file_model_type), intent(in), optional :: memory_model
+      type(reader_type) :: reader
+      character(:), allocatable :: text
+
+      if (allocated(input%text)) then
+         text = input%text
+      else
+         call read_text_file(input%path, text, error)
+         if (allocated(error)) return
+      end if
+      call new_reader(reader, text, input%path, input%overrides, error, input%origin)
       if (allocated(error)) return
-      if (present(tries_files)) reader%tries_files = tries_files
-      call read_case_group(reader, case)
-      call read_structure(reader, path, case, raw, error, memory_model)
+      reader%tries_files = input%tries_files
+      call read_keys(reader, input%path, case, error, memory_model)
       if (allocated(error)) return
-      call list_inputs(path, raw, case%inputs)
-      call read_harmonics(reader, case%harmonics)
-      call read_sweep(reader, case%analysis, case%sweep)
-      call read_solver(reader, case%solver)
-      call read_pseudo_time(reader, case%pseudo_time)
-      call read_wear(reader, case%analysis, case%wear)
-      call read_time(reader, case%time)
-      case%output%file = stem_of(path)//'.h5'
-      call read_output(reader, directory_of(path), case%output)
-      call read_observed(reader, raw, case%model)
       call reader%finish(error)
       if (allocated(error)) return
       case%namelist = reader%effective()
       call check_combinations(case, error)
    end subroutine read_groups
+
+   !> Every key, in the order of the effective input.
+   subroutine read_keys(reader, path, case, error, memory_model)
+      type(reader_type), intent(inout) :: reader
+      character(*), intent(in) :: path
+      type(case_type), intent(inout) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(file_model_type), intent(in), optional :: memory_model
+      type(file_model_type) :: raw
+
+      call case%bind_keys(reader)
+      call read_structure(reader, path, case, raw, error, memory_model)
+      if (allocated(error)) return
+      call list_inputs(path, raw, case%inputs)
+      call read_harmonics(reader, case%harmonics)
+      call read_sweep(reader, case%analysis, case%sweep)
+      call case%solver%bind_keys(reader)
+      call case%pseudo_time%bind_keys(reader)
+      call case%wear%bind_keys(reader, case%analysis == analysis_wear)
+      call case%time%bind_keys(reader)
+      case%output%file = stem_of(path)//'.h5'
+      call read_output(reader, directory_of(path), case%output)
+      call read_observed(reader, raw, case%model)
+   end subroutine read_keys
+
+   !> What every key is and holds by default: the keys that an empty input is asked for.
+   subroutine list_keys(keys)
+      type(record_list), intent(out) :: keys
+      type(reader_type) :: reader
+      type(case_type) :: case
+      type(string_type) :: none(0)
+      type(error_type), allocatable :: ignored
+
+      call new_reader(reader, '', '', none, ignored)
+      call read_keys(reader, '', case, ignored)
+      keys = reader%records
+   end subroutine list_keys
 
    !> The files that the case was read from, after those that are listed already.
    subroutine list_inputs(path, raw, inputs)
@@ -136,7 +186,7 @@ contains
          allocate (case%inputs(0))
          call append(case%inputs, worn)
       end if
-      call read_springs(reader, n_dof, case%springs)
+      call read_springs(reader, case%springs)
       call read_loads(reader, options, raw)
       call finish_model(reader, options, raw, case%model, error)
       if (.not. allocated(case%title)) then

@@ -1,7 +1,9 @@
 !> Contact pairs and nonlinear springs: groups &contact and &spring on top of a model file.
 module fw_read_contact
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use fw_contact_data, only: contact_type, spring_type, law_words, law_penalty, memory_words
+   use fw_contact_data, only: contact_type, spring_type, law_words, law_penalty
+   use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
+                              bind_normal_load, bind_stiffnesses, bind_march, bind_springs
    use fw_kinds, only: wp
    use fw_model_file, only: file_model_type
    use fw_read_model, only: refuse_model
@@ -29,12 +31,11 @@ contains
       real(wp) :: scale
 
       call read_n_pairs(reader, file_model, contact)
-      call reader%get_word('contact', 'law', contact%law, law_words)
+      call bind_law(reader, contact)
       call read_sides(reader, n_dof, contact)
       call read_constants(reader, needs_area, contact)
       call read_stiffnesses(reader, contact)
-      call reader%get('contact', 'penalty_scale', contact%penalty_scale, above=0.0_wp)
-      call reader%get_word('contact', 'memory', contact%memory, memory_words)
+      call bind_march(reader, contact)
       scale = contact%penalty_scale
       if (contact%law == law_penalty .and. abs(scale - 1.0_wp) > 0.0_wp) then
          call reader%refuse('contact', 'penalty_scale', "has no meaning with law = 'penalty': "// &
@@ -52,7 +53,7 @@ contains
       n_file = 0
       if (allocated(file_model%side_1)) n_file = size(file_model%side_1, 2)
       contact%n_pairs = n_file
-      call reader%get('contact', 'n_pairs', contact%n_pairs, least=0, most=1000000)
+      call bind_pairs(reader, contact)
       if (contact%n_pairs == n_file .and. n_file > 0) then
          contact%side_1 = file_model%side_1
          contact%side_2 = file_model%side_2
@@ -78,32 +79,12 @@ contains
       type(reader_type), intent(inout) :: reader
       integer, intent(in) :: n_dof
       type(contact_type), intent(inout) :: contact
-      logical :: from_file
+      logical :: needed
 
-      from_file = allocated(contact%side_1)
-      call read_side('side_1', contact%side_1, .not. (from_file .or. reader%failed()) &
-                     .and. contact%n_pairs > 0)
-      call read_side('side_2', contact%side_2, .false.)
+      needed = .not. (allocated(contact%side_1) .or. reader%failed()) .and. contact%n_pairs > 0
+      if (.not. allocated(contact%side_1)) allocate (contact%side_1(3, contact%n_pairs), source=0)
+      call bind_sides(reader, contact, needed)
       if (.not. reader%failed()) call check_sides(reader, n_dof, contact)
-
-   contains
-
-      subroutine read_side(key, side, required)
-         character(*), intent(in) :: key
-         integer, allocatable, intent(inout) :: side(:, :)
-         logical, intent(in) :: required
-         integer, allocatable :: numbers(:)
-
-         if (allocated(side)) then
-            numbers = reshape(side, [size(side)])
-         else
-            allocate (numbers(3*contact%n_pairs), source=0)
-         end if
-         call reader%get_array('contact', key, numbers, [3, contact%n_pairs], .true., &
-                               least=-n_dof, most=n_dof, required=required)
-         side = reshape(numbers, [3, contact%n_pairs])
-      end subroutine read_side
-
    end subroutine read_sides
 
    !> Every pair must join something to something else.
@@ -162,17 +143,12 @@ contains
       n_pairs = contact%n_pairs
       slides = has_tangent(contact)
       closes = has_normal(contact)
-      call reader%get_array('contact', 'mu', contact%mu, [n_pairs], .true., least=0.0_wp, &
-                            required=any(slides) .and. .not. allocated(contact%mu))
+      call bind_friction(reader, contact, any(slides) .and. .not. allocated(contact%mu))
       if (.not. allocated(contact%mu)) allocate (contact%mu(n_pairs), source=0.0_wp)
-      if (.not. allocated(contact%gap)) allocate (contact%gap(n_pairs), source=0.0_wp)
-      call reader%get_array('contact', 'gap', contact%gap, [n_pairs], .true.)
-      call reader%get_array('contact', 'area', contact%area, [n_pairs], .true., above=0.0_wp, &
-                            required=needs_area .and. n_pairs > 0 &
-                                     .and. .not. allocated(contact%area))
-      call reader%get_array('contact', 'normal_load', contact%normal_load, [n_pairs], .true., &
-                            least=0.0_wp, &
-                            required=any(slides .and. .not. closes .and. contact%mu > 0.0_wp))
+      call bind_gap(reader, contact, needs_area .and. n_pairs > 0 &
+                    .and. .not. allocated(contact%area))
+      call bind_normal_load(reader, contact, &
+                            any(slides .and. .not. closes .and. contact%mu > 0.0_wp))
       if (.not. allocated(contact%normal_load)) then
          allocate (contact%normal_load(n_pairs), source=0.0_wp)
       else if (all(closes) .and. any(contact%normal_load > 0.0_wp)) then
@@ -223,27 +199,27 @@ contains
    subroutine read_stiffnesses(reader, contact)
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(inout) :: contact
+      logical :: is_penalty
 
-      call read_one('tangential_stiffness', contact%tangential_stiffness, any(has_tangent(contact)))
-      call read_one('normal_stiffness', contact%normal_stiffness, any(has_normal(contact)))
+      is_penalty = contact%law == law_penalty
+      call bind_stiffnesses(reader, contact, is_penalty .and. any(has_tangent(contact)), &
+                            is_penalty .and. any(has_normal(contact)))
+      call finish_one('tangential_stiffness', contact%tangential_stiffness)
+      call finish_one('normal_stiffness', contact%normal_stiffness)
 
    contains
 
-      subroutine read_one(key, values, needed)
+      subroutine finish_one(key, values)
          character(*), intent(in) :: key
          real(wp), allocatable, intent(inout) :: values(:)
-         logical, intent(in) :: needed
-         logical :: is_penalty
 
-         is_penalty = contact%law == law_penalty
-         call reader%get_array('contact', key, values, [contact%n_pairs], .true., above=0.0_wp, &
-                               required=is_penalty .and. needed)
-         if (allocated(values) .and. .not. is_penalty) then
+         if (.not. allocated(values)) then
+            allocate (values(contact%n_pairs), source=0.0_wp)
+         else if (.not. is_penalty) then
             call reader%refuse('contact', key, "belongs to law = 'penalty', but law = '"// &
                                trim(law_words(contact%law))//"': remove it or change the law")
          end if
-         if (.not. allocated(values)) allocate (values(contact%n_pairs), source=0.0_wp)
-      end subroutine read_one
+      end subroutine finish_one
 
    end subroutine read_stiffnesses
 
@@ -264,28 +240,17 @@ contains
    end function has_normal
 
    !> Group &spring.
-   subroutine read_springs(reader, n_dof, springs)
+   subroutine read_springs(reader, springs)
       type(reader_type), intent(inout) :: reader
-      integer, intent(in) :: n_dof
       type(spring_type), intent(inout) :: springs
       integer :: m, i
 
-      call reader%get('spring', 'n_springs', springs%n_springs, least=0, most=1000000)
-      m = springs%n_springs
       if (reader%given('spring', 'coefficient') .and. &
           .not. reader%given('spring', 'n_springs')) then
          call reader%refuse('spring', 'n_springs', 'is missing: must be the number of springs')
       end if
-      allocate (springs%side_2(m), source=0)
-      allocate (springs%power(m), source=3)
-      call reader%get_array('spring', 'side_1', springs%side_1, [m], .true., least=-n_dof, &
-                            most=n_dof, required=m > 0)
-      call reader%get_array('spring', 'side_2', springs%side_2, [m], .true., least=-n_dof, &
-                            most=n_dof)
-      call reader%get_array('spring', 'coefficient', springs%coefficient, [m], .true., &
-                            required=m > 0)
-      call reader%get_array('spring', 'power', springs%power, [m], .true., least=1, &
-                            most=99)
+      call bind_springs(reader, springs)
+      m = springs%n_springs
       if (.not. allocated(springs%side_1)) allocate (springs%side_1(m), source=0)
       if (.not. allocated(springs%coefficient)) allocate (springs%coefficient(m), source=0.0_wp)
       if (reader%failed()) return

@@ -7,6 +7,9 @@ module fw_read_model
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type, read_model_hdf5
+   use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads
+   use fw_model_keys, only: source_words, source_inline, source_hdf5, source_matrix_market, &
+                            source_memory
    use fw_damping, only: add_modal_damping
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
@@ -17,28 +20,7 @@ module fw_read_model
    implicit none (type, external)
    private
 
-   public :: read_model, read_loads, finish_model, refuse_model, model_options
-
-   character(*), parameter :: source_words(*) = &
-      [character(13) :: 'inline', 'hdf5', 'matrix_market', 'memory']
-   integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3, &
-                         source_memory = 4
-   !> More dofs are taken for a mistake: the matrices are dense.
-   integer, parameter :: largest = 100000
-
-   !> Keys of &model and &load that act once all is read.
-   type :: model_options
-      integer :: source = source_inline
-      character(:), allocatable :: file
-      real(wp) :: rayleigh_mass = 0.0_wp
-      real(wp) :: rayleigh_stiffness = 0.0_wp
-      !> Fraction of critical damping of every mode.
-      real(wp) :: modal_damping = 0.0_wp
-      !> [rad/s]
-      real(wp) :: rotation_speed = 0.0_wp
-      real(wp) :: static_scale = 1.0_wp
-      real(wp) :: harmonic_scale = 1.0_wp
-   end type model_options
+   public :: read_model, read_loads, finish_model, refuse_model
 
    type, extends(trial_type) :: model_trial
    contains
@@ -64,7 +46,7 @@ contains
       call choose_source(reader, present(memory_model), options)
       is_inline = options%source == source_inline
       is_file = options%source == source_hdf5 .or. options%source == source_matrix_market
-      call reader%get('model', 'file', options%file, required=is_file)
+      call options%bind_file(reader)
       n_dof = 0
       if (present(memory_model)) then
          raw = memory_model
@@ -81,10 +63,7 @@ contains
                             "'hdf5' or 'matrix_market', or remove file")
       end if
       call read_matrices(reader, is_inline, n_dof, raw)
-      call reader%get('model', 'rayleigh_mass', options%rayleigh_mass, least=0.0_wp)
-      call reader%get('model', 'rayleigh_stiffness', options%rayleigh_stiffness, least=0.0_wp)
-      call reader%get('model', 'modal_damping', options%modal_damping, least=0.0_wp)
-      call reader%get('model', 'rotation_speed', options%rotation_speed, least=0.0_wp)
+      call options%bind_additions(reader)
    end subroutine read_model
 
    !> Key `source`; the matrices of the calling program need no group &model.
@@ -99,7 +78,7 @@ contains
          call reader%require_group('model', 'the matrices: source and file, or n_dof, '// &
                                    'mass and stiffness')
       end if
-      call reader%get_word('model', 'source', options%source, source_words)
+      call options%bind_source(reader)
       if (in_memory .and. options%source /= source_memory) then
          call reader%refuse('model', 'source', "= '"//trim(source_words(options%source))// &
                             "': the calling program gives its own matrices: leave source out")
@@ -149,36 +128,33 @@ contains
       !> Dofs of the model file.
       integer, intent(in) :: n_file
       type(file_model_type), intent(inout) :: raw
+      real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
       integer :: n_dof
 
       n_dof = n_file
-      call reader%get('model', 'n_dof', n_dof, least=1, most=largest, &
-                      required=is_inline)
+      call bind_order(reader, n_dof, is_inline)
       if (.not. is_inline .and. n_dof /= n_file) then
          call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model has '// &
                             to_text(n_file)//' dofs; remove n_dof')
       end if
-      call read_one('mass', raw%mass, is_inline)
-      call read_one('stiffness', raw%stiffness, is_inline)
-      call read_one('damping', raw%damping, .false.)
+      call bind_matrices(reader, is_inline, mass, stiffness, damping)
+      call take('mass', mass, raw%mass)
+      call take('stiffness', stiffness, raw%stiffness)
+      call take('damping', damping, raw%damping)
 
    contains
 
-      subroutine read_one(key, matrix, required)
+      subroutine take(key, given, matrix)
          character(*), intent(in) :: key
-         real(wp), allocatable, intent(inout) :: matrix(:, :)
-         logical, intent(in) :: required
-         real(wp), allocatable :: values(:)
+         real(wp), allocatable, intent(inout) :: given(:, :), matrix(:, :)
 
-         call reader%get_array('model', key, values, [n_dof, n_dof], .false., required=required)
-         if (.not. allocated(values)) return
-         if (.not. is_inline) then
+         if (is_inline) then
+            call move_alloc(given, matrix)
+         else if (allocated(given)) then
             call reader%refuse('model', key, 'is given beside a model that is complete: remove '// &
                                "it, or give source = 'inline'")
-         else
-            matrix = reshape(values, [n_dof, n_dof])
          end if
-      end subroutine read_one
+      end subroutine take
 
    end subroutine read_matrices
 
@@ -188,25 +164,8 @@ contains
       type(model_options), intent(inout) :: options
       type(file_model_type), intent(inout) :: raw
 
-      call read_one('static', raw%load_static)
-      call read_one('cosine', raw%load_cosine)
-      call read_one('sine', raw%load_sine)
-      call reader%get('load', 'static_scale', options%static_scale)
-      call reader%get('load', 'harmonic_scale', options%harmonic_scale)
-
-   contains
-
-      subroutine read_one(key, load)
-         character(*), intent(in) :: key
-         real(wp), allocatable, intent(inout) :: load(:)
-         integer :: n_dof
-
-         n_dof = 0
-         if (allocated(raw%stiffness)) n_dof = size(raw%stiffness, 1)
-         if (.not. allocated(load)) allocate (load(n_dof), source=0.0_wp)
-         call reader%get_array('load', key, load, [n_dof], .true.)
-      end subroutine read_one
-
+      call bind_loads(reader, raw%load_static, raw%load_cosine, raw%load_sine)
+      call options%bind_scales(reader)
    end subroutine read_loads
 
    !> Check the parts and put them together: rotation, damping, scales.

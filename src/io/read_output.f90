@@ -1,10 +1,11 @@
 !> Group &output: the result file and what is observed.
 module fw_read_output
    use fw_case, only: output_options
+   use fw_key, only: key
+   use fw_key, only: key_visitor
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type
-   use fw_namelist_data, only: value_type
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
@@ -13,7 +14,7 @@ module fw_read_output
    implicit none (type, external)
    private
 
-   public :: read_output, read_observed
+   public :: read_output, read_observed, bind_observed
 
 contains
 
@@ -26,14 +27,12 @@ contains
       type(output_options), intent(inout) :: options
 
       options%names_file = reader%given('output', 'file')
-      call reader%get('output', 'file', options%file)
+      call options%bind_keys(reader)
       if (len_trim(options%file) == 0) then
          call reader%refuse('output', 'file', "= '': must name a file")
       end if
       options%file = resolve_path(options%file, directory)
       call reader%amend('output', 'file', quoted_text(options%file))
-      call reader%get('output', 'histories', options%histories)
-      call reader%get('output', 'contact', options%contact)
    end subroutine read_output
 
    !> Key `observe`: dof numbers or names of the model file; all by default.
@@ -42,15 +41,14 @@ contains
       type(file_model_type), intent(in) :: raw
       !> Its number of dofs is known.
       type(model_type), intent(inout) :: model
-      type(value_type), allocatable :: chosen(:)
-      type(string_type), allocatable :: names(:)
+      type(string_type), allocatable :: chosen(:), names(:)
+      logical, allocatable :: is_text(:)
       real(wp), allocatable :: rows(:, :)
       integer :: i, most
 
       most = model%n_dof
       if (allocated(raw%observe_name)) most = most + size(raw%observe_name)
-      call reader%get_list('output', 'observe', 'dof numbers or names of observed '// &
-                           'quantities', chosen, most)
+      call bind_observed(reader, most, chosen, is_text)
       if (reader%failed()) return
       call list_default(raw, model%n_dof, names, rows)
       if (size(chosen) == 0) then
@@ -61,12 +59,27 @@ contains
       allocate (model%observe_name(size(chosen)))
       allocate (model%observe_matrix(size(chosen), model%n_dof), source=0.0_wp)
       do i = 1, size(chosen)
-         call choose(reader, chosen(i), names, rows, model%observe_name(i)%text, &
+         call choose(reader, chosen(i)%text, is_text(i), names, rows, model%observe_name(i)%text, &
                      model%observe_matrix(i, :))
          call refuse_repeated(reader, model%observe_name(:i))
          if (reader%failed()) return
       end do
    end subroutine read_observed
+
+   !> The key of what is observed: numbers and names as they are given.
+   subroutine bind_observed(keys, most, chosen, is_text)
+      class(key_visitor), intent(inout) :: keys
+      !> As many quantities there are.
+      integer, intent(in) :: most
+      type(string_type), allocatable, intent(out) :: chosen(:)
+      !> Which of them are names.
+      logical, allocatable, intent(out) :: is_text(:)
+
+      call keys%bind_list(key('observe', 'which displacements are written; a dof number k is '// &
+                              'called uk', absent='all that the model file names, else every '// &
+                              'dof'), 'dof numbers or names of observed quantities', most, &
+                          chosen, is_text)
+   end subroutine bind_observed
 
    !> What the model file observes, or every dof.
    subroutine list_default(raw, n_dof, names, rows)
@@ -90,9 +103,10 @@ contains
    end subroutine list_default
 
    !> One value of `observe`: a dof number, or a name.
-   subroutine choose(reader, value, names, rows, name, row)
+   subroutine choose(reader, value, is_text, names, rows, name, row)
       type(reader_type), intent(inout) :: reader
-      type(value_type), intent(in) :: value
+      character(*), intent(in) :: value
+      logical, intent(in) :: is_text
       type(string_type), intent(in) :: names(:)
       real(wp), intent(in) :: rows(:, :)
       character(:), allocatable, intent(out) :: name
@@ -100,14 +114,14 @@ contains
       integer :: dof, i
       logical :: is_number
 
-      name = value%text
+      name = value
       do i = 1, size(names)
-         if (names(i)%text /= value%text) cycle
+         if (names(i)%text /= value) cycle
          row = rows(i, :)
          return
       end do
-      call read_integer(value%text, dof, is_number)
-      if (is_number .and. .not. value%quoted) then
+      call read_integer(value, dof, is_number)
+      if (is_number .and. .not. is_text) then
          name = 'u'//to_text(dof)
          if (dof >= 1 .and. dof <= size(row)) then
             row(dof) = 1.0_wp
@@ -116,9 +130,9 @@ contains
                                ': must be a dof from 1 to '//to_text(size(row)))
          end if
       else
-         call reader%refuse('output', 'observe', '= '//quoted_text(value%text)// &
+         call reader%refuse('output', 'observe', '= '//quoted_text(value)// &
                             ': must be a dof number or a name of the model'// &
-                            did_you_mean(value%text, names))
+                            did_you_mean(value, names))
       end if
    end subroutine choose
 

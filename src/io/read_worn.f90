@@ -3,6 +3,7 @@
 module fw_read_worn
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_contact_data, only: contact_type
+   use fw_contact_keys, only: bind_worn
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -45,8 +46,7 @@ contains
       integer :: step
 
       step = 0
-      call reader%get('contact', 'worn', path)
-      call reader%get('contact', 'worn_step', step, least=0)
+      call bind_worn(reader, path, step)
       allocate (contact%depth(contact%n_pairs), source=0.0_wp)
       if (.not. allocated(path)) then
          if (step > 0) call reader%refuse('contact', 'worn_step', '= '//to_text(step)// &

@@ -1,78 +1,64 @@
-!> Typed access to a namelist file with the overrides of the command line on top.
-!>
-!> Every getter names its group, key and accepted values once. From these same calls come the
-!> list of known keys (so the check for unknown ones and the nearest key), the checks of range,
-!> count and repetition, and the effective input. Problems are gathered, not raised one by one:
-!> `finish` returns all of them together, so that one run shows everything there is to mend.
+!> Reads the keys of the options from a namelist: checks of range, count and repetition, the nearest
+!> key for an unknown one, and the effective input, all from the declarations of the keys.
 module fw_reader
-   use fw_array_entries, only: source_type, spread_entry
-   use fw_error, only: error_type, fatal_error, status_input
-   use fw_kinds, only: wp, i8
-   use fw_namelist, only: parse_namelist, parse_override
-   use fw_namelist_data, only: namelist_type, value_type, entry_type, add_entry, value_count, &
-                               stray_word, location, &
-                               is_entry, last_entry, multiply_out
-   use fw_records, only: record_list
-   use fw_reader_text, only: near, did_you_mean, shown, to_strings, words_text, element_text, &
-                             dims_text, real_list, repeat_hint
-   use fw_text, only: string_type, lower_case, to_text, join
+   use fw_array_entries, only: source_type
+   use fw_error, only: error_type
+   use fw_input, only: input_type
+   use fw_key, only: key_type
+   use fw_key_range, only: range_type
+   use fw_kinds, only: wp
+   use fw_namelist_data, only: value_type, value_count, last_entry, multiply_out
+   use fw_records, only: record_type, record_list
+   use fw_reader_text, only: near, did_you_mean, shown, to_strings, words_text, dims_text, &
+                             number_list
+   use fw_text, only: string_type, lower_case, to_text
    use fw_text_list, only: append
-   use fw_values, only: range_type, new_range, read_real, read_integer, read_logical, &
-                        number_text, quoted_text
+   use fw_values, only: range_text, read_real, read_integer, read_logical, number_text, quoted_text
    implicit none (type, external)
    private
 
    public :: reader_type, new_reader
 
-   !> Larger arrays than this in a namelist are taken for a wrong size.
-   integer(i8), parameter :: largest_array = 10000000_i8
-   !> More problems than this are counted only.
-   integer, parameter :: most_problems = 12
    !> A list of mixed values has no shape to be checked against.
    integer, parameter :: most_listed = 1000000
 
-   character(*), parameter :: real_kind = 'a finite real'
+   character(*), parameter :: real_kind = 'a finite real', integer_kind = 'an integer'
 
-   type :: reader_type
+   !> An extent of arrays.
+   type :: size_type
+      character(12) :: name
+      integer :: extent
+   end type size_type
+
+   type, extends(input_type) :: reader_type
       !> Model files are tried in a process of their own first: for programs of one thread.
       logical :: tries_files = .false.
-      type(namelist_type), private :: input
-      type(record_list), private :: records
-      type(string_type), allocatable, private :: problems(:)
+      type(record_list) :: records
+      character(:), allocatable, private :: group
+      type(size_type), allocatable, private :: sizes(:)
    contains
-      !> One value: real, integer, logical or text.
-      generic :: get => get_real, get_integer, get_logical, get_text
-      !> A word of a list, as its position in the list.
-      procedure :: get_word
-      !> Arrays, in Fortran order.
-      generic :: get_array => get_reals, get_integers
-      !> The values as they stand, numbers and texts mixed.
-      procedure :: get_list
-      procedure :: given
-      procedure :: refuse
-      procedure :: place_of
-      procedure :: require_group
+      procedure :: open
+      procedure :: bind_real
+      procedure :: bind_integer
+      procedure :: bind_logical
+      procedure :: bind_text
+      procedure :: bind_word
+      procedure :: bind_list
+      procedure :: bind_reals
+      procedure :: bind_integers
+      procedure :: extents
+      procedure :: set_size
       procedure :: amend
-      procedure :: failed
       procedure :: finish
       procedure :: effective
-      procedure, private :: get_real
-      procedure, private :: get_integer
-      procedure, private :: get_logical
-      procedure, private :: get_text
-      procedure, private :: get_reals
-      procedure, private :: get_integers
-      procedure, private :: find_last
-      procedure, private :: find_scalar
-      procedure, private :: find_elements
-      procedure, private :: refuse_value
-      procedure, private :: blame
+      procedure, private :: take_number
+      procedure, private :: take_numbers
       procedure, private :: find_unknown
    end type reader_type
 
 contains
 
-   !> Parse the text of a namelist file and the overrides.
+   !> A reader of the text of a namelist file with the overrides on top.
    subroutine new_reader(reader, text, source, overrides, error, origin)
       type(reader_type), intent(out) :: reader
       character(*), intent(in) :: text
@@ -83,97 +69,118 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> What messages put before an override (default: '--set').
       character(*), intent(in), optional :: origin
-      type(entry_type) :: entry
-      integer :: i
 
-      allocate (reader%problems(0))
-      call parse_namelist(text, source, reader%input, error)
-      do i = 1, size(overrides)
-         if (allocated(error)) return
-         call parse_override(overrides(i)%text, entry, error, origin)
-         if (.not. allocated(error)) call add_entry(reader%input, entry)
-      end do
+      allocate (reader%sizes(0))
+      call reader%parse(text, source, overrides, error, origin)
    end subroutine new_reader
 
-   subroutine get_real(self, group, key, value, above, least, most, required, below)
+   subroutine open(self, group, help)
       class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> The default on entry.
+      character(*), intent(in) :: group, help
+
+      self%group = group
+      call self%records%open(group, help)
+   end subroutine open
+
+   !> Note down what a key of the present group is, once.
+   subroutine note(self, key, kind, accepts, default, words)
+      type(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      !> As of record_type.
+      character(*), intent(in) :: kind, accepts
+      !> Blank for none.
+      character(*), intent(in) :: default
+      character(*), intent(in), optional :: words(:)
+      type(record_type) :: record
+
+      record%group = self%group
+      record%key = key
+      record%kind = kind
+      record%accepts = accepts
+      if (len(default) > 0) record%default = default
+      if (present(words)) record%words = words
+      call self%records%add(record)
+   end subroutine note
+
+   subroutine bind_real(self, key, value, needed)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
       real(wp), intent(inout) :: value
-      real(wp), intent(in), optional :: above, least, most
-      logical, intent(in), optional :: required
-      real(wp), intent(in), optional :: below
-      type(range_type) :: range
+      logical, intent(in), optional :: needed
+
+      call self%take_number(key, real_kind, value, needed)
+   end subroutine bind_real
+
+   subroutine bind_integer(self, key, value, needed)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      integer, intent(inout) :: value
+      logical, intent(in), optional :: needed
       real(wp) :: number
+
+      number = real(value, wp)
+      call self%take_number(key, integer_kind, number, needed)
+      value = nint(number)
+   end subroutine bind_integer
+
+   subroutine take_number(self, key, kind, number, needed)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      !> real_kind or integer_kind.
+      character(*), intent(in) :: kind
+      real(wp), intent(inout) :: number
+      logical, intent(in), optional :: needed
+      character(:), allocatable :: accepts, default
+      real(wp) :: found
       integer :: i
       logical :: ok
 
-      range = new_range(real_kind, above, least, most, below)
-      call self%find_scalar(group, key, range%accepts, required, i)
-      if (i > 0) then
-         call read_real(self%input%entries(i)%values(1)%text, number, ok)
-         ok = ok .and. .not. self%input%entries(i)%values(1)%quoted
-         if (ok) ok = range%holds(number)
-         if (ok) value = number
-         if (.not. ok) call self%refuse_value(i, range%accepts)
-      end if
+      accepts = range_text(kind, key%range)
+      default = ''
       ! A default outside of the range stands for "none" and cannot be written down.
-      if (range%holds(value)) call self%amend(group, key, number_text(value))
-   end subroutine get_real
-
-   subroutine get_integer(self, group, key, value, least, most, required)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> The default on entry.
-      integer, intent(inout) :: value
-      integer, intent(in), optional :: least, most
-      logical, intent(in), optional :: required
-      type(range_type) :: range
-      integer :: number, i
-      logical :: ok
-
-      range = integer_range(least, most)
-      call self%find_scalar(group, key, range%accepts, required, i)
+      if (key%range%holds(number)) default = text_of(number, kind)
+      call note(self, key, name_of(kind), accepts, default)
+      call self%find_scalar(self%group, trim(key%name), accepts, needed, i)
       if (i > 0) then
-         call read_integer(self%input%entries(i)%values(1)%text, number, ok)
-         ok = ok .and. .not. self%input%entries(i)%values(1)%quoted
-         if (ok) ok = range%holds(real(number, wp))
-         if (ok) value = number
-         if (.not. ok) call self%refuse_value(i, range%accepts)
+         call read_number(self%namelist%entries(i)%values(1), kind, key%range, found, ok)
+         if (ok) number = found
+         if (.not. ok) call self%refuse_value(i, accepts)
       end if
-      if (range%holds(real(value, wp))) call self%amend(group, key, to_text(value))
-   end subroutine get_integer
+      if (key%range%holds(number)) then
+         call self%amend(self%group, trim(key%name), text_of(number, kind))
+      end if
+   end subroutine take_number
 
-   subroutine get_logical(self, group, key, value)
+   subroutine bind_logical(self, key, value)
       class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> The default on entry.
+      type(key_type), intent(in) :: key
       logical, intent(inout) :: value
       character(*), parameter :: accepts = '.true. or .false.'
       integer :: i
       logical :: ok, flag
 
-      call self%find_scalar(group, key, accepts, .false., i)
+      call note(self, key, 'logical', accepts, to_text(value))
+      call self%find_scalar(self%group, trim(key%name), accepts, .false., i)
       if (i > 0) then
-         call read_logical(self%input%entries(i)%values(1)%text, flag, ok)
+         call read_logical(self%namelist%entries(i)%values(1)%text, flag, ok)
          if (ok) value = flag
          if (.not. ok) call self%refuse_value(i, accepts)
       end if
-      call self%amend(group, key, to_text(value))
-   end subroutine get_logical
+      call self%amend(self%group, trim(key%name), to_text(value))
+   end subroutine bind_logical
 
-   subroutine get_text(self, group, key, value, required)
+   subroutine bind_text(self, key, value, needed)
       class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> The default on entry; may be unallocated.
+      type(key_type), intent(in) :: key
       character(:), allocatable, intent(inout) :: value
-      logical, intent(in), optional :: required
+      logical, intent(in), optional :: needed
       character(*), parameter :: accepts = 'a text in quotes'
       integer :: i
 
-      call self%find_scalar(group, key, accepts, required, i, free_text=.true.)
+      call note(self, key, 'text', accepts, '')
+      call self%find_scalar(self%group, trim(key%name), accepts, needed, i, free_text=.true.)
       if (i > 0) then
-         associate (entry => self%input%entries(i))
+         associate (entry => self%namelist%entries(i))
             if (entry%values(1)%quoted) then
                value = entry%values(1)%text
             else if (allocated(entry%raw)) then
@@ -183,197 +190,211 @@ contains
             end if
          end associate
       end if
-      if (allocated(value)) call self%amend(group, key, quoted_text(value))
-   end subroutine get_text
+      if (allocated(value)) call self%amend(self%group, trim(key%name), quoted_text(value))
+   end subroutine bind_text
 
-   subroutine get_word(self, group, key, choice, words)
+   subroutine bind_word(self, key, choice, words)
       class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> Position of the word in `words`; the default on entry.
+      type(key_type), intent(in) :: key
       integer, intent(inout) :: choice
       character(*), intent(in) :: words(:)
       character(:), allocatable :: accepts
       integer :: i, k, found
 
       accepts = words_text(words)
-      call self%find_scalar(group, key, accepts, .false., i)
+      call note(self, key, 'word', accepts, quoted_text(trim(words(choice))), words)
+      call self%find_scalar(self%group, trim(key%name), accepts, .false., i)
       if (i > 0) then
          found = 0
-         associate (value => self%input%entries(i)%values(1))
+         associate (value => self%namelist%entries(i)%values(1))
             do k = 1, size(words)
                if (lower_case(value%text) == lower_case(words(k))) found = k
             end do
             if (found > 0 .and. .not. value%quoted &
-                .and. .not. allocated(self%input%entries(i)%raw)) then
+                .and. .not. allocated(self%namelist%entries(i)%raw)) then
                call self%refuse_value(i, quoted_text(trim(words(found)))//', in quotes')
             else if (found > 0) then
                choice = found
             else
                call self%refuse_value(i, accepts//did_you_mean(lower_case(value%text), &
-                                                              to_strings(words)))
+                                                               to_strings(words)))
             end if
          end associate
       end if
-      call self%amend(group, key, quoted_text(trim(words(choice))))
-   end subroutine get_word
+      call self%amend(self%group, trim(key%name), quoted_text(trim(words(choice))))
+   end subroutine bind_word
 
-   subroutine get_reals(self, group, key, values, dims, repeats, above, least, required)
+   subroutine bind_list(self, key, accepts, most, values, is_text)
       class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> Unallocated where nothing is given; allocated on entry: the default of every element.
-      real(wp), allocatable, intent(inout) :: values(:)
-      !> Shape of the array.
-      integer, intent(in) :: dims(:)
-      !> Whether one value holds for all elements.
-      logical, intent(in) :: repeats
-      real(wp), intent(in), optional :: above, least
-      logical, intent(in), optional :: required
-      type(range_type) :: range
-      type(source_type) :: source
-      real(wp) :: number
-      integer :: k
-      logical :: ok
-
-      range = new_range(real_kind, above, least)
-      call self%find_elements(group, key, dims, repeats, range%accepts, required, &
-                              allocated(values), source)
-      if (.not. allocated(source%entry)) return
-      if (.not. allocated(values)) allocate (values(size(source%entry)), source=0.0_wp)
-      do k = 1, size(values)
-         if (source%entry(k) == 0) cycle
-         associate (value => self%input%entries(source%entry(k))%values(source%value(k)))
-            call read_real(value%text, number, ok)
-            if (ok) ok = range%holds(number) .and. .not. value%quoted
-            values(k) = number
-            if (ok) cycle
-            call self%refuse_value(source%entry(k), range%accepts, value, k, dims)
-            return
-         end associate
-      end do
-      call self%amend(group, key, real_list(values, dims, repeats))
-   end subroutine get_reals
-
-   subroutine get_integers(self, group, key, values, dims, repeats, least, most, required)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> Unallocated where nothing is given; allocated on entry: the default of every element.
-      integer, allocatable, intent(inout) :: values(:)
-      !> Shape of the array.
-      integer, intent(in) :: dims(:)
-      !> Whether one value holds for all elements.
-      logical, intent(in) :: repeats
-      integer, intent(in), optional :: least, most
-      logical, intent(in), optional :: required
-      type(range_type) :: range
-      type(source_type) :: source
-      integer :: k, number
-      logical :: ok
-
-      range = integer_range(least, most)
-      call self%find_elements(group, key, dims, repeats, range%accepts, required, &
-                              allocated(values), source)
-      if (.not. allocated(source%entry)) return
-      if (.not. allocated(values)) allocate (values(size(source%entry)), source=0)
-      do k = 1, size(values)
-         if (source%entry(k) == 0) cycle
-         associate (value => self%input%entries(source%entry(k))%values(source%value(k)))
-            call read_integer(value%text, number, ok)
-            if (ok) ok = range%holds(real(number, wp)) .and. .not. value%quoted
-            values(k) = number
-            if (ok) cycle
-            call self%refuse_value(source%entry(k), range%accepts, value, k, dims)
-            return
-         end associate
-      end do
-      call self%amend(group, key, real_list(real(values, wp), dims, repeats))
-   end subroutine get_integers
-
-   subroutine get_list(self, group, key, accepts, values, most)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key
-      !> What is accepted, in words.
+      type(key_type), intent(in) :: key
       character(*), intent(in) :: accepts
-      !> Empty where nothing is given; repeat counts are multiplied out.
-      type(value_type), allocatable, intent(out) :: values(:)
-      !> As many values can differ.
-      integer, intent(in), optional :: most
+      integer, intent(in) :: most
+      type(string_type), allocatable, intent(out) :: values(:)
+      logical, allocatable, intent(out) :: is_text(:)
+      type(value_type), allocatable :: found(:)
       character(:), allocatable :: text
-      integer :: i, k, limit
+      integer :: i, k
 
-      allocate (values(0))
-      call self%find_last(group, key, accepts, i)
+      allocate (values(0), is_text(0))
+      call note(self, key, 'list', accepts, '')
+      call self%find_last(self%group, trim(key%name), accepts, i)
       ! How many values there may be is not known where something failed before.
       if (i == 0 .or. self%failed()) return
-      limit = most_listed
-      if (present(most)) limit = min(most, most_listed)
-      if (value_count(self%input%entries(i)) > limit) then
-         call self%refuse(group, key, 'has '//to_text(value_count(self%input%entries(i)))// &
-                          ' values: must be at most '//to_text(limit)//' '//accepts// &
+      k = value_count(self%namelist%entries(i))
+      if (k > min(most, most_listed)) then
+         call self%refuse(self%group, trim(key%name), 'has '//to_text(k)//' values: must be '// &
+                          'at most '//to_text(min(most, most_listed))//' '//accepts// &
                           ', none of them twice')
          return
       end if
-      call multiply_out(self%input%entries(i)%values, values)
+      call multiply_out(self%namelist%entries(i)%values, found)
       text = ''
-      do k = 1, size(values)
+      do k = 1, size(found)
+         if (verify(found(k)%text, '+-0123456789') > 0) found(k)%quoted = .true.
+         call append(values, found(k)%text)
          if (k > 1) text = text//', '
-         if (verify(values(k)%text, '+-0123456789') > 0) then
-            text = text//quoted_text(values(k)%text)
-         else
-            text = text//shown(values(k))
+         text = text//shown(found(k))
+      end do
+      is_text = found%quoted
+      call self%amend(self%group, trim(key%name), text)
+   end subroutine bind_list
+
+   subroutine bind_reals(self, key, values, needed, default)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      real(wp), allocatable, intent(inout) :: values(:)
+      logical, intent(in), optional :: needed
+      real(wp), intent(in), optional :: default
+
+      call self%take_numbers(key, real_kind, values, needed, default)
+   end subroutine bind_reals
+
+   subroutine bind_integers(self, key, values, needed, default)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      integer, allocatable, intent(inout) :: values(:)
+      logical, intent(in), optional :: needed
+      integer, intent(in), optional :: default
+      real(wp), allocatable :: numbers(:)
+
+      if (allocated(values)) numbers = real(values, wp)
+      if (present(default)) then
+         call self%take_numbers(key, integer_kind, numbers, needed, real(default, wp))
+      else
+         call self%take_numbers(key, integer_kind, numbers, needed)
+      end if
+      if (allocated(numbers)) values = nint(numbers)
+   end subroutine bind_integers
+
+   !> An array, in Fortran order.
+   subroutine take_numbers(self, key, kind, numbers, needed, default)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      character(*), intent(in) :: kind
+      real(wp), allocatable, intent(inout) :: numbers(:)
+      logical, intent(in), optional :: needed
+      real(wp), intent(in), optional :: default
+      type(range_type) :: range
+      type(source_type) :: source
+      character(:), allocatable :: accepts, text
+      integer, allocatable :: dims(:)
+      integer :: k
+      logical :: ok
+
+      range = with_sizes(self, key%range)
+      accepts = range_text(kind, range)
+      dims = self%extents(key%shape)
+      text = ''
+      if (present(default)) text = text_of(default, kind)
+      call note(self, key, name_of(kind), accepts, text)
+      k = last_entry(self%namelist, self%group, trim(key%name))
+      if (k == 0) call blame_missing(self, key, accepts, dims, needed)
+      if (k > 0 .and. key%shape == ':') dims = [value_count(self%namelist%entries(k))]
+      if (present(default) .and. .not. allocated(numbers)) then
+         allocate (numbers(product(dims)), source=default)
+      end if
+      if (k == 0) return
+      call self%find_elements(self%group, trim(key%name), accepts, dims, key%repeats, &
+                              allocated(numbers), source)
+      if (.not. allocated(source%entry)) return
+      if (.not. allocated(numbers)) allocate (numbers(size(source%entry)), source=0.0_wp)
+      do k = 1, size(numbers)
+         if (source%entry(k) == 0) cycle
+         associate (value => self%namelist%entries(source%entry(k))%values(source%value(k)))
+            call read_number(value, kind, range, numbers(k), ok)
+            if (ok) cycle
+            call self%refuse_value(source%entry(k), accepts, value, k, dims)
+            return
+         end associate
+      end do
+      call self%amend(self%group, trim(key%name), &
+                      number_list(numbers, kind == integer_kind, dims, key%repeats))
+   end subroutine take_numbers
+
+   !> Record that an array is not given, where it is needed.
+   subroutine blame_missing(self, key, accepts, dims, needed)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      character(*), intent(in) :: accepts
+      integer, intent(in) :: dims(:)
+      logical, intent(in), optional :: needed
+      character(:), allocatable :: count
+
+      if (.not. present(needed)) return
+      if (.not. needed) return
+      count = ', '//dims_text(dims)//' of them'
+      if (key%repeats) count = ', one for all or '//dims_text(dims)//' of them'
+      if (any(dims == 0) .or. all(dims == 1)) count = ''
+      call self%blame(0, '&'//self%group//' '//trim(key%name)//' is missing: must be '//accepts// &
+                      count)
+   end subroutine blame_missing
+
+   !> A range whose bounds are all numbers.
+   pure type(range_type) function with_sizes(self, range) result(bounded)
+      class(reader_type), intent(in) :: self
+      type(range_type), intent(in) :: range
+      integer :: extent(1)
+
+      bounded = range
+      if (len_trim(range%within) == 0) return
+      extent = self%extents(range%within)
+      if (extent(1) == 0) return
+      bounded%least = -real(extent(1), wp)
+      bounded%most = real(extent(1), wp)
+   end function with_sizes
+
+   !> Tell an extent that shapes name.
+   subroutine set_size(self, name, extent)
+      class(reader_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: extent
+
+      self%sizes = [pack(self%sizes, self%sizes%name /= name), size_type(name, extent)]
+   end subroutine set_size
+
+   !> A size that was not told is 0.
+   pure function extents(self, shape)
+      class(reader_type), intent(in) :: self
+      character(*), intent(in) :: shape
+      integer, allocatable :: extents(:)
+      character(:), allocatable :: rest
+      integer :: extent, blank, k, status
+
+      allocate (extents(0))
+      rest = trim(shape)
+      do while (len(rest) > 0)
+         blank = index(rest//' ', ' ')
+         read (rest(:blank - 1), '(i12)', iostat=status) extent
+         if (status /= 0) then
+            extent = 0
+            do k = 1, size(self%sizes)
+               if (self%sizes(k)%name == rest(:blank - 1)) extent = self%sizes(k)%extent
+            end do
          end if
+         if (rest(:blank - 1) /= 'x') extents = [extents, extent]
+         rest = trim(rest(min(blank + 1, len(rest) + 1):))
       end do
-      call self%amend(group, key, text)
-   end subroutine get_list
-
-   !> Whether a key stands in the file or in an override.
-   pure logical function given(self, group, key)
-      class(reader_type), intent(in) :: self
-      character(*), intent(in) :: group, key
-
-      given = last_entry(self%input, group, key) > 0
-   end function given
-
-   !> Record a problem with the value of a key; the place is found here.
-   subroutine refuse(self, group, key, message)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group
-      !> Empty for the group as a whole.
-      character(*), intent(in) :: key
-      !> What was found and what is accepted.
-      character(*), intent(in) :: message
-
-      call self%blame(last_entry(self%input, group, key), '&'//trim(group//' '//key)//' '//message)
-   end subroutine refuse
-
-   !> Where a key stands, to put before a message from elsewhere: `case.nml:12: &model file`.
-   pure function place_of(self, group, key) result(place)
-      class(reader_type), intent(in) :: self
-      character(*), intent(in) :: group, key
-      character(:), allocatable :: place
-      integer :: i
-
-      place = self%input%source
-      i = last_entry(self%input, group, key)
-      if (i > 0) place = location(self%input%entries(i), self%input%source)
-      place = place//': &'//group//' '//key
-   end function place_of
-
-   !> Record a problem where a group is neither in the file nor in an override.
-   subroutine require_group(self, group, purpose)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group
-      !> What it must say, for the message.
-      character(*), intent(in) :: purpose
-      integer :: i
-
-      do i = 1, size(self%input%groups)
-         if (self%input%groups(i)%name == group) return
-      end do
-      do i = 1, self%input%n_entries
-         if (self%input%entries(i)%group == group) return
-      end do
-      call self%blame(0, 'group &'//group//' is missing: it gives '//purpose)
-   end subroutine require_group
+   end function extents
 
    !> Set the text of a key in the effective input.
    subroutine amend(self, group, key, text)
@@ -383,28 +404,14 @@ contains
       call self%records%set(group, key, text)
    end subroutine amend
 
-   !> Whether any problem was found so far.
-   pure logical function failed(self)
-      class(reader_type), intent(in) :: self
-
-      failed = size(self%problems) > 0
-   end function failed
-
    !> Check for unknown groups and keys; return everything that was found wrong as one error.
    !> Call when every key has been asked for.
    subroutine finish(self, error)
       class(reader_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: message
-      integer :: n
 
       call self%find_unknown()
-      n = size(self%problems)
-      if (n == 0) return
-      message = join(self%problems(:min(n, most_problems)), new_line('a'))
-      if (n > most_problems) message = message//new_line('a')//'and '// &
-                                       to_text(n - most_problems)//' more'
-      call fatal_error(error, message, status_input)
+      call self%raise(error)
    end subroutine finish
 
    !> The effective input as a namelist that reads back to the same case.
@@ -418,27 +425,27 @@ contains
    !> Unknown groups and keys go before the other problems: they often cause them.
    subroutine find_unknown(self)
       class(reader_type), intent(inout) :: self
-      type(string_type), allocatable :: others(:), groups(:), keys(:)
+      type(string_type), allocatable :: others(:)
       integer :: i
 
       call move_alloc(self%problems, others)
       allocate (self%problems(0))
-      groups = self%records%groups()
-      do i = 1, size(self%input%groups)
-         if (self%records%has_group(self%input%groups(i)%name)) cycle
-         call append(self%problems, self%input%source//':'// &
-                     to_text(self%input%groups(i)%line)//': there is no group &'// &
-                     self%input%groups(i)%name//near(self%input%groups(i)%name, groups))
+      do i = 1, size(self%namelist%groups)
+         associate (group => self%namelist%groups(i))
+            if (self%records%has_group(group%name)) cycle
+            call append(self%problems, self%namelist%source//':'//to_text(group%line)// &
+                        ': there is no group &'//group%name//near(group%name, self%records%groups))
+         end associate
       end do
-      do i = 1, self%input%n_entries
-         associate (entry => self%input%entries(i))
+      do i = 1, self%namelist%n_entries
+         associate (entry => self%namelist%entries(i))
             if (.not. self%records%has_group(entry%group)) then
                if (allocated(entry%option)) call self%blame(i, 'there is no group &'// &
-                                                   entry%group//near(entry%group, groups))
+                                                            entry%group// &
+                                                    near(entry%group, self%records%groups))
             else if (.not. self%records%has(entry%group, entry%key)) then
-               keys = self%records%keys(entry%group)
                call self%blame(i, '&'//entry%group//' has no key '//entry%key// &
-                               near(entry%key, keys))
+                               near(entry%key, self%records%keys(entry%group)))
             end if
          end associate
       end do
@@ -447,163 +454,40 @@ contains
       end do
    end subroutine find_unknown
 
-   !> Register a key and find its one value: an entry, or 0 for none or a refused one.
-   subroutine find_scalar(self, group, key, accepts, required, i_entry, free_text)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key, accepts
-      logical, intent(in), optional :: required
-      integer, intent(out) :: i_entry
-      !> Whether the value of an override may be any words without quotes (default: no).
-      logical, intent(in), optional :: free_text
-      logical :: is_alone
+   !> A value as a number of a kind and within a range.
+   subroutine read_number(value, kind, range, number, ok)
+      type(value_type), intent(in) :: value
+      character(*), intent(in) :: kind
+      type(range_type), intent(in) :: range
+      real(wp), intent(out) :: number
+      logical, intent(out) :: ok
+      integer :: whole
 
-      call self%find_last(group, key, accepts, i_entry)
-      if (i_entry == 0 .and. is_true(required) .and. .not. self%given(group, key)) then
-         call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts)
-      end if
-      if (i_entry == 0) return
-      associate (entry => self%input%entries(i_entry))
-         if (allocated(entry%raw)) then
-            is_alone = size(entry%values) == 1 .and. index(entry%raw, ',', .true.) < len(entry%raw)
-            if (is_true(free_text)) is_alone = is_alone .or. .not. entry%values(1)%quoted
-            if (is_alone) return
-            call self%refuse(group, key, '= '//entry%raw//': must be one value and nothing '// &
-                             'behind it, '//accepts)
-         else
-            if (value_count(entry) == 1) return
-            call self%refuse(group, key, 'has '//to_text(value_count(entry))// &
-                             ' values: must be one, '//accepts//stray_word(entry))
-         end if
-         i_entry = 0
-      end associate
-   end subroutine find_scalar
-
-   !> Register a key that is assigned as a whole and find its last entry.
-   subroutine find_last(self, group, key, accepts, i_entry)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key, accepts
-      integer, intent(out) :: i_entry
-      integer :: i, first
-
-      call self%records%add(group, key, accepts)
-      i_entry = last_entry(self%input, group, key)
-      if (i_entry == 0) return
-      first = 0
-      do i = 1, self%input%n_entries
-         if (.not. is_entry(self%input%entries(i), group, key)) cycle
-         if (first > 0 .and. .not. allocated(self%input%entries(i)%option)) then
-            call self%blame(i, '&'//group//' '//key//' is given twice (first in line '// &
-                            to_text(self%input%entries(first)%line)//'): keep one')
-         end if
-         first = i
-      end do
-      if (size(self%input%entries(i_entry)%sections) == 0) return
-      call self%refuse(group, key, 'has a subscript: must be assigned as a whole, '//accepts)
-      i_entry = 0
-   end subroutine find_last
-
-   !> Register an array and find the value of each element; `source%entry` stays unallocated
-   !> where nothing is given or a problem was found.
-   subroutine find_elements(self, group, key, dims, repeats, accepts, required, has_default, source)
-      class(reader_type), intent(inout) :: self
-      character(*), intent(in) :: group, key, accepts
-      integer, intent(in) :: dims(:)
-      logical, intent(in) :: repeats, has_default
-      logical, intent(in), optional :: required
-      type(source_type), intent(out) :: source
-      character(:), allocatable :: message
-      integer :: i
-
-      call self%records%add(group, key, accepts)
-      if (.not. self%given(group, key)) then
-         if (.not. is_true(required)) return
-         message = ', '//dims_text(dims)//' of them'
-         if (repeats) message = ', one for all or '//dims_text(dims)//' of them'
-         if (any(dims == 0) .or. all(dims == 1)) message = ''
-         call self%blame(0, '&'//group//' '//key//' is missing: must be '//accepts//message)
-         return
-      end if
-      if (any(dims == 0)) return
-      ! The expected size may itself be wrong where something failed before.
-      if (self%failed()) return
-      if (product(int(dims, i8)) > largest_array) then
-         call self%refuse(group, key, 'would have '//dims_text(dims)// &
-                          ' values: too many for a namelist; a model file may hold them')
-         return
-      end if
-      allocate (source%entry(product(dims)), source%value(product(dims)), source=0)
-      do i = 1, self%input%n_entries
-         if (.not. is_entry(self%input%entries(i), group, key)) cycle
-         call spread_entry(self%input, i, dims, repeats, source, message)
-         if (allocated(message)) call self%blame(i, '&'//group//' '//key//' '//message)
-      end do
-      i = findloc(source%entry, 0, 1)
-      if (i > 0 .and. .not. has_default .and. .not. self%failed()) then
-         call self%refuse(group, key, 'lacks element '//element_text(i, dims)// &
-                          ': must be '//accepts)
-      end if
-      if (self%failed()) deallocate (source%entry)
-   end subroutine find_elements
-
-   !> Record that a value is not what is accepted.
-   subroutine refuse_value(self, i_entry, accepts, value, element, dims)
-      class(reader_type), intent(inout) :: self
-      integer, intent(in) :: i_entry
-      character(*), intent(in) :: accepts
-      type(value_type), intent(in), optional :: value
-      integer, intent(in), optional :: element, dims(:)
-      character(:), allocatable :: name
-
-      associate (entry => self%input%entries(i_entry))
-         name = '&'//entry%group//' '//entry%key
-         if (present(element)) name = name//element_text(element, dims)
-         if (present(value)) then
-            call self%blame(i_entry, name//' = '//shown(value)//': must be '//accepts// &
-                            repeat_hint(value), value%line)
-         else if (allocated(entry%raw)) then
-            call self%blame(i_entry, name//' = '//entry%raw//': must be '//accepts// &
-                            repeat_hint(entry%values(1)))
-         else
-            call self%blame(i_entry, name//' = '//shown(entry%values(1))//': must be '//accepts)
-         end if
-      end associate
-   end subroutine refuse_value
-
-   !> Record a problem at an entry (0: at the file as a whole), or at a line of it.
-   subroutine blame(self, i_entry, message, line)
-      class(reader_type), intent(inout) :: self
-      integer, intent(in) :: i_entry
-      character(*), intent(in) :: message
-      integer, intent(in), optional :: line
-      character(:), allocatable :: place
-
-      place = self%input%source
-      if (i_entry > 0) place = location(self%input%entries(i_entry), self%input%source)
-      if (present(line)) then
-         if (.not. allocated(self%input%entries(i_entry)%option)) then
-            place = self%input%source//':'//to_text(line)
-         end if
-      end if
-      call append(self%problems, place//': '//message)
-   end subroutine blame
-
-   type(range_type) function integer_range(least, most) result(range)
-      integer, intent(in), optional :: least, most
-
-      if (present(least) .and. present(most)) then
-         range = new_range('an integer', least=real(least, wp), most=real(most, wp))
-      else if (present(least)) then
-         range = new_range('an integer', least=real(least, wp))
+      if (kind == integer_kind) then
+         call read_integer(value%text, whole, ok)
+         number = real(whole, wp)
       else
-         range = new_range('an integer')
+         call read_real(value%text, number, ok)
       end if
-   end function integer_range
+      if (ok) ok = range%holds(number) .and. .not. value%quoted
+   end subroutine read_number
 
-   pure logical function is_true(flag)
-      logical, intent(in), optional :: flag
+   pure character(7) function name_of(kind)
+      character(*), intent(in) :: kind
 
-      is_true = .false.
-      if (present(flag)) is_true = flag
-   end function is_true
+      name_of = merge('integer', 'real   ', kind == integer_kind)
+   end function name_of
+
+   function text_of(number, kind) result(text)
+      real(wp), intent(in) :: number
+      character(*), intent(in) :: kind
+      character(:), allocatable :: text
+
+      if (kind == integer_kind) then
+         text = to_text(nint(number))
+      else
+         text = number_text(number)
+      end if
+   end function text_of
 
 end module fw_reader

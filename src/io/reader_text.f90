@@ -7,7 +7,7 @@ module fw_reader_text
    implicit none (type, external)
    private
 
-   public :: near, did_you_mean, shown, to_strings, words_text, element_text, dims_text, real_list
+   public :: near, did_you_mean, shown, to_strings, words_text, element_text, dims_text, number_list
    public :: repeat_hint, printable
 
 contains
@@ -172,8 +172,9 @@ contains
    end function dims_text
 
    !> Numbers as namelist values; equal ones are written once.
-   function real_list(numbers, dims, repeats) result(text)
+   function number_list(numbers, are_whole, dims, repeats) result(text)
       real(wp), intent(in) :: numbers(:)
+      logical, intent(in) :: are_whole
       integer, intent(in) :: dims(:)
       logical, intent(in) :: repeats
       character(:), allocatable :: text
@@ -182,16 +183,30 @@ contains
       text = ''
       if (size(numbers) == 0) return
       if (repeats .and. all(abs(numbers - numbers(1)) <= 0.0_wp)) then
-         text = number_text(numbers(1))
+         text = one(1)
          return
       end if
       per_line = merge(dims(1), 6, size(dims) > 1)
       do i = 1, size(numbers)
-         text = text//number_text(numbers(i))
+         text = text//one(i)
          if (i == size(numbers)) exit
          text = text//','//merge(new_line('a'), ' ', mod(i, per_line) == 0)
          if (mod(i, per_line) == 0) text = text//repeat(' ', 6)
       end do
-   end function real_list
+
+   contains
+
+      function one(i) result(number)
+         integer, intent(in) :: i
+         character(:), allocatable :: number
+
+         if (are_whole) then
+            number = to_text(nint(numbers(i)))
+         else
+            number = number_text(numbers(i))
+         end if
+      end function one
+
+   end function number_list
 
 end module fw_reader_text

@@ -1,29 +1,38 @@
-!> The keys that a reader asked for: what each accepts and its effective value.
+!> The keys that a reader was asked for: what each is and its effective value.
 module fw_records
+   use fw_key, only: key_type
    use fw_text, only: string_type
    use fw_text_list, only: append
    implicit none (type, external)
    private
 
-   public :: record_list
+   public :: record_type, record_list
 
    type :: record_type
-      character(:), allocatable :: group, key
+      character(:), allocatable :: group
+      type(key_type) :: key
+      !> real, integer, logical, text, word or list.
+      character(7) :: kind = ''
       !> What is accepted, in words.
       character(:), allocatable :: accepts
+      !> The words of a word.
+      character(24), allocatable :: words(:)
+      !> The default as namelist text; unallocated where there is none.
+      character(:), allocatable :: default
       !> The value in effect as namelist text; unallocated where there is none.
       character(:), allocatable :: value
    end type record_type
 
    type :: record_list
-      private
       type(record_type), allocatable :: records(:)
+      !> Groups in the order of their first keys, and what they are for.
+      type(string_type), allocatable :: groups(:), purposes(:)
    contains
+      procedure :: open
       procedure :: add
       procedure :: set
       procedure :: has
       procedure :: has_group
-      procedure :: groups
       procedure :: keys
       procedure :: to_namelist
       procedure, private :: find
@@ -31,17 +40,25 @@ module fw_records
 
 contains
 
-   !> Register a key (once).
-   pure subroutine add(self, group, key, accepts)
+   !> Register a group (once).
+   pure subroutine open(self, group, purpose)
       class(record_list), intent(inout) :: self
-      character(*), intent(in) :: group, key, accepts
-      type(record_type) :: record
+      character(*), intent(in) :: group, purpose
 
-      if (.not. allocated(self%records)) allocate (self%records(0))
-      if (self%has(group, key)) return
-      record%group = group
-      record%key = key
-      record%accepts = accepts
+      if (.not. allocated(self%records)) then
+         allocate (self%records(0), self%groups(0), self%purposes(0))
+      end if
+      if (self%has_group(group)) return
+      call append(self%groups, group)
+      call append(self%purposes, purpose)
+   end subroutine open
+
+   !> Register a key (once).
+   pure subroutine add(self, record)
+      class(record_list), intent(inout) :: self
+      type(record_type), intent(in) :: record
+
+      if (self%has(record%group, record%key%name)) return
       self%records = [self%records, record]
    end subroutine add
 
@@ -68,28 +85,10 @@ contains
       integer :: i
 
       has_group = .false.
-      if (.not. allocated(self%records)) return
-      do i = 1, size(self%records)
-         has_group = has_group .or. self%records(i)%group == group
+      do i = 1, size(self%groups)
+         has_group = has_group .or. self%groups(i)%text == group
       end do
    end function has_group
-
-   !> The groups in the order of their first keys.
-   pure function groups(self) result(names)
-      class(record_list), intent(in) :: self
-      type(string_type), allocatable :: names(:)
-      integer :: i, k
-      logical :: known
-
-      allocate (names(0))
-      do i = 1, size(self%records)
-         known = .false.
-         do k = 1, size(names)
-            known = known .or. names(k)%text == self%records(i)%group
-         end do
-         if (.not. known) call append(names, self%records(i)%group)
-      end do
-   end function groups
 
    !> The keys of a group.
    pure function keys(self, group) result(names)
@@ -99,10 +98,9 @@ contains
       integer :: i
 
       allocate (names(0))
-      if (.not. allocated(self%records)) return
       do i = 1, size(self%records)
          if (self%records(i)%group /= group) cycle
-         call append(names, self%records(i)%key)
+         call append(names, trim(self%records(i)%key%name))
       end do
    end function keys
 
@@ -110,15 +108,13 @@ contains
    pure function to_namelist(self) result(text)
       class(record_list), intent(in) :: self
       character(:), allocatable :: text
-      type(string_type), allocatable :: names(:)
       integer :: g, i
 
       text = ''
-      names = self%groups()
-      do g = 1, size(names)
-         text = text//'&'//names(g)%text//new_line('a')
+      do g = 1, size(self%groups)
+         text = text//'&'//self%groups(g)%text//new_line('a')
          do i = 1, size(self%records)
-            if (self%records(i)%group /= names(g)%text) cycle
+            if (self%records(i)%group /= self%groups(g)%text) cycle
             if (allocated(self%records(i)%value)) text = text//record_text(self%records(i))
          end do
          text = text//'/'//new_line('a')
@@ -130,7 +126,7 @@ contains
       character(:), allocatable :: text
       integer, parameter :: comment_column = 40
 
-      text = '   '//record%key//' = '//record%value
+      text = '   '//trim(record%key%name)//' = '//record%value
       if (index(record%value, new_line('a')) == 0 .and. len(text) < comment_column) then
          text = text//repeat(' ', comment_column - len(text))//'! '//record%accepts
       end if
@@ -141,11 +137,9 @@ contains
       class(record_list), intent(in) :: self
       character(*), intent(in) :: group, key
 
-      if (allocated(self%records)) then
-         do i = 1, size(self%records)
-            if (self%records(i)%group == group .and. self%records(i)%key == key) return
-         end do
-      end if
+      do i = 1, size(self%records)
+         if (self%records(i)%group == group .and. self%records(i)%key%name == key) return
+      end do
       i = 0
    end function find
 

@@ -1,70 +1,45 @@
-!> Namelist values as numbers, the ranges they may lie in, and numbers as namelist text.
+!> Namelist values as numbers, numbers as namelist text, and ranges in words.
 module fw_values
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
    use, intrinsic :: ieee_exceptions, only: ieee_set_flag
    use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode
    use, intrinsic :: ieee_exceptions, only: ieee_usual
+   use fw_key_range, only: range_type
    use fw_kinds, only: wp
    use fw_text, only: lower_case, to_text
    implicit none (type, external)
    private
 
-   public :: range_type, new_range, read_real, read_integer, read_logical
-   public :: number_text, quoted_text
-
-   !> What a number may be: strictly above and below, or from `least` to `most`.
-   type :: range_type
-      !> What is accepted, in words: `a real above 0`.
-      character(:), allocatable :: accepts
-      real(wp) :: above = -huge(1.0_wp)
-      real(wp) :: least = -huge(1.0_wp)
-      real(wp) :: most = huge(1.0_wp)
-      !> Binds where `has_below`.
-      real(wp) :: below = huge(1.0_wp)
-      logical :: has_below = .false.
-   contains
-      procedure :: holds
-   end type range_type
+   public :: read_real, read_integer, read_logical
+   public :: number_text, quoted_text, range_text
 
 contains
 
-   !> A range with its description; bounds not given do not bind.
-   function new_range(kind, above, least, most, below) result(range)
-      !> `a real`, `an integer` or the like.
+   !> What a range accepts, in words: `a finite real above 0`.
+   function range_text(kind, range) result(text)
+      !> `a finite real`, `an integer` or the like.
       character(*), intent(in) :: kind
-      real(wp), intent(in), optional :: above, least, most, below
-      type(range_type) :: range
+      type(range_type), intent(in) :: range
+      character(:), allocatable :: text
+      logical :: has_least, has_most
 
-      range%accepts = kind
-      if (present(above)) then
-         range%above = above
-         range%accepts = range%accepts//' above '//number_text(above)
+      has_least = range%least > -huge(1.0_wp)
+      has_most = range%most < huge(1.0_wp)
+      text = kind
+      if (range%above > -huge(1.0_wp)) text = text//' above '//number_text(range%above)
+      if (has_least .and. has_most) then
+         text = kind//' from '//number_text(range%least)//' to '//number_text(range%most)
+      else if (has_least) then
+         text = kind//' of at least '//number_text(range%least)
+      else if (has_most) then
+         text = text//' and at most '//number_text(range%most)
       end if
-      if (present(least)) range%least = least
-      if (present(most)) range%most = most
-      if (present(least) .and. present(most)) then
-         range%accepts = kind//' from '//number_text(least)//' to '//number_text(most)
-      else if (present(least)) then
-         range%accepts = kind//' of at least '//number_text(least)
-      else if (present(most)) then
-         range%accepts = range%accepts//' and at most '//number_text(most)
+      if (len_trim(range%within) > 0 .and. .not. has_most) then
+         text = text//' within +-'//trim(range%within)
       end if
-      if (present(below)) then
-         range%has_below = .true.
-         range%below = below
-         range%accepts = range%accepts//' and below '//number_text(below)
-      end if
-   end function new_range
-
-   pure logical function holds(self, number)
-      class(range_type), intent(in) :: self
-      real(wp), intent(in) :: number
-
-      holds = ieee_is_finite(number) .and. number > self%above .and. number >= self%least &
-              .and. number <= self%most
-      if (self%has_below) holds = holds .and. number < self%below
-   end function holds
+      if (range%below < huge(1.0_wp)) text = text//' and below '//number_text(range%below)
+   end function range_text
 
    !> A finite real; Fortran d-exponents are understood.
    subroutine read_real(text, number, ok)

@@ -1,6 +1,12 @@
 !> Options of the nonlinear solvers. Defaults live here and nowhere else; the words are those
 !> of the namelist, in the order of the constants.
 module fw_solver_options
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: above
+   use fw_key_range, only: at_least
+   use fw_key_range, only: below
+   use fw_key_range, only: operator(.and.)
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -53,6 +59,8 @@ module fw_solver_options
       logical :: fallback = .true.
       !> Leave out work that a case does not need (stuck pairs, components that nothing moves).
       logical :: skips = .true.
+   contains
+      procedure :: bind_keys => bind_solver_keys
    end type solver_options
 
    !> Options of pseudo-time integration (group &pseudo_time).
@@ -64,6 +72,8 @@ module fw_solver_options
       !> Courant number of the explicit scheme.
       real(wp) :: cfl = 0.8_wp
       integer :: max_steps = 500
+   contains
+      procedure :: bind_keys => bind_pseudo_time_keys
    end type pseudo_time_options
 
    !> The frequencies of a case (group &sweep).
@@ -76,6 +86,77 @@ module fw_solver_options
       integer :: max_points = 1000
       !> Compute the Floquet multipliers of every point.
       logical :: stability = .false.
+   contains
+      procedure :: bind_keys => bind_sweep_keys
    end type sweep_options
+
+contains
+
+   !> The keys of group &solver.
+   subroutine bind_solver_keys(self, keys)
+      class(solver_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%open('solver', 'nonlinear solver, tolerance')
+      call keys%bind_word(key('kind', "Newton's method with a line search, MINPACK's hybrid "// &
+                              'method, KINSOL of SUNDIALS, or pseudo-time'), &
+                          self%kind, solver_words)
+      call keys%bind_word(key('linear', 'how linear problems are solved; auto: by their size', &
+                              only="kind = 'newton', 'pseudo_time'"), self%linear, linear_words)
+      call keys%bind_word(key('jacobian', 'derivative of the residual; difference is a check', &
+                              only="natural sweeps and points, not kind = 'pseudo_time'"), &
+                          self%jacobian, jacobian_words)
+      call keys%bind(key('tolerance', 'on the norm of the residual over that of the vibratory '// &
+                         'load', above(0.0_wp) .and. below(1.0_wp)), self%tolerance)
+      call keys%bind(key('max_iterations', 'steps from each guess', at_least(1)), &
+                     self%max_iterations)
+      call keys%bind(key('fallback', 'try other ways where the first guess fails'), self%fallback)
+      call keys%bind(key('skips', 'leave out stuck pairs and components that nothing moves'), &
+                     self%skips)
+   end subroutine bind_solver_keys
+
+   !> The keys of group &pseudo_time.
+   subroutine bind_pseudo_time_keys(self, keys)
+      class(pseudo_time_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%open('pseudo_time', 'pseudo-time integration')
+      call keys%bind_word(key('flow', 'P of P dU/dt* = -R(U): 2 i n omega M, the identity, or '// &
+                              'the linear joint with every pair closed'), self%flow, flow_words)
+      call keys%bind_word(key('scheme', "steps by Newton's method, CVODE (wear: IDA), linearly "// &
+                              'implicit, or explicit'), self%scheme, scheme_words)
+      call keys%bind(key('step', 'first step; 0: chosen by the scheme', at_least(0.0_wp)), &
+                     self%step)
+      call keys%bind(key('cfl', 'Courant number', above(0.0_wp), only="scheme = 'runge_kutta'"), &
+                     self%cfl)
+      call keys%bind(key('max_steps', 'steps taken and refused', at_least(1)), self%max_steps)
+   end subroutine bind_pseudo_time_keys
+
+   !> The keys of group &sweep.
+   subroutine bind_sweep_keys(self, keys, is_sweep)
+      class(sweep_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+      !> Whether the analysis is one of a range.
+      logical, intent(in) :: is_sweep
+
+      call keys%open('sweep', 'frequencies')
+      call keys%bind(key('start', 'first frequency, or the only one', above(0.0_wp), &
+                         unit='unit', absent='required'), self%start, needed=.true.)
+      call keys%bind(key('end', 'last frequency; below start the sweep goes down', &
+                         at_least(0.0_wp), unit='unit', absent='required for frf'), self%end, &
+                     needed=is_sweep)
+      call keys%bind_word(key('unit', 'of start and end; results are in rad/s'), &
+                          self%unit, unit_words)
+      call keys%bind_word(key('continuation', 'points at given frequencies, or a branch '// &
+                              'through folds'), self%continuation, continuation_words)
+      call keys%bind(key('n_points', 'points, evenly spaced, both ends included; of a branch: '// &
+                         'sets the first step', at_least(1), absent='required for a natural '// &
+                         'frf'), self%n_points, &
+                     needed=is_sweep .and. self%continuation == continuation_natural)
+      call keys%bind(key('max_points', 'points of a branch at most', at_least(1), &
+                         only="continuation = 'arclength'"), self%max_points)
+      call keys%bind(key('stability', 'compute the Floquet multipliers of every point', &
+                         only="springs and law = 'penalty'"), self%stability)
+   end subroutine bind_sweep_keys
 
 end module fw_solver_options

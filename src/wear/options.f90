@@ -1,5 +1,13 @@
 !> Options of fretting wear (group &wear). Defaults live here and nowhere else.
 module fw_wear_options
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: above
+   use fw_key_range, only: at_least
+   use fw_key_range, only: at_most
+   use fw_key_range, only: below
+   use fw_key_range, only: from_to
+   use fw_key_range, only: operator(.and.)
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -40,6 +48,7 @@ module fw_wear_options
       !> Keep the excitation at the resonance of the first observed quantity.
       logical :: follow_resonance = .false.
    contains
+      procedure :: bind_keys
       procedure :: controls_error
       procedure :: tolerance
       procedure :: halve_steps
@@ -51,6 +60,44 @@ module fw_wear_options
    real(wp), parameter :: default_error_tolerance = 1.0e-3_wp
 
 contains
+
+   !> The keys of group &wear.
+   subroutine bind_keys(self, keys, is_wear)
+      class(wear_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+      !> Whether the analysis is one of wear.
+      logical, intent(in) :: is_wear
+      ! The default, huge, stands for no limit and lies outside of what may be written.
+      real(wp), parameter :: most_cycles = 1.0e300_wp
+
+      call keys%open('wear', 'fretting wear')
+      call keys%bind_word(key('scheme', 'vibration and depth together, depth by the rate at '// &
+                              'the start of a step, or linearly implicit'), &
+                          self%scheme, wear_scheme_words)
+      call keys%bind_word(key('law', 'depth by pressure times slip, or by friction energy'), &
+                          self%law, wear_law_words)
+      call keys%bind(key('order', 'of the implicit scheme 1 to 4, of the explicit one 1 or 2; '// &
+                         '0: chosen', from_to(0, 4), only="scheme = 'implicit', 'explicit'"), &
+                     self%order)
+      call keys%bind(key('coefficient', 'k_w: depth is k_w times contact force times slip over '// &
+                         'area', above(0.0_wp), unit='L^2/F', absent='required for wear'), &
+                     self%coefficient, needed=is_wear)
+      call keys%bind(key('n_cycles', 'cycles to be covered', above(0.0_wp) .and. &
+                         at_most(most_cycles), absent='none'), self%n_cycles)
+      call keys%bind(key('max_depth_step', 'largest growth of the depth in a step; 0: by the '// &
+                         'error alone', at_least(0.0_wp), unit='L'), self%max_depth_step)
+      call keys%bind(key('error_tolerance', 'largest estimated error of a step over the '// &
+                         'largest depth; 0: by max_depth_step, else 1e-3', at_least(0.0_wp)), &
+                     self%error_tolerance)
+      call keys%bind(key('steady_tolerance', 'a joint is steady when its largest rate has '// &
+                         'fallen to this part of the largest so far', above(0.0_wp) .and. &
+                         below(1.0_wp)), self%steady_tolerance)
+      call keys%bind(key('max_steps', 'steps at most', at_least(1)), self%max_steps)
+      call keys%bind(key('check_steps', 'run once more with halved steps, to see how far the '// &
+                         'profile moves'), self%check_steps)
+      call keys%bind(key('follow_resonance', 'keep the frequency at the peak of the first '// &
+                         'observed quantity'), self%follow_resonance)
+   end subroutine bind_keys
 
    !> Whether the error sets the steps, not the growth of the depth alone.
    pure logical function controls_error(self)

@@ -1,4 +1,5 @@
 """Options, exit statuses and what goes to which stream."""
+import json
 import os
 
 import pytest
@@ -14,10 +15,46 @@ def test_version(fw_run):
 def test_help_names_every_option_and_group(fw_run, option):
     done = fw_run(option)
     assert done.returncode == 0 and done.stderr == ""
-    for word in ["--set", "-o", "--restart", "--check", "-q", "-v", "--version", "&contact",
+    for word in ["--set", "-o", "--restart", "--keys", "--check", "-q", "-v", "--version", "&contact",
                  "Exit status"]:
         assert word in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 88
+
+
+def test_keys_of_all_groups_or_of_one(fw_run):
+    everything = fw_run("--keys")
+    assert everything.returncode == 0 and everything.stderr == ""
+    one = fw_run("--keys", "solver").stdout
+    assert one in everything.stdout and one.startswith("&solver ")
+    assert "tolerance = a finite real above 0 and below 1 [1e-8]" in one
+    assert "side_1 = an integer within +-n_dof, one for all or 3 x n_pairs of them" in \
+        everything.stdout
+    assert "did you mean solver?" in fw_run.refused("--keys", "solvr", status=2)
+    assert "json" in fw_run.refused("--keys=xml", status=2)
+
+
+def test_keys_for_programs_are_those_that_a_case_has(fw_run):
+    """Default, what is accepted, and the order of the effective input of a case with little."""
+    fw_run.write("&case analysis = 'point' / &model n_dof = 1 mass = 1.0 stiffness = 1.0 /\n"
+                 "&sweep start = 2.0 /\n")
+    listed = json.loads(fw_run("--keys=json").stdout)
+    group, shown = "", []
+    for line in fw_run("--check", "case.nml").stdout.splitlines():
+        if line.startswith("&"):
+            group = line[1:]
+        elif " = " in line:
+            key, _, rest = line.strip().partition(" = ")
+            value, _, accepts = rest.partition("!")
+            known = listed[group]["keys"][key]
+            shown.append((group, key))
+            assert accepts.strip() in ("", known["accepts"]), key
+            if known["type"] == "word":
+                assert value.strip() in [f"'{word}'" for word in known["words"]]
+            if "default" in known and key not in ("analysis", "n_dof"):
+                assert value.strip() == known["default"], key
+    assert len(shown) > 50
+    order = [(group, key) for group, content in listed.items() for key in content["keys"]]
+    assert shown == [place for place in order if place in set(shown)]
 
 
 def test_no_argument(fw_run):

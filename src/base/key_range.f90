@@ -1,0 +1,107 @@
+!> What the number of a key may be: `above(0.0_wp) .and. below(1.0_wp)`, `from_to(1, 99)`.
+module fw_key_range
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: range_type
+   public :: above, at_least, at_most, below, from_to, dof_numbers
+   public :: operator(.and.)
+
+   !> What a number may be; a bound that is huge does not bind.
+   type :: range_type
+      !> Strict bounds.
+      real(wp) :: above = -huge(1.0_wp), below = huge(1.0_wp)
+      real(wp) :: least = -huge(1.0_wp), most = huge(1.0_wp)
+      !> Name of the size that bounds the number on either side of 0, or blank.
+      character(12) :: within = ''
+   contains
+      procedure :: holds
+   end type range_type
+
+   interface at_least
+      module procedure at_least_real
+      module procedure at_least_integer
+   end interface at_least
+
+   interface from_to
+      module procedure from_to_real
+      module procedure from_to_integer
+   end interface from_to
+
+   !> Both ranges.
+   interface operator(.and.)
+      module procedure both
+   end interface operator(.and.)
+
+contains
+
+   pure type(range_type) function above(number) result(range)
+      real(wp), intent(in) :: number
+
+      range%above = number
+   end function above
+
+   pure type(range_type) function below(number) result(range)
+      real(wp), intent(in) :: number
+
+      range%below = number
+   end function below
+
+   pure type(range_type) function at_least_real(number) result(range)
+      real(wp), intent(in) :: number
+
+      range%least = number
+   end function at_least_real
+
+   pure type(range_type) function at_least_integer(number) result(range)
+      integer, intent(in) :: number
+
+      range%least = real(number, wp)
+   end function at_least_integer
+
+   pure type(range_type) function at_most(number) result(range)
+      real(wp), intent(in) :: number
+
+      range%most = number
+   end function at_most
+
+   pure type(range_type) function from_to_real(least, most) result(range)
+      real(wp), intent(in) :: least, most
+
+      range%least = least
+      range%most = most
+   end function from_to_real
+
+   pure type(range_type) function from_to_integer(least, most) result(range)
+      integer, intent(in) :: least, most
+
+      range = from_to_real(real(least, wp), real(most, wp))
+   end function from_to_integer
+
+   !> Numbers of dofs, negative for those whose sign is turned.
+   pure type(range_type) function dof_numbers() result(range)
+      range%within = 'n_dof'
+   end function dof_numbers
+
+   pure type(range_type) function both(first, second) result(range)
+      type(range_type), intent(in) :: first, second
+
+      range%above = max(first%above, second%above)
+      range%below = min(first%below, second%below)
+      range%least = max(first%least, second%least)
+      range%most = min(first%most, second%most)
+      range%within = first%within
+   end function both
+
+   pure logical function holds(self, number)
+      class(range_type), intent(in) :: self
+      real(wp), intent(in) :: number
+
+      holds = ieee_is_finite(number) .and. number > self%above .and. number >= self%least &
+              .and. number <= self%most
+      if (self%below < huge(1.0_wp)) holds = holds .and. number < self%below
+   end function holds
+
+end module fw_key_range

@@ -1,0 +1,148 @@
+!> The keys of groups &contact and &spring.
+module fw_contact_keys
+   use fw_contact_data, only: contact_type, spring_type, law_words, memory_words
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: above
+   use fw_key_range, only: at_least
+   use fw_key_range, only: dof_numbers
+   use fw_key_range, only: from_to
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, bind_normal_load, &
+             bind_stiffnesses, bind_march, bind_worn, bind_springs
+
+   !> More pairs or springs are taken for a mistake.
+   integer, parameter :: most = 1000000
+
+   character(*), parameter :: of_file = 'of the file'
+
+contains
+
+   subroutine bind_pairs(keys, contact)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+
+      call keys%open('contact', 'contact pairs, friction, gap, contact law')
+      call keys%bind(key('n_pairs', 'contact pairs; 0 switches the contact of a file off', &
+                         from_to(0, most), absent=of_file), contact%n_pairs)
+      call keys%set_size('n_pairs', contact%n_pairs)
+   end subroutine bind_pairs
+
+   subroutine bind_law(keys, contact)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+
+      call keys%bind_word(key('law', 'rigid, rigid at velocity level (friction on dofs with '// &
+                              'mass), or elastic'), contact%law, law_words)
+   end subroutine bind_law
+
+   subroutine bind_sides(keys, contact, needed)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      logical, intent(in) :: needed
+
+      call keys%bind(key('side_1', 'dofs of t1, t2, n on one side; 0: none, negative: with its '// &
+                         'sign turned', &
+                         dof_numbers(), shape='3 x n_pairs', absent='of the file, else required'), &
+                     contact%side_1, needed)
+      call keys%bind(key('side_2', 'the same of the other side, 0: ground; the normal points '// &
+                         'from side 2 to side 1', dof_numbers(), shape='3 x n_pairs', &
+                         absent=of_file), contact%side_2, default=0)
+   end subroutine bind_sides
+
+   subroutine bind_friction(keys, contact, needed)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      logical, intent(in) :: needed
+
+      call keys%bind(key('mu', 'friction coefficient', at_least(0.0_wp), shape='n_pairs', &
+                         absent='of the file, else required with tangential dofs'), contact%mu, &
+                     needed)
+   end subroutine bind_friction
+
+   subroutine bind_gap(keys, contact, needs_area)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      logical, intent(in) :: needs_area
+
+      call keys%bind(key('gap', 'initial gap; negative: interference, which preloads', &
+                         unit='L', shape='n_pairs', absent=of_file), contact%gap, default=0.0_wp)
+      call keys%bind(key('area', 'of a pair: from contact forces to pressure', above(0.0_wp), &
+                         'L^2', 'n_pairs', absent='of the file, else required for wear', &
+                         only="analysis = 'wear'"), contact%area, needs_area)
+   end subroutine bind_gap
+
+   subroutine bind_normal_load(keys, contact, needed)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      logical, intent(in) :: needed
+
+      call keys%bind(key('normal_load', 'constant compressive force', at_least(0.0_wp), 'F', &
+                         'n_pairs', absent='required with friction', &
+                         only='pairs without a normal dof'), contact%normal_load, needed)
+   end subroutine bind_normal_load
+
+   !> Each left unallocated where it is not given.
+   subroutine bind_stiffnesses(keys, contact, slides, closes)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      !> Whether there are tangential dofs, normal dofs.
+      logical, intent(in) :: slides, closes
+      character(*), parameter :: only = "law = 'penalty'"
+
+      call keys%bind(key('tangential_stiffness', 'contact stiffness', above(0.0_wp), 'F/L', &
+                         'n_pairs', absent='required with tangential dofs', only=only), &
+                     contact%tangential_stiffness, slides)
+      call keys%bind(key('normal_stiffness', 'the same, for the normal', above(0.0_wp), 'F/L', &
+                         'n_pairs', absent='required with normal dofs', only=only), &
+                     contact%normal_stiffness, closes)
+   end subroutine bind_stiffnesses
+
+   subroutine bind_march(keys, contact)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+
+      call keys%bind(key('penalty_scale', 'multiplies the automatic eps of the rigid laws', &
+                         above(0.0_wp), only="law = 'dlft', 'dlft_velocity'"), &
+                     contact%penalty_scale)
+      call keys%bind_word(key('memory', 'where pairs that never slip start: unstrained, or as '// &
+                              'the last point ended'), contact%memory, memory_words)
+   end subroutine bind_march
+
+   subroutine bind_worn(keys, path, step)
+      class(key_visitor), intent(inout) :: keys
+      !> Not allocated where there is none.
+      character(:), allocatable, intent(inout) :: path
+      integer, intent(inout) :: step
+
+      call keys%bind(key('worn', 'result file of a wear run: start from the depths that it '// &
+                         'ends with, on top of gap', absent='none'), path)
+      call keys%bind(key('worn_step', 'row of its /wear/depth, counted from 1; 0: the last', &
+                         at_least(0), only='worn'), step)
+   end subroutine bind_worn
+
+   !> Group &spring. Arrays that are needed and not given are left unallocated.
+   subroutine bind_springs(keys, springs)
+      class(key_visitor), intent(inout) :: keys
+      type(spring_type), intent(inout) :: springs
+      logical :: needed
+
+      call keys%open('spring', 'nonlinear springs')
+      call keys%bind(key('n_springs', 'nonlinear springs', from_to(0, most)), springs%n_springs)
+      call keys%set_size('n_springs', springs%n_springs)
+      needed = springs%n_springs > 0
+      call keys%bind(key('side_1', 'dof on one side', dof_numbers(), shape='n_springs', &
+                         absent='required'), springs%side_1, needed)
+      call keys%bind(key('side_2', 'dof on the other side, 0: ground', dof_numbers(), &
+                         shape='n_springs'), springs%side_2, default=0)
+      call keys%bind(key('coefficient', 'force = coefficient * elongation**power', &
+                         unit='F/L^power', shape='n_springs', absent='required'), &
+                     springs%coefficient, needed)
+      call keys%bind(key('power', 'odd powers keep the symmetry of odd harmonics', &
+                         from_to(1, 99), shape='n_springs'), springs%power, default=3)
+   end subroutine bind_springs
+
+end module fw_contact_keys

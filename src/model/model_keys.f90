@@ -1,0 +1,135 @@
+!> The keys of groups &model and &load.
+module fw_model_keys
+   use fw_key, only: key
+   use fw_key, only: key_type
+   use fw_key, only: key_visitor
+   use fw_key_range, only: at_least
+   use fw_key_range, only: from_to
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: model_options
+   public :: source_words, source_inline, source_hdf5, source_matrix_market, source_memory
+   public :: bind_order, bind_matrices, bind_loads
+
+   character(*), parameter :: source_words(*) = &
+      [character(13) :: 'inline', 'hdf5', 'matrix_market', 'memory']
+   integer, parameter :: source_inline = 1, source_hdf5 = 2, source_matrix_market = 3, &
+                         source_memory = 4
+
+   !> More dofs are taken for a mistake: the matrices are dense.
+   integer, parameter :: largest = 100000
+
+   !> Keys that act once all is read.
+   type :: model_options
+      integer :: source = source_inline
+      character(:), allocatable :: file
+      real(wp) :: rayleigh_mass = 0.0_wp
+      real(wp) :: rayleigh_stiffness = 0.0_wp
+      !> Fraction of critical damping of every mode.
+      real(wp) :: modal_damping = 0.0_wp
+      !> [rad/s]
+      real(wp) :: rotation_speed = 0.0_wp
+      real(wp) :: static_scale = 1.0_wp
+      real(wp) :: harmonic_scale = 1.0_wp
+   contains
+      procedure :: bind_source
+      procedure :: bind_file
+      procedure :: bind_additions
+      procedure :: bind_scales
+   end type model_options
+
+contains
+
+   subroutine bind_source(self, keys)
+      class(model_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%open('model', 'mass, stiffness and damping, inline or from a file')
+      call keys%bind_word(key('source', "where the matrices are; 'memory': in the program that "// &
+                              'calls the library'), self%source, source_words)
+   end subroutine bind_source
+
+   subroutine bind_file(self, keys)
+      class(model_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%bind(key('file', 'model file, relative to the namelist', &
+                         absent='required unless inline'), self%file, &
+                     needed=any(self%source == [source_hdf5, source_matrix_market]))
+   end subroutine bind_file
+
+   subroutine bind_order(keys, n_dof, is_inline)
+      class(key_visitor), intent(inout) :: keys
+      integer, intent(inout) :: n_dof
+      logical, intent(in) :: is_inline
+
+      call keys%bind(key('n_dof', 'order of the matrices; with a file it may be left out', &
+                         from_to(1, largest), absent='required inline'), n_dof, needed=is_inline)
+      call keys%set_size('n_dof', n_dof)
+   end subroutine bind_order
+
+   !> The matrices (n_dof, n_dof), each left unallocated where it is not given.
+   subroutine bind_matrices(keys, is_inline, mass, stiffness, damping)
+      class(key_visitor), intent(inout) :: keys
+      logical, intent(in) :: is_inline
+      real(wp), allocatable, intent(inout) :: mass(:, :), stiffness(:, :), damping(:, :)
+      character(*), parameter :: shape = 'n_dof x n_dof'
+
+      call keys%bind(key('mass', 'symmetric, no negative diagonal; may be singular', unit='M', &
+                         shape=shape, repeats=.false., absent='required inline'), mass, is_inline)
+      call keys%bind(key('stiffness', 'symmetric; may be singular where contact holds the '// &
+                         'structure', unit='F/L', shape=shape, repeats=.false., &
+                         absent='required inline'), stiffness, is_inline)
+      call keys%bind(key('damping', 'symmetric; the next three add to it', unit='F s/L', &
+                         shape=shape, repeats=.false., absent='0'), damping)
+   end subroutine bind_matrices
+
+   subroutine bind_additions(self, keys)
+      class(model_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%bind(key('rayleigh_mass', 'adds this times M to the damping', at_least(0.0_wp), &
+                         unit='1/s'), self%rayleigh_mass)
+      call keys%bind(key('rayleigh_stiffness', 'adds this times K, with rotation, to the '// &
+                         'damping', at_least(0.0_wp), unit='s'), self%rayleigh_stiffness)
+      call keys%bind(key('modal_damping', 'fraction of critical damping of every mode with '// &
+                         'open contact', at_least(0.0_wp)), self%modal_damping)
+      call keys%bind(key('rotation_speed', 'adds its square times stiffness_rotation and '// &
+                         'load/static_rotation of the model file', at_least(0.0_wp), &
+                         unit='rad/s'), self%rotation_speed)
+   end subroutine bind_additions
+
+   !> Group &load, begun here; what a model file holds stays where nothing is given.
+   subroutine bind_loads(keys, static, cosine, sine)
+      class(key_visitor), intent(inout) :: keys
+      !> (n_dof)
+      real(wp), allocatable, intent(inout) :: static(:), cosine(:), sine(:)
+
+      call keys%open('load', 'static and harmonic loads')
+      call keys%bind(load_key('static', 'constant load'), static, default=0.0_wp)
+      call keys%bind(load_key('cosine', 'cosine part of the first harmonic'), cosine, &
+                     default=0.0_wp)
+      call keys%bind(load_key('sine', 'sine part of the first harmonic'), sine, default=0.0_wp)
+
+   contains
+
+      pure type(key_type) function load_key(name, help)
+         character(*), intent(in) :: name, help
+
+         load_key = key(name, help, unit='F', shape='n_dof', absent='of the file')
+      end function load_key
+
+   end subroutine bind_loads
+
+   subroutine bind_scales(self, keys)
+      class(model_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+
+      call keys%bind(key('static_scale', 'multiplies the static load, that of rotation '// &
+                         'included'), self%static_scale)
+      call keys%bind(key('harmonic_scale', 'multiplies cosine and sine'), self%harmonic_scale)
+   end subroutine bind_scales
+
+end module fw_model_keys
