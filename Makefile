@@ -9,7 +9,7 @@ SHELL := /bin/bash
 .PHONY: help deps build debug run test lint docs clean
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
-.PHONY: bench-peers bench-full paper
+.PHONY: bench-peers bench-full compare paper
 .PHONY: stress long faults verify
 
 BUILD := build/release
@@ -102,7 +102,12 @@ bench-precision: build ## error against run time of every method, and of wear
 bench-solvers: build ## every solver, flow and scheme from many starts
 	PYTHONPATH=python $(PYTHON) bench/run.py solvers
 
-bench-paper: build ## methods, iterations against frequency, aliasing
+bench-# make compare OTHER=/path/to/fw_run TIMES=9
+TIMES ?= 0
+compare: build ## numbers and work of OTHER (another fw_run) and of this build, TIMES paired runs
+	@$(PYTHON) bench/compare/compare_builds.py --of $(BUILD)/fw_run --with $(OTHER) --times $(TIMES)
+
+paper: build ## methods, iterations against frequency, aliasing
 	PYTHONPATH=python $(PYTHON) bench/run.py paper iterations aliasing
 
 bench-time: build ## harmonic balance against integration in time
@@ -122,6 +127,11 @@ bench-peers: build ## pyHarm on the same problems, where it is installed
 
 bench-full: build ## every part of docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) bench/run.py all --peer-python $(PEER_PYTHON)
+
+# make compare OTHER=/path/to/fw_run TIMES=9
+TIMES ?= 0
+compare: build ## numbers and work of OTHER (another fw_run) and of this build, TIMES paired runs
+	@$(PYTHON) bench/compare/compare_builds.py --of $(BUILD)/fw_run --with $(OTHER) --times $(TIMES)
 
 paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) bench/gallery.py

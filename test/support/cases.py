@@ -1,0 +1,49 @@
+"""Cases as groups of keys, written as namelists by the package, run, and read as arrays."""
+import subprocess
+
+import h5py
+from limits import limit
+from project import PATIENT, PROGRAM
+
+from fretwear._namelist import literal
+from fretwear._namelist import write_namelist as namelist_text
+
+__all__ = ["literal", "merged", "read", "run", "write_namelist"]
+
+
+def write_namelist(path, groups):
+    """Write {group: {key: value}} as a namelist."""
+    path.write_text(namelist_text(groups))
+
+
+def merged(groups, changes):
+    """Groups with changes to some keys; None takes a key out."""
+    result = {name: dict(keys) for name, keys in groups.items()}
+    for name, keys in changes.items():
+        result.setdefault(name, {}).update(keys)
+        result[name] = {key: value for key, value in result[name].items() if value is not None}
+    return result
+
+
+def run(folder, groups, *arguments, name="case", status=(0,), program=PROGRAM, seconds=120.0):
+    """Write a case into a folder, run it there and want one of the statuses; the process."""
+    path = folder / f"{name}.nml"
+    write_namelist(path, groups)
+    done = subprocess.run([program, "-q", *map(str, arguments), path.name], cwd=folder, text=True,
+                          capture_output=True, timeout=limit(seconds), check=False, env=PATIENT)
+    assert done.returncode in status, (
+        f"fw_run ended with status {done.returncode}: {done.stderr}\n{path.read_text()}")
+    return done
+
+
+def read(path):
+    """Every dataset of a result, and the attributes of the file and of /wear."""
+    found = {}
+    with h5py.File(path, "r") as file:
+        def take(name, item):
+            if isinstance(item, h5py.Dataset):
+                found[name] = item[()]
+        file.visititems(take)
+        found["attributes"] = dict(file.attrs)
+        found["wear"] = dict(file["wear"].attrs) if "wear" in file else {}
+    return found
