@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help deps build debug run test lint docs clean
+.PHONY: help deps build debug run test lint keys docs clean
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare paper
@@ -70,6 +70,9 @@ lint: build/deps.stamp ## linters of the Fortran and the Python code, type check
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs \
 	   test/robustness test/stress test/verify
+
+keys: build ## tables of keys in the user guide, settings of the Python package
+	@$(PYTHON) tools/write_keys.py $(BUILD)/fw_run
 
 docs: build/deps.stamp ## reference of library and Python package, in build/docs
 	@$(PYTHON) tools/build_docs.py build/docs

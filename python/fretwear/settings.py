@@ -2,6 +2,7 @@
 
 Each is a dictionary of which every key may be left out; the library knows the defaults
 (`Case.namelist()` shows them) and refuses what it does not know. See the user guide for advice.
+Written by tools/write_keys.py from the declarations in the library.
 """
 
 from __future__ import annotations
@@ -16,146 +17,255 @@ __all__ = ["CaseGroup", "Contact", "Groups", "Harmonics", "Load", "Output", "Pse
 
 
 class CaseGroup(TypedDict, total=False):
-    """Group &case: title, kind of analysis, OpenMP threads (0: all)."""
+    """Group &case: title, kind of analysis, threads."""
 
+    #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
+    #: a sweep, one frequency, wear at one frequency, or integration in time (default: 'frf')
     analysis: Literal["frf", "point", "wear", "time"]
+    #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
 
 
 class Structure(TypedDict, total=False):
-    """Group &model: where the matrices come from, and what is added to them."""
+    """Group &model: mass, stiffness and damping, inline or from a file."""
 
+    #: where the matrices are; 'memory': in the program that calls the library (default: 'inline')
     source: Literal["inline", "hdf5", "matrix_market"]
+    #: model file, relative to the namelist (required unless inline)
     file: str
+    #: order of the matrices; with a file it may be left out (required inline)
     n_dof: int
+    #: [M] symmetric, no negative diagonal; may be singular (required inline)
     mass: ArrayLike
+    #: [F/L] symmetric; may be singular where contact holds the structure (required inline)
     stiffness: ArrayLike
+    #: [F s/L] symmetric; the next three add to it (default: 0)
     damping: ArrayLike
-    rayleigh_mass: float  # [1/s]
-    rayleigh_stiffness: float  # [s]
-    modal_damping: float  # of critical
-    rotation_speed: float  # [rad/s]
+    #: [1/s] adds this times M to the damping (default: 0)
+    rayleigh_mass: float
+    #: [s] adds this times K, with rotation, to the damping (default: 0)
+    rayleigh_stiffness: float
+    #: fraction of critical damping of every mode with open contact (default: 0)
+    modal_damping: float
+    #: [rad/s] adds its square times stiffness_rotation and load/static_rotation of the model file
+    #: (default: 0)
+    rotation_speed: float
 
 
 class Contact(TypedDict, total=False):
-    """Group &contact: law and constants of the pairs, one for all or one per pair."""
+    """Group &contact: contact pairs, friction, gap, contact law."""
 
+    #: required with side_1; 0 switches the contact of a file off (default: of the file, else 0)
     n_pairs: int
+    #: rigid, rigid at velocity level (friction on dofs with mass), or elastic (default: 'dlft')
     law: Literal["dlft", "dlft_velocity", "penalty"]
+    #: dofs of t1, t2, n on one side; 0: none, negative: with its sign turned (default: of the file,
+    #: else required)
     side_1: ArrayLike
+    #: the same of the other side, 0: ground; the normal points from side 2 to side 1 (default: of
+    #: the file, else 0)
     side_2: ArrayLike
+    #: friction coefficient (default: of the file, else required with tangential dofs)
     mu: ArrayLike
-    gap: ArrayLike  # [length]
-    worn: str
-    worn_step: int
-    area: ArrayLike  # [length^2]
-    normal_load: ArrayLike  # [force]
-    tangential_stiffness: ArrayLike  # [force/length]
-    normal_stiffness: ArrayLike  # [force/length]
+    #: [L] initial gap; negative: interference, which preloads (default: of the file, else 0)
+    gap: ArrayLike
+    #: [L^2] of a pair: from contact forces to pressure; only: analysis = 'wear' (default: of the
+    #: file, else required for wear)
+    area: ArrayLike
+    #: [F] constant compressive force; only: pairs without a normal dof (required with friction)
+    normal_load: ArrayLike
+    #: [F/L] contact stiffness; only: law = 'penalty' (required with tangential dofs)
+    tangential_stiffness: ArrayLike
+    #: [F/L] the same, for the normal; only: law = 'penalty' (required with normal dofs)
+    normal_stiffness: ArrayLike
+    #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity' (default:
+    #: 1)
     penalty_scale: float
+    #: where pairs that never slip start: unstrained, or as the last point ended (default:
+    #: 'assembly')
     memory: Literal["assembly", "carried"]
+    #: result file of a wear run: start from the depths that it ends with, on top of gap (default:
+    #: none)
+    worn: str
+    #: row of its /wear/depth, counted from 1; 0: the last; only: worn (default: 0)
+    worn_step: int
 
 
 class Spring(TypedDict, total=False):
     """Group &spring: nonlinear springs."""
 
+    #: required with coefficient (default: 0)
     n_springs: int
+    #: dof on one side (required)
     side_1: ArrayLike
+    #: dof on the other side, 0: ground (default: 0)
     side_2: ArrayLike
-    coefficient: ArrayLike  # [force/length^power]
+    #: [F/L^power] force = coefficient * elongation**power (required)
+    coefficient: ArrayLike
+    #: odd powers keep the symmetry of odd harmonics (default: 3)
     power: ArrayLike
 
 
 class Load(TypedDict, total=False):
-    """Group &load: loads per dof [force], and factors of those of a model."""
+    """Group &load: static and harmonic loads."""
 
+    #: [F] constant load (default: of the file, else 0)
     static: ArrayLike
+    #: [F] cosine part of the first harmonic (default: of the file, else 0)
     cosine: ArrayLike
+    #: [F] sine part of the first harmonic (default: of the file, else 0)
     sine: ArrayLike
+    #: multiplies the static load, that of rotation included (default: 1)
     static_scale: float
+    #: multiplies cosine and sine (default: 1)
     harmonic_scale: float
 
 
 class Harmonics(TypedDict, total=False):
-    """Group &harmonics: the approximation."""
+    """Group &harmonics: method, number of harmonics, instants per period."""
 
+    #: how the equations are weighted: Galerkin, collocation, least squares, or unknowns at the
+    #: instants (default: 'hbm')
     method: Literal["hbm", "tcm", "tcm_least_squares", "hdhb"]
+    #: H, the highest harmonic; with accuracy the most that may be used (default: 53 with accuracy,
+    #: else 1)
     n_harmonics: int
+    #: instants of a period, at least 2H+1; 0: chosen (default: 0)
     n_time: int
+    #: instants of the equations; 0: twice the coefficients; only: method = 'tcm_least_squares'
+    #: (default: 0)
     n_collocation: int
+    #: harmonics above this one do not reach nonlinear springs; 0: no filter; only: method = 'hdhb'
+    #: (default: 0)
     filter_harmonics: int
+    #: decide stick, slip and separation at the instants, or locate them on the series (default:
+    #: 'auto')
     sampling: Literal["uniform", "events", "auto"]
+    #: which harmonics are kept; auto leaves even ones out where that is exact (default: 'auto')
     parity: Literal["auto", "all", "odd"]
+    #: as many harmonics as each point needs, up to n_harmonics; only: natural sweeps and points
+    #: (default: .false.)
     adaptive: bool
+    #: part of the contact and spring forces that may be left out; only: adaptive (default: 0.001)
     adaptive_tolerance: float
+    #: relative error of the response for which harmonics and instants are chosen; 0: as given;
+    #: only: method = 'hbm', natural sweeps and points (default: 0)
     accuracy: float
 
 
 class Sweep(TypedDict, total=False):
-    """Group &sweep: frequencies [unit]."""
+    """Group &sweep: frequencies."""
 
+    #: first frequency, or the only one (required)
     start: float
+    #: last frequency; below start the sweep goes down (required for frf, else 0)
     end: float
-    n_points: int
+    #: of start and end; results are in rad/s (default: 'rad/s')
     unit: Literal["rad/s", "Hz"]
+    #: points at given frequencies, or a branch through folds (default: 'natural')
     continuation: Literal["natural", "arclength"]
+    #: points, evenly spaced, both ends included; of a branch: sets the first step (required for a
+    #: natural frf, else 1)
+    n_points: int
+    #: points of a branch at most; only: continuation = 'arclength' (default: 1000)
     max_points: int
+    #: compute the Floquet multipliers of every point; only: springs and law = 'penalty' (default:
+    #: .false.)
     stability: bool
 
 
 class Solver(TypedDict, total=False):
-    """Group &solver: the nonlinear solver."""
+    """Group &solver: nonlinear solver, tolerance."""
 
+    #: Newton's method with a line search, MINPACK's hybrid method, KINSOL of SUNDIALS, or
+    #: pseudo-time (default: 'newton')
     kind: Literal["newton", "powell", "kinsol", "pseudo_time"]
+    #: how linear problems are solved; auto: by their size; only: kind = 'newton', 'pseudo_time'
+    #: (default: 'auto')
     linear: Literal["auto", "lu", "krylov"]
+    #: derivative of the residual; difference is a check; only: natural sweeps and points, not kind
+    #: = 'pseudo_time' (default: 'analytic')
     jacobian: Literal["analytic", "difference"]
+    #: on the norm of the residual over that of the vibratory load (default: 1e-8)
     tolerance: float
+    #: steps from each guess (default: 60)
     max_iterations: int
+    #: try other ways where the first guess fails (default: .true.)
     fallback: bool
+    #: leave out stuck pairs and components that nothing moves (default: .true.)
     skips: bool
 
 
 class PseudoTime(TypedDict, total=False):
     """Group &pseudo_time: pseudo-time integration."""
 
+    #: P of P dU/dt* = -R(U): 2 i n omega M, the identity, or the linear joint with every pair
+    #: closed (default: 'rotated')
     flow: Literal["rotated", "identity", "preconditioned"]
+    #: steps by Newton's method, CVODE (wear: IDA), linearly implicit, or explicit (default:
+    #: 'implicit_euler')
     scheme: Literal["implicit_euler", "bdf", "rosenbrock", "runge_kutta"]
+    #: first step; 0: chosen by the scheme (default: 0)
     step: float
+    #: Courant number; only: scheme = 'runge_kutta' (default: 0.8)
     cfl: float
+    #: steps taken and refused (default: 500)
     max_steps: int
 
 
 class Wear(TypedDict, total=False):
-    """Group &wear: fretting wear at the frequency of `sweep["start"]`."""
+    """Group &wear: fretting wear."""
 
+    #: depth by the rate at the start of a step, vibration and depth together, or linearly implicit
+    #: (default: 'implicit')
     scheme: Literal["explicit", "implicit", "pseudo_time"]
+    #: depth by pressure times slip, or by friction energy (default: 'archard')
     law: Literal["archard", "energy"]
+    #: of the implicit scheme 1 to 4, of the explicit one 1 or 2; 0: chosen; only: scheme =
+    #: 'implicit', 'explicit' (default: 0)
     order: int
-    coefficient: float  # [length^2/force]
+    #: [L^2/F] k_w: depth is k_w times contact force times slip over area (required for wear)
+    coefficient: float
+    #: cycles to be covered (default: none)
     n_cycles: float
-    max_depth_step: float  # [length]
+    #: [L] largest growth of the depth in a step; 0: by the error alone (default: 0)
+    max_depth_step: float
+    #: largest estimated error of a step over the largest depth; 0: by max_depth_step, else 1e-3
+    #: (default: 0)
     error_tolerance: float
+    #: a joint is steady when its largest rate has fallen to this part of the largest so far
+    #: (default: 1e-6)
     steady_tolerance: float
+    #: steps at most (default: 1000)
     max_steps: int
+    #: run once more with halved steps, to see how far the profile moves (default: .false.)
     check_steps: bool
+    #: keep the frequency at the peak of the first observed quantity (default: .false.)
     follow_resonance: bool
 
 
 class Time(TypedDict, total=False):
-    """Group &time: integration in time."""
+    """Group &time: time integration."""
 
+    #: periods integrated at most (default: 500)
     n_periods: int
+    #: steps, at least max(16, 4H); also the instants of histories (default: 1000)
     steps_per_period: int
 
 
 class Output(TypedDict, total=False):
-    """Group &output: the result file and what is observed."""
+    """Group &output: result file, observed quantities."""
 
+    #: result file, relative to the namelist (default: name of the namelist with .h5)
     file: str
-    observe: str | int | Sequence[str | int]
+    #: write one period of every quantity at every point; large (default: .false.)
     histories: bool
+    #: write contact forces, states and dissipation (default: .true.)
     contact: bool
+    #: which displacements are written; a dof number k is called uk (default: all that the model
+    #: file names, else every dof)
+    observe: str | int | Sequence[str | int]
 
 
 class Groups(TypedDict, total=False):

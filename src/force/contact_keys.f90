@@ -26,7 +26,7 @@ contains
       type(contact_type), intent(inout) :: contact
 
       call keys%open('contact', 'contact pairs, friction, gap, contact law')
-      call keys%bind(key('n_pairs', 'contact pairs; 0 switches the contact of a file off', &
+      call keys%bind(key('n_pairs', 'required with side_1; 0 switches the contact of a file off', &
                          from_to(0, most), absent=of_file), contact%n_pairs)
       call keys%set_size('n_pairs', contact%n_pairs)
    end subroutine bind_pairs
@@ -131,7 +131,8 @@ contains
       logical :: needed
 
       call keys%open('spring', 'nonlinear springs')
-      call keys%bind(key('n_springs', 'nonlinear springs', from_to(0, most)), springs%n_springs)
+      call keys%bind(key('n_springs', 'required with coefficient', from_to(0, most)), &
+                     springs%n_springs)
       call keys%set_size('n_springs', springs%n_springs)
       needed = springs%n_springs > 0
       call keys%bind(key('side_1', 'dof on one side', dof_numbers(), shape='n_springs', &

@@ -59,7 +59,7 @@ contains
                shape_text(entry)//unit_text(entry)//default_text(entry)
             write (unit, '(a)') '      '//trim(entry%key%help)
             if (len_trim(entry%key%only) > 0) then
-               write (unit, '(a)') '      only with: '//trim(entry%key%only)
+               write (unit, '(a)') '      only: '//trim(entry%key%only)
             end if
          end associate
       end do

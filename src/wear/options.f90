@@ -71,8 +71,8 @@ contains
       real(wp), parameter :: most_cycles = 1.0e300_wp
 
       call keys%open('wear', 'fretting wear')
-      call keys%bind_word(key('scheme', 'vibration and depth together, depth by the rate at '// &
-                              'the start of a step, or linearly implicit'), &
+      call keys%bind_word(key('scheme', 'depth by the rate at the start of a step, vibration '// &
+                              'and depth together, or linearly implicit'), &
                           self%scheme, wear_scheme_words)
       call keys%bind_word(key('law', 'depth by pressure times slip, or by friction energy'), &
                           self%law, wear_law_words)

@@ -1,0 +1,207 @@
+#!/usr/bin/env python3
+"""The keys of the namelist as the program declares them, put into the documents and the package.
+
+    write_keys.py [--check] [PROGRAM]
+
+Writes the tables of docs/user-guide.md, between their marks, and python/fretwear/settings.py from
+`fw_run --keys=json`. With --check nothing is written; the status is 1 where a file differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+GUIDE = ROOT / "docs" / "user-guide.md"
+SETTINGS = ROOT / "python" / "fretwear" / "settings.py"
+WIDTH = 100
+
+Keys = dict[str, dict[str, Any]]
+
+SETTINGS_HEAD = '''"""Settings of a case: the groups of the namelist, by the same names.
+
+Each is a dictionary of which every key may be left out; the library knows the defaults
+(`Case.namelist()` shows them) and refuses what it does not know. See the user guide for advice.
+Written by tools/write_keys.py from the declarations in the library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, TypedDict
+
+from numpy.typing import ArrayLike
+'''
+#: Classes that are not called as their groups are.
+CLASSES = {"case": "CaseGroup", "model": "Structure"}
+#: What the package gives by itself.
+OWN_WORDS = {"source": ["memory"]}
+
+
+def declared(program: str) -> Keys:
+    """Every group with its purpose and its keys."""
+    shown = subprocess.run([program, "--keys=json"], check=True, capture_output=True, text=True)
+    return json.loads(shown.stdout)
+
+
+def number(value: float) -> str:
+    return f"{value:g}" if abs(value) >= 1e7 else f"{value}"
+
+
+def range_text(key: dict[str, Any]) -> str:
+    """Such as `> 0, < 1`; '' where every number will do."""
+    if "within" in key:
+        return f"within +-{key['within']}"
+    if "least" in key and "most" in key:
+        return f"{number(key['least'])} to {number(key['most'])}"
+    bounds = [("above", ">"), ("least", ">="), ("below", "<"), ("most", "<=")]
+    return ", ".join(f"{sign} {number(key[name])}" for name, sign in bounds
+                     if name in key and abs(key[name]) < 1e300)
+
+
+def accepts(key: dict[str, Any]) -> str:
+    kind = key["type"]
+    if kind == "word":
+        return ", ".join(f"`'{word}'`" for word in key["words"])
+    if kind in ("text", "list"):
+        return "text" if kind == "text" else key["accepts"]
+    if kind == "logical":
+        return "`.true.`, `.false.`"
+    text = f"{kind}s" if "shape" in key else kind
+    if bounds := range_text(key):
+        text = bounds if "shape" not in key else f"{text} {bounds}"
+    if "shape" in key and key["shape"] != ":":
+        text += f", one or {key['shape']}" if key["repeats"] else f", {key['shape']}"
+    return text
+
+
+def default(key: dict[str, Any]) -> str:
+    """In words and, where the component has one, the value."""
+    parts = [coded(key["absent"])] if "absent" in key else []
+    if "default" in key:
+        parts.append(f"`{key['default']}`")
+    return ", else ".join(parts)
+
+
+def coded(text: str) -> str:
+    """Words in quotes, and names with an underscore or of a dataset, as code."""
+    return re.sub(r"\w+ = '[^' ]+'|'[^' ]+'|/\w+/\w+|\w+/\w+_\w+|\b\w+_\w+\b", r"`\g<0>`", text)
+
+
+def meaning(key: dict[str, Any]) -> str:
+    text = coded(key["help"])
+    return f"{text}; only: {coded(key['only'])}" if "only" in key else text
+
+
+def table(keys: Keys) -> str:
+    """The keys of a group as Markdown; a column for units where there are any."""
+    columns = ["key", "unit", "default", "accepts", "meaning"]
+    if not any("unit" in key for key in keys.values()):
+        columns.remove("unit")
+    lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
+    for name, key in keys.items():
+        unit = f"[{key['unit']}]" if key.get("unit", "unit") != "unit" else coded_unit(key)
+        cells = {"key": f"`{name}`", "unit": unit, "default": default(key),
+                 "accepts": accepts(key), "meaning": meaning(key)}
+        lines.append("| " + " | ".join(cells[column] for column in columns) + " |")
+    return "\n".join(lines)
+
+
+def coded_unit(key: dict[str, Any]) -> str:
+    """The unit that another key names."""
+    return "`unit`" if "unit" in key else ""
+
+
+def guide(groups: Keys, text: str) -> str:
+    """The guide with its tables renewed."""
+    for group, content in groups.items():
+        begin, end = f"<!-- keys of {group} -->\n", "<!-- end of keys -->"
+        pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+        if not pattern.search(text):
+            sys.exit(f"{GUIDE}: has no table of &{group}: put {begin.strip()} and {end} there")
+        new = begin + table(content["keys"]) + "\n" + end
+        text = pattern.sub(lambda _, new=new: new, text)
+    return text
+
+
+def annotation(name: str, key: dict[str, Any]) -> str:
+    if "shape" in key:
+        return "ArrayLike"
+    if key["type"] == "word":
+        words = [word for word in key["words"] if word not in OWN_WORDS.get(name, [])]
+        return "Literal[" + ", ".join(f'"{word}"' for word in words) + "]"
+    return {"real": "float", "integer": "int", "logical": "bool", "text": "str",
+            "list": "str | int | Sequence[str | int]"}[key["type"]]
+
+
+def comment(key: dict[str, Any]) -> list[str]:
+    """Unit, default and help, as lines that the reference takes up."""
+    text = f"[{key['unit']}] " if key.get("unit", "unit") != "unit" else ""
+    text += key["help"]
+    if "only" in key:
+        text += f"; only: {key['only']}"
+    parts = [key["absent"]] if "absent" in key else []
+    parts += [key["default"]] if "default" in key else []
+    said = ", else ".join(parts)
+    text += f" ({said})" if said.startswith("required") else f" (default: {said})"
+    lines, line = [], "    #:"
+    for word in text.split():
+        if len(line) + len(word) + 1 > WIDTH:
+            lines.append(line)
+            line = "    #:"
+        line += f" {word}"
+    return [*lines, line]
+
+
+def settings(groups: Keys) -> str:
+    """The module of the package."""
+    names = {group: CLASSES.get(group, "".join(part.title() for part in group.split("_")))
+             for group in groups}
+    public = sorted([*names.values(), "Groups"])
+    lines, line = [], '__all__ = ["' + public[0] + '"'
+    for name in public[1:]:
+        if len(line) + len(name) + 5 > WIDTH:
+            lines.append(line + ",")
+            line = '           "' + name + '"'
+        else:
+            line += f', "{name}"'
+    text = [SETTINGS_HEAD, *lines, line + "]"]
+    for group, content in groups.items():
+        text += ["", "", f"class {names[group]}(TypedDict, total=False):",
+                 f'    """Group &{group}: {content["help"]}."""', ""]
+        for name, key in content["keys"].items():
+            text += [*comment(key), f"    {name}: {annotation(name, key)}"]
+    text += ["", "", "class Groups(TypedDict, total=False):",
+             '    """All groups; `model` is the one that `structure` stands for where a model is '
+             'an argument."""', ""]
+    text += [f"    {'structure' if group == 'model' else group}: {name}"
+             for group, name in names.items()]
+    return "\n".join(text) + "\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program", nargs="?", default=str(ROOT / "build" / "release" / "fw_run"))
+    parser.add_argument("--check", action="store_true", help="write nothing, compare")
+    arguments = parser.parse_args()
+    groups = declared(arguments.program)
+    stale = 0
+    for path, text in ((GUIDE, guide(groups, GUIDE.read_text())), (SETTINGS, settings(groups))):
+        if path.read_text() == text:
+            continue
+        if arguments.check:
+            print(f"{path.relative_to(ROOT)}: is not what the program declares: run make keys")
+            stale = 1
+        else:
+            path.write_text(text)
+    return stale
+
+
+if __name__ == "__main__":
+    sys.exit(main())
