@@ -3,11 +3,13 @@
 !> the largest one of a coefficient against events on 2048 angles.
 program events
    use, intrinsic :: iso_fortran_env, only: int64, output_unit
-   use fw_forces, only: forces_type
-   use fw_forces, only: new_forces
+   use fw_force_law, only: force_workspace
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
+   use fw_friction, only: friction_law
+   use fw_friction, only: rigid_friction
    use fw_kinds, only: wp
+   use fw_pair_law, only: pair_law
    implicit none (type, external)
 
    integer, parameter :: n_pairs = 24, n_samples = 7
@@ -30,7 +32,7 @@ contains
 
    subroutine compare(directions, n_harmonics)
       integer, intent(in) :: directions, n_harmonics
-      type(forces_type) :: exact
+      type(force_workspace) :: exact
       real(wp) :: unused(2)
 
       call measure(directions, n_harmonics, .true., 2048, exact, unused)
@@ -42,8 +44,8 @@ contains
    subroutine report(directions, n_harmonics, by_events, n_time, exact)
       integer, intent(in) :: directions, n_harmonics, n_time
       logical, intent(in) :: by_events
-      type(forces_type), intent(in) :: exact
-      type(forces_type) :: forces
+      type(force_workspace), intent(in) :: exact
+      type(force_workspace) :: forces
       real(wp) :: seconds(2)
 
       call measure(directions, n_harmonics, by_events, n_time, forces, seconds)
@@ -56,9 +58,11 @@ contains
    subroutine measure(directions, n_harmonics, by_events, n_time, forces, seconds)
       integer, intent(in) :: directions, n_harmonics, n_time
       logical, intent(in) :: by_events
-      type(forces_type), intent(out) :: forces
+      type(force_workspace), intent(out) :: forces
       real(wp), intent(out) :: seconds(2)
       type(fourier_type) :: fourier
+      type(friction_law) :: at_instants
+      class(pair_law), allocatable :: law
       logical :: present(3, n_pairs)
       real(wp) :: samples(2, n_samples)
       integer(int64) :: clock(3), rate
@@ -67,18 +71,24 @@ contains
       fourier = new_fourier(n_harmonics, n_time)
       present = .true.
       present(2, :) = directions == 2
-      forces = new_forces([(0.1_wp + 0.9_wp*i/n_pairs, i=1, n_pairs)], present, fourier)
+      at_instants = rigid_friction()
+      call at_instants%take_pairs([(0.1_wp + 0.9_wp*i/n_pairs, i=1, n_pairs)], present)
+      if (by_events) then
+         call at_instants%located(law)
+      else
+         allocate (law, source=at_instants)
+      end if
+      call law%reserve(fourier, forces)
       do k = 1, fourier%n_coefficients
          forces%prediction(:, :, k) = numbers(:, :, k)/(1 + k/2)
       end do
       if (directions == 1) forces%prediction(:, 2, :) = 0.0_wp
       forces%offset = -1.0_wp
-      if (by_events) call forces%resolve_events(fourier)
       do i = 1, n_samples
          call system_clock(clock(1), rate)
-         call forces%evaluate(fourier)
+         call law%evaluate(fourier, forces)
          call system_clock(clock(2))
-         call forces%linearize(fourier)
+         call law%linearize(fourier, forces)
          call system_clock(clock(3))
          samples(:, i) = real(clock(2:3) - clock(1:2), wp)/real(rate, wp)
       end do

@@ -1,0 +1,336 @@
+!> What a force law is to the rest of the program: facts that hold whatever it is solved with, a
+!> prediction that says what its forces are computed from, and forces with their exact derivative.
+!>
+!> A law belongs to elements (pairs, springs) with up to three components each. It is written once,
+!> when it is built, and may be shared; what an evaluation leaves stands in a workspace, one for
+!> each that evaluates. For a law of n elements and nc Fourier coefficients:
+!>
+!>   y = stiffness ((d/dtau)**order u_r + gap)  [+ the balance without the law's own force],
+!>   evaluate: y -> force,   linearize: d force/d y, element by element.
+!>
+!> Nobody asks a law by its name: who needs to know something of it reads `facts` or `prediction`.
+module fw_force_law
+   use fw_fourier, only: fourier_type
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: force_law, force_workspace, law_room
+   public :: prediction_type, law_facts
+   public :: pair_stuck, pair_open, pair_mixed
+
+   !> State of an element over the whole period: its derivative is the identity, zero, or any other
+   !> and then stored.
+   integer, parameter :: pair_stuck = 1, pair_open = 2, pair_mixed = 3
+
+   !> What the input y of a law is made of.
+   type :: prediction_type
+      !> Derivative of the relative displacement that each component takes: 0, or 1.
+      integer :: order(3) = 0
+      !> Derivatives are by t, not by tau: times omega for each order.
+      logical :: by_time = .false.
+      !> The balance without the law's own force is a part of y: the law is rigid, and stiffness is
+      !> a number of the method, of the order of the structure's own.
+      logical :: takes_balance = .false.
+      !> Makes the input of the displacement or its derivative (n_elements, 3 or 1): [force/length]
+      !> where y is a force.
+      real(wp), allocatable :: stiffness(:, :)
+      !> Added to the displacement of the last component [length], and what its input is where it
+      !> does not exist: minus the dead load [force] (n_elements).
+      real(wp), allocatable :: gap(:), load(:)
+   end type prediction_type
+
+   !> What holds of a law wherever it is used.
+   type :: law_facts
+      !> The force of the opposite motion is the opposite one, as long as no offset acts: odd
+      !> harmonics answer odd harmonics.
+      logical :: is_odd = .true.
+      !> The force depends on the past of the period.
+      logical :: remembers = .false.
+      !> Elements may stick (derivative identity) or stay open (zero) through the period.
+      logical :: can_stick = .false., can_open = .false.
+      !> Forces are determined only where no displacement follows from that of other elements.
+      logical :: needs_independent = .false.
+      !> Its paths can be followed from event to event, without instants.
+      logical :: has_events = .false.
+      !> They are followed so: forces at the instants are there after `sample` only.
+      logical :: follows_events = .false.
+      !> Sliding under pressure, with its derivative: what wear takes.
+      logical :: measures_slip = .false.
+      !> A perturbation can be followed through the period: Floquet multipliers.
+      logical :: has_multipliers = .false.
+      !> The integration in time knows the law.
+      logical :: is_integrated = .false.
+      !> Instants below which the sampling error exceeds that of the truncation: in all, for each
+      !> harmonic, and for each harmonic where elements may separate or the normal load varies.
+      integer :: fewest_instants = 64
+      integer :: instants_per_harmonic = 16, instants_with_separation = 32
+   end type law_facts
+
+   !> Room that only one law knows.
+   type, abstract :: law_room
+   end type law_room
+
+   !> What evaluations of one law leave: one for each that evaluates. Sizes are (n_elements,
+   !> n_components, n_coefficients or n_time).
+   type :: force_workspace
+      !> Coefficients of y and of the forces.
+      real(wp), allocatable :: prediction(:, :, :), force(:, :, :)
+      !> The same at the instants; forces only after `sample` where events are followed.
+      real(wp), allocatable :: prediction_time(:, :, :), force_time(:, :, :)
+      !> Constant part of the input of the last component: stiffness times gap with the wear depth,
+      !> or minus the dead load (n_elements).
+      real(wp), allocatable :: offset(:)
+      !> Angular frequency, for derivatives by time [rad/s].
+      real(wp) :: omega = 1.0_wp
+      !> Size of the tangential inputs, change of x over the last turn, smallest pressure, turns
+      !> of the march (n_elements).
+      real(wp), allocatable :: scale(:), drift(:), pressure(:)
+      integer, allocatable :: turns(:)
+      !> Corrected position where the period starts and where it ends, in units of y
+      !> (n_elements, 2).
+      real(wp), allocatable :: x_start(:, :), x(:, :)
+      !> pair_stuck, pair_open or pair_mixed (n_elements), and the same at which `linearize` was
+      !> called last: a derivative may be kept while the forces move on.
+      integer, allocatable :: state(:), linear_state(:)
+      !> Transposed derivative of the force by the input of each mixed element:
+      !> (coefficient, component) of the input, then of the output, element.
+      real(wp), allocatable :: jacobian(:, :, :)
+      !> Inputs and outputs of a product with the derivative (coefficient and component, element).
+      real(wp), allocatable :: input(:, :), output(:, :)
+      !> Sliding under pressure over the period [force**2] (n_elements), and its derivative by the
+      !> input (coefficient, component; element): only where asked for.
+      logical :: measures_slip = .false.
+      real(wp), allocatable :: slip(:), slip_derivative(:, :)
+      class(law_room), allocatable :: room
+   contains
+      procedure :: reserve => reserve_workspace
+      procedure :: measure_scale
+      procedure :: always_closed
+      procedure :: all_open
+      procedure :: all_periodic
+   end type force_workspace
+
+   !> Change of x over the last turn, as a part of the largest predicted force, above which a march
+   !> counts as not periodic.
+   real(wp), parameter :: negligible_drift = 1.0e-9_wp
+
+   type, abstract :: force_law
+      integer :: n_elements = 0
+      integer :: n_components = 1
+      !> Which components exist (n_components, n_elements).
+      logical, allocatable :: present(:, :)
+      type(prediction_type) :: prediction
+      type(law_facts) :: facts
+   contains
+      procedure :: reserve
+      procedure :: take_elements
+      procedure :: set_offset
+      procedure(evaluate_interface), deferred :: evaluate
+      procedure(linearize_interface), deferred :: linearize
+      procedure :: sample
+      procedure :: coefficients
+      procedure :: fractions
+      procedure :: slope_at_rest
+      procedure :: n_parameters
+      procedure :: by_parameter
+   end type force_law
+
+   abstract interface
+      !> Forces from the inputs, both coefficients, and the states.
+      subroutine evaluate_interface(self, fourier, work)
+         import :: force_law, force_workspace, fourier_type
+         implicit none (type, external)
+         class(force_law), intent(in) :: self
+         type(fourier_type), intent(inout) :: fourier
+         type(force_workspace), intent(inout) :: work
+      end subroutine evaluate_interface
+
+      !> Derivatives of the mixed elements at the last evaluation.
+      subroutine linearize_interface(self, fourier, work)
+         import :: force_law, force_workspace, fourier_type
+         implicit none (type, external)
+         class(force_law), intent(in) :: self
+         type(fourier_type), intent(in) :: fourier
+         type(force_workspace), intent(inout) :: work
+      end subroutine linearize_interface
+   end interface
+
+contains
+
+   !> Room for evaluations; every path starts from x = 0, the unstrained assembly.
+   subroutine reserve_workspace(self, n_elements, n_components, fourier, measures_slip)
+      class(force_workspace), intent(inout) :: self
+      integer, intent(in) :: n_elements, n_components
+      type(fourier_type), intent(in) :: fourier
+      !> Whether sliding and its derivative are wanted.
+      logical, intent(in), optional :: measures_slip
+      integer :: n
+
+      n = n_elements
+      allocate (self%prediction(n, n_components, fourier%n_coefficients), source=0.0_wp)
+      allocate (self%force, source=self%prediction)
+      allocate (self%prediction_time(n, n_components, fourier%n_time), source=0.0_wp)
+      allocate (self%force_time, source=self%prediction_time)
+      allocate (self%input(n_components*fourier%n_coefficients, n), source=0.0_wp)
+      allocate (self%output, source=self%input)
+      allocate (self%offset(n), self%scale(n), self%drift(n), self%pressure(n), source=0.0_wp)
+      allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
+      allocate (self%turns(n), source=0)
+      allocate (self%state(n), self%linear_state(n), source=pair_stuck)
+      if (.not. present(measures_slip)) return
+      self%measures_slip = measures_slip
+      if (.not. measures_slip) return
+      allocate (self%slip(n), source=0.0_wp)
+      allocate (self%slip_derivative(n_components*fourier%n_coefficients, n), source=0.0_wp)
+   end subroutine reserve_workspace
+
+   !> Elements without gap, load or stiffness.
+   pure subroutine take_elements(self, present)
+      class(force_law), intent(inout) :: self
+      !> Which components exist (n_components, n_elements).
+      logical, intent(in) :: present(:, :)
+      integer :: n
+
+      n = size(present, 2)
+      self%n_components = size(present, 1)
+      self%n_elements = n
+      self%present = present
+      allocate (self%prediction%stiffness(n, self%n_components), source=0.0_wp)
+      allocate (self%prediction%gap(n), self%prediction%load(n), source=0.0_wp)
+   end subroutine take_elements
+
+   !> The constant part of the inputs, before evaluations.
+   pure subroutine set_offset(self, depth, work)
+      class(force_law), intent(in) :: self
+      !> Wear depth, on top of the gap (n_elements) [length].
+      real(wp), intent(in) :: depth(:)
+      type(force_workspace), intent(inout) :: work
+      integer :: i, last
+
+      last = self%n_components
+      associate (p => self%prediction)
+         do i = 1, self%n_elements
+            work%offset(i) = -p%load(i)
+            if (self%present(last, i)) work%offset(i) = p%stiffness(i, last)*(p%gap(i) + depth(i))
+         end do
+      end associate
+   end subroutine set_offset
+
+   !> Room for evaluations of this law.
+   subroutine reserve(self, fourier, work, measures_slip)
+      class(force_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(out) :: work
+      logical, intent(in), optional :: measures_slip
+
+      call work%reserve(self%n_elements, self%n_components, fourier, measures_slip)
+   end subroutine reserve
+
+   !> Make the forces at the instants available in `force_time`; after sampling they are.
+   subroutine sample(self, work)
+      class(force_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+
+      associate (unused => self, unused_work => work)
+      end associate
+   end subroutine sample
+
+   !> Coefficients of the forces on another set of harmonics over the same instants
+   !> (n_elements, n_components, n_coefficients).
+   subroutine coefficients(self, work, computed, fourier, force)
+      class(force_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      !> Harmonics of the last evaluation, and those wanted.
+      type(fourier_type), intent(in) :: computed
+      type(fourier_type), intent(inout) :: fourier
+      real(wp), intent(inout) :: force(:, :, :)
+
+      associate (unused => computed)
+      end associate
+      call fourier%to_coefficients(self%n_elements*self%n_components, work%force_time, force)
+   end subroutine coefficients
+
+   !> Share of the period that each element spends in stick, slip and open (3, n_elements): without
+   !> a law's own say it slips where it bears, the last component being the pressure.
+   pure subroutine fractions(self, work, share)
+      class(force_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(out) :: share(:, :)
+      integer :: i
+
+      share = 0.0_wp
+      do i = 1, self%n_elements
+         share(3, i) = real(count(work%force_time(i, self%n_components, :) >= 0.0_wp), wp) &
+                       /real(size(work%force_time, 3), wp)
+         share(2, i) = 1.0_wp - share(3, i)
+      end do
+   end subroutine fractions
+
+   !> Slope of the force by its input about the position at rest of an element that bears, 0 where
+   !> it holds nothing: with it a first guess is made.
+   pure real(wp) function slope_at_rest(self, element, component) result(slope)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element, component
+
+      slope = merge(1.0_wp, 0.0_wp, self%present(component, element))
+   end function slope_at_rest
+
+   !> Constants of each element by which `by_parameter` differentiates.
+   pure integer function n_parameters(self)
+      class(force_law), intent(in) :: self
+
+      n_parameters = 0
+      associate (unused => self)
+      end associate
+   end function n_parameters
+
+   !> Derivative of the coefficients of each element's force by its own constant of a number, the
+   !> inputs being held, at the last evaluation (n_elements, n_components, n_coefficients).
+   subroutine by_parameter(self, number, fourier, work, force)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: number
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(inout) :: force(:, :, :)
+
+      force = 0.0_wp
+      associate (unused => self, unused_number => number, unused_fourier => fourier, &
+                 unused_work => work)
+      end associate
+   end subroutine by_parameter
+
+   !> Bound of the tangential inputs of each element, of three components.
+   pure subroutine measure_scale(self)
+      class(force_workspace), intent(inout) :: self
+      integer :: k
+
+      self%scale = 0.0_wp
+      do k = 1, size(self%prediction, 3)
+         self%scale = self%scale + abs(self%prediction(:, 1, k)) + abs(self%prediction(:, 2, k))
+      end do
+   end subroutine measure_scale
+
+   !> Whether an element bears at every instant.
+   elemental logical function always_closed(self, element)
+      class(force_workspace), intent(in) :: self
+      integer, intent(in) :: element
+
+      always_closed = self%pressure(element) > 0.0_wp
+   end function always_closed
+
+   !> Whether the march of every element has become periodic.
+   pure logical function all_periodic(self)
+      class(force_workspace), intent(in) :: self
+
+      all_periodic = all(self%drift <= negligible_drift*self%scale)
+   end function all_periodic
+
+   !> Whether no element bears at any instant.
+   pure logical function all_open(self)
+      class(force_workspace), intent(in) :: self
+
+      all_open = all(self%state == pair_open)
+   end function all_open
+
+end module fw_force_law

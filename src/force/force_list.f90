@@ -1,0 +1,66 @@
+!> The nonlinear forces of a case: laws one after another, and the rows of the relative
+!> displacements that their elements act on. Laws whose prediction takes the balance come last, for
+!> they count the forces of the others.
+!>
+!> The list is written once; each law leaves what it evaluates in a workspace of its own, at the
+!> same place in an array of workspaces.
+module fw_force_list
+   use fw_force_law, only: force_law
+   use fw_force_law, only: force_workspace
+   use fw_fourier, only: fourier_type
+   implicit none (type, external)
+   private
+
+   public :: force_list, force_entry
+
+   type :: force_entry
+      class(force_law), allocatable :: law
+      !> Row of each component of each element, 0 where there is none (n_components, n_elements).
+      integer, allocatable :: row(:, :)
+   end type force_entry
+
+   type :: force_list
+      integer :: n_laws = 0
+      !> Place of the law of the contact pairs.
+      integer :: pairs = 0
+      type(force_entry), allocatable :: entry(:)
+   contains
+      procedure :: add
+      procedure :: reserve
+   end type force_list
+
+contains
+
+   !> Append a law, with the rows of its elements.
+   subroutine add(self, law, row)
+      class(force_list), intent(inout) :: self
+      class(force_law), intent(in) :: law
+      integer, intent(in) :: row(:, :)
+      type(force_entry), allocatable :: longer(:)
+      integer :: k
+
+      allocate (longer(self%n_laws + 1))
+      do k = 1, self%n_laws
+         call move_alloc(self%entry(k)%law, longer(k)%law)
+         call move_alloc(self%entry(k)%row, longer(k)%row)
+      end do
+      self%n_laws = self%n_laws + 1
+      allocate (longer(self%n_laws)%law, source=law)
+      longer(self%n_laws)%row = row
+      call move_alloc(longer, self%entry)
+   end subroutine add
+
+   !> Workspaces of all laws, for one that evaluates (n_laws).
+   subroutine reserve(self, fourier, work)
+      class(force_list), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), allocatable, intent(out) :: work(:)
+      integer :: k
+
+      allocate (work(self%n_laws))
+      do k = 1, self%n_laws
+         call self%entry(k)%law%reserve(fourier, work(k))
+      end do
+   end subroutine reserve
+
+end module fw_force_list

@@ -1,0 +1,289 @@
+!> Coulomb friction with a unilateral normal force, decided instant by instant: predicted forces
+!> in, contact forces out, marched through stick, slip and separation until the period repeats.
+!>
+!> One correction serves three laws, which differ in their prediction alone: 'dlft' and
+!> 'dlft_velocity' predict from the balance, and are rigid; 'penalty' predicts from stiffnesses.
+module fw_friction
+   use fw_correction, only: march_turn_1d
+   use fw_correction, only: march_turn_2d
+   use fw_correction, only: project_turn
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: law_facts
+   use fw_force_law, only: law_room
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_open
+   use fw_force_law, only: pair_stuck
+   use fw_force_law, only: prediction_type
+   use fw_fourier, only: fourier_type
+   use fw_friction_events, only: follow_events
+   use fw_kinds, only: wp
+   use fw_pair_law, only: pair_law
+   use fw_sampled_turn, only: settle_samples
+   use fw_settling, only: periodic_tolerance
+   use fw_settling, only: shakedown_turns
+   use fw_slip, only: slip_work
+   use fw_threads, only: pairs_for_threads
+   implicit none (type, external)
+   private
+
+   public :: friction_law, friction_room
+   public :: rigid_friction, rigid_friction_of_rates, elastic_friction
+
+   !> Pairs marched together: one cache line, and a whole number of vector registers.
+   integer, parameter :: block_size = 8
+   !> Turns after which the limit of a march is looked for by Newton's method. One direction needs
+   !> one; a random sample with two needed 4 at most, pairs of a blade root that creep thousands.
+   integer, parameter :: plain_turns = 4
+
+   type, extends(pair_law) :: friction_law
+   contains
+      procedure :: reserve
+      procedure :: evaluate
+      procedure :: linearize
+      procedure :: fractions
+      procedure :: located
+   end type friction_law
+
+   !> What the march leaves beside the workspace.
+   type, extends(law_room) :: friction_room
+      !> Smallest mu p - |d| (n_pairs).
+      real(wp), allocatable :: margin(:)
+      !> Whether the march ends at the limit that `settle` found (n_pairs).
+      logical, allocatable :: settled(:)
+   end type friction_room
+
+   interface
+      !> See fw_friction_derivative.
+      module subroutine linearize(self, fourier, work)
+         class(friction_law), intent(in) :: self
+         type(fourier_type), intent(in) :: fourier
+         type(force_workspace), intent(inout) :: work
+      end subroutine linearize
+   end interface
+
+contains
+
+   !> Friction of rigid pairs, predicted from positions.
+   pure type(friction_law) function rigid_friction() result(law)
+      law%prediction = prediction_type(takes_balance=.true.)
+      law%facts = law_facts(remembers=.true., can_stick=.true., can_open=.true., &
+                            needs_independent=.true., has_events=.true., measures_slip=.true., &
+                            is_integrated=.true.)
+   end function rigid_friction
+
+   !> Friction of rigid pairs, predicted from velocities, which need no memory.
+   pure type(friction_law) function rigid_friction_of_rates() result(law)
+      law = rigid_friction()
+      law%prediction%order = [1, 1, 0]
+      law%facts%remembers = .false.
+   end function rigid_friction_of_rates
+
+   !> Friction of pairs with stiffnesses (elastic dry friction), which are functions of the
+   !> displacements: perturbations can be followed.
+   pure type(friction_law) function elastic_friction() result(law)
+      law = rigid_friction()
+      law%prediction%takes_balance = .false.
+      law%facts%needs_independent = .false.
+      law%facts%has_multipliers = .true.
+   end function elastic_friction
+
+   subroutine reserve(self, fourier, work, measures_slip)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(out) :: work
+      logical, intent(in), optional :: measures_slip
+
+      call work%reserve(self%n_elements, self%n_components, fourier, measures_slip)
+      allocate (work%room, source=new_room(self%n_elements))
+   end subroutine reserve
+
+   pure type(friction_room) function new_room(n_pairs) result(room)
+      integer, intent(in) :: n_pairs
+
+      allocate (room%margin(n_pairs), source=0.0_wp)
+      allocate (room%settled(n_pairs), source=.false.)
+   end function new_room
+
+   subroutine evaluate(self, fourier, work)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (friction_room)
+         call evaluate_at_instants(self, fourier, work, room)
+      end select
+   end subroutine evaluate
+
+   subroutine evaluate_at_instants(self, fourier, work, room)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer :: first, n_blocks, block, k
+
+      call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time)
+      do k = 1, fourier%n_time
+         work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
+      end do
+      call work%measure_scale()
+      n_blocks = (self%n_elements + block_size - 1)/block_size
+      !$omp parallel do default(none) shared(self, work, room, n_blocks, fourier) &
+      !$omp private(first, block) schedule(static) if(self%n_elements >= pairs_for_threads)
+      do block = 1, n_blocks
+         first = (block - 1)*block_size + 1
+         call march(self, work, room, fourier%n_time, first, &
+                    min(first + block_size - 1, self%n_elements))
+      end do
+      !$omp end parallel do
+      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force)
+      call classify(room, work)
+      if (work%measures_slip) then
+         call slip_work(self%n_elements, fourier%n_time, self%mu, work%prediction_time, &
+                        self%facts%remembers, work%x, work%slip)
+      end if
+   end subroutine evaluate_at_instants
+
+   !> State of every pair over the whole march.
+   pure subroutine classify(room, work)
+      type(friction_room), intent(in) :: room
+      type(force_workspace), intent(inout) :: work
+      integer :: i, k
+
+      do i = 1, size(work%state)
+         if (room%margin(i) >= 0.0_wp .and. work%pressure(i) > 0.0_wp) then
+            work%state(i) = pair_stuck
+            cycle
+         end if
+         work%state(i) = pair_open
+         if (work%pressure(i) > 0.0_wp) work%state(i) = pair_mixed
+         do k = 1, size(work%force_time, 3)
+            if (work%state(i) == pair_mixed) exit
+            if (work%force_time(i, 3, k) < 0.0_wp) work%state(i) = pair_mixed
+         end do
+      end do
+   end subroutine classify
+
+   !> March pairs first..last until their state repeats after a period.
+   subroutine march(self, work, room, n_time, first, last)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer, intent(in) :: n_time, first, last
+      integer :: turn
+
+      work%x(first:last, :) = work%x_start(first:last, :)
+      room%margin(first:last) = huge(1.0_wp)
+      work%pressure(first:last) = huge(1.0_wp)
+      room%settled(first:last) = .false.
+      if (.not. self%facts%remembers) then
+         work%drift(first:last) = 0.0_wp
+         call project_turn(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
+                           work%force_time, room%margin, work%pressure)
+         work%turns(first:last) = 1
+         return
+      end if
+      work%turns(first:last) = 0
+      do turn = 1, plain_turns
+         call march_turn(self, work, room, n_time, first, last, turn)
+         if (all(work%turns(first:last) > 0)) return
+      end do
+      call find_limits(self, work, room, n_time, first, last)
+      call march_turn(self, work, room, n_time, first, last, plain_turns + 1)
+      where (work%turns(first:last) == 0) work%turns(first:last) = shakedown_turns
+   end subroutine march
+
+   !> One turn, and which pairs repeat after it.
+   subroutine march_turn(self, work, room, n_time, first, last, turn)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer, intent(in) :: n_time, first, last, turn
+      real(wp) :: start(block_size, 2)
+      integer :: i
+
+      start(:last - first + 1, :) = work%x(first:last, :)
+      if (self%two_directions) then
+         call march_turn_2d(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
+                            work%x, work%force_time, room%margin, work%pressure)
+      else
+         call march_turn_1d(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
+                            work%x, work%force_time, room%margin, work%pressure)
+      end if
+      do i = first, last
+         work%drift(i) = maxval(abs(work%x(i, :) - start(i - first + 1, :)))
+         if (work%turns(i) > 0 .or. room%settled(i)) cycle
+         if (work%drift(i) <= periodic_tolerance*work%scale(i)) work%turns(i) = turn
+      end do
+   end subroutine march_turn
+
+   !> Bring the pairs that do not repeat yet to the limit of their march.
+   subroutine find_limits(self, work, room, n_time, first, last)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer, intent(in) :: n_time, first, last
+      real(wp) :: x(2)
+      integer :: i
+
+      do i = first, last
+         if (work%turns(i) > 0) cycle
+         x = work%x(i, :)
+         call settle_samples(self%n_elements, n_time, i, work%prediction_time, self%mu(i), &
+                             work%scale(i), periodic_tolerance, x, room%settled(i))
+         work%x(i, :) = x
+      end do
+   end subroutine find_limits
+
+   subroutine located(self, law)
+      class(friction_law), intent(in) :: self
+      class(pair_law), allocatable, intent(out) :: law
+
+      allocate (law, source=follow_events(self))
+   end subroutine located
+
+   pure subroutine fractions(self, work, share)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(out) :: share(:, :)
+
+      select type (room => work%room)
+      type is (friction_room)
+         call fractions_of_instants(self, work, room, share)
+      end select
+   end subroutine fractions
+
+   pure subroutine fractions_of_instants(self, work, room, share)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      type(friction_room), intent(in) :: room
+      real(wp), intent(out) :: share(:, :)
+      integer :: i, k, n_time
+      real(wp) :: tangential, limit
+      logical :: sticks
+      ! A slipping force lies on the cone to round-off.
+      real(wp), parameter :: on_cone = 1.0_wp - 1.0e-12_wp
+
+      n_time = size(work%force_time, 3)
+      share = 0.0_wp
+      do k = 1, n_time
+         do i = 1, self%n_elements
+            limit = -self%mu(i)*work%force_time(i, 3, k)
+            tangential = norm2(work%force_time(i, 1:2, k))
+            if (work%force_time(i, 3, k) >= 0.0_wp) then
+               share(3, i) = share(3, i) + 1.0_wp
+               cycle
+            end if
+            sticks = tangential < on_cone*limit .or. room%margin(i) >= 0.0_wp
+            if (sticks) then
+               share(1, i) = share(1, i) + 1.0_wp
+            else
+               share(2, i) = share(2, i) + 1.0_wp
+            end if
+         end do
+      end do
+      share = share/real(n_time, wp)
+   end subroutine fractions_of_instants
+
+end module fw_friction

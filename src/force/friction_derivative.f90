@@ -1,0 +1,161 @@
+!> The derivative of friction that is decided at instants: rows of the march, projected on the
+!> harmonics pair by pair.
+submodule(fw_friction) fw_friction_derivative
+   use fw_correction_derivative, only: add_start
+   use fw_correction_derivative, only: limit_derivative
+   use fw_correction_derivative, only: march_derivative
+   use fw_lapack, only: dgemm
+   use fw_sampled_turn, only: limit_is_unique
+   use fw_slip, only: slip_gradient
+   implicit none (type, external)
+
+   !> Distance from the friction cone, as a part of the largest predicted force, that round-off
+   !> leaves of a pair that has settled on it.
+   real(wp), parameter :: touch = 1.0e-10_wp
+
+contains
+
+   module procedure linearize
+      integer :: nc
+
+      work%linear_state = work%state
+      if (.not. any(work%state == pair_mixed)) return
+      nc = fourier%n_coefficients
+      if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
+      select type (room => work%room)
+      type is (friction_room)
+         call differentiate_pairs(self, fourier, room, work)
+      end select
+   end procedure linearize
+
+   subroutine differentiate_pairs(self, fourier, room, work)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(friction_room), intent(in) :: room
+      type(force_workspace), intent(inout) :: work
+      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :)
+      real(wp), allocatable :: by_start(:, :, :), weight(:, :, :)
+      real(wp) :: x(2)
+      integer :: i, nc
+      logical :: unique
+
+      nc = fourier%n_coefficients
+      !$omp parallel default(none) shared(self, fourier, room, work, nc) &
+      !$omp private(rows, dx, y, by_start, weight, x, i, unique) &
+      !$omp if(self%n_elements >= pairs_for_threads)
+      allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
+      allocate (by_start(2, 2, fourier%n_time), weight(2, 2, nc))
+      !$omp do schedule(dynamic)
+      do i = 1, self%n_elements
+         if (work%state(i) /= pair_mixed) cycle
+         y = work%prediction_time(i, :, :)
+         call derive(self, fourier, room%settled(i), work, i, y, x, rows, dx, unique, by_start)
+         call project(work%jacobian(:, :, i), fourier, rows, y(3, :), self%present(3, i))
+         if (unique) call project_start(work%jacobian(:, :, i), fourier, dx, by_start, weight)
+         if (.not. work%measures_slip) cycle
+         if (unique) call add_start(3*nc, fourier%n_time, by_start, dx, rows)
+         call slip_gradient(fourier%n_time, nc, fourier%synthesis, y, self%mu(i), &
+                            self%present(:, i), self%facts%remembers, x, rows, &
+                            work%slip_derivative(:, i))
+      end do
+      !$omp end do
+      !$omp end parallel
+   end subroutine differentiate_pairs
+
+   !> Derivative of the friction of a pair at the instants. A limit that is the only one (unique)
+   !> has a derivative of its own, dx, whose part in the rows is left to `project_start`; any other
+   !> carries that of the way to it.
+   subroutine derive(self, fourier, settled, work, pair, y, x, rows, dx, unique, by_start)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      !> Whether the march ends at its limit.
+      logical, intent(in) :: settled
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: pair
+      real(wp), intent(in) :: y(3, fourier%n_time)
+      !> Corrected position at the end of the period.
+      real(wp), intent(out) :: x(2)
+      real(wp), intent(inout) :: rows(fourier%n_coefficients, 3, 2, fourier%n_time)
+      real(wp), intent(inout) :: dx(fourier%n_coefficients, 3, 2)
+      logical, intent(out) :: unique
+      !> Of a unique limit: derivative of the position at the instants by that at the start.
+      real(wp), intent(inout) :: by_start(2, 2, fourier%n_time)
+      real(wp) :: inverse(2, 2)
+
+      unique = .false.
+      x = work%x(pair, :)
+      if (settled) then
+         call limit_is_unique(self%n_elements, fourier%n_time, pair, work%prediction_time, &
+                              self%mu(pair), touch*work%scale(pair), x, unique, inverse, by_start)
+      end if
+      if (unique) then
+         call limit_derivative(fourier%n_time, fourier%n_coefficients, fourier%synthesis, y, &
+                               self%mu(pair), touch*work%scale(pair), self%present(:, pair), &
+                               inverse, x, rows, dx)
+      else
+         x = work%x_start(pair, :)
+         dx = 0.0_wp
+         call march_derivative(fourier%n_time, fourier%n_coefficients, work%turns(pair), &
+                               fourier%synthesis, y, self%mu(pair), 0.0_wp, self%present(:, pair), &
+                               self%facts%remembers, x, rows, dx)
+      end if
+   end subroutine derive
+
+   !> From rows at the instants to the transposed derivative between coefficients.
+   subroutine project(jacobian, fourier, rows, y_n, has_normal)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
+      real(wp), intent(in) :: rows(3*fourier%n_coefficients, 2, fourier%n_time)
+      real(wp), intent(in) :: y_n(:)
+      logical, intent(in) :: has_normal
+      integer :: nc, c, k, j
+      real(wp) :: factor
+      logical :: closes
+
+      nc = fourier%n_coefficients
+      do c = 1, 2
+         call dgemm('N', 'T', 3*nc, nc, fourier%n_time, 1.0_wp, rows(1, c, 1), 6*nc, &
+                    fourier%analysis, nc, 0.0_wp, jacobian(1, (c - 1)*nc + 1), 3*nc)
+      end do
+      jacobian(:, 2*nc + 1:) = 0.0_wp
+      if (.not. has_normal) return
+      ! A pair that bears throughout keeps its coefficients; of any other, the instants of the
+      ! rarer state are added up.
+      closes = 2*count(y_n < 0.0_wp) > fourier%n_time .and. fourier%projects .and. &
+               fourier%n_time > 2*maxval(fourier%harmonic)
+      factor = merge(-1.0_wp, 1.0_wp, closes)
+      do k = 1, fourier%n_time
+         if ((y_n(k) < 0.0_wp) .eqv. closes) cycle
+         do j = 1, nc
+            jacobian(2*nc + 1:, 2*nc + j) = jacobian(2*nc + 1:, 2*nc + j) + &
+                                            factor*fourier%analysis(j, k)*fourier%synthesis(:, k)
+         end do
+      end do
+      if (.not. closes) return
+      do j = 1, nc
+         jacobian(2*nc + j, 2*nc + j) = jacobian(2*nc + j, 2*nc + j) + 1.0_wp
+      end do
+   end subroutine project
+
+   !> What the start of a turn adds to the projected rows: of rank two.
+   subroutine project_start(jacobian, fourier, dx, by_start, weight)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
+      real(wp), intent(in) :: dx(3*fourier%n_coefficients, 2), by_start(2, 2, fourier%n_time)
+      !> Room.
+      real(wp), intent(inout) :: weight(2, 2, fourier%n_coefficients)
+      integer :: c, j, column, nc
+
+      nc = fourier%n_coefficients
+      call dgemm('N', 'T', 4, nc, fourier%n_time, -1.0_wp, by_start, 4, fourier%analysis, nc, &
+                 0.0_wp, weight, 4)
+      do c = 1, 2
+         do j = 1, nc
+            column = (c - 1)*nc + j
+            jacobian(:, column) = jacobian(:, column) + weight(c, 1, j)*dx(:, 1) &
+                                  + weight(c, 2, j)*dx(:, 2)
+         end do
+      end do
+   end subroutine project_start
+
+end submodule fw_friction_derivative

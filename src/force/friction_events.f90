@@ -1,0 +1,152 @@
+!> Coulomb friction with a unilateral normal force, its paths followed from event to event
+!> (fw_event_contact): the instants only isolate the events, and the forces are exact integrals over
+!> the pieces between them. The same laws as fw_friction.
+module fw_friction_events
+   use fw_event_contact, only: event_contact_type
+   use fw_event_contact, only: new_event_contact
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: law_room
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_open
+   use fw_force_law, only: pair_stuck
+   use fw_fourier, only: fourier_type
+   use fw_kinds, only: wp
+   use fw_pair_law, only: pair_law
+   implicit none (type, external)
+   private
+
+   public :: friction_by_events, follow_events
+
+   type, extends(pair_law) :: friction_by_events
+   contains
+      procedure :: reserve
+      procedure :: evaluate
+      procedure :: linearize
+      procedure :: sample
+      procedure :: coefficients
+      procedure :: fractions
+   end type friction_by_events
+
+   type, extends(law_room) :: event_room
+      type(event_contact_type) :: paths
+   end type event_room
+
+contains
+
+   !> The law of friction whose pairs and prediction are given.
+   pure type(friction_by_events) function follow_events(law) result(self)
+      class(pair_law), intent(in) :: law
+
+      self%prediction = law%prediction
+      self%facts = law%facts
+      self%facts%follows_events = .true.
+      self%n_elements = law%n_elements
+      self%n_components = law%n_components
+      self%two_directions = law%two_directions
+      if (allocated(law%present)) self%present = law%present
+      if (allocated(law%mu)) self%mu = law%mu
+   end function follow_events
+
+   subroutine reserve(self, fourier, work, measures_slip)
+      class(friction_by_events), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(out) :: work
+      logical, intent(in), optional :: measures_slip
+
+      call work%reserve(self%n_elements, self%n_components, fourier, measures_slip)
+      allocate (event_room :: work%room)
+      select type (room => work%room)
+      type is (event_room)
+         call new_event_contact(self%mu, self%present, self%facts%remembers, fourier, room%paths)
+      end select
+   end subroutine reserve
+
+   subroutine evaluate(self, fourier, work)
+      class(friction_by_events), intent(in) :: self
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (event_room)
+         call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
+                                  work%force, work%x)
+         work%turns = 1
+         work%drift = room%paths%drift
+         call work%measure_scale()
+         call classify_paths(room%paths, work)
+         if (work%measures_slip) call room%paths%friction_path(work%slip)
+      end select
+   end subroutine evaluate
+
+   !> Of the pressure, only whether it ever vanishes is known.
+   pure subroutine classify_paths(paths, work)
+      type(event_contact_type), intent(in) :: paths
+      type(force_workspace), intent(inout) :: work
+      integer :: i
+
+      do i = 1, size(work%state)
+         work%pressure(i) = merge(1.0_wp, 0.0_wp, paths%closed(i))
+         work%state(i) = pair_mixed
+         if (paths%open(i)) work%state(i) = pair_open
+         if (paths%closed(i) .and. .not. paths%moved(i)) work%state(i) = pair_stuck
+      end do
+   end subroutine classify_paths
+
+   subroutine linearize(self, fourier, work)
+      class(friction_by_events), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+      integer :: nc
+
+      work%linear_state = work%state
+      if (.not. any(work%state == pair_mixed)) return
+      nc = fourier%n_coefficients
+      if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
+      select type (room => work%room)
+      type is (event_room)
+         ! Where slip is not measured, the derivative of it is not allocated: not present.
+         call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, &
+                                   work%jacobian, work%slip_derivative)
+      end select
+   end subroutine linearize
+
+   subroutine sample(self, work)
+      class(friction_by_events), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (event_room)
+         call room%paths%values(work%force_time)
+      end select
+   end subroutine sample
+
+   subroutine coefficients(self, work, computed, fourier, force)
+      class(friction_by_events), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(fourier_type), intent(in) :: computed
+      type(fourier_type), intent(inout) :: fourier
+      real(wp), intent(inout) :: force(:, :, :)
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (event_room)
+         call room%paths%coefficients(fourier, computed%harmonic, force)
+      end select
+   end subroutine coefficients
+
+   pure subroutine fractions(self, work, share)
+      class(friction_by_events), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(out) :: share(:, :)
+
+      share = 0.0_wp
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (event_room)
+         call room%paths%fractions(share)
+      end select
+   end subroutine fractions
+
+end module fw_friction_events

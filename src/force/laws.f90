@@ -1,0 +1,37 @@
+!> The laws of contact pairs by their words: a new law is a word and a line here, and a file of its
+!> own.
+module fw_laws
+   use fw_friction, only: elastic_friction
+   use fw_friction, only: rigid_friction
+   use fw_friction, only: rigid_friction_of_rates
+   use fw_pair_law, only: pair_law
+   implicit none (type, external)
+   private
+
+   public :: law_words, law_number, new_law
+
+   character(*), parameter :: law_words(*) = &
+      [character(13) :: 'dlft', 'dlft_velocity', 'penalty']
+
+contains
+
+   !> The law of a number in `law_words`, without its pairs.
+   subroutine new_law(number, law)
+      integer, intent(in) :: number
+      class(pair_law), allocatable, intent(out) :: law
+
+      select case (law_words(number))
+      case ('dlft_velocity'); allocate (law, source=rigid_friction_of_rates())
+      case ('penalty'); allocate (law, source=elastic_friction())
+      case default; allocate (law, source=rigid_friction())
+      end select
+   end subroutine new_law
+
+   !> Where a word stands among `law_words`; 0 where it does not.
+   pure integer function law_number(word)
+      character(*), intent(in) :: word
+
+      law_number = findloc(law_words, word, dim=1)
+   end function law_number
+
+end module fw_laws

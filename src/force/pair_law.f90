@@ -1,0 +1,83 @@
+!> Laws of contact pairs: components (t1, t2, n), friction, and a normal force that presses,
+!> either constant or from the distance of the two sides.
+module fw_pair_law
+   use fw_contact_data, only: contact_type
+   use fw_force_law, only: force_law
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: pair_law
+
+   type, abstract, extends(force_law) :: pair_law
+      !> Friction coefficient (n_elements).
+      real(wp), allocatable :: mu(:)
+      !> Whether a pair has two tangential directions.
+      logical :: two_directions = .false.
+   contains
+      procedure :: build
+      procedure :: take_pairs
+      procedure :: slope_at_rest
+      procedure :: located
+   end type pair_law
+
+contains
+
+   !> Take what the pairs of a case are; `present` marks the components in use (3, n_pairs).
+   !> Stiffnesses of a rigid law are left to whoever knows the structure.
+   subroutine build(self, contact, present)
+      class(pair_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+      logical, intent(in) :: present(:, :)
+
+      if (contact%n_pairs == 0) then
+         call self%take_pairs([real(wp) ::], present)
+         return
+      end if
+      call self%take_pairs(contact%mu, present)
+      associate (p => self%prediction)
+         p%gap = contact%gap
+         p%load = merge(contact%normal_load, 0.0_wp, contact%side_1(3, :) == 0 .and. &
+                        contact%side_2(3, :) == 0)
+         if (p%takes_balance) return
+         where (any(present(1:2, :), dim=1))
+            p%stiffness(:, 1) = contact%tangential_stiffness
+            p%stiffness(:, 2) = contact%tangential_stiffness
+         end where
+         where (present(3, :)) p%stiffness(:, 3) = contact%normal_stiffness
+      end associate
+   end subroutine build
+
+   !> Pairs that touch, without a load.
+   pure subroutine take_pairs(self, mu, present)
+      class(pair_law), intent(inout) :: self
+      !> Friction coefficient (n_pairs).
+      real(wp), intent(in) :: mu(:)
+      !> Which components exist (3, n_pairs).
+      logical, intent(in) :: present(:, :)
+
+      call self%take_elements(present)
+      self%mu = mu
+      self%two_directions = any(present(2, :))
+   end subroutine take_pairs
+
+   !> A pair without friction or load holds nothing tangentially.
+   pure real(wp) function slope_at_rest(self, element, component) result(slope)
+      class(pair_law), intent(in) :: self
+      integer, intent(in) :: element, component
+
+      slope = merge(1.0_wp, 0.0_wp, self%present(component, element))
+      if (component < 3 .and. .not. self%mu(element) > 0.0_wp) slope = 0.0_wp
+   end function slope_at_rest
+
+   !> The same law with its paths followed from event to event; not allocated where `facts` know of
+   !> no events.
+   subroutine located(self, law)
+      class(pair_law), intent(in) :: self
+      class(pair_law), allocatable, intent(out) :: law
+
+      associate (unused => self, unused_law => law)
+      end associate
+   end subroutine located
+
+end module fw_pair_law

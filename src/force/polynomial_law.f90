@@ -1,0 +1,131 @@
+!> Nonlinear springs, force coefficient * u_r**power, by alternating frequency/time.
+module fw_polynomial_law
+   use fw_force_law, only: force_law
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: law_facts
+   use fw_force_law, only: pair_mixed
+   use fw_fourier, only: fourier_type
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: polynomial_law, new_polynomial
+
+   type, extends(force_law) :: polynomial_law
+      !> Force per length**power (n_elements).
+      real(wp), allocatable :: coefficient(:)
+      integer, allocatable :: power(:)
+      !> Harmonics above this one are filtered from the elongations (LaBryer and Attar 2009).
+      integer :: highest_harmonic = huge(0)
+   contains
+      procedure :: evaluate
+      procedure :: linearize
+      procedure :: n_parameters
+      procedure :: by_parameter
+   end type polynomial_law
+
+contains
+
+   pure type(polynomial_law) function new_polynomial(coefficient, power) result(self)
+      !> (n_springs) each.
+      real(wp), intent(in) :: coefficient(:)
+      integer, intent(in) :: power(:)
+      logical :: present(1, size(coefficient))
+
+      present = .true.
+      call self%take_elements(present)
+      self%prediction%stiffness = 1.0_wp
+      self%coefficient = coefficient
+      self%power = power
+      self%facts = law_facts(is_odd=all(modulo(power, 2) == 1), has_multipliers=.true., &
+                             is_integrated=.true.)
+   end function new_polynomial
+
+   !> Forces from the elongations.
+   subroutine evaluate(self, fourier, work)
+      class(polynomial_law), intent(in) :: self
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(inout) :: work
+      integer :: i, k
+
+      if (self%n_elements == 0) return
+      call low_pass(self, fourier, work%prediction)
+      call fourier%to_time(self%n_elements, work%prediction, work%prediction_time)
+      do k = 1, fourier%n_time
+         do i = 1, self%n_elements
+            work%force_time(i, 1, k) = self%coefficient(i)* &
+                                       work%prediction_time(i, 1, k)**self%power(i)
+         end do
+      end do
+      call fourier%to_coefficients(self%n_elements, work%force_time, work%force)
+      work%state = pair_mixed
+   end subroutine evaluate
+
+   !> Zero the coefficients above the highest harmonic.
+   pure subroutine low_pass(self, fourier, coefficients)
+      type(polynomial_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: coefficients(:, :, :)
+      integer :: h
+
+      do h = 1, fourier%n_retained
+         if (fourier%harmonic(h) <= self%highest_harmonic) cycle
+         coefficients(:, :, fourier%column(h):fourier%column(h) + 1) = 0.0_wp
+      end do
+   end subroutine low_pass
+
+   !> Derivatives at the last evaluated elongations.
+   subroutine linearize(self, fourier, work)
+      class(polynomial_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+      integer :: i, j, k, nc
+      real(wp) :: slope
+
+      nc = fourier%n_coefficients
+      work%linear_state = work%state
+      if (.not. allocated(work%jacobian)) allocate (work%jacobian(nc, nc, self%n_elements))
+      work%jacobian = 0.0_wp
+      do i = 1, self%n_elements
+         do k = 1, fourier%n_time
+            slope = self%coefficient(i)*real(self%power(i), wp)* &
+                    work%prediction_time(i, 1, k)**(self%power(i) - 1)
+            do j = 1, nc
+               work%jacobian(:, j, i) = work%jacobian(:, j, i) + &
+                                        (slope*fourier%analysis(j, k))*fourier%synthesis(:, k)
+            end do
+         end do
+         ! Inputs are rows here: what is filtered has no derivative.
+         do j = 1, fourier%n_retained
+            if (fourier%harmonic(j) <= self%highest_harmonic) cycle
+            work%jacobian(fourier%column(j):fourier%column(j) + 1, :, i) = 0.0_wp
+         end do
+      end do
+   end subroutine linearize
+
+   !> The coefficient.
+   pure integer function n_parameters(self)
+      class(polynomial_law), intent(in) :: self
+
+      n_parameters = merge(1, 0, self%n_elements > 0)
+   end function n_parameters
+
+   !> The force of a unit coefficient.
+   subroutine by_parameter(self, number, fourier, work, force)
+      class(polynomial_law), intent(in) :: self
+      integer, intent(in) :: number
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp) :: values(self%n_elements, fourier%n_time)
+      integer :: k
+
+      do k = 1, fourier%n_time
+         values(:, k) = work%prediction_time(:, 1, k)**self%power
+      end do
+      call fourier%to_coefficients(self%n_elements, values, force)
+      associate (unused => number)
+      end associate
+   end subroutine by_parameter
+
+end module fw_polynomial_law
