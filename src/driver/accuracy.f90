@@ -12,9 +12,9 @@
 !> answer. Orders p are below those seen on exact references, so that the estimate is a bound.
 module fw_accuracy
    use fw_case, only: case_type
-   use fw_contact_data, only: law_penalty
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_laws, only: is_rigid
    use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
    use fw_level, only: level_type
@@ -78,7 +78,7 @@ contains
       self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics)
       allocate (self%level(size(self%n_harmonics), fewest:most))
       if (case%contact%n_pairs > 0) then
-         if (case%contact%law /= law_penalty) then
+         if (is_rigid(case%contact%law)) then
             self%order = merge(order_massless, order_rigid, without_mass(case))
          end if
          self%factor_time = factor_instants

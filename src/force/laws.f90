@@ -1,6 +1,7 @@
 !> The laws of contact pairs by their words: a new law is a word and a line here, and a file of its
 !> own.
 module fw_laws
+   use fw_force_law, only: law_facts
    use fw_friction, only: elastic_friction
    use fw_friction, only: rigid_friction
    use fw_friction, only: rigid_friction_of_rates
@@ -8,7 +9,7 @@ module fw_laws
    implicit none (type, external)
    private
 
-   public :: law_words, law_number, new_law
+   public :: law_words, law_number, new_law, facts_of, is_rigid
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty']
@@ -26,6 +27,24 @@ contains
       case default; allocate (law, source=rigid_friction())
       end select
    end subroutine new_law
+
+   !> What holds of the law of a number.
+   type(law_facts) function facts_of(number) result(facts)
+      integer, intent(in) :: number
+      class(pair_law), allocatable :: law
+
+      call new_law(number, law)
+      facts = law%facts
+   end function facts_of
+
+   !> Whether the law of a number predicts from the balance.
+   logical function is_rigid(number)
+      integer, intent(in) :: number
+      class(pair_law), allocatable :: law
+
+      call new_law(number, law)
+      is_rigid = law%prediction%takes_balance
+   end function is_rigid
 
    !> Where a word stands among `law_words`; 0 where it does not.
    pure integer function law_number(word)

@@ -1,10 +1,11 @@
 !> Combinations of sound keys that cannot be run, each with what to use instead.
 module fw_combinations
    use fw_case, only: case_type, analysis_frf, analysis_point, analysis_wear
-   use fw_contact_data, only: law_penalty
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
+   use fw_force_law, only: law_facts
    use fw_kinds, only: wp
+   use fw_laws, only: facts_of
    use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: continuation_natural
    use fw_solver_options, only: jacobian_analytic
@@ -91,9 +92,12 @@ contains
    subroutine check_stability(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
+      type(law_facts) :: facts
 
       if (.not. case%sweep%stability) return
-      if (case%contact%n_pairs == 0 .or. case%contact%law == law_penalty) return
+      if (case%contact%n_pairs == 0) return
+      facts = facts_of(case%contact%law)
+      if (facts%has_multipliers) return
       call fatal_error(error, "sweep%stability = .true. needs contact%law = 'penalty' (or "// &
                        "no contact pairs): rigid contact has no Floquet multipliers", status_input)
    end subroutine check_stability

@@ -8,14 +8,15 @@
 module fw_time_structure
    use fw_kinds, only: wp
    use fw_contact_data, only: contact_type
-   use fw_contact_data, only: law_penalty
    use fw_contact_data, only: spring_type
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_failure
    use fw_lapack, only: dgemm
    use fw_lapack, only: dsyevd
+   use fw_laws, only: new_law
    use fw_model, only: model_type
+   use fw_pair_law, only: pair_law
    implicit none (type, external)
    private
 
@@ -41,9 +42,8 @@ module fw_time_structure
       integer, allocatable :: row(:, :)
       !> Whether a row moves without inertia (n_rows).
       logical, allocatable :: massless(:)
-      !> 1/stiffness of the penalty law, 0 for rigid contact (n_rows) [length/force].
+      !> 1/stiffness of elastic pairs, 0 for rigid ones (n_rows) [length/force].
       real(wp), allocatable :: compliance(:)
-      logical :: rigid = .true.
       !> Friction coefficient, gap with wear [length], constant normal force [force] (n_pairs).
       real(wp), allocatable :: mu(:), gap(:), normal_load(:)
       !> Springs: force coefficient * e**power (n_springs).
@@ -74,7 +74,6 @@ contains
       self%damping = model%damping
       self%stiffness = model%stiffness
       self%load = reshape([model%load_static, model%load_cosine, model%load_sine], [model%n_dof, 3])
-      self%rigid = contact%law /= law_penalty
       call take_pairs(contact, present, self)
       call take_springs(springs, self)
       call find_massless(self, error)
@@ -85,7 +84,7 @@ contains
       type(contact_type), intent(in) :: contact
       logical, intent(in) :: present(:, :)
       type(time_structure), intent(inout) :: self
-      real(wp) :: stiffness
+      class(pair_law), allocatable :: law
       integer :: i, c
 
       allocate (self%row(3, contact%n_pairs), source=0)
@@ -93,19 +92,20 @@ contains
       allocate (self%rows(self%n_dof, 3*contact%n_pairs + self%n_springs), source=0.0_wp)
       allocate (self%mu(0), self%gap(0), self%normal_load(0))
       if (contact%n_pairs == 0) return
-      self%mu = contact%mu
-      self%gap = contact%gap
+      call new_law(contact%law, law)
+      call law%build(contact, present)
+      self%mu = law%mu
+      self%gap = law%prediction%gap
       if (allocated(contact%depth)) self%gap = self%gap + contact%depth
-      self%normal_load = merge(contact%normal_load, 0.0_wp, &
-                               contact%side_1(3, :) == 0 .and. contact%side_2(3, :) == 0)
+      self%normal_load = law%prediction%load
       do i = 1, contact%n_pairs
          do c = 1, 3
             if (.not. present(c, i)) cycle
-            if (.not. self%rigid) then
-               stiffness = contact%tangential_stiffness(i)
-               if (c == 3) stiffness = contact%normal_stiffness(i)
-               if (stiffness <= 0.0_wp) cycle
-               self%compliance(self%n_rows + 1) = 1.0_wp/stiffness
+            if (.not. law%prediction%takes_balance) then
+               associate (stiffness => law%prediction%stiffness(i, c))
+                  if (stiffness <= 0.0_wp) cycle
+                  self%compliance(self%n_rows + 1) = 1.0_wp/stiffness
+               end associate
             end if
             self%n_rows = self%n_rows + 1
             self%row(c, i) = self%n_rows
