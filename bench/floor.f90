@@ -14,7 +14,7 @@ module floor_system
    use fw_correction, only: march_turn_2d
    use fw_correction_derivative, only: march_derivative
    use fw_error, only: error_type
-   use fw_forces, only: pair_mixed
+   use fw_force_law, only: pair_mixed
    use fw_hbm, only: hbm_system
    use fw_kinds, only: sp
    use fw_kinds, only: wp
@@ -64,7 +64,8 @@ module floor_system
       !> Products since the derivative was made: the size of the Krylov basis.
       integer :: n_products = 0
       ! Scratch of the floor.
-      real(wp), allocatable :: x(:, :), margin(:), pressure(:), values(:, :, :), force(:, :, :)
+      real(wp), allocatable :: mu(:), x(:, :), margin(:), pressure(:)
+      real(wp), allocatable :: values(:, :, :), force(:, :, :)
       real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :), jacobian(:, :)
       real(wp), allocatable :: basis(:, :), vector(:), weights(:)
       complex(wp), allocatable :: input(:), output(:), coupling(:, :), solved(:, :), square(:, :)
@@ -91,17 +92,20 @@ contains
    end function processor_time
 
    !> Take over a system that was built.
-   subroutine new_measured_system(system, self)
+   subroutine new_measured_system(system, mu, self)
       type(hbm_system), intent(in) :: system
+      !> Friction coefficient (n_pairs).
+      real(wp), intent(in) :: mu(:)
       type(measured_system), intent(out) :: self
       integer, parameter :: n_trials = 1000, longest_basis = 61
       integer :: i, m, n, nc, nt
       real(wp) :: start
 
       self%hbm_system = system
+      self%mu = mu
       call self%fourier%renew_fft()
       m = self%structure%n_coordinates
-      n = self%contact%n_pairs
+      n = self%n_pairs
       nc = self%fourier%n_coefficients
       nt = self%fourier%n_time
       allocate (self%x(n, 2), self%margin(n), self%pressure(n), source=0.0_wp)
@@ -187,14 +191,14 @@ contains
       call self%hbm_system%residual(x, r)
       middle = processor_time()
       m = self%structure%n_coordinates
-      n = 3*self%contact%n_pairs
+      n = 3*self%n_pairs
       do h = 1, self%fourier%n_retained
          call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, self%input, 1, zero, &
                     self%output, 1)
       end do
-      call self%fourier%to_time(n, self%contact%prediction, self%values)
+      call self%fourier%to_time(n, self%work(self%forces%pairs)%prediction, self%values)
       call march(self)
-      call self%fourier%to_coefficients(n, self%contact%force_time, self%force)
+      call self%fourier%to_coefficients(n, self%work(self%forces%pairs)%force_time, self%force)
       call add(self, part_residual, start, middle)
    end subroutine residual
 
@@ -204,16 +208,17 @@ contains
       integer, parameter :: block_size = 8
       integer :: first, last, turn
 
-      associate (c => self%contact, nt => self%fourier%n_time)
+      associate (c => self%work(self%forces%pairs), n => self%n_pairs, nt => self%fourier%n_time, &
+                 planar => any(self%joint%row(2, :) > 0))
          self%x = c%x
-         do first = 1, c%n_pairs, block_size
-            last = min(first + block_size - 1, c%n_pairs)
+         do first = 1, n, block_size
+            last = min(first + block_size - 1, n)
             do turn = 1, min(maxval(c%turns(first:last)), 5)
-               if (c%two_directions) then
-                  call march_turn_2d(c%n_pairs, nt, first, last, c%mu, c%prediction_time, self%x, &
+               if (planar) then
+                  call march_turn_2d(n, nt, first, last, self%mu, c%prediction_time, self%x, &
                                      self%values, self%margin, self%pressure)
                else
-                  call march_turn_1d(c%n_pairs, nt, first, last, c%mu, c%prediction_time, self%x, &
+                  call march_turn_1d(n, nt, first, last, self%mu, c%prediction_time, self%x, &
                                      self%values, self%margin, self%pressure)
                end if
             end do
@@ -232,8 +237,8 @@ contains
       call self%hbm_system%linearize(n_linear)
       middle = processor_time()
       nc = self%fourier%n_coefficients
-      do i = 1, self%contact%n_pairs
-         if (self%contact%linear_state(i) == pair_mixed) call derive(self, i, nc)
+      do i = 1, self%n_pairs
+         if (self%work(self%forces%pairs)%linear_state(i) == pair_mixed) call derive(self, i, nc)
       end do
       call add(self, part_linearize, start, middle)
       self%n_products = 0
@@ -245,12 +250,12 @@ contains
       real(wp) :: x(2)
       integer :: c
 
-      associate (f => self%fourier, contact => self%contact)
+      associate (f => self%fourier, contact => self%work(self%forces%pairs))
          self%y = contact%prediction_time(i, :, :)
          self%dx = 0.0_wp
          x = contact%x(i, :)
-         call march_derivative(f%n_time, nc, 1, f%synthesis, self%y, contact%mu(i), 0.0_wp, &
-                               contact%present(:, i), .true., x, self%rows, self%dx)
+         call march_derivative(f%n_time, nc, 1, f%synthesis, self%y, self%mu(i), 0.0_wp, &
+                               self%joint%row(:, i) > 0, .true., x, self%rows, self%dx)
          do c = 1, 2
             call dgemm('N', 'T', 3*nc, nc, f%n_time, 1.0_wp, self%rows(1, 1, c, 1), 6*nc, &
                        f%analysis, nc, 0.0_wp, self%jacobian(1, (c - 1)*nc + 1), 3*nc)
@@ -296,10 +301,12 @@ contains
                     self%input, 1, zero, self%output, 1)
       end do
       n = 3*self%fourier%n_coefficients
-      do i = 1, self%contact%n_pairs
-         if (self%contact%linear_state(i) /= pair_mixed) cycle
-         call dgemv('T', n, n, 1.0_wp, self%contact%jacobian(1, 1, i), n, self%pair_in(1, i), 1, &
-                    0.0_wp, self%vector, 1)
+      do i = 1, self%n_pairs
+         if (self%work(self%forces%pairs)%linear_state(i) /= pair_mixed) cycle
+         associate (work => self%work(self%forces%pairs))
+            call dgemv('T', n, n, 1.0_wp, work%jacobian(1, 1, i), n, work%input(1, i), 1, 0.0_wp, &
+                       self%vector, 1)
+         end associate
       end do
       call add(self, part_apply, start, middle)
       self%n_products = min(self%n_products + 1, size(self%basis, 2) - 1)
@@ -372,7 +379,7 @@ program floor
    building = processor_time()
    call build_system(input, balance, error)
    call stop_on(error)
-   call new_measured_system(balance, system)
+   call new_measured_system(balance, input%contact%mu, system)
    building = processor_time() - building
    newton%options = input%solver
    call sweep()

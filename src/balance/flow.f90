@@ -107,19 +107,23 @@ contains
       end associate
    end subroutine fill_flow
 
-   !> Prediction stiffness of every component of every pair.
+   !> Prediction stiffness of every component of every pair, where that is one.
    subroutine add_closed_joint(balance, h, p)
       type(hbm_system), intent(in) :: balance
       integer, intent(in) :: h
       complex(wp), intent(inout) :: p(:, :)
       integer :: i, c
 
-      do i = 1, balance%contact%n_pairs
-         do c = 1, 3
-            if (balance%joint%row(c, i) == 0) cycle
-            call balance%incidence%add_block(balance%joint%row(c, i), h, balance%stiffness(i, c), p)
+      associate (prediction => balance%forces%entry(balance%forces%pairs)%law%prediction)
+         do i = 1, balance%n_pairs
+            do c = 1, 3
+               if (balance%joint%row(c, i) == 0) cycle
+               if (prediction%by_time .and. prediction%order(c) > 0) cycle
+               call balance%incidence%add_block(balance%joint%row(c, i), h, &
+                                                cmplx(prediction%stiffness(i, c), kind=wp), p)
+            end do
          end do
-      end do
+      end associate
    end subroutine add_closed_joint
 
    !> Factors of P for the explicit schemes, massless directions made regular.

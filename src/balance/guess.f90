@@ -1,6 +1,7 @@
 !> First guess of a solution: the linear one with every pair closed and stuck, but open where that
 !> would take tension on average.
 module fw_guess
+   use fw_force_law, only: force_law
    use fw_kinds, only: wp
    use fw_hbm, only: hbm_system
    use fw_hbm, only: to_real
@@ -20,8 +21,8 @@ contains
    subroutine stuck_guess(system, x)
       type(hbm_system), intent(in) :: system
       real(wp), intent(out), contiguous :: x(:)
-      logical :: closed(system%contact%n_pairs)
-      real(wp) :: tension(system%contact%n_pairs)
+      logical :: closed(system%n_pairs)
+      real(wp) :: tension(system%n_pairs)
       integer :: round
 
       closed = .true.
@@ -36,8 +37,8 @@ contains
    subroutine free_guess(system, x)
       type(hbm_system), intent(in) :: system
       real(wp), intent(out), contiguous :: x(:)
-      logical :: closed(system%contact%n_pairs)
-      real(wp) :: tension(system%contact%n_pairs)
+      logical :: closed(system%n_pairs)
+      real(wp) :: tension(system%n_pairs)
 
       closed = .false.
       call linear_solution(system, closed, x, tension)
@@ -65,15 +66,18 @@ contains
       if (.not. system%fourier%has_constant()) return
       free = .true.
       stiffness = system%structure%stiffness(:, :, 1)
-      do i = 1, system%contact%n_pairs
-         row = system%joint%row(3, i)
-         if (row == 0) cycle
-         if (system%rigid) then
-            free(system%incidence%coordinate_of(row)) = .false.
-         else
-            call system%incidence%add_block(row, 1, system%stiffness(i, 3), stiffness)
-         end if
-      end do
+      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+         do i = 1, system%n_pairs
+            row = system%joint%row(3, i)
+            if (row == 0) cycle
+            if (p%takes_balance) then
+               free(system%incidence%coordinate_of(row)) = .false.
+            else
+               call system%incidence%add_block(row, 1, cmplx(p%stiffness(i, 3), kind=wp), &
+                                                stiffness)
+            end if
+         end do
+      end associate
       kept = pack([(j, j=1, size(free))], free)
       held = is_positive_definite(real(stiffness(kept, kept), wp))
    end function held_without_friction
@@ -113,28 +117,44 @@ contains
       logical, intent(inout) :: held(:)
       integer :: i, c, j, row
       real(wp) :: gap
+      complex(wp) :: slope
 
-      do i = 1, size(closed)
-         if (.not. closed(i)) cycle
-         do c = 1, 3
-            row = system%joint%row(c, i)
-            if (row == 0) cycle
-            ! Without friction or load a pair holds nothing tangentially.
-            if (c < 3 .and. .not. system%contact%mu(i) > 0.0_wp) cycle
-            gap = 0.0_wp
-            if (c == 3 .and. system%fourier%harmonic(h) == 0) gap = system%gap(i) + system%depth(i)
-            if (system%rigid) then
-               j = system%incidence%coordinate_of(row)
-               held(j) = .true.
-               q(j) = -gap
-            else
-               call system%incidence%scatter_harmonic( &
-                  row, h, cmplx(-system%stiffness(i, c)*gap, kind=wp), force)
-               call system%incidence%add_block(row, h, system%stiffness(i, c), stiffness)
-            end if
+      associate (law => system%forces%entry(system%forces%pairs)%law)
+         do i = 1, size(closed)
+            if (.not. closed(i)) cycle
+            do c = 1, 3
+               row = system%joint%row(c, i)
+               if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
+               gap = 0.0_wp
+               if (c == 3 .and. system%fourier%harmonic(h) == 0) gap = law%prediction%gap(i) + &
+                  system%depth(i)
+               if (law%prediction%takes_balance) then
+                  j = system%incidence%coordinate_of(row)
+                  held(j) = .true.
+                  q(j) = -gap
+               else
+                  slope = elastic_slope(system, law, i, c, system%fourier%harmonic(h))
+                  call system%incidence%scatter_harmonic(row, h, -slope*gap, force)
+                  call system%incidence%add_block(row, h, slope, stiffness)
+               end if
+            end do
          end do
-      end do
+      end associate
    end subroutine close_pairs
+
+   !> Force of an elastic pair about its position at rest over the amplitude of its displacement in
+   !> a harmonic n: each derivative by tau is a factor i n.
+   complex(wp) function elastic_slope(system, law, pair, component, harmonic) result(slope)
+      type(hbm_system), intent(in) :: system
+      class(force_law), intent(in) :: law
+      integer, intent(in) :: pair, component, harmonic
+
+      slope = cmplx(law%prediction%stiffness(pair, component)*law%slope_at_rest(pair, component), &
+                    kind=wp)
+      if (law%prediction%order(component) > 0) then
+         slope = cmplx(0.0_wp, system%rate_unit(law%prediction)*harmonic, wp)*slope
+      end if
+   end function elastic_slope
 
    !> Solve for the coordinates that are not held.
    subroutine solve_free(stiffness, force, held, q)
@@ -170,17 +190,19 @@ contains
 
       tension = 0.0_wp
       call system%incidence%gather(system%joint%row(3, :), size(q), 1, real(q, wp), opening)
-      do i = 1, size(tension)
-         row = system%joint%row(3, i)
-         if (row == 0) cycle
-         if (system%rigid) then
-            j = system%incidence%coordinate_of(row)
-            tension(i) = system%load(j, 1) - &
-                         real(sum(system%structure%stiffness(j, :, 1)*q), wp)
-         else
-            tension(i) = system%stiffness(i, 3)*(opening(i) + system%gap(i) + system%depth(i))
-         end if
-      end do
+      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+         do i = 1, size(tension)
+            row = system%joint%row(3, i)
+            if (row == 0) cycle
+            if (p%takes_balance) then
+               j = system%incidence%coordinate_of(row)
+               tension(i) = system%load(j, 1) - &
+                            real(sum(system%structure%stiffness(j, :, 1)*q), wp)
+            else
+               tension(i) = p%stiffness(i, 3)*(opening(i) + p%gap(i) + system%depth(i))
+            end if
+         end do
+      end associate
    end subroutine mean_tension
 
    subroutine to_real_vector(system, q, x)

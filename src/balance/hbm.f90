@@ -1,28 +1,27 @@
 !> Harmonic balance with alternating frequency/time:
 !>
-!>   R(q) = Z_r q + f_springs(q) + B^T lambda(y) - F_r,
+!>   R(q) = Z_r q + sum over laws of B^T lambda(y) - F_r,
 !>
-!> with the prediction of the contact forces  y = F_r - Z_r q - f_springs + eps (q + gap)  (dlft)
-!> or  y = k (q + gap)  (penalty); dlft_velocity takes eps dq/dtau in the tangential directions.
+!> with the prediction of each law, of the order that it declares,
+!>
+!>   y = k (B (d/dtau)**order q + gap),
+!>   y = k (B (d/dtau)**order q + gap) + F_r - Z_r q - sum over those above   (takes the balance).
+!>
 !> Unknowns are (coordinate, coefficient), coordinates innermost.
 module fw_hbm
    use fw_kinds, only: wp
    use fw_condensation, only: condensation_type
-   use fw_contact_data, only: contact_type
-   use fw_contact_data, only: spring_type
-   use fw_contact_data, only: law_dlft_velocity
-   use fw_contact_data, only: law_penalty
    use fw_error, only: error_type
-   use fw_forces, only: forces_type
-   use fw_forces, only: new_forces
-   use fw_forces, only: pair_stuck
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: pair_stuck
+   use fw_force_law, only: prediction_type
+   use fw_force_list, only: force_entry
+   use fw_force_list, only: force_list
    use fw_fourier, only: fourier_type
    use fw_incidence, only: incidence_type
    use fw_incidence, only: new_incidence
    use fw_joint, only: joint_type
    use fw_lapack, only: zgemv
-   use fw_polynomial, only: springs_type
-   use fw_polynomial, only: new_springs
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_threads, only: coordinates_for_threads
@@ -37,17 +36,14 @@ module fw_hbm
       type(incidence_type) :: incidence
       type(condensation_type) :: structure
       type(fourier_type) :: fourier
-      type(forces_type) :: contact
-      type(springs_type) :: springs
-      !> The contact law predicts from equilibrium (dlft) or from stiffness alone (penalty).
-      logical :: rigid = .true.
-      !> Tangential prediction from velocities, without memory (dlft_velocity).
-      logical :: velocity_level = .false.
-      !> Prediction stiffness: eps, or the penalty stiffness (n_pairs, 3) [force/length].
-      real(wp), allocatable :: stiffness(:, :)
-      !> Gap and wear depth (n_pairs) [length]; load of pairs without a normal dof (n_pairs).
-      real(wp), allocatable :: gap(:), depth(:), normal_load(:)
-      !> F - Z q - f_springs, and the loads (n_coordinates, n_coefficients).
+      !> The laws of the forces, which are not written after construction, and what their
+      !> evaluations leave (n_laws).
+      type(force_list) :: forces
+      type(force_workspace), allocatable :: work(:)
+      integer :: n_pairs = 0
+      !> Wear depth of the pairs (n_pairs) [length].
+      real(wp), allocatable :: depth(:)
+      !> F - Z q less the forces that do not take the balance, and the loads (n_coordinates, n_coefficients).
       real(wp), allocatable :: balance(:, :), load(:, :)
       !> What a step of pseudo-time adds to the derivative, P/h, outside of the contact laws
       !> (n_coordinates, n_coordinates, n_retained); only allocated during such a step.
@@ -69,7 +65,7 @@ module fw_hbm
       integer :: n_gathered_active = 0
       integer, allocatable :: gathered(:)
       complex(wp), allocatable :: active_stiffness(:, :, :)
-      real(wp), allocatable :: active_out(:, :), pair_in(:, :), pair_out(:, :)
+      real(wp), allocatable :: active_out(:, :)
       type(preconditioner_lu_type), allocatable :: preconditioner(:)
       !> Coordinates for which the preconditioner was built (first n_preconditioned entries).
       integer :: n_preconditioned = 0
@@ -85,6 +81,7 @@ module fw_hbm
       procedure :: set_frequency
       procedure :: parameter_derivative
       procedure :: coordinate_of
+      procedure :: rate_unit
       procedure :: residual
       procedure :: linearize
       procedure :: reduce
@@ -165,49 +162,38 @@ contains
 
    !> Build the system of a joint. The structure must stand at a frequency already (its stiffness
    !> sets eps); call set_frequency before the first residual.
-   subroutine new_hbm(joint, structure, fourier, contact, springs, self)
+   subroutine new_hbm(joint, structure, fourier, forces, depth, self)
       type(joint_type), intent(in) :: joint
       type(condensation_type), intent(in) :: structure
       type(fourier_type), intent(in) :: fourier
-      type(contact_type), intent(in) :: contact
-      type(spring_type), intent(in) :: springs
+      type(force_list), intent(in) :: forces
+      !> Wear depth of the pairs (n_pairs) [length]; zero where it is not allocated.
+      real(wp), allocatable, intent(in) :: depth(:)
       type(hbm_system), intent(out) :: self
-      integer :: m, nc, nh
+      integer :: k, m, nc, nh
 
       self%joint = joint
       call new_incidence(joint%relative, structure%n_coordinates, self%incidence)
       self%structure = structure
       self%fourier = fourier
-      self%rigid = contact%law /= law_penalty
-      self%velocity_level = contact%law == law_dlft_velocity
       m = structure%n_coordinates
       nc = fourier%n_coefficients
       nh = fourier%n_retained
       self%n = m*nc
-      if (contact%n_pairs > 0) then
-         self%contact = new_forces(contact%mu, joint%row > 0, fourier)
-         self%gap = contact%gap
-         self%normal_load = merge(contact%normal_load, 0.0_wp, contact%side_1(3, :) == 0 .and. &
-                                  contact%side_2(3, :) == 0)
-      else
-         self%contact = new_forces([real(wp) ::], joint%row > 0, fourier)
-         allocate (self%gap(0), self%normal_load(0))
-      end if
-      allocate (self%depth(contact%n_pairs), source=0.0_wp)
-      if (allocated(contact%depth)) self%depth = contact%depth
-      if (springs%n_springs > 0) then
-         self%springs = new_springs(springs%coefficient, springs%power, fourier)
-      else
-         self%springs = new_springs([real(wp) ::], [integer ::], fourier)
-      end if
-      self%contact%remembers = .not. self%velocity_level
-      call set_stiffness(self, contact)
+      self%forces = forces
+      self%n_pairs = forces%entry(forces%pairs)%law%n_elements
+      call forces%reserve(fourier, self%work)
+      allocate (self%depth(self%n_pairs), source=0.0_wp)
+      if (allocated(depth)) self%depth = depth
+      do k = 1, self%forces%n_laws
+         associate (law => self%forces%entry(k)%law)
+            if (law%prediction%takes_balance) call set_stiffness(self, law%prediction)
+         end associate
+      end do
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       allocate (self%complex_in(m, nh), self%complex_out(m, nh), source=(0.0_wp, 0.0_wp))
       allocate (self%active_out(m, nc), self%used(m), self%place(m), self%preconditioned(m))
       allocate (self%gathered(m), self%kept_place(m), self%unknown_stiffness(m))
-      allocate (self%pair_in(3*nc, contact%n_pairs), source=0.0_wp)
-      allocate (self%pair_out(3*nc, contact%n_pairs), source=0.0_wp)
       allocate (self%preconditioner(nh))
    end subroutine new_hbm
 
@@ -215,33 +201,25 @@ contains
    !> has none: any value above zero serves), one for both tangential directions (the
    !> friction law is isotropic) and one for the normal. Directions that nothing moves do not
    !> count, whether they are left out or not.
-   subroutine set_stiffness(self, contact)
-      type(hbm_system), intent(inout) :: self
-      type(contact_type), intent(in) :: contact
+   subroutine set_stiffness(self, prediction)
+      type(hbm_system), intent(in) :: self
+      type(prediction_type), intent(inout) :: prediction
       real(wp) :: stiffness(3)
       logical :: counts(2)
       integer :: i, c
 
-      allocate (self%stiffness(contact%n_pairs, 3), source=0.0_wp)
-      do i = 1, contact%n_pairs
-         if (self%rigid) then
-            stiffness = 0.0_wp
-            do c = 1, 3
-               if (self%joint%row(c, i) == 0) cycle
-               stiffness(c) = local_stiffness(self, self%coordinate_of(c, i))
-            end do
-            counts = self%joint%row(1:2, i) > 0 .and. .not. self%joint%idle(1:2, i)
-            if (.not. any(counts)) counts = self%joint%row(1:2, i) > 0
-            stiffness(1:2) = sum(stiffness(1:2), mask=counts)/real(max(1, count(counts)), wp)
-            if (maxval(stiffness) <= 0.0_wp) stiffness = largest_stiffness(self)
-            where (stiffness <= 0.0_wp .and. self%joint%row(:, i) > 0) stiffness &
-               = maxval(stiffness)
-            self%stiffness(i, :) = contact%penalty_scale*stiffness
-         else
-            if (any(self%joint%row(1:2, i) > 0)) self%stiffness(i, 1:2) &
-               = contact%tangential_stiffness(i)
-            if (self%joint%row(3, i) > 0) self%stiffness(i, 3) = contact%normal_stiffness(i)
-         end if
+      do i = 1, self%n_pairs
+         stiffness = 0.0_wp
+         do c = 1, 3
+            if (self%joint%row(c, i) == 0) cycle
+            stiffness(c) = local_stiffness(self, self%coordinate_of(c, i))
+         end do
+         counts = self%joint%row(1:2, i) > 0 .and. .not. self%joint%idle(1:2, i)
+         if (.not. any(counts)) counts = self%joint%row(1:2, i) > 0
+         stiffness(1:2) = sum(stiffness(1:2), mask=counts)/real(max(1, count(counts)), wp)
+         if (maxval(stiffness) <= 0.0_wp) stiffness = largest_stiffness(self)
+         where (stiffness <= 0.0_wp .and. self%joint%row(:, i) > 0) stiffness = maxval(stiffness)
+         prediction%stiffness(i, :) = prediction%scale*stiffness
       end do
    end subroutine set_stiffness
 
@@ -311,8 +289,11 @@ contains
          static = norm2(self%load(:, 1))
       end if
       load_norm = max(load_norm, static_share*static)
-      if (load_norm <= 0.0_wp) load_norm = norm2(self%normal_load) + norm2(self%stiffness(:, &
-         3)*self%gap)
+      if (load_norm <= 0.0_wp) then
+         associate (p => self%forces%entry(self%forces%pairs)%law%prediction)
+            load_norm = norm2(p%load) + norm2(p%stiffness(:, 3)*p%gap)
+         end associate
+      end if
       if (load_norm <= 0.0_wp) load_norm = 1.0_wp
    end function load_norm
 
@@ -321,18 +302,24 @@ contains
       class(hbm_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
       real(wp), intent(out), contiguous :: r(:)
-      integer :: m, nc
+      integer :: k, m, nc
 
       m = self%structure%n_coordinates
       nc = self%fourier%n_coefficients
       if (m == 0) return
       call multiply_stiffness(self, m, nc, x)
-      if (self%springs%n_springs > 0) call add_springs(self, m, nc, x)
-      if (self%contact%n_pairs > 0) then
-         call predict(self, m, nc, x)
-         call self%contact%evaluate(self%fourier)
-         if (self%velocity_level) call hold_stuck_means(self, m, nc, x)
-      end if
+      do k = 1, self%forces%n_laws
+         associate (entry => self%forces%entry(k), work => self%work(k))
+            call predict(self, entry, m, nc, x, work)
+            if (k == self%forces%pairs) call entry%law%set_offset(self%depth, work)
+            call entry%law%evaluate(self%fourier, work)
+            if (entry%law%prediction%takes_balance) then
+               call hold_stuck_means(self, entry, m, nc, x, work)
+            else
+               call self%incidence%scatter(entry%rows, m, nc, -1.0_wp, work%force, self%balance)
+            end if
+         end associate
+      end do
       call collect(self, m, nc, r)
    end subroutine residual
 
@@ -356,53 +343,51 @@ contains
       self%balance = self%load - self%balance
    end subroutine multiply_stiffness
 
-   !> balance = balance - f_springs.
-   subroutine add_springs(self, m, nc, q)
-      class(hbm_system), intent(inout) :: self
+   !> Predicted inputs of a law.
+   subroutine predict(self, entry, m, nc, q, work)
+      type(hbm_system), intent(in) :: self
+      type(force_entry), intent(in) :: entry
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
-
-      associate (rows => self%joint%spring_row)
-         call self%incidence%gather(rows, m, nc, q, self%springs%elongation)
-         call self%springs%evaluate(self%fourier)
-         call self%incidence%scatter(rows, m, nc, -1.0_wp, self%springs%force, self%balance)
-      end associate
-   end subroutine add_springs
-
-   !> Predicted contact forces.
-   subroutine predict(self, m, nc, q)
-      class(hbm_system), intent(inout) :: self
-      integer, intent(in) :: m, nc
-      real(wp), intent(in) :: q(m, nc)
+      type(force_workspace), intent(inout) :: work
       integer :: j
 
-      associate (y => self%contact%prediction)
-         call self%incidence%gather(self%joint%pair_rows, m, nc, q, y)
+      associate (p => entry%law%prediction, y => work%prediction)
+         call self%incidence%gather(entry%rows, m, nc, q, y)
          do j = 1, nc
-            y(:, :, j) = self%stiffness*y(:, :, j)
+            y(:, :, j) = p%stiffness*y(:, :, j)
          end do
-         if (self%velocity_level) call tangential_rates(self, y)
-         if (self%rigid) call add_balance(self, y)
-         self%contact%offset = merge(self%stiffness(:, 3)*(self%gap + self%depth), &
-                                     -self%normal_load, self%joint%row(3, :) > 0)
+         if (any(p%order > 0)) call take_rates(self%fourier, self%rate_unit(p), p%order, y)
+         if (p%takes_balance) call add_balance(self, entry%row, y)
       end associate
    end subroutine predict
 
-   !> Replace predictions from displacements by predictions from velocities du/dtau.
-   subroutine tangential_rates(self, y)
-      type(hbm_system), intent(in) :: self
+   !> What makes a derivative by tau one by what a law takes: omega where that is the time.
+   pure real(wp) function rate_unit(self, prediction)
+      class(hbm_system), intent(in) :: self
+      type(prediction_type), intent(in) :: prediction
+
+      rate_unit = merge(self%structure%omega, 1.0_wp, prediction%by_time)
+   end function rate_unit
+
+   !> Replace inputs from displacements by inputs from velocities, where the law takes these.
+   subroutine take_rates(fourier, unit, order, y)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: unit
+      integer, intent(in) :: order(:)
       real(wp), intent(inout) :: y(:, :, :)
       real(wp) :: cosine, n
       integer :: i, c, h, k
 
-      do h = 1, self%fourier%n_retained
-         k = self%fourier%column(h)
-         n = real(self%fourier%harmonic(h), wp)
-         if (self%fourier%harmonic(h) == 0) then
-            y(:, 1:2, k) = 0.0_wp
-            cycle
-         end if
-         do c = 1, 2
+      do h = 1, fourier%n_retained
+         k = fourier%column(h)
+         n = unit*real(fourier%harmonic(h), wp)
+         do c = 1, size(y, 2)
+            if (order(c) == 0) cycle
+            if (fourier%harmonic(h) == 0) then
+               y(:, c, k) = 0.0_wp
+               cycle
+            end if
             do i = 1, size(y, 1)
                cosine = y(i, c, k)
                y(i, c, k) = n*y(i, c, k + 1)
@@ -410,51 +395,63 @@ contains
             end do
          end do
       end do
-   end subroutine tangential_rates
+   end subroutine take_rates
 
-   !> What rigid pairs must transmit for equilibrium.
-   subroutine add_balance(self, y)
+   !> What elements must transmit for equilibrium.
+   subroutine add_balance(self, row, y)
       type(hbm_system), intent(in) :: self
+      integer, intent(in) :: row(:, :)
       real(wp), intent(inout) :: y(:, :, :)
       integer :: i, c, j
 
       do j = 1, size(y, 3)
-         do c = 1, 3
+         do c = 1, size(y, 2)
             do i = 1, size(y, 1)
-               if (self%joint%row(c, i) == 0) cycle
-               y(i, c, j) = y(i, c, j) + self%balance(self%coordinate_of(c, i), j)
+               if (row(c, i) == 0) cycle
+               y(i, c, j) = y(i, c, j) + self%balance(self%incidence%coordinate_of(row(c, i)), j)
             end do
          end do
       end do
    end subroutine add_balance
 
-   !> Velocities say nothing of the mean position of a pair that sticks through the period: it
+   !> Velocities say nothing of the mean position of an element that sticks through the period: it
    !> stays where it was assembled.
-   subroutine hold_stuck_means(self, m, nc, q)
-      class(hbm_system), intent(inout) :: self
+   subroutine hold_stuck_means(self, entry, m, nc, q, work)
+      type(hbm_system), intent(in) :: self
+      type(force_entry), intent(in) :: entry
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
+      type(force_workspace), intent(inout) :: work
       integer :: i, c
 
       if (.not. self%fourier%has_constant()) return
-      do i = 1, self%contact%n_pairs
-         if (self%contact%state(i) /= pair_stuck) cycle
-         do c = 1, 2
-            if (self%joint%row(c, i) == 0) cycle
-            self%contact%force(i, c, 1) = self%contact%force(i, c, 1) + &
-                                          self%stiffness(i, c)*q(self%coordinate_of(c, i), 1)
+      associate (p => entry%law%prediction, row => entry%row)
+         if (all(p%order == 0)) return
+         do i = 1, size(row, 2)
+            if (work%state(i) /= pair_stuck) cycle
+            do c = 1, size(row, 1)
+               if (row(c, i) == 0 .or. p%order(c) == 0) cycle
+               work%force(i, c, 1) = work%force(i, c, 1) + &
+                                     p%stiffness(i, c)*q(self%incidence%coordinate_of(row(c, i)), 1)
+            end do
          end do
-      end do
+      end associate
    end subroutine hold_stuck_means
 
-   !> r = -balance + B^T lambda.
+   !> r = -balance + B^T lambda of the laws that take the balance; those of the others it holds.
    subroutine collect(self, m, nc, r)
-      class(hbm_system), intent(inout) :: self
+      class(hbm_system), intent(in) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(out) :: r(m, nc)
+      integer :: k
 
       r = -self%balance
-      call self%incidence%scatter(self%joint%pair_rows, m, nc, 1.0_wp, self%contact%force, r)
+      do k = 1, self%forces%n_laws
+         associate (entry => self%forces%entry(k))
+            if (.not. entry%law%prediction%takes_balance) cycle
+            call self%incidence%scatter(entry%rows, m, nc, 1.0_wp, self%work(k)%force, r)
+         end associate
+      end do
    end subroutine collect
 
    !> U_n = uc_n - i us_n of each retained harmonic (n_rows, n_retained).

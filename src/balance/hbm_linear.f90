@@ -1,15 +1,15 @@
-!> The linear problem of a Newton step of harmonic balance. With A the derivative of the smooth
-!> part (Z_r and springs) and G that of the contact forces by their prediction, per pair,
+!> The linear problem of a Newton step of harmonic balance. With G the derivative of the forces of
+!> a law by its inputs, element by element, and d the derivative of its order,
 !>
-!>   J v = A v + B^T G (eps B v - B A v)  (dlft),   J v = A v + B^T G k B v  (penalty).
+!>   A v = Z_r v + B^T G k B d v                of the laws that are functions of displacements,
+!>   J v = A v + B^T G (eps B d v - B A v)      with those that take the balance.
 !>
 !> Rows of components that stick (or stay closed) through the period read eps v = -r: their
 !> coordinates are solved at once. The others are `active`; behind them in `used` stand the
 !> coordinates whose rows of A the active pairs need still (normal forces of slipping pairs).
 submodule(fw_hbm) fw_hbm_linear
-   use fw_forces, only: pair_mixed
-   use fw_forces, only: pair_open
-   use fw_forces, only: pair_stuck
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_open
    use fw_lapack, only: dgemv
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
@@ -21,8 +21,12 @@ submodule(fw_hbm) fw_hbm_linear
 contains
 
    module procedure linearize
-      if (self%contact%n_pairs > 0) call self%contact%linearize(self%fourier)
-      if (self%springs%n_springs > 0) call self%springs%linearize(self%fourier)
+      integer :: k
+
+      do k = 1, self%forces%n_laws
+         if (size(self%work(k)%state) == 0) cycle
+         call self%forces%entry(k)%law%linearize(self%fourier, self%work(k))
+      end do
       call choose_active(self)
       call gather_stiffness(self)
       n_linear = self%n_active*self%fourier%n_coefficients
@@ -33,21 +37,14 @@ contains
    subroutine choose_active(self)
       type(hbm_system), intent(inout) :: self
       logical :: held(self%structure%n_coordinates), wanted(self%structure%n_coordinates)
-      integer :: i, c, j, k
+      integer :: j, k
 
       held = .false.
       wanted = .false.
-      if (self%rigid .and. self%reduced) then
-         do i = 1, self%contact%n_pairs
-            do c = 1, 3
-               if (self%joint%row(c, i) == 0 .or. self%contact%linear_state(i) == pair_open) cycle
-               j = self%coordinate_of(c, i)
-               ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
-               if (c < 3 .and. self%velocity_level) cycle
-               held(j) = self%contact%linear_state(i) == pair_stuck .or. &
-                           (c == 3 .and. self%pins_normals .and. self%contact%always_closed(i))
-               wanted(j) = self%contact%linear_state(i) == pair_mixed
-            end do
+      if (self%reduced) then
+         do k = 1, self%forces%n_laws
+            if (.not. self%forces%entry(k)%law%prediction%takes_balance) cycle
+            call find_held(self, self%forces%entry(k), self%work(k), held, wanted)
          end do
       end if
       self%place = 0
@@ -68,6 +65,28 @@ contains
       self%n_used = k
       call place_kept(self)
    end subroutine choose_active
+
+   !> Coordinates whose rows elements hold, and those of them whose rows of A are needed still.
+   subroutine find_held(self, entry, work, held, wanted)
+      type(hbm_system), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
+      logical, intent(inout) :: held(:), wanted(:)
+      integer :: i, c, j, last
+
+      last = size(entry%row, 1)
+      do i = 1, size(entry%row, 2)
+         do c = 1, last
+            if (entry%row(c, i) == 0 .or. work%linear_state(i) == pair_open) cycle
+            ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
+            if (entry%law%prediction%order(c) > 0) cycle
+            j = self%incidence%coordinate_of(entry%row(c, i))
+            held(j) = work%linear_state(i) == pair_stuck .or. &
+                      (c == last .and. self%pins_normals .and. work%always_closed(i))
+            wanted(j) = work%linear_state(i) == pair_mixed
+         end do
+      end do
+   end subroutine find_held
 
    !> Copy the rows and columns in use, so that products run over contiguous memory.
    subroutine gather_stiffness(self)
@@ -118,18 +137,23 @@ contains
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: r(m, nc)
       real(wp), intent(inout) :: step(m, nc)
-      integer :: i, c, j, place
+      integer :: i, c, j, k, place
 
       step = 0.0_wp
       if (self%n_active == m) return
-      do i = 1, self%contact%n_pairs
-         do c = 1, 3
-            if (self%joint%row(c, i) == 0) cycle
-            j = self%coordinate_of(c, i)
-            place = self%place(j)
-            if (place > 0 .and. place <= self%n_active) cycle
-            step(j, :) = -r(j, :)/self%stiffness(i, c)
-         end do
+      do k = 1, self%forces%n_laws
+         associate (p => self%forces%entry(k)%law%prediction, row => self%forces%entry(k)%row)
+            if (.not. p%takes_balance) cycle
+            do i = 1, size(row, 2)
+               do c = 1, size(row, 1)
+                  if (row(c, i) == 0) cycle
+                  j = self%incidence%coordinate_of(row(c, i))
+                  place = self%place(j)
+                  if (place > 0 .and. place <= self%n_active) cycle
+                  step(j, :) = -r(j, :)/p%stiffness(i, c)
+               end do
+            end do
+         end associate
       end do
    end subroutine pinned_step
 
@@ -154,10 +178,7 @@ contains
          self%complex_out(:self%n_used, h) = self%complex_out(self%used(:self%n_used), h)
       end do
       call outputs_to_real(self)
-      associate (all => self%incidence%identity)
-         if (self%springs%n_springs > 0) call spring_product(self, all, m, self%balance)
-         call contact_product(self, all, m, self%balance)
-      end associate
+      call add_forces(self, self%incidence%identity, m, self%balance)
       rhs = rhs - self%active_out(:self%n_active, :)
    end subroutine reduce_shaped
 
@@ -202,44 +223,62 @@ contains
       step(self%used(:self%n_active), :) = solution
    end subroutine scatter
 
-   !> dR/d omega = (I - B^T G B)(Z' q - F') for rigid laws, Z' q - F' for penalty.
+   !> dR/d omega = Z' q - F', with what the forces add to it.
    module procedure parameter_derivative
       integer :: m
 
       m = self%structure%n_coordinates
       call to_complex(self%fourier, m, x, self%complex_in)
       call self%structure%frequency_derivative(self%complex_in, self%complex_out)
-      call derivative_with_contact(self, m, self%fourier%n_coefficients, dr)
+      call derivative_with_forces(self, m, self%fourier%n_coefficients, x, dr)
    end procedure parameter_derivative
 
-   !> dr from the slopes of all coordinates in complex_out.
-   subroutine derivative_with_contact(self, m, nc, dr)
+   !> dr from the slopes of all coordinates in complex_out: the inputs of a law change by the
+   !> balance that it takes, and by the unit of time of its rates.
+   subroutine derivative_with_forces(self, m, nc, q, dr)
       type(hbm_system), intent(inout) :: self
       integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
       real(wp), intent(out) :: dr(m, nc)
-      integer :: i, c, j
+      integer :: k
 
       call to_real(self%fourier, m, self%complex_out, dr)
-      if (.not. self%rigid) return
-      do i = 1, self%contact%n_pairs
-         if (self%contact%linear_state(i) == pair_open) cycle
-         self%pair_in(:, i) = 0.0_wp
-         do c = 1, 3
-            if (self%joint%row(c, i) == 0) cycle
-            self%pair_in((c - 1)*nc + 1:c*nc, i) = -dr(self%coordinate_of(c, i), :)
-         end do
-         self%pair_out(:, i) = self%pair_in(:, i)
-         if (self%contact%linear_state(i) == pair_mixed) then
-            call dgemv('T', 3*nc, 3*nc, 1.0_wp, self%contact%jacobian(1, 1, i), 3*nc, &
-                       self%pair_in(1, i), 1, 0.0_wp, self%pair_out(1, i), 1)
-         end if
-         do c = 1, 3
-            if (self%joint%row(c, i) == 0) cycle
-            j = self%coordinate_of(c, i)
-            dr(j, :) = dr(j, :) + self%pair_out((c - 1)*nc + 1:c*nc, i)
-         end do
+      do k = 1, self%forces%n_laws
+         associate (p => self%forces%entry(k)%law%prediction)
+            if (.not. (p%takes_balance .or. p%by_time)) cycle
+            call inputs_by_frequency(self, self%forces%entry(k), m, nc, q, dr, self%work(k)%input)
+         end associate
+         call multiply_derivative(self%work(k))
+         call add_outputs(self, self%forces%entry(k), self%work(k), self%incidence%identity, m, dr)
       end do
-   end subroutine derivative_with_contact
+   end subroutine derivative_with_forces
+
+   !> Derivatives of the inputs by the frequency.
+   subroutine inputs_by_frequency(self, entry, m, nc, q, dr, input)
+      type(hbm_system), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc), dr(m, nc)
+      real(wp), intent(inout) :: input(:, :)
+      integer :: i, c
+
+      input = 0.0_wp
+      associate (p => entry%law%prediction, row => entry%row)
+         do i = 1, size(row, 2)
+            do c = 1, size(row, 1)
+               if (row(c, i) == 0) cycle
+               associate (y => input((c - 1)*nc + 1:c*nc, i))
+                  if (p%by_time .and. p%order(c) > 0) then
+                     call self%incidence%gather_row(row(c, i), self%incidence%identity, m, &
+                                                    p%stiffness(i, c), q, y)
+                     call take_rate(self, .false., 1.0_wp, y)
+                  end if
+                  if (p%takes_balance) y = y - dr(self%incidence%coordinate_of(row(c, i)), :)
+               end associate
+            end do
+         end do
+      end associate
+   end subroutine inputs_by_frequency
 
    module procedure apply
       integer :: h, k, na, nu, ld
@@ -256,8 +295,7 @@ contains
       end do
       !$omp end parallel do
       call outputs_to_real(self)
-      if (self%springs%n_springs > 0) call spring_product(self, self%place, na, vector)
-      if (self%contact%n_pairs > 0) call contact_product(self, self%place, na, vector)
+      call add_forces(self, self%place, na, vector)
       if (allocated(self%shift)) call add_shift(self)
       do k = 1, self%fourier%n_coefficients
          product((k - 1)*na + 1:k*na) = self%active_out(:na, k)
@@ -307,96 +345,118 @@ contains
       end do
    end subroutine outputs_to_real
 
-   !> active_out = active_out + derivative of the springs times vector.
-   subroutine spring_product(self, map, n_mapped, vector)
+   !> active_out = active_out + what the forces add to the product, Z_r v being in active_out. Laws
+   !> that take the balance take that of the others, but not of one another.
+   subroutine add_forces(self, map, n_mapped, vector)
       type(hbm_system), intent(inout) :: self
       !> Places of the coordinates in the vector, and its rows.
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
-      integer :: i, k
+      integer :: k
 
-      associate (s => self%springs, rows => self%joint%spring_row)
-         do i = 1, s%n_springs
-            ! The spring's own workspaces are free between evaluations.
-            call self%incidence%gather_row(rows(i), map, n_mapped, 1.0_wp, vector, &
-                                           s%elongation(i, :))
-            do k = 1, self%fourier%n_coefficients
-               s%force(i, k) = dot_product(s%jacobian(:, k, i), s%elongation(i, :))
-            end do
-            call self%incidence%scatter_row(rows(i), self%place, self%n_used, &
-                                            size(self%active_out, 1), 1.0_wp, s%force(i, :), &
-                                            self%active_out)
-         end do
-      end associate
-   end subroutine spring_product
+      do k = 1, self%forces%n_laws
+         associate (entry => self%forces%entry(k), work => self%work(k))
+            call multiply_element(self, entry, map, n_mapped, vector, work)
+            if (entry%law%prediction%takes_balance) cycle
+            call add_outputs(self, entry, work, self%place, self%n_used, self%active_out)
+         end associate
+      end do
+      do k = 1, self%forces%n_laws
+         associate (entry => self%forces%entry(k), work => self%work(k))
+            if (.not. entry%law%prediction%takes_balance) cycle
+            call add_outputs(self, entry, work, self%place, self%n_active, self%active_out)
+         end associate
+      end do
+   end subroutine add_forces
 
-   !> active_out = active_out + B^T G (eps B v - B A v), A v being in active_out.
-   subroutine contact_product(self, map, n_mapped, vector)
-      type(hbm_system), intent(inout) :: self
-      !> Places of the coordinates in the vector, and its rows.
+   !> Outputs of the derivative of a law for a vector.
+   subroutine multiply_element(self, entry, map, n_mapped, vector, work)
+      type(hbm_system), intent(in) :: self
+      type(force_entry), intent(in) :: entry
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
-      integer :: i, n
+      type(force_workspace), intent(inout) :: work
+      integer :: i
 
-      n = 3*self%fourier%n_coefficients
-      !$omp parallel do default(none) shared(self, map, n_mapped, vector, n) private(i) &
-      !$omp schedule(static) if(self%contact%n_pairs >= pairs_for_threads)
-      do i = 1, self%contact%n_pairs
-         if (self%contact%linear_state(i) == pair_open) cycle
-         call gather_inputs(self, i, map, n_mapped, vector, self%pair_in(:, i))
-         if (self%contact%linear_state(i) == pair_mixed) then
-            call dgemv('T', n, n, 1.0_wp, self%contact%jacobian(1, 1, i), n, self%pair_in(1, i), &
-               1, &
-                       0.0_wp, self%pair_out(1, i), 1)
-         else
-            self%pair_out(:, i) = self%pair_in(:, i)
-         end if
+      !$omp parallel do default(none) shared(self, entry, map, n_mapped, vector, work) private(i) &
+      !$omp schedule(static) if(size(work%state) >= pairs_for_threads)
+      do i = 1, size(work%state)
+         if (work%linear_state(i) == pair_open) cycle
+         call gather_inputs(self, entry, i, map, n_mapped, vector, &
+                            work%linear_state(i) == pair_stuck, work%input(:, i))
+         call multiply_derivative_of(work, i)
       end do
       !$omp end parallel do
-      call add_outputs(self)
-   end subroutine contact_product
+   end subroutine multiply_element
 
-   !> Derivative of the prediction of a pair: eps B v - B A v, or k B v.
-   subroutine gather_inputs(self, pair, map, n_mapped, vector, inputs)
+   !> Outputs of all elements from their inputs.
+   subroutine multiply_derivative(work)
+      type(force_workspace), intent(inout) :: work
+      integer :: i
+
+      do i = 1, size(work%state)
+         if (work%linear_state(i) /= pair_open) call multiply_derivative_of(work, i)
+      end do
+   end subroutine multiply_derivative
+
+   subroutine multiply_derivative_of(work, element)
+      type(force_workspace), intent(inout) :: work
+      integer, intent(in) :: element
+      integer :: n
+
+      if (work%linear_state(element) == pair_mixed) then
+         n = size(work%input, 1)
+         call dgemv('T', n, n, 1.0_wp, work%jacobian(1, 1, element), n, work%input(1, element), 1, &
+                    0.0_wp, work%output(1, element), 1)
+      else
+         work%output(:, element) = work%input(:, element)
+      end if
+   end subroutine multiply_derivative_of
+
+   !> Derivative of the prediction of an element: k B d v, and - B A v where it takes the balance.
+   subroutine gather_inputs(self, entry, element, map, n_mapped, vector, is_stuck, inputs)
       type(hbm_system), intent(in) :: self
-      integer, intent(in) :: pair
+      type(force_entry), intent(in) :: entry
+      integer, intent(in) :: element
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
-      real(wp), intent(out) :: inputs(self%fourier%n_coefficients, 3)
+      logical, intent(in) :: is_stuck
+      real(wp), intent(out) :: inputs(self%fourier%n_coefficients, size(entry%row, 1))
       integer :: c, row, place
 
-      do c = 1, 3
-         row = self%joint%row(c, pair)
-         if (row == 0) then
-            inputs(:, c) = 0.0_wp
-            cycle
-         end if
-         call self%incidence%gather_row(row, map, n_mapped, self%stiffness(pair, c), vector, &
-                                        inputs(:, c))
-         if (.not. self%rigid) cycle
-         if (c < 3 .and. self%velocity_level) then
-            call differentiate_inputs(self, self%contact%linear_state(pair) == pair_stuck, &
-                                      inputs(:, c))
-         end if
-         place = self%place(self%incidence%coordinate_of(row))
-         if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
-      end do
+      associate (p => entry%law%prediction)
+         do c = 1, size(entry%row, 1)
+            row = entry%row(c, element)
+            if (row == 0) then
+               inputs(:, c) = 0.0_wp
+               cycle
+            end if
+            call self%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), vector, &
+                                           inputs(:, c))
+            if (p%order(c) > 0) call take_rate(self, is_stuck, self%rate_unit(p), inputs(:, c))
+            if (.not. p%takes_balance) cycle
+            place = self%place(self%incidence%coordinate_of(row))
+            if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
+         end do
+      end associate
    end subroutine gather_inputs
 
-   !> Derivative by tau in place; the mean of a stuck pair stays, see hold_stuck_means.
-   subroutine differentiate_inputs(self, keep_mean, inputs)
+   !> Derivative in place, unit times that by tau; the mean of a stuck pair stays, see
+   !> hold_stuck_means.
+   subroutine take_rate(self, keep_mean, unit, inputs)
       type(hbm_system), intent(in) :: self
       logical, intent(in) :: keep_mean
+      real(wp), intent(in) :: unit
       real(wp), intent(inout) :: inputs(:)
       real(wp) :: cosine, n
       integer :: h, k
 
       do h = 1, self%fourier%n_retained
          k = self%fourier%column(h)
-         n = real(self%fourier%harmonic(h), wp)
+         n = unit*real(self%fourier%harmonic(h), wp)
          if (self%fourier%harmonic(h) == 0) then
             if (.not. keep_mean) inputs(k) = 0.0_wp
             cycle
@@ -405,22 +465,26 @@ contains
          inputs(k) = n*inputs(k + 1)
          inputs(k + 1) = -n*cosine
       end do
-   end subroutine differentiate_inputs
+   end subroutine take_rate
 
-   !> Pairs may share coordinates (penalty), so that this stays in one thread.
-   subroutine add_outputs(self)
-      type(hbm_system), intent(inout) :: self
+   !> rows = rows + B^T outputs of a law. Elements may share coordinates, so that this stays in one
+   !> thread.
+   subroutine add_outputs(self, entry, work, map, n_mapped, rows)
+      type(hbm_system), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      real(wp), intent(inout) :: rows(:, :)
       integer :: i, c, nc
 
       nc = self%fourier%n_coefficients
-      do i = 1, self%contact%n_pairs
-         if (self%contact%linear_state(i) == pair_open) cycle
-         do c = 1, 3
-            if (self%joint%row(c, i) == 0) cycle
-            call self%incidence%scatter_row(self%joint%row(c, i), self%place, self%n_active, &
-                                            size(self%active_out, 1), 1.0_wp, &
-                                            self%pair_out((c - 1)*nc + 1:c*nc, i), &
-                                            self%active_out)
+      do i = 1, size(entry%row, 2)
+         if (work%linear_state(i) == pair_open) cycle
+         do c = 1, size(entry%row, 1)
+            if (entry%row(c, i) == 0) cycle
+            call self%incidence%scatter_row(entry%row(c, i), map, n_mapped, size(rows, 1), 1.0_wp, &
+                                            work%output((c - 1)*nc + 1:c*nc, i), rows)
          end do
       end do
    end subroutine add_outputs

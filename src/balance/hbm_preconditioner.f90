@@ -1,9 +1,8 @@
 !> The preconditioner of the linear problem of a Newton step: per harmonic, in single precision, for
 !> the coordinates that were active when it was built.
 submodule(fw_hbm) fw_hbm_preconditioner
-   use fw_forces, only: pair_mixed
-   use fw_forces, only: pair_open
-   use fw_forces, only: pair_stuck
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_open
    use fw_kinds, only: sp
    implicit none (type, external)
 
@@ -15,17 +14,18 @@ contains
 
    !> Per harmonic, the matrix with each G replaced by its mean over cosine and sine.
    module procedure build_preconditioner
-      integer :: h
+      integer :: h, k
 
-      !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
+      !$omp parallel do default(none) shared(self) private(h, k) schedule(dynamic) &
       !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
          call self%preconditioner(h)%reserve(self%n_active, largest_diagonal(self, h))
          associate (m => self%preconditioner(h)%matrix, na => self%n_active, &
                     scale => self%preconditioner(h)%scale)
             m(:na, :na) = cmplx(scale*self%active_stiffness(:na, :na, h), kind=sp)
-            call add_mean_springs(self, h, scale, m)
-            call add_mean_contact(self, h, scale, m)
+            do k = 1, self%forces%n_laws
+               call add_mean_forces(self, self%forces%entry(k), self%work(k), h, scale, m)
+            end do
             if (allocated(self%shift)) then
                m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
             end if
@@ -59,14 +59,18 @@ contains
          place = self%place(self%preconditioned(k))
          if (place > 0 .and. place <= self%n_active) self%kept_place(place) = k
       end do
-      ! Without rigid laws no coordinate joins or leaves, and pairs may share them.
-      if (.not. self%rigid) return
-      do i = 1, self%contact%n_pairs
-         do c = 1, 3
-            if (self%joint%row(c, i) == 0) cycle
-            place = self%place(self%coordinate_of(c, i))
-            if (place > 0) self%unknown_stiffness(place) = self%stiffness(i, c)
-         end do
+      ! Only where a law takes the balance do coordinates join and leave; no others share them.
+      do k = 1, self%forces%n_laws
+         associate (p => self%forces%entry(k)%law%prediction, row => self%forces%entry(k)%row)
+            if (.not. p%takes_balance) cycle
+            do i = 1, size(row, 2)
+               do c = 1, size(row, 1)
+                  if (row(c, i) == 0) cycle
+                  place = self%place(self%incidence%coordinate_of(row(c, i)))
+                  if (place > 0) self%unknown_stiffness(place) = p%stiffness(i, c)
+               end do
+            end do
+         end associate
       end do
    end procedure place_kept
 
@@ -98,26 +102,10 @@ contains
       end if
    end function mean_block
 
-   subroutine add_mean_springs(self, h, scale, m)
+   subroutine add_mean_forces(self, entry, work, h, scale, m)
       type(hbm_system), intent(in) :: self
-      integer, intent(in) :: h
-      real(wp), intent(in) :: scale
-      complex(sp), intent(inout) :: m(:, :)
-      integer :: i, k
-      complex(wp) :: mean
-
-      k = self%fourier%column(h)
-      associate (row => self%joint%spring_row)
-         do i = 1, self%springs%n_springs
-            mean = scale*mean_block(self%springs%jacobian(:, :, i), self%fourier%harmonic(h), k, k)
-            call self%incidence%add_mapped_block(row(i), row(i), h, self%place, self%n_active, &
-                                                 mean, m)
-         end do
-      end associate
-   end subroutine add_mean_springs
-
-   subroutine add_mean_contact(self, h, scale, m)
-      type(hbm_system), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
       integer, intent(in) :: h
       real(wp), intent(in) :: scale
       complex(sp), intent(inout) :: m(:, :)
@@ -126,49 +114,52 @@ contains
 
       k = self%fourier%column(h)
       nc = self%fourier%n_coefficients
-      do i = 1, self%contact%n_pairs
-         if (self%contact%linear_state(i) == pair_open) cycle
-         do c_out = 1, 3
-            if (self%joint%row(c_out, i) == 0) cycle
-            do c_in = 1, 3
-               if (self%joint%row(c_in, i) == 0) cycle
-               if (self%contact%linear_state(i) == pair_mixed) then
-                  mean = mean_block(self%contact%jacobian(:, :, i), self%fourier%harmonic(h), &
+      do i = 1, size(entry%row, 2)
+         if (work%linear_state(i) == pair_open) cycle
+         do c_out = 1, size(entry%row, 1)
+            if (entry%row(c_out, i) == 0) cycle
+            do c_in = 1, size(entry%row, 1)
+               if (entry%row(c_in, i) == 0) cycle
+               if (work%linear_state(i) == pair_mixed) then
+                  mean = mean_block(work%jacobian(:, :, i), self%fourier%harmonic(h), &
                                     (c_in - 1)*nc + k, (c_out - 1)*nc + k)
                else
                   mean = merge(one, zero, c_in == c_out)
                end if
-               call add_rows(self, h, i, c_out, c_in, scale*mean, m)
+               call add_rows(self, entry, h, i, c_out, c_in, work%linear_state(i) == pair_stuck, &
+                             scale*mean, m)
             end do
          end do
       end do
-   end subroutine add_mean_contact
+   end subroutine add_mean_forces
 
-   !> m(out, :) = m(out, :) + mean (eps e_in - A(in, :)), or + mean k e_in.
-   subroutine add_rows(self, h, pair, c_out, c_in, mean, m)
+   !> m(out, :) = m(out, :) + mean (k d e_in - A(in, :)), without A where the balance is not taken.
+   subroutine add_rows(self, entry, h, element, c_out, c_in, is_stuck, mean, m)
       type(hbm_system), intent(in) :: self
-      integer, intent(in) :: h, pair, c_out, c_in
+      type(force_entry), intent(in) :: entry
+      integer, intent(in) :: h, element, c_out, c_in
+      logical, intent(in) :: is_stuck
       complex(wp), intent(in) :: mean
       complex(sp), intent(inout) :: m(:, :)
       integer :: p_out, p_in, n
       complex(wp) :: factor
 
-      ! d/dtau is a factor i n of the complex coefficient uc - i us.
-      n = self%fourier%harmonic(h)
-      factor = one
-      if (self%velocity_level .and. c_in < 3) factor = cmplx(0.0_wp, n, wp)
-      if (n == 0 .and. self%contact%linear_state(pair) == pair_stuck) factor = one
-      associate (row => self%joint%row, na => self%n_active)
-         if (self%rigid) then
-            p_out = self%place(self%coordinate_of(c_out, pair))
-            p_in = self%place(self%coordinate_of(c_in, pair))
+      associate (p => entry%law%prediction, row => entry%row(:, element), na => self%n_active)
+         ! d/dtau is a factor i n of the complex coefficient uc - i us.
+         n = self%fourier%harmonic(h)
+         factor = one
+         if (p%order(c_in) > 0) factor = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
+         if (n == 0 .and. is_stuck) factor = one
+         if (p%takes_balance) then
+            p_out = self%place(self%incidence%coordinate_of(row(c_out)))
+            p_in = self%place(self%incidence%coordinate_of(row(c_in)))
             if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then
                m(p_out, :na) = cmplx(m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h), &
                                      kind=sp)
             end if
          end if
-         call self%incidence%add_mapped_block(row(c_out, pair), row(c_in, pair), h, self%place, &
-                                              na, self%stiffness(pair, c_in)*factor*mean, m)
+         call self%incidence%add_mapped_block(row(c_out), row(c_in), h, self%place, na, &
+                                              p%stiffness(element, c_in)*factor*mean, m)
       end associate
    end subroutine add_rows
 

@@ -194,7 +194,7 @@ contains
    pure subroutine add_block(self, row, h, stiffness, matrix)
       class(incidence_type), intent(in) :: self
       integer, intent(in) :: row, h
-      real(wp), intent(in) :: stiffness
+      complex(wp), intent(in) :: stiffness
       complex(wp), intent(inout) :: matrix(:, :)
       integer :: e, f
 

@@ -4,11 +4,12 @@ module fw_joint
    use fw_kinds, only: wp
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: spring_type
-   use fw_contact_data, only: law_penalty
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
+   use fw_force_law, only: law_facts
+   use fw_laws, only: facts_of
    use fw_model, only: model_type
    use fw_relative, only: relative_type
    use fw_relative, only: new_relative
@@ -22,8 +23,6 @@ module fw_joint
       type(relative_type) :: relative
       !> Row of each component of each pair, 0 where it is absent or can never move (3, n_pairs).
       integer, allocatable :: row(:, :)
-      !> The same in the order of forces: all first components, then the others (3 n_pairs).
-      integer, allocatable :: pair_rows(:)
       !> Row of each spring (n_springs).
       integer, allocatable :: spring_row(:)
       !> Components that nothing ever moves (3, n_pairs), and how many of them were dropped.
@@ -67,7 +66,6 @@ contains
             side_2 = [side_2, contact%side_2(c, i)]
          end do
       end do
-      self%pair_rows = reshape(transpose(self%row), [3*contact%n_pairs])
       self%spring_row = [(n_rows + i, i=1, springs%n_springs)]
       if (springs%n_springs > 0) then
          side_1 = [side_1, springs%side_1]
@@ -126,15 +124,19 @@ contains
 
    !> Half-wave symmetry is exact where nothing static acts, normal loads are constant, springs
    !> are odd, and no pair carries a static force over from an earlier point of the sweep.
-   pure logical function symmetric(model, contact, springs, joint)
+   logical function symmetric(model, contact, springs, joint)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       type(spring_type), intent(in) :: springs
       type(joint_type), intent(in) :: joint
+      type(law_facts) :: facts
 
       symmetric = all(abs(model%load_static) <= 0.0_wp)
-      if (contact%n_pairs > 0) symmetric = symmetric .and. &
-         all(joint%row(3, :) == 0) .and. contact%memory /= memory_carried
+      if (contact%n_pairs > 0) then
+         facts = facts_of(contact%law)
+         symmetric = symmetric .and. facts%is_odd .and. all(joint%row(3, :) == 0) .and. &
+                     contact%memory /= memory_carried
+      end if
       if (springs%n_springs > 0) symmetric = symmetric .and. all(modulo(springs%power, 2) == 1)
    end function symmetric
 
@@ -144,9 +146,11 @@ contains
       type(joint_type), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
       character(*), parameter :: component(*) = [character(2) :: 't1', 't2', 'n']
+      type(law_facts) :: facts
       integer :: i, c
 
-      if (contact%law == law_penalty) return
+      facts = facts_of(contact%law)
+      if (.not. facts%needs_independent) return
       do i = 1, contact%n_pairs
          do c = 1, 3
             if (self%row(c, i) == 0) cycle

@@ -20,21 +20,20 @@ contains
       real(wp) :: share
       type(fourier_type) :: kept
       real(wp) :: all_power, kept_power
-      integer :: n_time
+      integer :: k, n_time
 
       n_time = system%fourier%n_time
       kept = new_fourier(min(n_harmonics, (n_time - 1)/2), n_time)
       all_power = 0.0_wp
       kept_power = 0.0_wp
-      if (system%contact%n_pairs > 0) then
-         call system%contact%sample()
-         call add_power(kept, 3*system%contact%n_pairs, n_time, system%contact%force_time, &
-                        all_power, kept_power)
-      end if
-      if (system%springs%n_springs > 0) then
-         call add_power(kept, system%springs%n_springs, n_time, system%springs%force_time, &
-                        all_power, kept_power)
-      end if
+      do k = 1, system%forces%n_laws
+         associate (law => system%forces%entry(k)%law, work => system%work(k))
+            if (law%n_elements == 0) cycle
+            call law%sample(work)
+            call add_power(kept, law%n_elements*law%n_components, n_time, work%force_time, &
+                           all_power, kept_power)
+         end associate
+      end do
       share = 0.0_wp
       if (all_power > kept_power) then
          share = sqrt((all_power - kept_power)/max(all_power, 0.5_wp*system%reference**2))

@@ -44,7 +44,7 @@ contains
          end if
       end do
       point%amplitude = [(largest_magnitude(point%coefficients(:, i)), i=1, n_observed)]
-      if (with_contact .and. system%contact%n_pairs > 0) call recover_contact(system, x, &
+      if (with_contact .and. system%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
    end subroutine recover_point
 
@@ -97,19 +97,21 @@ contains
       type(point_type), intent(inout) :: point
       type(fourier_type) :: all_harmonics
       real(wp), allocatable :: force(:, :, :)
-      integer :: n_pairs, h, k, n
+      integer :: n_pairs, pairs, h, k, n
 
-      n_pairs = system%contact%n_pairs
+      n_pairs = system%n_pairs
+      pairs = system%forces%pairs
       allocate (force(n_pairs, 3, coefficient_count(n_harmonics)))
       if (system%fourier%n_retained <= n_harmonics) then
          all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
-         call system%contact%coefficients(system%fourier, all_harmonics, force)
+         call system%forces%entry(pairs)%law%coefficients(system%work(pairs), system%fourier, &
+                                                          all_harmonics, force)
       end if
       do h = 1, system%fourier%n_retained
          n = system%fourier%harmonic(h)
          do k = 0, merge(0, 1, n == 0)
             force(:, :, max(1, 2*n) + k) = &
-               system%contact%force(:, :, system%fourier%column(h) + k)
+               system%work(pairs)%force(:, :, system%fourier%column(h) + k)
          end do
       end do
       allocate (point%force(3, n_pairs, size(force, 3)))
@@ -117,7 +119,7 @@ contains
          point%force(:, :, k) = transpose(force(:, :, k))
       end do
       allocate (point%fraction(3, n_pairs))
-      call system%contact%fractions(point%fraction)
+      call system%forces%entry(pairs)%law%fractions(system%work(pairs), point%fraction)
       call dissipated_energy(system, size(system%balance, 1), x, point)
    end subroutine recover_contact
 
@@ -127,17 +129,17 @@ contains
       integer, intent(in) :: m
       real(wp), intent(in) :: q(m, *)
       type(point_type), intent(inout) :: point
-      real(wp) :: u(system%contact%n_pairs, 3, system%fourier%n_coefficients)
+      real(wp) :: u(system%n_pairs, 3, system%fourier%n_coefficients)
       integer :: i, h, k
 
-      allocate (point%dissipation(system%contact%n_pairs), source=0.0_wp)
-      call system%incidence%gather(system%joint%pair_rows, m, system%fourier%n_coefficients, &
-                                   q, u)
-      associate (f => system%contact%force)
+      allocate (point%dissipation(system%n_pairs), source=0.0_wp)
+      associate (f => system%work(system%forces%pairs)%force, &
+                 rows => system%forces%entry(system%forces%pairs)%rows)
+         call system%incidence%gather(rows, m, system%fourier%n_coefficients, q, u)
          do h = 1, system%fourier%n_retained
             if (system%fourier%harmonic(h) == 0) cycle
             k = system%fourier%column(h)
-            do i = 1, system%contact%n_pairs
+            do i = 1, system%n_pairs
                point%dissipation(i) = point%dissipation(i) + pi*system%fourier%harmonic(h)* &
                                       sum(f(i, :, k)*u(i, :, k + 1) - f(i, :, k + 1)*u(i, :, k))
             end do
@@ -154,9 +156,9 @@ contains
       type(point_type), intent(inout) :: point
       type(fourier_type) :: all_harmonics
       real(wp), allocatable :: slip(:, :), slip_time(:, :)
-      integer :: k, n_pairs, n_time
+      integer :: k, n_pairs, n_time, pairs
 
-      n_pairs = system%contact%n_pairs
+      n_pairs = system%n_pairs
       n_time = system%fourier%n_time
       all_harmonics = new_fourier(n_harmonics, n_time)
       point%history = matmul(transpose(all_harmonics%synthesis), point%coefficients)
@@ -167,10 +169,11 @@ contains
                                    system%fourier%n_coefficients, q, slip)
       slip_time = matmul(slip, system%fourier%synthesis)
       point%slip_history = reshape(slip_time, [3, n_pairs, n_time])
-      call system%contact%sample()
+      pairs = system%forces%pairs
+      call system%forces%entry(pairs)%law%sample(system%work(pairs))
       allocate (point%force_history(3, n_pairs, n_time))
       do k = 1, n_time
-         point%force_history(:, :, k) = transpose(system%contact%force_time(:, :, k))
+         point%force_history(:, :, k) = transpose(system%work(pairs)%force_time(:, :, k))
       end do
    end subroutine recover_histories
 

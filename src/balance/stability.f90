@@ -77,7 +77,7 @@ contains
       if (allocated(error)) return
       call new_history(system, x, history)
       n_harmonics = chosen_harmonics(system, basis)
-      if (n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%contact%n_pairs)])) then
+      if (n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%n_pairs)])) then
          call marched_multipliers(system, basis, history, multipliers, error)
          if (allocated(error)) return
       else
@@ -102,7 +102,8 @@ contains
       integer, intent(in) :: n_dof
       type(error_type), allocatable, intent(out) :: error
 
-      if (system%rigid .and. system%contact%n_pairs > 0) then
+      if (system%n_pairs > 0 .and. &
+          .not. system%forces%entry(system%forces%pairs)%law%facts%has_multipliers) then
          call fatal_error(error, '&sweep stability needs law = ''penalty'' in &contact: forces '// &
                           'of rigid contact are no function of the displacements', status_input)
       else if (system%joint%n_idle > 0) then

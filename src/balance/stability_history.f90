@@ -1,13 +1,16 @@
 !> The nonlinear forces along one period of a solution, and their derivatives at each instant: what
 !> the march of a perturbation needs. Rows are those of the joint.
 module fw_stability_history
-   use fw_forces, only: forces_type
-   use fw_forces, only: new_forces
-   use fw_forces, only: pair_mixed
+   use fw_force_law, only: force_law
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: pair_mixed
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
+   use fw_friction, only: elastic_friction
+   use fw_friction, only: friction_law
    use fw_hbm, only: hbm_system
    use fw_kinds, only: wp
+   use fw_pair_law, only: pair_law
    use fw_stability_tangent, only: relative_displacements
    implicit none (type, external)
    private
@@ -20,15 +23,17 @@ module fw_stability_history
 
    type :: history_type
       integer :: n_time = 0
-      !> Row of each component, 0 where there is none (3, n_pairs), and of each spring.
-      integer, allocatable :: row(:, :), spring_row(:)
-      !> Prediction stiffness of each row, 0 of springs (n_rows) [force/length].
+      !> Row of each component, 0 where there is none (3, n_pairs), and of each element whose force
+      !> depends on the displacement at the instant alone.
+      integer, allocatable :: row(:, :), pointwise_row(:)
+      !> Prediction stiffness of each row of the pairs, 0 of others (n_rows) [force/length].
       real(wp), allocatable :: stiffness(:)
       !> Tangential rows of pairs that slip, which remember their position (n_rows).
       logical, allocatable :: remembers(:)
       !> Pairs along the period.
-      type(forces_type) :: forces
-      !> Slopes of the springs (n_springs, n_time).
+      type(friction_law) :: law
+      type(force_workspace) :: forces
+      !> Slopes of the other elements (as pointwise_row, n_time).
       real(wp), allocatable :: slope(:, :)
    contains
       procedure :: rubs
@@ -43,7 +48,7 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       type(history_type), intent(out) :: self
       type(fourier_type) :: fourier
-      real(wp), allocatable :: rows(:, :), elongation(:)
+      real(wp), allocatable :: rows(:, :)
       integer :: i, c, h
 
       h = maxval(system%fourier%harmonic)
@@ -51,29 +56,64 @@ contains
       fourier = new_fourier(h, self%n_time)
       call relative_displacements(system, system%structure%n_coordinates, x, h, rows)
       self%row = system%joint%row
-      self%spring_row = system%joint%spring_row
       allocate (self%stiffness(size(rows, 2)), source=0.0_wp)
       allocate (self%remembers(size(rows, 2)), source=.false.)
-      self%forces = new_forces(system%contact%mu, self%row > 0, fourier)
-      do i = 1, system%contact%n_pairs
-         do c = 1, 3
-            if (self%row(c, i) == 0) cycle
-            self%stiffness(self%row(c, i)) = system%stiffness(i, c)
-            self%forces%prediction(i, c, :) = system%stiffness(i, c)*rows(:, self%row(c, i))
+      call take_law(system%forces%entry(system%forces%pairs)%law, self%law)
+      call self%law%reserve(fourier, self%forces)
+      associate (p => self%law%prediction)
+         do i = 1, system%n_pairs
+            do c = 1, 3
+               if (self%row(c, i) == 0) cycle
+               self%stiffness(self%row(c, i)) = p%stiffness(i, c)
+               self%forces%prediction(i, c, :) = p%stiffness(i, c)*rows(:, self%row(c, i))
+            end do
+         end do
+      end associate
+      self%forces%x_start = system%work(system%forces%pairs)%x_start
+      call self%law%set_offset(system%depth, self%forces)
+      call self%law%evaluate(fourier, self%forces)
+      call find_memory(self)
+      call take_slopes(system, rows, fourier, self)
+   end subroutine new_history
+
+   !> The pairs of a law, decided at instants whatever the balance does.
+   subroutine take_law(law, at_instants)
+      class(force_law), intent(in) :: law
+      type(friction_law), intent(out) :: at_instants
+
+      at_instants = elastic_friction()
+      select type (law)
+      class is (pair_law)
+         call at_instants%take_pairs(law%mu, law%present)
+      end select
+      at_instants%prediction = law%prediction
+   end subroutine take_law
+
+   !> Slopes of the laws other than that of the pairs.
+   subroutine take_slopes(system, rows, fourier, self)
+      class(hbm_system), intent(in) :: system
+      real(wp), intent(in) :: rows(:, :)
+      type(fourier_type), intent(in) :: fourier
+      type(history_type), intent(inout) :: self
+      real(wp), allocatable :: elongation(:)
+      integer :: i, k, n
+
+      allocate (self%pointwise_row(0))
+      do k = 1, system%forces%n_laws
+         if (k == system%forces%pairs) cycle
+         self%pointwise_row = [self%pointwise_row, system%forces%entry(k)%row(1, :)]
+      end do
+      allocate (self%slope(size(self%pointwise_row), self%n_time))
+      n = 0
+      do k = 1, system%forces%n_laws
+         if (k == system%forces%pairs) cycle
+         do i = 1, size(system%forces%entry(k)%row, 2)
+            n = n + 1
+            elongation = matmul(rows(:, self%pointwise_row(n)), fourier%synthesis)
+            self%slope(n, :) = system%forces%entry(k)%law%slope_at(i, elongation)
          end do
       end do
-      self%forces%x_start = system%contact%x_start
-      self%forces%offset = merge(system%stiffness(:, 3)*(system%gap + system%depth), &
-                                 -system%normal_load, self%row(3, :) > 0)
-      call self%forces%evaluate(fourier)
-      call find_memory(self)
-      allocate (self%slope(system%springs%n_springs, self%n_time))
-      do i = 1, system%springs%n_springs
-         elongation = matmul(rows(:, self%spring_row(i)), fourier%synthesis)
-         self%slope(i, :) = system%springs%coefficient(i)*real(system%springs%power(i), wp)* &
-                            elongation**(system%springs%power(i) - 1)
-      end do
-   end subroutine new_history
+   end subroutine take_slopes
 
    !> Positions that slip or open pairs set anew. That of a pair that sticks throughout stays
    !> where it was put: a multiplier of exactly 1, which says nothing and is left out.
@@ -94,7 +134,7 @@ contains
       class(history_type), intent(in) :: self
       integer, intent(in) :: pair
 
-      rubs = self%forces%mu(pair) > 0.0_wp .and. any(self%row(1:2, pair) > 0) .and. &
+      rubs = self%law%mu(pair) > 0.0_wp .and. any(self%row(1:2, pair) > 0) .and. &
              self%forces%state(pair) == pair_mixed
    end function rubs
 
@@ -111,8 +151,8 @@ contains
       by_u = 0.0_wp
       by_x = 0.0_wp
       keeps = .false.
-      do i = 1, size(self%spring_row)
-         by_u(self%spring_row(i), self%spring_row(i)) = self%slope(i, k)
+      do i = 1, size(self%pointwise_row)
+         by_u(self%pointwise_row(i), self%pointwise_row(i)) = self%slope(i, k)
       end do
       before = modulo(k - 2, self%n_time) + 1
       do i = 1, size(self%row, 2)
@@ -122,9 +162,9 @@ contains
          d = self%forces%prediction_time(i, 1:2, k) - &
              (self%forces%prediction_time(i, 1:2, before) - self%forces%force_time(i, 1:2, before))
          length = norm2(d)
-         if (length > self%forces%mu(i)*p) then
-            call slip(self, i, self%forces%mu(i)*p/length, d/length, by_u, by_x)
-         else if (self%forces%mu(i) > 0.0_wp) then
+         if (length > self%law%mu(i)*p) then
+            call slip(self, i, self%law%mu(i)*p/length, d/length, by_u, by_x)
+         else if (self%law%mu(i) > 0.0_wp) then
             call stick(self, i, by_u, by_x, keeps)
          end if
          if (self%row(3, i) > 0) then
@@ -171,7 +211,7 @@ contains
             by_u(row, column) = turn*self%stiffness(column)
             by_x(row, column) = -turn
          end do
-         if (normal > 0) by_u(row, normal) = -self%forces%mu(pair)*e(c)*self%stiffness(normal)
+         if (normal > 0) by_u(row, normal) = -self%law%mu(pair)*e(c)*self%stiffness(normal)
       end do
    end subroutine slip
 

@@ -8,7 +8,7 @@
 !>
 !> Friction that slips depends on the past and has no place here: see fw_stability_march.
 module fw_stability_tangent
-   use fw_forces, only: pair_stuck
+   use fw_force_law, only: pair_stuck
    use fw_fourier, only: coefficient_count
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
@@ -46,18 +46,18 @@ contains
       integer, intent(in) :: n_harmonics
       type(tangent_type), intent(out) :: self
       real(wp), allocatable :: rows(:, :)
-      integer :: i, n_terms
+      integer :: k, n_terms
 
       self%n_harmonics = n_harmonics
       self%n_coefficients = coefficient_count(n_harmonics)
-      n_terms = system%springs%n_springs
-      do i = 1, system%contact%n_pairs
-         n_terms = n_terms + count(system%joint%row(:, i) > 0)
+      n_terms = 0
+      do k = 1, system%forces%n_laws
+         n_terms = n_terms + count(system%forces%entry(k)%row > 0)
       end do
       allocate (self%row(n_terms))
       allocate (self%block(self%n_coefficients, self%n_coefficients, n_terms))
       call relative_displacements(system, system%structure%n_coordinates, x, n_harmonics, rows)
-      call add_springs(system, rows, self)
+      call add_pointwise(system, rows, self)
       call add_gaps(system, rows, self)
       call add_stuck(system, state, self)
    end subroutine new_tangent
@@ -85,24 +85,29 @@ contains
       end associate
    end subroutine relative_displacements
 
-   subroutine add_springs(system, rows, self)
+   !> Laws other than that of the pairs, whose force depends on the displacement at the instant.
+   subroutine add_pointwise(system, rows, self)
       class(hbm_system), intent(in) :: system
       real(wp), intent(in) :: rows(:, :)
       type(tangent_type), intent(inout) :: self
       type(fourier_type) :: fourier
-      real(wp), allocatable :: slope(:)
-      integer :: i, row, power
+      real(wp), allocatable :: elongation(:)
+      integer :: i, k, row
 
-      do i = 1, system%springs%n_springs
-         row = system%joint%spring_row(i)
-         power = system%springs%power(i)
-         ! Exact: the slope has power - 1 times the harmonics, the block adds two times H'.
-         fourier = new_fourier(self%n_harmonics, max(4, power + 1)*self%n_harmonics + 2)
-         slope = matmul(rows(:, row), fourier%synthesis)
-         slope = system%springs%coefficient(i)*real(power, wp)*slope**(power - 1)
-         call add_multiplication(fourier, slope, row, self)
+      do k = 1, system%forces%n_laws
+         if (k == system%forces%pairs) cycle
+         associate (law => system%forces%entry(k)%law)
+            ! Exact: the slope has power - 1 times the harmonics, the block adds two times H'.
+            fourier = new_fourier(self%n_harmonics, &
+                                  max(4, law%facts%instants_per_harmonic)*self%n_harmonics + 2)
+            do i = 1, law%n_elements
+               row = system%forces%entry(k)%row(1, i)
+               elongation = matmul(rows(:, row), fourier%synthesis)
+               call add_multiplication(fourier, law%slope_at(i, elongation), row, self)
+            end do
+         end associate
       end do
-   end subroutine add_springs
+   end subroutine add_pointwise
 
    !> Pairs that bear without friction.
    subroutine add_gaps(system, rows, self)
@@ -115,23 +120,27 @@ contains
 
       fourier = new_fourier(self%n_harmonics, 4*self%n_harmonics + 2)
       wide = new_fourier(2*self%n_harmonics, 4*self%n_harmonics + 2)
-      do i = 1, system%contact%n_pairs
-         row = system%joint%row(3, i)
-         if (row == 0 .or. has_friction(system, i)) cycle
-         gap = rows(:, row)
-         gap(1) = gap(1) + system%gap(i) + system%depth(i)
-         ! Harmonics above 2 H' of the slope couple nothing.
-         slope = matmul(closed_share(gap, 2*self%n_harmonics), wide%synthesis)
-         slope = system%stiffness(i, 3)*slope
-         call add_multiplication(fourier, slope, row, self)
-      end do
+      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+         do i = 1, system%n_pairs
+            row = system%joint%row(3, i)
+            if (row == 0 .or. has_friction(system, i)) cycle
+            gap = rows(:, row)
+            gap(1) = gap(1) + p%gap(i) + system%depth(i)
+            ! Harmonics above 2 H' of the slope couple nothing.
+            slope = matmul(closed_share(gap, 2*self%n_harmonics), wide%synthesis)
+            slope = p%stiffness(i, 3)*slope
+            call add_multiplication(fourier, slope, row, self)
+         end do
+      end associate
    end subroutine add_gaps
 
    pure logical function has_friction(system, pair)
       class(hbm_system), intent(in) :: system
       integer, intent(in) :: pair
 
-      has_friction = system%contact%mu(pair) > 0.0_wp .and. any(system%joint%row(1:2, pair) > 0)
+      associate (law => system%forces%entry(system%forces%pairs)%law)
+         has_friction = law%slope_at_rest(pair, 1) > 0.0_wp .or. law%slope_at_rest(pair, 2) > 0.0_wp
+      end associate
    end function has_friction
 
    !> The operator of a product with slope(tau), projected: a term from a row to itself.
@@ -220,7 +229,7 @@ contains
       type(tangent_type), intent(inout) :: self
       integer :: i, c, j
 
-      do i = 1, system%contact%n_pairs
+      do i = 1, system%n_pairs
          if (.not. has_friction(system, i) .or. state(i) /= pair_stuck) cycle
          do c = 1, 3
             if (system%joint%row(c, i) == 0) cycle
@@ -228,7 +237,8 @@ contains
             self%row(self%n_terms) = system%joint%row(c, i)
             self%block(:, :, self%n_terms) = 0.0_wp
             do j = 1, self%n_coefficients
-               self%block(j, j, self%n_terms) = system%stiffness(i, c)
+               self%block(j, j, self%n_terms) = &
+                  system%forces%entry(system%forces%pairs)%law%prediction%stiffness(i, c)
             end do
          end do
       end do

@@ -85,9 +85,10 @@ contains
       end if
       call need(self, case, self%current, self%doublings, error)
       if (allocated(error)) return
-      associate (contact => self%level(self%current, self%doublings)%system%contact)
-         if (allocated(contact%events)) self%factor_time = merge(factor_planar, 0.0_wp, &
-                                                                 contact%two_directions)
+      associate (system => self%level(self%current, self%doublings)%system)
+         if (system%forces%entry(system%forces%pairs)%law%facts%follows_events) then
+            self%factor_time = merge(factor_planar, 0.0_wp, any(system%joint%row(2, :) > 0))
+         end if
       end associate
    end subroutine start
 

@@ -194,9 +194,11 @@ contains
       type(hbm_system), intent(in) :: system
 
       scale = 0.0_wp
-      if (any(system%stiffness > 0.0_wp)) then
-         scale = system%reference/maxval(system%stiffness)
-      end if
+      associate (stiffness => system%forces%entry(system%forces%pairs)%law%prediction%stiffness)
+         if (any(stiffness > 0.0_wp)) then
+            scale = system%reference/maxval(stiffness)
+         end if
+      end associate
    end function displacement_scale
 
    !> What is known of a point of the curve.

@@ -68,7 +68,7 @@ contains
       if (.not. held_without_friction(system)) then
          reason = 'the joint cannot carry its static load while it slides, for only '// &
                   'friction holds it: '//reason//'; it needs more preload, friction or support'
-      else if (system%rigid) then
+      else if (system%forces%entry(system%forces%pairs)%law%prediction%takes_balance) then
          reason = reason//'; try another penalty_scale (0.3 or 3), '//trim(finer(system))// &
                   ', or a sweep that starts where the response is small; an undamped resonance '// &
                   'needs damping'
@@ -85,7 +85,9 @@ contains
       character(16) :: advice
 
       advice = 'more n_time'
-      if (allocated(system%contact%events)) advice = 'more n_harmonics'
+      if (system%forces%entry(system%forces%pairs)%law%facts%follows_events) then
+         advice = 'more n_harmonics'
+      end if
    end function finer
 
    !> By halves of the interval between a share that has a solution and one that has none.

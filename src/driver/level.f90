@@ -120,7 +120,9 @@ contains
 
       call carry_solution(source%system, source%solver%last, self%system, x)
       call self%solver%know(x, source%solver%omega_last)
-      self%system%contact%x_start = source%system%contact%x_start
+      associate (pairs => source%system%forces%pairs)
+         self%system%work(pairs)%x_start = source%system%work(pairs)%x_start
+      end associate
    end subroutine take_over
 
 end module fw_level

@@ -121,7 +121,9 @@ contains
          if (allocated(error)) return
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then
-         system%contact%x_start = system%contact%x
+         associate (contact => system%work(system%forces%pairs))
+            contact%x_start = contact%x
+         end associate
       end if
       call system_clock(clock_end)
       point%seconds = real(clock_end - clock, wp)/real(rate, wp)

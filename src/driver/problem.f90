@@ -10,6 +10,8 @@ module fw_problem
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
+   use fw_case_forces, only: new_forces
+   use fw_force_list, only: force_list
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
    use fw_fourier, only: fft_pays
@@ -36,10 +38,6 @@ module fw_problem
 
    public :: build_system
 
-   !> Instants per harmonic below which the sampling error exceeds that of the truncation: with
-   !> friction alone, and where pairs may separate or the normal load varies.
-   integer, parameter :: instants_friction = 16, instants_separation = 32
-   integer, parameter :: fewest_instants = 64
    !> Instants at least where the events decide and instants only isolate them.
    integer, parameter :: fewest_for_events = 8, fewest_for_planar = 32
    !> Pairs up to which events serve an accuracy in two tangential directions.
@@ -61,6 +59,7 @@ contains
       type(joint_type) :: joint
       type(fourier_type) :: fourier
       type(condensation_type) :: structure
+      type(force_list) :: forces
       real(wp) :: range(2)
 
       harmonics = case%harmonics
@@ -69,7 +68,9 @@ contains
       skip_idle = case%solver%skips .and. .not. case%sweep%stability
       call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
-      call choose_harmonics(case, harmonics, joint, fourier, error)
+      call new_forces(case%contact, case%springs, joint%row, joint%spring_row, &
+                      locates_events(case, harmonics, joint), harmonics%filter_harmonics, forces)
+      call choose_harmonics(case, harmonics, joint, forces, fourier, error)
       if (allocated(error)) return
       range = case%sweep%start
       if (case%analysis == analysis_frf) then
@@ -83,14 +84,8 @@ contains
       if (allocated(error)) return
       call structure%update(case%sweep%start, error)
       if (allocated(error)) return
-      call new_hbm(joint, structure, fourier, case%contact, case%springs, system)
-      if (locates_events(case, harmonics, joint)) then
-         call system%contact%resolve_events(system%fourier)
-      end if
+      call new_hbm(joint, structure, fourier, forces, case%contact%depth, system)
       system%reduced = case%solver%skips
-      if (harmonics%filter_harmonics > 0) then
-         system%springs%highest_harmonic = harmonics%filter_harmonics
-      end if
       if (case%contact%n_pairs > 0 .and. fft_pays(fourier%n_coefficients)) then
          call system%fourier%prepare_fft(3*case%contact%n_pairs)
       end if
@@ -98,17 +93,18 @@ contains
 
    !> Only odd harmonics where the symmetry is exact, and keeps so at the instants: their number
    !> must be even.
-   subroutine choose_harmonics(case, harmonics, joint, fourier, error)
+   subroutine choose_harmonics(case, harmonics, joint, forces, fourier, error)
       type(case_type), intent(in) :: case
       type(harmonics_options), intent(in) :: harmonics
       type(joint_type), intent(in) :: joint
+      type(force_list), intent(in) :: forces
       type(fourier_type), intent(out) :: fourier
       type(error_type), allocatable, intent(out) :: error
       logical :: odd_only
       integer :: n_time
 
       n_time = harmonics%n_time
-      if (n_time == 0) n_time = automatic_n_time(case, harmonics, joint)
+      if (n_time == 0) n_time = automatic_n_time(case, harmonics, joint, forces)
       ! Only the projection keeps the symmetry of the instants; collocation at an odd number of
       ! them does not.
       odd_only = joint%half_wave_symmetric .and. modulo(n_time, 2) == 0 .and. &
@@ -185,24 +181,20 @@ contains
       n_points = min(max(n_points, fourier%n_coefficients), fourier%n_time)
    end function least_squares_points
 
-   !> Instants per period where the input leaves the choice. Polynomials are sampled without any
-   !> error from (power + 1) H + 1 instants on; for contact see the parameters above.
-   pure integer function automatic_n_time(case, harmonics, joint) result(n_time)
+   !> Instants per period where the input leaves the choice: what the laws need.
+   pure integer function automatic_n_time(case, harmonics, joint, forces) result(n_time)
       type(case_type), intent(in) :: case
       type(harmonics_options), intent(in) :: harmonics
       type(joint_type), intent(in) :: joint
+      type(force_list), intent(in) :: forces
       integer :: h
 
       h = harmonics%n_harmonics
       n_time = 2*h + 1
       if (harmonics%method == method_hdhb) return
-      n_time = 2*h + 2
-      if (case%springs%n_springs > 0) n_time = max(n_time, (maxval(case%springs%power) + 1)*h + 2)
-      if (locates_events(case, harmonics, joint)) then
+      n_time = max(2*h + 2, forces%least_instants(h, separates=any(joint%row(3, :) > 0)))
+      if (forces%entry(forces%pairs)%law%facts%follows_events) then
          n_time = max(n_time, least_events(case, harmonics, is_planar(joint)))
-      else if (case%contact%n_pairs > 0) then
-         n_time = max(n_time, fewest_instants, instants_friction*h)
-         if (any(joint%row(3, :) > 0)) n_time = max(n_time, instants_separation*h)
       end if
       n_time = nint(n_time*2.0_wp**harmonics%doublings)
       n_time = n_time + modulo(n_time, 2)

@@ -117,9 +117,16 @@ contains
    logical function is_lasting(system)
       type(hbm_system), intent(in) :: system
 
-      is_lasting = system%contact%all_periodic()
-      if (system%contact%n_pairs == 0 .or. any(system%springs%power == 1)) return
-      if (is_lasting .and. system%contact%all_open()) is_lasting = held_without_contact(system)
+      integer :: k
+
+      associate (contact => system%work(system%forces%pairs))
+         is_lasting = contact%all_periodic()
+         if (system%n_pairs == 0) return
+         do k = 1, system%forces%n_laws
+            if (system%forces%entry(k)%law%facts%holds_unloaded) return
+         end do
+         if (is_lasting .and. contact%all_open()) is_lasting = held_without_contact(system)
+      end associate
    end function is_lasting
 
    !> With the derivative that the case asks for.
@@ -180,9 +187,11 @@ contains
       call self%whole%set_frequency(system%structure%omega, error)
       if (allocated(error)) return
       ! One and the same law: prediction stiffness, memory and reference of the condensed system.
-      self%whole%stiffness = system%stiffness
+      self%whole%forces = system%forces
       self%whole%depth = system%depth
-      self%whole%contact%x_start = system%contact%x_start
+      associate (pairs => system%forces%pairs)
+         self%whole%work(pairs)%x_start = system%work(pairs)%x_start
+      end associate
       self%whole%reference = system%reference
       allocate (whole_x(self%whole%n))
       call carry_solution(system, x, self%whole, whole_x)

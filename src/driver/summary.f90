@@ -97,7 +97,8 @@ contains
       logical, intent(in) :: all_converged
       integer :: percent
 
-      self%sampling = merge(sampling_events, sampling_uniform, allocated(system%contact%events))
+      self%sampling = merge(sampling_events, sampling_uniform, &
+                            system%forces%entry(system%forces%pairs)%law%facts%follows_events)
       deallocate (self%work)
       allocate (self%work(0))
       call add_line(self%work, 'unknowns', to_text(system%n)//' ('// &
@@ -123,7 +124,7 @@ contains
          call skip(self, 'stuck pairs, '//to_text(percent)// &
                    ' % of the unknowns of the linear problems')
       end if
-      if (linear%n_problems == 0 .and. system%contact%n_pairs > 0 .and. &
+      if (linear%n_problems == 0 .and. system%n_pairs > 0 .and. &
           kind == solver_newton .and. all_converged) then
          call skip(self, 'every linear problem: the joint stays stuck')
       else if (linear%n_empty > 0) then

@@ -9,7 +9,6 @@ module fw_time_response
    use fw_kinds, only: wp
    use fw_case, only: analysis_frf
    use fw_case, only: case_type
-   use fw_contact_data, only: law_dlft_velocity
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -175,13 +174,12 @@ contains
             state%velocity = state%velocity + real(h, wp)*request%omega*c(2*h + 1, :)
          end do
       end associate
-      call take_corrected(self%start_case, self%system, self%structure, balance%converged, state)
+      call take_corrected(self%system, self%structure, balance%converged, state)
    end subroutine initial_state
 
    !> Corrected positions: those of the march where there is one, the displacements themselves
    !> where the law is written in velocities, the unstrained assembly otherwise.
-   subroutine take_corrected(case, system, structure, converged, state)
-      type(case_type), intent(in) :: case
+   subroutine take_corrected(system, structure, converged, state)
       type(hbm_system), intent(in) :: system
       type(time_structure), intent(in) :: structure
       logical, intent(in) :: converged
@@ -190,17 +188,20 @@ contains
 
       allocate (state%corrected(2, structure%n_pairs), source=0.0_wp)
       if (.not. converged) return
-      do i = 1, structure%n_pairs
-         do c = 1, 2
-            r = structure%row(c, i)
-            if (r == 0) cycle
-            if (case%contact%law == law_dlft_velocity) then
-               state%corrected(c, i) = dot_product(structure%rows(:, r), state%displacement)
-            else if (system%stiffness(i, c) > 0.0_wp) then
-               state%corrected(c, i) = system%contact%x(i, c)/system%stiffness(i, c)
-            end if
+      associate (p => system%forces%entry(system%forces%pairs)%law%prediction, &
+                 contact => system%work(system%forces%pairs))
+         do i = 1, structure%n_pairs
+            do c = 1, 2
+               r = structure%row(c, i)
+               if (r == 0) cycle
+               if (p%order(c) > 0) then
+                  state%corrected(c, i) = dot_product(structure%rows(:, r), state%displacement)
+               else if (p%stiffness(i, c) > 0.0_wp) then
+                  state%corrected(c, i) = contact%x(i, c)/p%stiffness(i, c)
+               end if
+            end do
          end do
-      end do
+      end associate
    end subroutine take_corrected
 
 end module fw_time_response

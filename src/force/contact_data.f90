@@ -10,12 +10,7 @@ module fw_contact_data
    private
 
    public :: contact_type, spring_type
-   public :: law_words, law_dlft, law_dlft_velocity, law_penalty
    public :: memory_words, memory_assembly, memory_carried
-
-   character(*), parameter :: law_words(*) = &
-      [character(13) :: 'dlft', 'dlft_velocity', 'penalty']
-   integer, parameter :: law_dlft = 1, law_dlft_velocity = 2, law_penalty = 3
 
    character(*), parameter :: memory_words(*) = [character(8) :: 'assembly', 'carried']
    integer, parameter :: memory_assembly = 1, memory_carried = 2
@@ -23,7 +18,8 @@ module fw_contact_data
    !> Contact pairs (group &contact, /contact of a model file).
    type :: contact_type
       integer :: n_pairs = 0
-      integer :: law = law_dlft
+      !> Which law, a number in `law_words` (fw_laws).
+      integer :: law = 1
       !> Signed dof numbers of (t1, t2, n), 0 where there is none (3, n_pairs).
       integer, allocatable :: side_1(:, :), side_2(:, :)
       !> Friction coefficient (n_pairs).

@@ -1,6 +1,6 @@
 !> The keys of groups &contact and &spring.
 module fw_contact_keys
-   use fw_contact_data, only: contact_type, spring_type, law_words, memory_words
+   use fw_contact_data, only: contact_type, spring_type, memory_words
    use fw_key, only: key
    use fw_key, only: key_visitor
    use fw_key_range, only: above
@@ -8,6 +8,7 @@ module fw_contact_keys
    use fw_key_range, only: dof_numbers
    use fw_key_range, only: from_to
    use fw_kinds, only: wp
+   use fw_laws, only: law_words
    implicit none (type, external)
    private
 

@@ -35,6 +35,8 @@ module fw_force_law
       !> Makes the input of the displacement or its derivative (n_elements, 3 or 1): [force/length]
       !> where y is a force.
       real(wp), allocatable :: stiffness(:, :)
+      !> Multiplies the stiffness that the structure gives a law that takes the balance.
+      real(wp) :: scale = 1.0_wp
       !> Added to the displacement of the last component [length], and what its input is where it
       !> does not exist: minus the dead load [force] (n_elements).
       real(wp), allocatable :: gap(:), load(:)
@@ -51,6 +53,8 @@ module fw_force_law
       logical :: can_stick = .false., can_open = .false.
       !> Forces are determined only where no displacement follows from that of other elements.
       logical :: needs_independent = .false.
+      !> It holds the structure even where it transmits no force (a linear part).
+      logical :: holds_unloaded = .false.
       !> Its paths can be followed from event to event, without instants.
       logical :: has_events = .false.
       !> They are followed so: forces at the instants are there after `sample` only.
@@ -63,8 +67,11 @@ module fw_force_law
       logical :: is_integrated = .false.
       !> Instants below which the sampling error exceeds that of the truncation: in all, for each
       !> harmonic, and for each harmonic where elements may separate or the normal load varies.
+      !> (The defaults are those of friction.)
       integer :: fewest_instants = 64
       integer :: instants_per_harmonic = 16, instants_with_separation = 32
+      !> Beyond those for each harmonic.
+      integer :: further_instants = 0
    end type law_facts
 
    !> Room that only one law knows.
@@ -81,8 +88,6 @@ module fw_force_law
       !> Constant part of the input of the last component: stiffness times gap with the wear depth,
       !> or minus the dead load (n_elements).
       real(wp), allocatable :: offset(:)
-      !> Angular frequency, for derivatives by time [rad/s].
-      real(wp) :: omega = 1.0_wp
       !> Size of the tangential inputs, change of x over the last turn, smallest pressure, turns
       !> of the march (n_elements).
       real(wp), allocatable :: scale(:), drift(:), pressure(:)
@@ -105,6 +110,7 @@ module fw_force_law
       class(law_room), allocatable :: room
    contains
       procedure :: reserve => reserve_workspace
+      procedure :: measure_slip
       procedure :: measure_scale
       procedure :: always_closed
       procedure :: all_open
@@ -132,6 +138,7 @@ module fw_force_law
       procedure :: coefficients
       procedure :: fractions
       procedure :: slope_at_rest
+      procedure :: slope_at
       procedure :: n_parameters
       procedure :: by_parameter
    end type force_law
@@ -159,12 +166,10 @@ module fw_force_law
 contains
 
    !> Room for evaluations; every path starts from x = 0, the unstrained assembly.
-   subroutine reserve_workspace(self, n_elements, n_components, fourier, measures_slip)
+   subroutine reserve_workspace(self, n_elements, n_components, fourier)
       class(force_workspace), intent(inout) :: self
       integer, intent(in) :: n_elements, n_components
       type(fourier_type), intent(in) :: fourier
-      !> Whether sliding and its derivative are wanted.
-      logical, intent(in), optional :: measures_slip
       integer :: n
 
       n = n_elements
@@ -178,12 +183,16 @@ contains
       allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
       allocate (self%turns(n), source=0)
       allocate (self%state(n), self%linear_state(n), source=pair_stuck)
-      if (.not. present(measures_slip)) return
-      self%measures_slip = measures_slip
-      if (.not. measures_slip) return
-      allocate (self%slip(n), source=0.0_wp)
-      allocate (self%slip_derivative(n_components*fourier%n_coefficients, n), source=0.0_wp)
    end subroutine reserve_workspace
+
+   !> Ask for `slip`, and for its derivative after `linearize`, from now on.
+   pure subroutine measure_slip(self)
+      class(force_workspace), intent(inout) :: self
+
+      self%measures_slip = .true.
+      allocate (self%slip(size(self%input, 2)), source=0.0_wp)
+      allocate (self%slip_derivative, source=self%input)
+   end subroutine measure_slip
 
    !> Elements without gap, load or stiffness.
    pure subroutine take_elements(self, present)
@@ -218,13 +227,12 @@ contains
    end subroutine set_offset
 
    !> Room for evaluations of this law.
-   subroutine reserve(self, fourier, work, measures_slip)
+   subroutine reserve(self, fourier, work)
       class(force_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(out) :: work
-      logical, intent(in), optional :: measures_slip
 
-      call work%reserve(self%n_elements, self%n_components, fourier, measures_slip)
+      call work%reserve(self%n_elements, self%n_components, fourier)
    end subroutine reserve
 
    !> Make the forces at the instants available in `force_time`; after sampling they are.
@@ -275,6 +283,17 @@ contains
 
       slope = merge(1.0_wp, 0.0_wp, self%present(component, element))
    end function slope_at_rest
+
+   !> Slope of the force of one component that depends on its input at the same instant alone.
+   elemental real(wp) function slope_at(self, element, y) result(slope)
+      class(force_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y
+
+      slope = 0.0_wp
+      associate (unused => self, unused_element => element, unused_input => y)
+      end associate
+   end function slope_at
 
    !> Constants of each element by which `by_parameter` differentiates.
    pure integer function n_parameters(self)

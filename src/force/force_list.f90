@@ -17,6 +17,8 @@ module fw_force_list
       class(force_law), allocatable :: law
       !> Row of each component of each element, 0 where there is none (n_components, n_elements).
       integer, allocatable :: row(:, :)
+      !> The same in the order of inputs and forces: all first components, then the others.
+      integer, allocatable :: rows(:)
    end type force_entry
 
    type :: force_list
@@ -27,6 +29,7 @@ module fw_force_list
    contains
       procedure :: add
       procedure :: reserve
+      procedure :: least_instants
    end type force_list
 
 contains
@@ -43,10 +46,12 @@ contains
       do k = 1, self%n_laws
          call move_alloc(self%entry(k)%law, longer(k)%law)
          call move_alloc(self%entry(k)%row, longer(k)%row)
+         call move_alloc(self%entry(k)%rows, longer(k)%rows)
       end do
       self%n_laws = self%n_laws + 1
       allocate (longer(self%n_laws)%law, source=law)
       longer(self%n_laws)%row = row
+      longer(self%n_laws)%rows = reshape(transpose(row), [size(row)])
       call move_alloc(longer, self%entry)
    end subroutine add
 
@@ -62,5 +67,26 @@ contains
          call self%entry(k)%law%reserve(fourier, work(k))
       end do
    end subroutine reserve
+
+   !> Instants that laws which decide at instants need for harmonics 0..n_harmonics.
+   pure integer function least_instants(self, n_harmonics, separates) result(n_time)
+      class(force_list), intent(in) :: self
+      integer, intent(in) :: n_harmonics
+      !> Whether elements may separate, or their normal load varies.
+      logical, intent(in) :: separates
+      integer :: k, per_harmonic
+
+      n_time = 0
+      do k = 1, self%n_laws
+         if (self%entry(k)%law%n_elements == 0) cycle
+         associate (facts => self%entry(k)%law%facts)
+            if (facts%follows_events) cycle
+            per_harmonic = merge(facts%instants_with_separation, facts%instants_per_harmonic, &
+                                 separates)
+            n_time = max(n_time, facts%fewest_instants, &
+                         per_harmonic*n_harmonics + facts%further_instants)
+         end associate
+      end do
+   end function least_instants
 
 end module fw_force_list

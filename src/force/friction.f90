@@ -87,13 +87,12 @@ contains
       law%facts%has_multipliers = .true.
    end function elastic_friction
 
-   subroutine reserve(self, fourier, work, measures_slip)
+   subroutine reserve(self, fourier, work)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(out) :: work
-      logical, intent(in), optional :: measures_slip
 
-      call work%reserve(self%n_elements, self%n_components, fourier, measures_slip)
+      call work%reserve(self%n_elements, self%n_components, fourier)
       allocate (work%room, source=new_room(self%n_elements))
    end subroutine reserve
 

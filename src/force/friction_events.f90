@@ -47,13 +47,12 @@ contains
       if (allocated(law%mu)) self%mu = law%mu
    end function follow_events
 
-   subroutine reserve(self, fourier, work, measures_slip)
+   subroutine reserve(self, fourier, work)
       class(friction_by_events), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(out) :: work
-      logical, intent(in), optional :: measures_slip
 
-      call work%reserve(self%n_elements, self%n_components, fourier, measures_slip)
+      call work%reserve(self%n_elements, self%n_components, fourier)
       allocate (event_room :: work%room)
       select type (room => work%room)
       type is (event_room)

@@ -36,6 +36,7 @@ contains
       end if
       call self%take_pairs(contact%mu, present)
       associate (p => self%prediction)
+         p%scale = contact%penalty_scale
          p%gap = contact%gap
          p%load = merge(contact%normal_load, 0.0_wp, contact%side_1(3, :) == 0 .and. &
                         contact%side_2(3, :) == 0)

@@ -20,16 +20,20 @@ module fw_polynomial_law
    contains
       procedure :: evaluate
       procedure :: linearize
+      procedure :: slope_at
       procedure :: n_parameters
       procedure :: by_parameter
    end type polynomial_law
 
 contains
 
-   pure type(polynomial_law) function new_polynomial(coefficient, power) result(self)
+   pure type(polynomial_law) function new_polynomial(coefficient, power, highest_harmonic) &
+      result(self)
       !> (n_springs) each.
       real(wp), intent(in) :: coefficient(:)
       integer, intent(in) :: power(:)
+      !> Harmonics above it are filtered; 0: none is.
+      integer, intent(in) :: highest_harmonic
       logical :: present(1, size(coefficient))
 
       present = .true.
@@ -37,8 +41,14 @@ contains
       self%prediction%stiffness = 1.0_wp
       self%coefficient = coefficient
       self%power = power
+      if (highest_harmonic > 0) self%highest_harmonic = highest_harmonic
       self%facts = law_facts(is_odd=all(modulo(power, 2) == 1), has_multipliers=.true., &
-                             is_integrated=.true.)
+                             is_integrated=.true., holds_unloaded=any(power == 1))
+      ! From (power + 1) H + 1 instants on, polynomials are sampled without any error.
+      self%facts%fewest_instants = 0
+      self%facts%instants_per_harmonic = maxval([0, power]) + 1
+      self%facts%instants_with_separation = self%facts%instants_per_harmonic
+      self%facts%further_instants = 2
    end function new_polynomial
 
    !> Forces from the elongations.
@@ -88,8 +98,7 @@ contains
       work%jacobian = 0.0_wp
       do i = 1, self%n_elements
          do k = 1, fourier%n_time
-            slope = self%coefficient(i)*real(self%power(i), wp)* &
-                    work%prediction_time(i, 1, k)**(self%power(i) - 1)
+            slope = self%slope_at(i, work%prediction_time(i, 1, k))
             do j = 1, nc
                work%jacobian(:, j, i) = work%jacobian(:, j, i) + &
                                         (slope*fourier%analysis(j, k))*fourier%synthesis(:, k)
@@ -102,6 +111,14 @@ contains
          end do
       end do
    end subroutine linearize
+
+   elemental real(wp) function slope_at(self, element, y) result(slope)
+      class(polynomial_law), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: y
+
+      slope = self%coefficient(element)*real(self%power(element), wp)*y**(self%power(element) - 1)
+   end function slope_at
 
    !> The coefficient.
    pure integer function n_parameters(self)

@@ -1,10 +1,11 @@
 !> Contact pairs and nonlinear springs: groups &contact and &spring on top of a model file.
 module fw_read_contact
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use fw_contact_data, only: contact_type, spring_type, law_words, law_penalty
+   use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
                               bind_normal_load, bind_stiffnesses, bind_march, bind_springs
    use fw_kinds, only: wp
+   use fw_laws, only: law_words, is_rigid
    use fw_model_file, only: file_model_type
    use fw_read_model, only: refuse_model
    use fw_reader, only: reader_type
@@ -37,8 +38,9 @@ contains
       call read_stiffnesses(reader, contact)
       call bind_march(reader, contact)
       scale = contact%penalty_scale
-      if (contact%law == law_penalty .and. abs(scale - 1.0_wp) > 0.0_wp) then
-         call reader%refuse('contact', 'penalty_scale', "has no meaning with law = 'penalty': "// &
+      if (.not. is_rigid(contact%law) .and. abs(scale - 1.0_wp) > 0.0_wp) then
+         call reader%refuse('contact', 'penalty_scale', "has no meaning with law = '"// &
+                            trim(law_words(contact%law))//"': "// &
                             'scale tangential_stiffness and normal_stiffness')
       end if
    end subroutine read_contact
@@ -201,7 +203,7 @@ contains
       type(contact_type), intent(inout) :: contact
       logical :: is_penalty
 
-      is_penalty = contact%law == law_penalty
+      is_penalty = .not. is_rigid(contact%law)
       call bind_stiffnesses(reader, contact, is_penalty .and. any(has_tangent(contact)), &
                             is_penalty .and. any(has_normal(contact)))
       call finish_one('tangential_stiffness', contact%tangential_stiffness)

@@ -12,8 +12,8 @@
 module fw_wear_system
    use fw_kinds, only: wp
    use fw_contact_data, only: contact_type
-   use fw_forces, only: pair_mixed
-   use fw_forces, only: pair_stuck
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_stuck
    use fw_hbm, only: hbm_system
    use fw_lapack, only: zgemm
    use fw_linalg, only: lu_type
@@ -32,7 +32,9 @@ module fw_wear_system
       real(wp), allocatable :: rate(:)
       !> From S to the rate: k_w/(A eps) (n_pairs).
       real(wp), allocatable, private :: factor(:)
-      !> Makes a force of a depth: eps in the normal direction (n_pairs).
+      !> Prediction stiffness in the normal direction (n_pairs) [force/length].
+      real(wp), allocatable, private :: normal(:)
+      !> Makes a force of a depth: the same, or where there is none the tangential one (n_pairs).
       real(wp), allocatable, private :: weight(:)
       !> Pairs whose depth stays in the linear problem (first n_wearing entries).
       integer, private :: n_wearing = 0
@@ -79,13 +81,16 @@ contains
       self%hbm_system = balance
       call self%fourier%renew_fft()
       call self%free_depths()
-      call self%contact%measure_slip(self%fourier%n_coefficients)
-      tangential = maxval(self%stiffness(:, 1:2), dim=2)
+      call self%work(self%forces%pairs)%measure_slip()
+      associate (p => self%forces%entry(self%forces%pairs)%law%prediction)
+         tangential = maxval(p%stiffness(:, 1:2), dim=2)
+         self%normal = p%stiffness(:, 3)
+      end associate
       allocate (self%base(contact%n_pairs), self%rate(contact%n_pairs), source=0.0_wp)
       allocate (self%factor(contact%n_pairs), source=0.0_wp)
       where (tangential > 0.0_wp) self%factor = coefficient/(contact%area*tangential)
       if (by_energy) self%factor = contact%mu*self%factor
-      self%weight = self%stiffness(:, 3)
+      self%weight = self%normal
       where (self%weight <= 0.0_wp) self%weight = tangential
       where (self%weight <= 0.0_wp) self%weight = 1.0_wp
       allocate (self%wearing(contact%n_pairs), source=0)
@@ -112,7 +117,7 @@ contains
    subroutine free_depths(self)
       class(wear_system), intent(inout) :: self
 
-      self%n = self%n_vibration() + self%contact%n_pairs
+      self%n = self%n_vibration() + self%n_pairs
       self%pins_normals = .false.
    end subroutine free_depths
 
@@ -129,7 +134,7 @@ contains
    subroutine update_rate(self)
       class(wear_system), intent(inout) :: self
 
-      self%rate = self%factor*self%contact%slip
+      self%rate = self%factor*self%work(self%forces%pairs)%slip
    end subroutine update_rate
 
    !> Depths in the units in which residuals count them [force].
@@ -144,26 +149,28 @@ contains
    !> Mean compressive force of every pair at the last point [force].
    pure function mean_pressure(self) result(pressure)
       class(wear_system), intent(in) :: self
-      real(wp) :: pressure(self%contact%n_pairs)
+      real(wp) :: pressure(self%n_pairs)
 
-      pressure = self%normal_load
-      if (any(self%joint%row(3, :) > 0)) pressure = merge(-self%contact%force(:, 3, 1), pressure, &
-                                               self%joint%row(3, :) > 0)
+      pressure = self%forces%entry(self%forces%pairs)%law%prediction%load
+      if (any(self%joint%row(3, :) > 0)) pressure = merge( &
+         -self%work(self%forces%pairs)%force(:, 3, 1), pressure, self%joint%row(3, :) > 0)
    end function mean_pressure
 
    !> Largest elastic compression of a pair at the last point: the depth that would unload it
    !> alone [length]. Pairs pressed by dead loads do not count; zero where all are.
    pure real(wp) function compression(self)
       class(wear_system), intent(in) :: self
-      real(wp) :: pressure(self%contact%n_pairs), stiffness
+      real(wp) :: pressure(self%n_pairs), stiffness
       integer :: i
 
       compression = 0.0_wp
       pressure = self%mean_pressure()
-      do i = 1, self%contact%n_pairs
+      do i = 1, self%n_pairs
          if (self%joint%row(3, i) == 0) cycle
-         stiffness = self%stiffness(i, 3)
-         if (self%rigid) stiffness = self%structure%static_stiffness(self%coordinate_of(3, i))
+         stiffness = self%normal(i)
+         if (self%forces%entry(self%forces%pairs)%law%prediction%takes_balance) then
+            stiffness = self%structure%static_stiffness(self%coordinate_of(3, i))
+         end if
          if (stiffness > 0.0_wp) compression = max(compression, pressure(i)/stiffness)
       end do
    end function compression
@@ -197,8 +204,8 @@ contains
 
       call self%hbm_system%linearize(self%n_balance)
       self%n_wearing = 0
-      do i = 1, self%contact%n_pairs
-         if (self%contact%linear_state(i) /= pair_mixed) cycle
+      do i = 1, self%n_pairs
+         if (self%work(self%forces%pairs)%linear_state(i) /= pair_mixed) cycle
          self%n_wearing = self%n_wearing + 1
          self%wearing(self%n_wearing) = i
       end do
@@ -213,16 +220,17 @@ contains
       integer :: n, j, i
 
       n = self%n_vibration()
-      self%pair_in = 0.0_wp
+      self%work(self%forces%pairs)%input = 0.0_wp
       call settle_depths(self, r)
       call self%hbm_system%reduce(self%adjusted, rhs(:self%n_balance))
-      do j = 1, self%n_wearing
-         i = self%wearing(j)
-         ! pair_in holds what the coordinates that are solved at once do to the prediction.
-         rhs(self%n_balance + j) = -r(n + i) + self%weight(i)*self%cycles*self%factor(i)* &
-                                   dot_product(self%contact%slip_derivative(:, i), &
-                                               self%pair_in(:, i))
-      end do
+      associate (work => self%work(self%forces%pairs))
+         do j = 1, self%n_wearing
+            i = self%wearing(j)
+            ! The inputs hold what the coordinates that are solved at once do to the prediction.
+            rhs(self%n_balance + j) = -r(n + i) + self%weight(i)*self%cycles*self%factor(i)* &
+                                      dot_product(work%slip_derivative(:, i), work%input(:, i))
+         end do
+      end associate
    end subroutine reduce
 
    !> Residuals of the balance after the depths that leave the linear problem have taken theirs.
@@ -235,11 +243,11 @@ contains
       n = self%n_vibration()
       self%adjusted = r(:n)
       if (.not. self%fourier%has_constant()) return
-      do i = 1, self%contact%n_pairs
+      do i = 1, self%n_pairs
          row = self%joint%row(3, i)
-         if (row == 0 .or. self%contact%linear_state(i) /= pair_stuck) cycle
+         if (row == 0 .or. self%work(self%forces%pairs)%linear_state(i) /= pair_stuck) cycle
          call self%incidence%scatter_row(row, self%incidence%identity, m, m, &
-                                         -self%stiffness(i, 3)/self%weight(i), r(n + i:n + i), &
+                                         -self%normal(i)/self%weight(i), r(n + i:n + i), &
                                          self%adjusted)
       end do
    end subroutine settle_depths
@@ -267,13 +275,15 @@ contains
 
       n = self%n_balance
       call self%hbm_system%apply(vector(:n), product(:n))
-      do j = 1, self%n_wearing
-         i = self%wearing(j)
-         call add_depth_column(self, i, vector(n + j), product)
-         product(n + j) = self%weight(i)*(vector(n + j) - self%cycles*self%factor(i)*( &
-                          dot_product(self%contact%slip_derivative(:, i), self%pair_in(:, i)) + &
-                          depth_slope(self, i)*vector(n + j)))
-      end do
+      associate (work => self%work(self%forces%pairs))
+         do j = 1, self%n_wearing
+            i = self%wearing(j)
+            call add_depth_column(self, i, vector(n + j), product)
+            product(n + j) = self%weight(i)*(vector(n + j) - self%cycles*self%factor(i)*( &
+                             dot_product(work%slip_derivative(:, i), work%input(:, i)) + &
+                             depth_slope(self, i)*vector(n + j)))
+         end do
+      end associate
    end subroutine apply
 
    !> dS/dw of a pair at fixed displacements.
@@ -283,8 +293,8 @@ contains
 
       slope = 0.0_wp
       if (self%joint%row(3, pair) == 0) return
-      slope = self%stiffness(pair, 3)* &
-              self%contact%slip_derivative(2*self%fourier%n_coefficients + 1, pair)
+      slope = self%normal(pair)* &
+              self%work(self%forces%pairs)%slip_derivative(2*self%fourier%n_coefficients + 1, pair)
    end function depth_slope
 
    !> product = product + B^T G eps e_0 of one pair, times its depth.
@@ -301,8 +311,8 @@ contains
          if (self%joint%row(c, pair) == 0) cycle
          call self%incidence%scatter_row( &
             self%joint%row(c, pair), self%place, self%n_active, self%n_active, &
-            self%stiffness(pair, 3)*depth, &
-            self%contact%jacobian(2*nc + 1, (c - 1)*nc + 1:c*nc, pair), product)
+            self%normal(pair)*depth, &
+            self%work(self%forces%pairs)%jacobian(2*nc + 1, (c - 1)*nc + 1:c*nc, pair), product)
       end do
    end subroutine add_depth_column
 
@@ -387,29 +397,32 @@ contains
 
       nc = self%fourier%n_coefficients
       n = self%fourier%harmonic(h)
-      if (self%rigid) call zgemm('N', 'N', self%n_used, n_right, self%n_active, one, &
-                                 self%active_stiffness(1, 1, h), size(self%active_stiffness, 1), &
-                                 z, size(z, 1), zero, self%product, size(self%product, 1))
-      do j = 1, self%n_wearing
-         i = self%wearing(j)
-         do c = 1, 3
-            row = self%joint%row(c, i)
-            if (row == 0) cycle
-            ! d/dtau is a factor i n of the complex coefficient.
-            turn = one
-            if (self%velocity_level .and. c < 3) turn = cmplx(0.0_wp, n, wp)
-            call self%incidence%gather_harmonic(row, h, self%place, self%n_active, &
-                                                turn*self%stiffness(i, c), z, input)
-            place = self%place(self%incidence%coordinate_of(row))
-            if (self%rigid .and. place > 0) input = input - self%product(place, :n_right)
-            k = (c - 1)*nc + self%fourier%column(h)
-            associate (g => self%contact%slip_derivative(:, i), &
-                       scale => self%weight(i)*self%cycles*self%factor(i))
-               rows(j, :n_right) = rows(j, :n_right) + scale*g(k)*real(input, wp)
-               if (n > 0) rows(j, :n_right) = rows(j, :n_right) - scale*g(k + 1)*aimag(input)
-            end associate
+      associate (p => self%forces%entry(self%forces%pairs)%law%prediction, &
+                 work => self%work(self%forces%pairs))
+         if (p%takes_balance) call zgemm('N', 'N', self%n_used, n_right, self%n_active, one, &
+            self%active_stiffness(1, 1, h), size(self%active_stiffness, 1), z, size(z, 1), zero, &
+            self%product, size(self%product, 1))
+         do j = 1, self%n_wearing
+            i = self%wearing(j)
+            do c = 1, 3
+               row = self%joint%row(c, i)
+               if (row == 0) cycle
+               ! d/dtau is a factor i n of the complex coefficient.
+               turn = one
+               if (p%order(c) > 0) turn = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
+               call self%incidence%gather_harmonic(row, h, self%place, self%n_active, &
+                                                   turn*p%stiffness(i, c), z, input)
+               place = self%place(self%incidence%coordinate_of(row))
+               if (p%takes_balance .and. place > 0) input = input - self%product(place, :n_right)
+               k = (c - 1)*nc + self%fourier%column(h)
+               associate (g => work%slip_derivative(:, i), &
+                          scale => self%weight(i)*self%cycles*self%factor(i))
+                  rows(j, :n_right) = rows(j, :n_right) + scale*g(k)*real(input, wp)
+                  if (n > 0) rows(j, :n_right) = rows(j, :n_right) - scale*g(k + 1)*aimag(input)
+               end associate
+            end do
          end do
-      end do
+      end associate
    end subroutine subtract_rows
 
    subroutine precondition(self, vector)

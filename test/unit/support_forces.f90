@@ -45,7 +45,8 @@ contains
       else
          call move_alloc(law, self%law)
       end if
-      call self%law%reserve(fourier, self%force_workspace, measures_slip=.true.)
+      call self%law%reserve(fourier, self%force_workspace)
+      call self%measure_slip()
    end subroutine new_forces
 
    subroutine evaluate(self, fourier)

@@ -3,6 +3,7 @@
 module support_models
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
+   use fw_laws, only: law_words
    use fw_case, only: case_type
    use fw_case, only: analysis_point
    use fw_contact_data, only: contact_type
@@ -17,6 +18,7 @@ module support_models
    public :: random_type, random_structure, chain_structure, new_contact, new_springs_data
    public :: new_case, new_system, solve_dense
    public :: damping_none, damping_rayleigh, damping_general
+   public :: law_dlft, law_dlft_velocity, law_penalty
 
    integer, parameter :: damping_none = 0, damping_rayleigh = 1, damping_general = 2
 
@@ -28,6 +30,11 @@ module support_models
       procedure :: vector
       procedure :: matrix
    end type random_type
+
+   !> Laws by their words.
+   integer, parameter :: law_dlft = findloc(law_words, 'dlft', dim=1)
+   integer, parameter :: law_dlft_velocity = findloc(law_words, 'dlft_velocity', dim=1)
+   integer, parameter :: law_penalty = findloc(law_words, 'penalty', dim=1)
 
 contains
 
