@@ -1,44 +1,39 @@
-!> What one run of the Python package needs, behind an opaque handle: f2py passes no derived types.
-!> A session belongs to one thread at a time; separate sessions may run side by side.
+!> A session of the library (fw_session) with what the Python package needs beside it, behind an
+!> opaque handle: f2py passes no derived types. A handle belongs to one thread at a time; separate
+!> ones may run side by side.
 module fw_python_session
    use, intrinsic :: iso_c_binding, only: c_f_pointer
+   use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_c_binding, only: c_ptr
-   use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_error, only: status_ok
    use fw_kinds, only: i8
-   use fw_model_file, only: file_model_type
+   use fw_kinds, only: wp
    use fw_observer, only: observer_type
-   use fw_outcome, only: outcome_type
    use fw_point, only: point_type
-   use fw_read_case, only: case_input
-   use fw_read_case, only: read_input
-   use fw_run, only: check_case
-   use fw_run, only: run_case
+   use fw_session, only: session_type
    use fw_text, only: join
-   use fw_text, only: string_type
-   use fw_threads, only: thread_scope
    implicit none (type, external)
    private
 
-   public :: session_type, new_session, session_of
+   public :: handle_type, new_handle, handle_of
 
    !> Places in the array through which Python and a run see each other: Python sets the first to
    !> stop the run; the run counts its points in the second, of those in the third (0: not known).
    integer, parameter :: control_stop = 1, control_done = 2, control_total = 3
 
-   type :: session_type
-      !> The model of the calling program, where it gives one.
-      type(file_model_type), allocatable :: model
-      type(case_type), allocatable :: case
-      !> Why the last call failed, the table of the last run, and what the run remarked.
+   type :: handle_type
+      type(session_type) :: session
+      !> Why the last call failed, the table of the last run, and what was remarked.
       character(:), allocatable :: message, summary, remarks
+      !> The bytes of the result file of the last run in memory.
+      integer(c_int8_t), allocatable :: image(:)
    contains
-      procedure :: read
-      procedure :: check
+      procedure :: conclude
       procedure :: run
-   end type session_type
+      procedure :: solve
+   end type handle_type
 
    !> Watches the array that Python shares.
    type, extends(observer_type) :: python_observer
@@ -55,85 +50,76 @@ module fw_python_session
 
 contains
 
-   function new_session() result(handle)
-      integer(i8) :: handle
-      type(session_type), pointer :: session
+   function new_handle() result(number)
+      integer(i8) :: number
+      type(handle_type), pointer :: handle
 
-      allocate (session)
-      handle = transfer(c_loc(session), handle)
-   end function new_session
+      allocate (handle)
+      handle%message = ''
+      handle%summary = ''
+      handle%remarks = ''
+      handle%session%origin = 'argument'
+      number = transfer(c_loc(handle), number)
+   end function new_handle
 
-   !> The session behind a handle of new_session.
-   function session_of(handle) result(session)
-      integer(i8), intent(in) :: handle
-      type(session_type), pointer :: session
+   !> The object behind a number of new_handle.
+   function handle_of(number) result(handle)
+      integer(i8), intent(in) :: number
+      type(handle_type), pointer :: handle
       type(c_ptr) :: address
 
-      address = transfer(handle, address)
-      call c_f_pointer(address, session)
-   end function session_of
+      address = transfer(number, address)
+      call c_f_pointer(address, handle)
+   end function handle_of
 
-   !> Read and validate a case from namelist text and overrides.
-   subroutine read(self, text, path, overrides, origin, status)
-      class(session_type), intent(inout) :: self
-      character(*), intent(in) :: text, path
-      type(string_type), intent(in) :: overrides(:)
-      !> What messages put before an override.
-      character(*), intent(in) :: origin
-      integer, intent(out) :: status
-      type(error_type), allocatable :: error
-      type(thread_scope) :: threads
-      type(case_input) :: input
-
-      input%text = text
-      input%path = path
-      input%overrides = overrides
-      input%origin = origin
-      if (allocated(self%case)) deallocate (self%case)
-      allocate (self%case)
-      ! Damping and checks of a model must not depend on the threads of the BLAS either.
-      call threads%enter(0)
-      if (allocated(self%model)) then
-         call read_input(input, self%case, error, self%model)
-      else
-         call read_input(input, self%case, error)
-      end if
-      call threads%leave()
-      call conclude(self, error, status)
-   end subroutine read
-
-   !> Everything that would refuse the case before it is computed.
-   subroutine check(self, status)
-      class(session_type), intent(inout) :: self
-      integer, intent(out) :: status
-      type(error_type), allocatable :: error
-
-      call check_case(self%case, error)
-      call conclude(self, error, status)
-   end subroutine check
-
-   !> Run the case that was read; the array `control` is watched and updated meanwhile.
-   subroutine run(self, control, status)
-      class(session_type), intent(inout) :: self
+   !> Run the case; the array `control` is watched and updated meanwhile.
+   subroutine run(self, control, in_memory, status)
+      class(handle_type), intent(inout) :: self
       integer(i8), intent(inout), target :: control(:)
+      !> Keep the bytes of the result file in `image` instead of writing it.
+      logical, intent(in) :: in_memory
       integer, intent(out) :: status
       type(error_type), allocatable :: error
-      type(outcome_type) :: outcome
       type(python_observer) :: observer
 
       observer%control => control
       observer%remarks = ''
-      call run_case(self%case, observer, outcome, error)
+      if (allocated(self%image)) deallocate (self%image)
+      if (in_memory) then
+         call self%session%run(observer, error, image=self%image)
+      else
+         call self%session%run(observer, error, write_file=.true.)
+      end if
+      ! The file has them, or the image.
+      call self%session%points%clear()
       self%remarks = observer%remarks
       self%summary = ''
-      if (allocated(outcome%summary)) self%summary = join(outcome%summary, line_end)
-      call conclude(self, error, status)
-      if (status == status_ok) status = outcome%status
+      if (allocated(self%session%outcome%summary)) then
+         self%summary = join(self%session%outcome%summary, line_end)
+      end if
+      call self%conclude(error, status)
+      if (status == status_ok) status = self%session%outcome%status
    end subroutine run
+
+   !> One step at a frequency [rad/s]; see `solve` of the session.
+   subroutine solve(self, omega, control, status)
+      class(handle_type), intent(inout) :: self
+      real(wp), intent(in) :: omega
+      integer(i8), intent(inout), target :: control(:)
+      integer, intent(out) :: status
+      type(error_type), allocatable :: error
+      type(python_observer) :: observer
+
+      observer%control => control
+      observer%remarks = ''
+      call self%session%solve(omega, observer, error)
+      self%remarks = observer%remarks
+      call self%conclude(error, status)
+   end subroutine solve
 
    !> Keep what an error says.
    subroutine conclude(self, error, status)
-      class(session_type), intent(inout) :: self
+      class(handle_type), intent(inout) :: self
       type(error_type), allocatable, intent(in) :: error
       integer, intent(out) :: status
 

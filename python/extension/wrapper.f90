@@ -14,17 +14,24 @@ module fw_python
    use fw_model, only: model_type
    use fw_python_operators, only: build_condensation
    use fw_python_operators, only: unpack_jacobian
-   use fw_python_session, only: new_session
-   use fw_python_session, only: session_of
-   use fw_python_session, only: session_type
+   use fw_python_parts, only: case_part
+   use fw_python_parts, only: namelist_words
+   use fw_python_parts, only: quantity_lines
+   use fw_python_session, only: handle_of
+   use fw_python_session, only: handle_type
+   use fw_python_session, only: new_handle
    use fw_recovery, only: largest_magnitude
+   use fw_text, only: join
    use fw_text, only: string_type
    use fw_version, only: version
    implicit none (type, external)
    private
 
-   public :: open_session, close_session, give_matrix, give_vector, give_sides, give_text
-   public :: read_case, check_case, run_case, text_length, fetch_text, library_version
+   public :: open_session, close_session, library_version
+   public :: new_model, put_reals, put_integers, put_texts, observe
+   public :: give_case, prepare, check_case, run_case
+   public :: start, solve, count_frequencies, frequencies
+   public :: count_values, get_values, count_bytes, get_bytes, parse_namelist
    public :: harmonic_operators, to_time, to_coefficients, differentiate, amplitudes
    public :: dynamic_stiffness, condense, recover, contact_forces
 
@@ -38,186 +45,347 @@ contains
       text = version
    end subroutine library_version
 
-   subroutine open_session(handle)
-      integer(i8), intent(out) :: handle
+   subroutine open_session(number)
+      integer(i8), intent(out) :: number
 
-      handle = new_session()
+      number = new_handle()
    end subroutine open_session
 
-   subroutine close_session(handle)
-      integer(i8), intent(in) :: handle
-      type(session_type), pointer :: session
+   subroutine close_session(number)
+      integer(i8), intent(in) :: number
+      type(handle_type), pointer :: handle
 
-      session => session_of(handle)
-      deallocate (session)
+      handle => handle_of(number)
+      deallocate (handle)
    end subroutine close_session
 
-   !> A matrix of the model in memory: 'mass', 'stiffness', 'damping', 'stiffness_rotation',
-   !> 'observe_matrix' or 'position'.
-   subroutine give_matrix(handle, name, n_rows, n_columns, values)
-      integer(i8), intent(in) :: handle
-      character(*), intent(in) :: name
-      integer, intent(in) :: n_rows, n_columns
-      real(wp), intent(in) :: values(n_rows, n_columns)
-      type(session_type), pointer :: session
-      !f2py threadsafe
+   !> Begin a model in memory, with its parts to follow.
+   subroutine new_model(number, n_dof, n_pairs, status)
+      integer(i8), intent(in) :: number
+      integer, intent(in) :: n_dof, n_pairs
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
 
-      session => session_of(handle)
-      if (.not. allocated(session%model)) allocate (session%model)
-      select case (name)
-      case ('mass')
-         session%model%mass = values
-      case ('stiffness')
-         session%model%stiffness = values
-      case ('damping')
-         session%model%damping = values
-      case ('stiffness_rotation')
-         session%model%stiffness_rotation = values
-      case ('observe_matrix')
-         session%model%observe_matrix = values
-      case default ! 'position'
-         session%model%position = values
-      end select
-   end subroutine give_matrix
+      handle => handle_of(number)
+      call handle%session%new_model(n_dof, n_pairs, error)
+      call handle%conclude(error, status)
+   end subroutine new_model
 
-   !> Values per pair or dof: 'mu', 'gap', 'area', 'load_static', 'load_cosine', 'load_sine' or
-   !> 'load_static_rotation'.
-   subroutine give_vector(handle, name, n, values)
-      integer(i8), intent(in) :: handle
+   !> A real part of the model by the name of its dataset in a model file, flattened.
+   subroutine put_reals(number, name, n, values, status)
+      integer(i8), intent(in) :: number
       character(*), intent(in) :: name
       integer, intent(in) :: n
       real(wp), intent(in) :: values(n)
-      type(session_type), pointer :: session
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+      !f2py threadsafe
 
-      session => session_of(handle)
-      if (.not. allocated(session%model)) allocate (session%model)
-      select case (name)
-      case ('mu')
-         session%model%mu = values
-      case ('gap')
-         session%model%gap = values
-      case ('area')
-         session%model%area = values
-      case ('load_static')
-         session%model%load_static = values
-      case ('load_cosine')
-         session%model%load_cosine = values
-      case ('load_sine')
-         session%model%load_sine = values
-      case default ! 'load_static_rotation'
-         session%model%load_static_rotation = values
-      end select
-   end subroutine give_vector
+      handle => handle_of(number)
+      call handle%session%put(name, values, error)
+      call handle%conclude(error, status)
+   end subroutine put_reals
 
-   !> Signed dof numbers of the contact pairs.
-   subroutine give_sides(handle, n_pairs, side_1, side_2)
-      integer(i8), intent(in) :: handle
-      integer, intent(in) :: n_pairs
-      integer, intent(in) :: side_1(3, n_pairs), side_2(3, n_pairs)
-      type(session_type), pointer :: session
-
-      session => session_of(handle)
-      if (.not. allocated(session%model)) allocate (session%model)
-      session%model%side_1 = side_1
-      session%model%side_2 = side_2
-   end subroutine give_sides
-
-   !> 'title', or a list: 'observe_name' or 'patch'.
-   subroutine give_text(handle, name, n, text)
-      integer(i8), intent(in) :: handle
+   !> Signed dof numbers of a side of the pairs, flattened.
+   subroutine put_integers(number, name, n, values, status)
+      integer(i8), intent(in) :: number
       character(*), intent(in) :: name
       integer, intent(in) :: n
-      integer(1), intent(in) :: text(n)
-      type(session_type), pointer :: session
-
-      session => session_of(handle)
-      if (.not. allocated(session%model)) allocate (session%model)
-      select case (name)
-      case ('title')
-         session%model%title = from_bytes(text)
-      case ('observe_name')
-         session%model%observe_name = list_of(text)
-      case default ! 'patch'
-         session%model%patch = list_of(text)
-      end select
-   end subroutine give_text
-
-   !> Read and validate a case; the status is that of fw_run.
-   subroutine read_case(handle, n_text, text, n_path, path, n_overrides, overrides, origin, status)
-      integer(i8), intent(in) :: handle
-      integer, intent(in) :: n_text, n_path, n_overrides
-      integer(1), intent(in) :: text(n_text), path(n_path), overrides(n_overrides)
-      character(*), intent(in) :: origin
+      integer, intent(in) :: values(n)
       integer, intent(out) :: status
-      type(session_type), pointer :: session
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+
+      handle => handle_of(number)
+      call handle%session%put(name, values, error)
+      call handle%conclude(error, status)
+   end subroutine put_integers
+
+   !> 'title', 'unit_system' or 'contact/patch'.
+   subroutine put_texts(number, name, n, texts, status)
+      integer(i8), intent(in) :: number
+      character(*), intent(in) :: name
+      integer, intent(in) :: n
+      integer(1), intent(in) :: texts(n)
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+
+      handle => handle_of(number)
+      call handle%session%put(name, list_of(texts), error)
+      call handle%conclude(error, status)
+   end subroutine put_texts
+
+   !> Observed quantities: names, and a column of factors of the dofs each.
+   subroutine observe(number, n, names, n_dof, n_observed, columns, status)
+      integer(i8), intent(in) :: number
+      integer, intent(in) :: n, n_dof, n_observed
+      integer(1), intent(in) :: names(n)
+      real(wp), intent(in) :: columns(n_dof, n_observed)
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+
+      handle => handle_of(number)
+      call handle%session%observe_all(list_of(names), columns, error)
+      call handle%conclude(error, status)
+   end subroutine observe
+
+   !> Take namelist text, and set keys on top of it: a key, then its value, and so on.
+   subroutine give_case(number, n_text, text, n_path, path, n_keys, keys, status)
+      integer(i8), intent(in) :: number
+      integer, intent(in) :: n_text, n_path, n_keys
+      integer(1), intent(in) :: text(n_text), path(n_path), keys(n_keys)
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+      type(string_type), allocatable :: words(:)
+      integer :: i
+
+      handle => handle_of(number)
+      call handle%session%load_text(from_bytes(text), from_bytes(path))
+      words = list_of(keys)
+      do i = 1, size(words) - 1, 2
+         if (.not. allocated(error)) then
+            call handle%session%set(words(i)%text, words(i + 1)%text, error)
+         end if
+      end do
+      call handle%conclude(error, status)
+   end subroutine give_case
+
+   !> Read and validate the case; the status is that of fw_run.
+   subroutine prepare(number, status)
+      integer(i8), intent(in) :: number
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
       !f2py threadsafe
 
-      session => session_of(handle)
-      call session%read(from_bytes(text), from_bytes(path), list_of(overrides), origin, status)
-   end subroutine read_case
+      handle => handle_of(number)
+      call handle%session%prepare(error)
+      call handle%conclude(error, status)
+   end subroutine prepare
 
-   subroutine check_case(handle, status)
-      integer(i8), intent(in) :: handle
+   subroutine check_case(number, status)
+      integer(i8), intent(in) :: number
       integer, intent(out) :: status
-      type(session_type), pointer :: session
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
       !f2py threadsafe
 
-      session => session_of(handle)
-      call session%check(status)
+      handle => handle_of(number)
+      call handle%session%check(error)
+      call handle%conclude(error, status)
    end subroutine check_case
 
-   !> Run the case that was read. Another thread may set control(1) to stop the run after the
-   !> present point, and read how many points are done in control(2), of control(3).
-   subroutine run_case(handle, control, status)
-      integer(i8), intent(in) :: handle
+   !> Run the case. Another thread may set control(1) to stop the run, and read how many points
+   !> are done in control(2), of control(3).
+   subroutine run_case(number, control, in_memory, status)
+      integer(i8), intent(in) :: number
       integer(i8), intent(inout) :: control(3)
+      integer, intent(in) :: in_memory
       integer, intent(out) :: status
-      type(session_type), pointer :: session
+      type(handle_type), pointer :: handle
       !f2py threadsafe
 
-      session => session_of(handle)
-      call session%run(control, status)
+      handle => handle_of(number)
+      call handle%run(control, in_memory /= 0, status)
    end subroutine run_case
 
-   subroutine text_length(handle, name, n)
-      integer(i8), intent(in) :: handle
-      character(*), intent(in) :: name
+   !> Prepare for steps from frequency to frequency.
+   subroutine start(number, status)
+      integer(i8), intent(in) :: number
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+      !f2py threadsafe
+
+      handle => handle_of(number)
+      call handle%session%start(error)
+      call handle%conclude(error, status)
+   end subroutine start
+
+   !> One step; see run_case for `control`.
+   subroutine solve(number, omega, control, status)
+      integer(i8), intent(in) :: number
+      real(wp), intent(in) :: omega
+      integer(i8), intent(inout) :: control(3)
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      !f2py threadsafe
+
+      handle => handle_of(number)
+      call handle%solve(omega, control, status)
+   end subroutine solve
+
+   subroutine count_frequencies(number, n)
+      integer(i8), intent(in) :: number
       integer, intent(out) :: n
+      type(handle_type), pointer :: handle
 
-      n = len(text_of(handle, name))
-   end subroutine text_length
+      handle => handle_of(number)
+      n = handle%session%n_frequencies()
+   end subroutine count_frequencies
 
-   subroutine fetch_text(handle, name, n, text)
-      integer(i8), intent(in) :: handle
-      character(*), intent(in) :: name
+   !> The frequencies of the sweep [rad/s], to the bit those that a run takes.
+   subroutine frequencies(number, n, omega, status)
+      integer(i8), intent(in) :: number
       integer, intent(in) :: n
-      integer(1), intent(inout) :: text(n)
+      real(wp), intent(inout) :: omega(n)
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+      integer :: k
 
-      text = transfer(text_of(handle, name), 0_1, n)
-   end subroutine fetch_text
+      handle => handle_of(number)
+      do k = 1, n
+         if (.not. allocated(error)) call handle%session%frequency(k, omega(k), error)
+      end do
+      call handle%conclude(error, status)
+   end subroutine frequencies
 
-   !> 'message', 'summary', 'remarks', or of the case that was read 'namelist' or 'output'.
-   function text_of(handle, name) result(text)
-      integer(i8), intent(in) :: handle
+   !> How many numbers `get_values` gives.
+   subroutine count_values(number, what, name, n, status)
+      integer(i8), intent(in) :: number
+      character(*), intent(in) :: what, name
+      integer, intent(out) :: n, status
+      real(wp), allocatable :: values(:)
+
+      call find_values(number, what, name, values, status)
+      n = size(values)
+   end subroutine count_values
+
+   !> Numbers, the last index running fastest: 'point': of the last step, by the name of the
+   !> dataset in a result file; 'case': of the effective case, see fw_python_parts.
+   subroutine get_values(number, what, name, n, values, status)
+      integer(i8), intent(in) :: number
+      character(*), intent(in) :: what, name
+      integer, intent(in) :: n
+      real(wp), intent(inout) :: values(n)
+      integer, intent(out) :: status
+      real(wp), allocatable :: found(:)
+
+      call find_values(number, what, name, found, status)
+      values = found(:n)
+   end subroutine get_values
+
+   subroutine find_values(number, what, name, values, status)
+      integer(i8), intent(in) :: number
+      character(*), intent(in) :: what, name
+      real(wp), allocatable, intent(out) :: values(:)
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      type(error_type), allocatable :: error
+
+      handle => handle_of(number)
+      if (what == 'point') then
+         call handle%session%get(name, 0, values, error)
+      else
+         call case_part(handle%session%case, name, values, error)
+      end if
+      if (.not. allocated(values)) allocate (values(0))
+      call handle%conclude(error, status)
+   end subroutine find_values
+
+   !> Bytes of a text or of the result in memory; -1 where there is no such name.
+   subroutine count_bytes(number, name, n)
+      integer(i8), intent(in) :: number
       character(*), intent(in) :: name
-      character(:), allocatable :: text
-      type(session_type), pointer :: session
+      integer(i8), intent(out) :: n
+      integer(1), allocatable :: bytes(:)
+      logical :: found
 
-      session => session_of(handle)
+      call find_bytes(number, name, bytes, found)
+      n = -1_i8
+      if (found) n = size(bytes, kind=i8)
+   end subroutine count_bytes
+
+   subroutine get_bytes(number, name, n, bytes)
+      integer(i8), intent(in) :: number
+      character(*), intent(in) :: name
+      integer(i8), intent(in) :: n
+      integer(1), intent(inout) :: bytes(n)
+      integer(1), allocatable :: found(:)
+      logical :: is_known
+
+      call find_bytes(number, name, found, is_known)
+      if (is_known) bytes = found(:n)
+   end subroutine get_bytes
+
+   !> 'message', 'summary', 'remarks', 'image' (the result file), or of the case that was read
+   !> 'namelist', 'output' (path of its result file), 'inputs' (paths of the files that were
+   !> read), 'observed' (names) or 'quantities'.
+   subroutine find_bytes(number, name, bytes, found)
+      integer(i8), intent(in) :: number
+      character(*), intent(in) :: name
+      integer(1), allocatable, intent(out) :: bytes(:)
+      logical, intent(out) :: found
+      type(handle_type), pointer :: handle
+      character(:), allocatable :: text
+
+      handle => handle_of(number)
+      found = .true.
       text = ''
-      select case (name)
-      case ('message')
-         if (allocated(session%message)) text = session%message
-      case ('summary')
-         if (allocated(session%summary)) text = session%summary
-      case ('remarks')
-         if (allocated(session%remarks)) text = session%remarks
-      case ('namelist')
-         if (allocated(session%case%namelist)) text = session%case%namelist
-      case default ! 'output'
-         if (allocated(session%case%output%file)) text = session%case%output%file
-      end select
-   end function text_of
+      associate (case => handle%session%case)
+         select case (name)
+         case ('message')
+            text = handle%message
+         case ('summary')
+            text = handle%summary
+         case ('remarks')
+            text = handle%remarks
+         case ('namelist')
+            if (allocated(case%namelist)) text = case%namelist
+         case ('output')
+            if (allocated(case%output%file)) text = case%output%file
+         case ('observed')
+            if (allocated(case%model%observe_name)) then
+               text = join(case%model%observe_name, new_line('a'))
+            end if
+         case ('inputs')
+            if (allocated(case%inputs)) text = join(case%inputs, new_line('a'))
+         case ('quantities')
+            text = quantity_lines(case)
+         case ('image')
+            if (allocated(handle%image)) bytes = handle%image
+         case default
+            found = .false.
+         end select
+      end associate
+      if (.not. allocated(bytes)) bytes = transfer(text, 0_1, len(text))
+   end subroutine find_bytes
+
+   !> The keys of a namelist, see namelist_words, with a null byte after each word; the message
+   !> where it is none. Called twice: for the number of bytes, then for them.
+   subroutine parse_namelist(n_text, text, n, bytes, n_found, status)
+      integer, intent(in) :: n_text, n
+      integer(1), intent(in) :: text(n_text)
+      integer(1), intent(inout) :: bytes(n)
+      integer(i8), intent(out) :: n_found
+      integer, intent(out) :: status
+      type(string_type), allocatable :: words(:)
+      type(error_type), allocatable :: error
+      integer(i8) :: first
+      integer :: i
+
+      call namelist_words(from_bytes(text), words, error)
+      status = status_ok
+      if (allocated(error)) then
+         status = error%status
+         deallocate (words)
+         allocate (words(1))
+         words(1)%text = error%message
+      end if
+      n_found = 0_i8
+      do i = 1, size(words)
+         first = n_found + 1_i8
+         n_found = n_found + len(words(i)%text, kind=i8) + 1_i8
+         if (n_found <= n) bytes(first:n_found) = transfer(words(i)%text//char(0), 0_1, &
+                                                           len(words(i)%text) + 1)
+      end do
+   end subroutine parse_namelist
 
    pure function from_bytes(bytes) result(text)
       integer(1), intent(in) :: bytes(:)

@@ -9,8 +9,10 @@ fretwear.model, fretwear.case, fretwear.settings
     The structure, and what is to be computed.
 fretwear.analyses
     Runs of the library in this process.
+fretwear.steps
+    A case frequency by frequency.
 fretwear.result
-    Result files.
+    Results.
 fretwear.importer
     Models of other programs.
 fretwear.reduction
@@ -41,6 +43,7 @@ __version__: str = "0.1.0"
 from .analyses import frf, run, wear
 from .case import Case
 from .errors import (
+    AbsentError,
     ConvergenceError,
     FretwearError,
     InputError,
@@ -49,6 +52,19 @@ from .errors import (
 )
 from .model import ContactPairs, Model, Spring
 from .result import Result
+from .steps import Point, Steps
 
-__all__ = ["Case", "ContactPairs", "ConvergenceError", "FretwearError", "InputError", "Model",
-           "OutputError", "Result", "RunInterrupted", "Spring", "__version__", "frf", "run", "wear"]
+__all__ = ["AbsentError", "Case", "ContactPairs", "ConvergenceError", "FretwearError", "InputError",
+           "Model", "OutputError", "Point", "Result", "RunInterrupted", "Spring", "Steps",
+           "__version__", "frf", "run", "wear"]
+
+
+def __getattr__(name: str) -> object:
+    """The functions of `fretwear.plot`, so that matplotlib is loaded when it is needed."""
+    if name.startswith("plot_"):
+        from importlib import import_module
+
+        plot = import_module(".plot", __name__)
+        if name in plot.__all__:
+            return getattr(plot, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

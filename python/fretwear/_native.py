@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from .errors import FretwearError, InputError, OutputError
 
-__all__ = ["NOT_CONVERGED", "STOPPED", "Session", "join_texts", "raise_status", "routines"]
+__all__ = ["NOT_CONVERGED", "STOPPED", "Session", "join_texts", "library_version",
+           "namelist_values", "raise_status", "routines"]
 
 OK, USAGE, INPUT, NOT_CONVERGED, IO, STOPPED = 0, 2, 3, 4, 5, 6
-
-#: What messages put before a setting that was given as an argument.
-_ORIGIN = b"argument"
 
 
 def routines() -> Any:
@@ -36,6 +34,11 @@ def routines() -> Any:
     return fw_python
 
 
+def library_version() -> str:
+    """Version of the compiled part."""
+    return str(routines().library_version().decode().strip())
+
+
 def raise_status(status: int, message: str) -> None:
     """Raise what a status of the library stands for; nothing for success."""
     if status in (USAGE, INPUT):
@@ -53,6 +56,35 @@ def join_texts(texts: Iterable[str]) -> NDArray[np.int8]:
 
 def _bytes(text: str) -> NDArray[np.int8]:
     return np.frombuffer(text.encode(errors="surrogateescape"), dtype=np.int8)
+
+
+def namelist_values(text: str) -> dict[str, list[str]]:
+    """Values by "group%key" as they stand in a namelist, read by the reader of the library.
+
+    Parameters
+    ----------
+    text : str
+        A namelist, such as the one that a result carries; whether it is a case that could run now
+        is not asked.
+
+    Raises
+    ------
+    InputError
+        It is no namelist.
+    """
+    core, given = routines(), _bytes(text)
+    n, status = core.parse_namelist(given, np.zeros(0, dtype=np.int8))
+    buffer = np.zeros(n, dtype=np.int8)
+    core.parse_namelist(given, buffer)
+    words = buffer.tobytes().decode(errors="surrogateescape").split("\0")[:-1]
+    raise_status(status, "".join(words))
+    found: dict[str, list[str]] = {}
+    k = 0
+    while k < len(words):
+        key, n = words[k], int(words[k + 1])
+        found[key] = words[k + 2:k + 2 + n]
+        k += 2 + n
+    return found
 
 
 class Session:
@@ -75,54 +107,111 @@ class Session:
             self._core.close_session(self._handle)
             self._handle = None
 
-    def text(self, name: str) -> str:
-        """'message', 'summary', 'remarks', 'namelist' or 'output'."""
-        buffer = np.zeros(self._core.text_length(self._handle, name), dtype=np.int8)
-        self._core.fetch_text(self._handle, name, buffer)
-        return buffer.tobytes().decode(errors="surrogateescape")
-
-    def give_matrix(self, name: str, values: NDArray[np.float64]) -> None:
-        """Hand over a Fortran-ordered matrix of the model."""
-        self._core.give_matrix(self._handle, name, values)
-
-    def give_vector(self, name: str, values: NDArray[np.float64]) -> None:
-        """Hand over values per pair or dof."""
-        self._core.give_vector(self._handle, name, values)
-
-    def give_sides(self, side_1: NDArray[np.int32], side_2: NDArray[np.int32]) -> None:
-        """Hand over the contact pairs, C-ordered (n_pairs, 3)."""
-        self._core.give_sides(self._handle, side_1.T, side_2.T)
-
-    def give_text(self, name: str, text: str) -> None:
-        """Hand over the title."""
-        self._core.give_text(self._handle, name, _bytes(text))
-
-    def give_texts(self, name: str, texts: Iterable[str]) -> None:
-        """Hand over a list of names."""
-        self._core.give_text(self._handle, name, join_texts(texts))
-
-    def read(self, text: str, path: str, overrides: Iterable[str]) -> None:
-        """Read and validate a case; raises what is wrong with it."""
-        status = self._core.read_case(self._handle, _bytes(text), _bytes(path),
-                                      join_texts(overrides), _ORIGIN)
+    def _checked(self, status: int) -> None:
         raise_status(status, self.text("message"))
+
+    # ------------------------------------------------------------------ what it is told
+
+    def new_model(self, n_dof: int, n_pairs: int) -> None:
+        """Begin a model in memory, with its parts to follow."""
+        self._checked(self._core.new_model(self._handle, n_dof, n_pairs))
+
+    def put(self, name: str, values: NDArray[Any]) -> None:
+        """Give real numbers or dof numbers of the model, by their names in a model file.
+
+        No copy is made of arrays whose elements lie in one piece. Matrices are symmetric, so that
+        their order does not matter; of the others the last index runs fastest.
+        """
+        flat = values.ravel(order="C" if name.startswith("contact/") else "K")
+        put = self._core.put_integers if flat.dtype.kind == "i" else self._core.put_reals
+        self._checked(put(self._handle, name, flat))
+
+    def put_texts(self, name: str, texts: Iterable[str]) -> None:
+        """Give "title", "unit_system" or "contact/patch"."""
+        self._checked(self._core.put_texts(self._handle, name, join_texts(texts)))
+
+    def observe(self, names: Iterable[str], columns: NDArray[np.float64]) -> None:
+        """Give observed quantities: names, and a column of factors (n_dof, n_observed)."""
+        self._checked(self._core.observe(self._handle, join_texts(names), columns))
+
+    def read(self, text: str, path: str, settings: Iterable[tuple[str, str]]) -> None:
+        """Read and validate a namelist with keys set on top; raises what is wrong with it."""
+        self._checked(self._core.give_case(
+            self._handle, _bytes(text), _bytes(path),
+            join_texts(word for setting in settings for word in setting)))
+        self._checked(self._core.prepare(self._handle))
+
+    # ------------------------------------------------------------------ what it does
 
     def check(self) -> None:
         """Raise whatever else would refuse the case before it is computed."""
-        raise_status(self._core.check_case(self._handle), self.text("message"))
+        self._checked(self._core.check_case(self._handle))
 
-    def run(self, control: NDArray[np.int64]) -> int:
+    def run(self, control: NDArray[np.int64], *, in_memory: bool = False) -> int:
         """Run the case. The interpreter lock is released meanwhile.
 
         Parameters
         ----------
         control : (3,) int64
-            Set the first to stop after the present point; the run counts its points in the
-            second, of those in the third (0: not known).
+            Set the first to stop; the run counts its points in the second, of those in the third
+            (0: not known).
+        in_memory : bool
+            Write no result file; `image` has its bytes.
 
         Returns
         -------
         int
             Status of the library; `text("message")` explains it where the run has failed.
         """
-        return int(self._core.run_case(self._handle, control))
+        return int(self._core.run_case(self._handle, control, int(in_memory)))
+
+    def start(self) -> None:
+        """Prepare for steps from frequency to frequency."""
+        self._checked(self._core.start(self._handle))
+
+    def solve(self, omega: float, control: NDArray[np.int64]) -> None:
+        """One step at a frequency [rad/s], from the solutions before it."""
+        self._checked(self._core.solve(self._handle, omega, control))
+
+    def frequencies(self) -> NDArray[np.float64]:
+        """Frequencies of the sweep [rad/s]."""
+        omega = np.zeros(self._core.count_frequencies(self._handle))
+        self._checked(self._core.frequencies(self._handle, omega))
+        return omega
+
+    # ------------------------------------------------------------------ what it knows
+
+    def text(self, name: str) -> str:
+        """'message', 'summary', 'remarks', 'namelist', 'output', 'inputs', 'observed', ..."""
+        return self._bytes_of(name).tobytes().decode(errors="surrogateescape")
+
+    def image(self) -> bytes:
+        """The result file of the last run in memory; empty where it has not come to a point."""
+        return self._bytes_of("image").tobytes()
+
+    def _bytes_of(self, name: str) -> NDArray[np.int8]:
+        n = self._core.count_bytes(self._handle, name)
+        if n < 0:
+            raise KeyError(name)  # a mistake in this package
+        buffer = np.zeros(n, dtype=np.int8)
+        self._core.get_bytes(self._handle, name, buffer)
+        return buffer
+
+    def point(self, name: str) -> NDArray[np.float64]:
+        """Numbers of the last step by the name of their dataset, flattened."""
+        return self._values("point", name)
+
+    def part(self, name: str) -> NDArray[np.float64]:
+        """A part of the effective case, flattened, matrices column by column: "mass",
+        "stiffness", "damping" and "load/..." with all that the namelist adds, "contact/side_1",
+        "contact/side_2", "contact/gap", "contact/depth", "contact/mu", "observe/matrix",
+        "n_springs", "solver_tolerance".
+        """
+        return self._values("case", name)
+
+    def _values(self, what: str, name: str) -> NDArray[np.float64]:
+        n, status = self._core.count_values(self._handle, what, name)
+        self._checked(status)
+        values = np.zeros(n)
+        self._checked(self._core.get_values(self._handle, what, name, values))
+        return values

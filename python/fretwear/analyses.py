@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
-import tempfile
 import threading
-import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -42,23 +39,25 @@ _BETWEEN_CALLS = 0.1
 
 
 def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool = True,
-        progress: Progress | None = None) -> Result:
-    """Run a case and open its result file.
+        progress: Progress | None = None, stop: threading.Event | None = None) -> Result:
+    """Run a case and open its result.
 
     The library computes in this process with the interpreter lock released; the numbers are those
-    of `fw_run`, to the last digit. Ctrl-C stops after the point at work and keeps what is done.
+    of `fw_run`, to the last digit. Ctrl-C stops the run and keeps what is done.
 
     Parameters
     ----------
     case : Case, str or Path
         The case, or the path of a namelist.
     file : str or Path, optional
-        Result file. Without it: where the case says; beside its namelist; or a temporary file
-        that disappears with the result.
+        Result file. Without it: where the case says, or beside its namelist; the result of a
+        model is in memory, and no file is touched (`Result.save` writes one).
     check : bool, optional
         Raise ConvergenceError where points have not converged (default).
     progress : callable, optional
         Called now and then with the points done and the points to come (0: not known).
+    stop : threading.Event, optional
+        Set it, in any thread, to stop the run as Ctrl-C does.
 
     Returns
     -------
@@ -81,27 +80,16 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
                          "points done and the points to come")
     if not isinstance(case, Case):
         case = Case.from_file(case)
-    folder = None
     if file is not None:
         case = case.replace(output={"file": os.path.abspath(file)})
-    elif not case.names_output:
-        folder = tempfile.mkdtemp(prefix="fretwear-")
-        case = case.replace(output={"file": os.path.join(folder, "result.h5")})
-    try:
-        with case.open() as session:
-            status, interrupted = _watched(session, progress)
-            report = (session.text("remarks") + session.text("summary")).splitlines()
-            message = session.text("message")
-            path = session.text("output")
-        if status not in (NOT_CONVERGED, STOPPED):
-            raise_status(status, message)
-        result = Result(path)
-    except BaseException:
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
-    if folder is not None:
-        weakref.finalize(result, shutil.rmtree, folder, True)
+    in_memory = not case.names_output
+    with case.open() as session:
+        status, interrupted = _watched(session, progress, stop, in_memory=in_memory)
+        report = (session.text("remarks") + session.text("summary")).splitlines()
+        message, path, image = session.text("message"), session.text("output"), session.image()
+    if status not in (NOT_CONVERGED, STOPPED):
+        raise_status(status, message)
+    result = Result.from_bytes(image, case) if in_memory else Result(path, case)
     if status == STOPPED or interrupted:
         raise RunInterrupted(result)
     if status == NOT_CONVERGED and check:
@@ -213,21 +201,24 @@ def _refuse_twice(group: str, own: Mapping[str, object], given: Mapping[str, obj
                          "it out, or make a Case and run it")
 
 
-def _watched(session: Session, progress: Progress | None) -> tuple[int, bool]:
+def _watched(session: Session, progress: Progress | None, stop: threading.Event | None, *,
+             in_memory: bool) -> tuple[int, bool]:
     """Run a session so that it can be interrupted; its status, and whether it was.
 
     The main thread alone gets signals, and only while it runs Python: the library works in another
-    thread, while the main one waits.
+    thread, while this one waits.
     """
     control = np.zeros(3, dtype=np.int64)
-    if threading.current_thread() is not threading.main_thread():
-        return session.run(control), False
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main and progress is None and stop is None:
+        return session.run(control, in_memory=in_memory), False
     status: list[int] = []
-    worker = threading.Thread(target=lambda: status.append(session.run(control)), name="fretwear")
-    with _stops_on_interrupt(control) as interrupted:
+    worker = threading.Thread(
+        target=lambda: status.append(session.run(control, in_memory=in_memory)), name="fretwear")
+    with _stops_on_interrupt(control, in_main) as interrupted:
         worker.start()
         try:
-            _wait(worker, control, progress)
+            _wait(worker, control, progress, stop)
         except BaseException:
             control[0] = 1
             worker.join()
@@ -235,20 +226,23 @@ def _watched(session: Session, progress: Progress | None) -> tuple[int, bool]:
     return status[0], bool(interrupted)
 
 
-def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: Progress | None) -> None:
-    if progress is None:
+def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: Progress | None,
+          stop: threading.Event | None) -> None:
+    if progress is None and stop is None:
         worker.join()
         return
     told = -1
     while worker.is_alive():
         worker.join(_BETWEEN_CALLS)
-        if told != control[1]:
+        if stop is not None and stop.is_set():
+            control[0] = 1
+        if progress is not None and told != control[1]:
             told = int(control[1])
             progress(told, int(control[2]))
 
 
 @contextmanager
-def _stops_on_interrupt(control: NDArray[np.int64]) -> Iterator[list[int]]:
+def _stops_on_interrupt(control: NDArray[np.int64], in_main: bool) -> Iterator[list[int]]:
     """Let Ctrl-C set the stop flag instead of raising; yields the list of signals received.
 
     A handler of the calling program gets its signal afterwards.
@@ -260,7 +254,7 @@ def _stops_on_interrupt(control: NDArray[np.int64]) -> Iterator[list[int]]:
         control[0] = 1
 
     before = signal.getsignal(signal.SIGINT)
-    if before is None or before == signal.SIG_IGN:  # not ours to handle
+    if not in_main or before is None or before == signal.SIG_IGN:  # not ours to handle
         yield received
         return
     signal.signal(signal.SIGINT, stop)
@@ -276,7 +270,7 @@ def _failure(result: Result, report: list[str]) -> str:
     """How many points failed, and where, or why a branch ended."""
     failed = result.omega[~result.converged]
     if not len(failed):
-        return f"{result.path}: the run ended early: {'; '.join(report[:1])}"
+        return f"{result.name}: the run ended early: {'; '.join(report[:1])}"
     where = ", ".join(f"{omega:.6g}" for omega in failed[:5]) + (", ..." if len(failed) > 5 else "")
-    return (f"{result.path}: {len(failed)} of {result.n_points} points did not converge, at omega "
+    return (f"{result.name}: {len(failed)} of {result.n_points} points did not converge, at omega "
             f"= {where} rad/s; try other settings of solver and harmonics, or a finer sweep")

@@ -55,7 +55,7 @@ class Case:
     def __init__(self, model: ModelLike, **groups: Unpack[Groups]) -> None:
         self._text, self._path = "", Path("case")  # for messages: there is no namelist
         self._model: Model | None = None
-        self._overrides: tuple[str, ...] = ()
+        self._overrides: tuple[tuple[str, str], ...] = ()
         if isinstance(model, Model):
             self._model = model
         elif isinstance(model, (str, os.PathLike)):
@@ -125,11 +125,12 @@ class Case:
     @property
     def names_output(self) -> bool:
         """Whether the result file has a place: one that was set, or one beside a namelist."""
-        return bool(self._text) or any(word.startswith("output%file=") for word in self._overrides)
+        return bool(self._text) or any(key == "output%file" for key, _ in self._overrides)
 
     def __repr__(self) -> str:
         what = repr(str(self._path)) if self._text else repr(self._model)
-        return " ".join(["<Case", what, *self._overrides]) + ">"
+        settings = (f"{key}={value}" for key, value in self._overrides)
+        return " ".join(["<Case", what, *settings]) + ">"
 
     def open(self) -> Session:
         """A session with this case, read and validated.
@@ -173,13 +174,13 @@ class Case:
             session.check()
 
 
-def _settings(groups: Mapping[str, Any]) -> Iterator[str]:
-    """Settings as the library takes them: group%key=value."""
+def _settings(groups: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Settings as the library takes them: group%key, and a value as a namelist has it."""
     for group, keys in groups.items():
         if not isinstance(keys, Mapping):
             raise InputError(f"{group}: is a {type(keys).__name__}, must be a dictionary of the "
                              f"keys of the group, such as {group}={{'key': value}}")
         name = "model" if group == "structure" else group
         for key, value in keys.items():
-            yield f"{name}%{key}={literal(value, f'{group}[{key!r}]')}"
+            yield f"{name}%{key}", literal(value, f"{group}[{key!r}]")
 

@@ -85,8 +85,8 @@ class Comparison:
 
     def text(self, tolerance: float) -> str:
         """What differs, for people."""
-        lines = [f"- {self.first.path}: {self.first.title} ({self.first.status})",
-                 f"+ {self.second.path}: {self.second.title} ({self.second.status})"]
+        lines = [f"- {self.first.name}: {self.first.title} ({self.first.status})",
+                 f"+ {self.second.name}: {self.second.title} ({self.second.status})"]
         lines += self.namelist
         lines.append(f"{'dataset':28s} {'largest':>12s} {'difference':>12s} {'relative':>10s}")
         for item in self.differences:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .result import Result
 
-__all__ = ["ConvergenceError", "FretwearError", "InputError", "OutputError", "RunInterrupted"]
+__all__ = ["AbsentError", "ConvergenceError", "FretwearError", "InputError", "OutputError",
+           "RunInterrupted"]
 
 
 class FretwearError(Exception):
@@ -27,6 +28,16 @@ class InputError(FretwearError, ValueError):
     """Wrong input; the message names the place, the value found and the remedy."""
 
     exit_status = 3
+
+
+class AbsentError(InputError):
+    """A result does not hold what was asked of it; the message says how to get it.
+
+    Parameters
+    ----------
+    message : str
+        What is absent, and what would make it present.
+    """
 
 
 class ConvergenceError(FretwearError, RuntimeError):

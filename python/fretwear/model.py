@@ -332,39 +332,30 @@ class Model:
 
     # ------------------------------------------------------------------ to the library
 
-    def give_to(self, session: Session) -> tuple[str, ...]:
-        """Hand the model to a session; returns the settings that say the rest of it."""
-        for name, values in self._matrices.items():
-            session.give_matrix(name, values)
-        for name, values in self._loads.items():
-            session.give_vector(f"load_{name}", values)
-        if self.title:
-            session.give_text("title", self.title)
+    def give_to(self, session: Session) -> tuple[tuple[str, str], ...]:
+        """Hand the model to a session; returns the keys that say the rest of it."""
+        session.new_model(self.n_dof, self.n_pairs)
+        for name, values in self._datasets().items():
+            if not name.startswith("observe/") and values.dtype.kind in "if":
+                session.put(name, values)
+        for name in ("title", "unit_system"):
+            if getattr(self, name):
+                session.put_texts(name, [getattr(self, name)])
         if self._observe is not None:
-            session.give_texts("observe_name", self._observe[0])
-            session.give_matrix("observe_matrix", self._observe[1])
+            session.observe(self._observe[0], self._observe[1].T)
         settings = self._spring_settings()
         if self.contact is not None:
-            settings += self._give_contact(session, self.contact)
+            if self.contact.patch is not None:
+                session.put_texts("contact/patch", self.contact.patch)
+            settings += [(f"contact%{name}", literal(getattr(self.contact, name)))
+                         for name in _IN_NAMELIST if getattr(self.contact, name) is not None]
         return tuple(settings)
 
-    def _give_contact(self, session: Session, contact: ContactPairs) -> list[str]:
-        session.give_sides(np.asarray(contact.side_1), np.asarray(contact.side_2))
-        for name in ("mu", "gap", "area"):
-            if getattr(contact, name) is not None:
-                session.give_vector(name, getattr(contact, name))
-        if contact.position is not None:
-            session.give_matrix("position", np.asfortranarray(np.asarray(contact.position).T))
-        if contact.patch is not None:
-            session.give_texts("patch", contact.patch)
-        return [f"contact%{name}={literal(getattr(contact, name))}" for name in _IN_NAMELIST
-                if getattr(contact, name) is not None]
-
-    def _spring_settings(self) -> list[str]:
+    def _spring_settings(self) -> list[tuple[str, str]]:
         if not self.springs:
             return []
-        return [f"spring%n_springs={len(self.springs)}"] + [
-            f"spring%{name}={literal([getattr(spring, name) for spring in self.springs])}"
+        return [("spring%n_springs", literal(len(self.springs)))] + [
+            (f"spring%{name}", literal([getattr(spring, name) for spring in self.springs]))
             for name in ("side_1", "side_2", "coefficient", "power")]
 
 

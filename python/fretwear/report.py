@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import base64
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
 from pathlib import Path
 
@@ -13,8 +13,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from .errors import InputError, OutputError
-from .export.recovery import namelist_values
+from ._native import namelist_values
+from .errors import AbsentError, InputError, OutputError
 from .plot import KINDS, Choices, fitting
 from .plot.style import units_of
 from .result import Result
@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Run `fretwear report`."""
     result = Result(options.result)
-    target = Path(options.output or f"{result.path.stem}.html")
+    target = Path(options.output or f"{Path(result.name).stem}.html")
     write_report(result, target, Choices(observe=options.observe, linear=options.linear))
     print(target)
     return 0
@@ -91,8 +91,11 @@ def render_report(result: Result, choices: Choices) -> str:
     """The page as text: nothing in it refers to anything outside of it."""
     sections = [("numbers", "Numbers", _numbers(result))]
     for name in fitting(result):
-        figure = KINDS[name].draw(result, choices)
-        sections.append((name, KINDS[name].title, _image(figure, KINDS[name].title)))
+        try:
+            content = _image(KINDS[name].draw(result, choices), KINDS[name].title)
+        except AbsentError as error:
+            content = f'<p class="warning">{escape(str(error))}</p>'
+        sections.append((name, KINDS[name].title, content))
     if result.n_points:
         sections.append(("points", "Points", _points(result)))
     if "wear/depth" in result:
@@ -101,7 +104,7 @@ def render_report(result: Result, choices: Choices) -> str:
     links = "".join(f'<a href="#{key}">{escape(title)}</a> ' for key, title, _ in sections)
     body = "\n".join(f'<section id="{key}"><h2>{escape(title)}</h2>\n{content}</section>'
                      for key, title, content in sections)
-    title = escape(result.title or result.path.name)
+    title = escape(result.title or Path(result.name).name)
     return (f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
             '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
             f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
@@ -110,8 +113,9 @@ def render_report(result: Result, choices: Choices) -> str:
 
 def _status(result: Result) -> str:
     version = result.attributes.get("fretwear_version", "")
-    text = (f'<p class="status">{escape(str(result.path.name))}: {escape(result.status)}, '
-            f"{result.elapsed:.3g} s, fretwear {escape(str(version))}</p>")
+    elapsed = _or_not_known(lambda: f"{result.elapsed:.3g} s")
+    text = (f'<p class="status">{escape(Path(result.name).name)}: {escape(result.status)}, '
+            f"{elapsed}, fretwear {escape(str(version))}</p>")
     if result.n_points and not result.converged.all():
         failed = np.flatnonzero(~result.converged)
         listed = ", ".join(f"{result.frequency[k]:.6g} Hz" for k in failed[:12])
@@ -195,12 +199,20 @@ def _wear_numbers(result: Result) -> list[tuple[str, object, str]]:
     depth, worst = result.depth[-1], int(np.argmax(result.depth[-1]))
     return [("wear steps", len(result.depth), ""),
             ("cycles", float(result.cycles[-1]), "1"),
-            ("steady state", result.steady_state or "?", ""),
+            ("steady state", _or_not_known(lambda: result.steady_state), ""),
             (f"largest depth, pair {worst + 1}", float(depth[worst]),
              units_of(result, "wear/depth")),
             ("mean depth", float(depth.mean()), units_of(result, "wear/depth")),
             ("largest depth per cycle, at the end", float(result.rate[-1].max()),
              units_of(result, "wear/rate"))]
+
+
+def _or_not_known(value: Callable[[], str]) -> str:
+    """A text, or that a run which has not come to its end does not tell."""
+    try:
+        return value()
+    except AbsentError:
+        return "not known"
 
 
 def _rows_shown(result: Result) -> np.ndarray:
@@ -226,7 +238,7 @@ def _points(result: Result) -> str:
         head += ["stick [1]", "slip [1]", "open [1]",
                  f"dissipation [{units_of(result, 'contact/dissipation')}]"]
         columns += [*result.fraction[shown].mean(axis=1).T, result.dissipation[shown].sum(axis=1)]
-    if result.stable is not None:
+    if "floquet/stable" in result:
         head.append("stable")
         columns.append(np.array(["no", "yes", "?"])[result.stable[shown]])
     head += ["iterations", "residual [1]"]

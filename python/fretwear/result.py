@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,12 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arguments import text, whole
-from .errors import InputError, OutputError
+from ._native import namelist_values
+from ._notebook import result_dataset, result_html
+from .case import Case
+from .cycle import Cycle, read_cycle
+from .errors import AbsentError, InputError, OutputError
 
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["DIRECTIONS", "STATES", "Result"]
+__all__ = ["DIRECTIONS", "STATES", "Quantity", "Result"]
 
 Floats = NDArray[np.float64]
 
@@ -28,28 +33,49 @@ DIRECTIONS = ("t1", "t2", "n")
 #: Contact states, in the order of `Result.fraction`.
 STATES = ("stick", "slip", "open")
 
-#: Dimensions of every dataset that `Result.to_xarray` takes over.
-_DIMENSIONS: dict[str, tuple[str, ...]] = {
-    "coefficients": ("point", "coefficient", "observed"),
-    "amplitude": ("point", "observed"),
-    "converged": ("point",),
-    "iterations": ("point",),
-    "residual": ("point",),
-    "seconds": ("point",),
-    "served_by": ("point",),
-    "fold": ("point",),
-    "harmonics": ("point",),
-    "instants": ("point",),
-    "error_estimate": ("point",),
-    "floquet/stable": ("point",),
-    "contact/force": ("point", "coefficient", "pair", "direction"),
-    "contact/fraction": ("point", "pair", "state"),
-    "contact/dissipation": ("point", "pair"),
-    "wear/depth": ("step", "pair"),
-    "wear/rate": ("step", "pair"),
-    "wear/energy": ("step", "pair"),
-    "wear/volume": ("step", "patch"),
+#: What makes a dataset present, by its name or the group that it is in.
+_REMEDIES = {
+    "contact/position": "give the pairs places (contact/position of a model)",
+    "contact/area": "give the pairs areas (contact%area)",
+    "contact/patch": "give the pairs patches (contact/patch of a model)",
+    "contact/": "it needs contact pairs, and output%contact = .true.",
+    "history/": "run with output%histories = .true.",
+    "floquet/": "run with sweep%stability = .true.",
+    "wear/depth_halved": "run with wear%check_steps = .true.",
+    "wear/": "run with case%analysis = 'wear'",
+    "error_estimate": "run with harmonics%accuracy",
+    "instants": "run with harmonics%accuracy",
+    "harmonics": "run with harmonics%accuracy or harmonics%adaptive = .true.",
+    "fold": "run with sweep%continuation = 'arclength'",
+    "served_by": "run with case%analysis = 'frf' or 'point'",
+    "peak/": "run a sweep (case%analysis = 'frf') with this version of fretwear",
+    "observed/": "name what to observe in output%observe",
 }
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A dataset as its file declares it.
+
+    Attributes
+    ----------
+    name : str
+        In the file, such as "contact/force".
+    shape : tuple of int
+        Of the array.
+    dimensions : tuple of str
+        Names of its axes ("point", "pair", ...); empty where the file names none.
+    units : str
+        Units of the model; "" where the file does not say.
+    long_name : str
+        What it is, in words.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    dimensions: tuple[str, ...]
+    units: str
+    long_name: str
 
 
 class Result:
@@ -62,6 +88,8 @@ class Result:
     ----------
     path : str or Path
         Result file, or the `.part` file of a run at work.
+    case : Case, optional
+        The case that was run; the one that the file tells of without it.
 
     Raises
     ------
@@ -76,30 +104,159 @@ class Result:
     >>> result.frequency[result.peak("tip")], result.amplitude_of("tip").max()  # doctest: +SKIP
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+    def __init__(self, path: str | Path, case: Case | None = None) -> None:
+        self._begin(Path(path), None, case)
+
+    @classmethod
+    def from_bytes(cls, image: bytes, case: Case | None = None) -> Result:
+        """A result that lives in memory.
+
+        Parameters
+        ----------
+        image : bytes
+            What a result file would hold.
+        case : Case, optional
+            The case that was run.
+        """
+        result = cls.__new__(cls)
+        result._begin(None, image, case)
+        return result
+
+    def _begin(self, path: Path | None, image: bytes | None, case: Case | None) -> None:
+        self._path, self._image, self._case = path, image, case
         self._arrays: dict[str, NDArray[Any]] = {}
+        self._cycles: dict[int, Cycle] = {}
         with self.open() as file:
             kind = _text(file.attrs.get("format", ""))
             if kind != FORMAT:
-                raise InputError(f"{self.path}: format is '{kind}', expected '{FORMAT}'")
+                raise InputError(f"{self.name}: format is '{kind}', expected '{FORMAT}'")
             version = int(file.attrs.get("format_version", 0))
             if version > FORMAT_VERSION:
-                raise InputError(f"{self.path}: format_version is {version}, this package reads "
+                raise InputError(f"{self.name}: format_version is {version}, this package reads "
                                  f"up to {FORMAT_VERSION}; update fretwear")
 
+    # ------------------------------------------------------------------ where it is
+
+    @property
+    def name(self) -> str:
+        """Path of the file, as a text; 'result in memory' of one that has none."""
+        return str(self._path) if self._path is not None else "result in memory"
+
+    @property
+    def path(self) -> Path:
+        """The file.
+
+        Raises
+        ------
+        AbsentError
+            The result is in memory.
+        """
+        if self._path is None:
+            raise AbsentError("the result is in memory and has no file: write one with save(path), "
+                              "or run with file=...")
+        return self._path
+
+    def save(self, path: str | Path) -> Result:
+        """Write the result to a file; returns the result of that file.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be written.
+        """
+        path = Path(path)
+        partial = path.with_name(path.name + ".part")
+        try:
+            image = self.path.read_bytes() if self._image is None else self._image
+            partial.write_bytes(image)
+            partial.replace(path)
+        except OSError as error:
+            partial.unlink(missing_ok=True)
+            raise OutputError(f"{path}: cannot be written: {error.strerror}") from None
+        return Result(path, self._case)
+
+    @property
+    def case(self) -> Case:
+        """The case that was run: what `fretwear.run` was given, or the input that the file holds.
+
+        A model file that has moved is looked for beside the result.
+
+        Raises
+        ------
+        AbsentError
+            The model was in the memory of another program, or its file is gone.
+        """
+        if self._case is None:
+            self._case = self._case_of_file()
+        return self._case
+
+    def _case_of_file(self) -> Case:
+        if namelist_values(self.namelist).get("model%source") == ["memory"]:
+            raise AbsentError(f"{self.name}: its model was in the memory of the program that ran "
+                              "it: keep the Result that `run` returned, or write the model with "
+                              "to_hdf5 and run that file")
+        case = Case.from_text(self.namelist, self._path or "case.nml")
+        try:
+            moved = str(self.model_file.absolute())
+        except AbsentError:
+            if namelist_values(self.namelist).get("model%source") == ["hdf5"]:
+                raise
+            return case
+        return case.replace(structure={"file": moved})
+
+    @property
+    def model_file(self) -> Path:
+        """Model file (HDF5) of the case, also where it has moved together with the result.
+
+        Raises
+        ------
+        AbsentError
+            The model is in no such file, or the file is not there.
+        """
+        values = namelist_values(self.namelist)
+        source = values.get("model%source", ["inline"])[0]
+        if source != "hdf5":
+            raise AbsentError(f"{self.name}: has no model file: model%source = '{source}'; write "
+                              "the model with Model.to_hdf5 and run that file")
+        path = Path(values["model%file"][0])
+        if path.exists():
+            return path
+        if self._path is not None and (beside := self._path.parent / path.name).exists():
+            return beside
+        raise AbsentError(f"{self.name}: its model file {path} is not there; put it there, or "
+                          f"beside the result as {path.name}")
+
+    def cycle(self, point: int) -> Cycle:
+        """One period of the contact at a point (from 0): what the law gives at the instants.
+
+        From the histories of the file where it holds them. Otherwise the point is solved once more,
+        with histories, and has to come out as it stands in the result.
+
+        Raises
+        ------
+        AbsentError
+            There are no contact pairs, or the point cannot be had again; the message says why.
+        """
+        whole("point", point, 0, self.n_points - 1)
+        if point not in self._cycles:
+            self._cycles[point] = read_cycle(self, point)
+        return self._cycles[point]
+
     @cached_property
-    def _names(self) -> frozenset[str]:
+    def _declared(self) -> dict[str, Quantity]:
         """Every dataset of the file."""
-        found: list[str] = []
+        found: dict[str, Quantity] = {}
 
         def note(name: str, item: object) -> None:
             if isinstance(item, h5py.Dataset):
-                found.append(name)
+                words = item.attrs.get("DIMENSION_LABELS", ())
+                found[name] = Quantity(
+                    name, tuple(item.shape), tuple(_text(word) for word in words),
+                    _text(item.attrs.get("units", "")), _text(item.attrs.get("long_name", "")))
 
         with self.open() as file:
             file.visititems(note)
-        return frozenset(found)
+        return found
 
     @cached_property
     def _attributes(self) -> dict[str, Any]:
@@ -107,7 +264,12 @@ class Result:
             return {name: _plain(value) for name, value in file.attrs.items()}
 
     def __repr__(self) -> str:
-        return f"<Result {str(self.path)!r}: {self.n_points} points, {self.status}>"
+        points = f"{len(self.omega)} points, " if "omega" in self else ""
+        return f"<Result {self.name!r}: {points}{self._attributes.get('status', 'no status')}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return result_html(self)
 
     @contextmanager
     def open(self) -> Iterator[h5py.File]:
@@ -119,48 +281,60 @@ class Result:
             Closed at the end of the `with` block.
         """
         try:
-            file = h5py.File(self.path, "r")
+            if self._image is not None:
+                file = h5py.File(h5py.h5f.open_file_image(self._image))
+            else:
+                file = h5py.File(self.path, "r")
         except OSError as error:
-            reason = "there is no such file" if not self.path.exists() else str(error)
-            raise OutputError(f"{self.path}: cannot be read: {reason}") from None
+            reason = str(error) if self._path is None or self._path.exists() else (
+                "there is no such file")
+            raise OutputError(f"{self.name}: cannot be read: {reason}") from None
         with file:
             yield file
 
     # ------------------------------------------------------------------ any dataset
 
     def __contains__(self, name: str) -> bool:
-        return isinstance(name, str) and name.strip("/") in self._names
+        return isinstance(name, str) and name.strip("/") in self._declared
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(self._names))
+        return iter(sorted(self._declared))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Read a dataset by its name in the file, such as "contact/force"."""
-        name = text("name", name).strip("/")
+        name = self.declared(name).name
         if name not in self._arrays:
-            self._arrays[name] = self._read(name)
+            with self.open() as file:
+                array: NDArray[Any] = np.asarray(file[name][()])
+            if array.dtype.kind in "SO":
+                array = np.array([_text(word) for word in array.ravel()]).reshape(array.shape)
+            array.flags.writeable = False
+            self._arrays[name] = array
         return self._arrays[name]
 
-    def _read(self, name: str) -> NDArray[Any]:
-        with self.open() as file:
-            array: NDArray[Any] = np.asarray(self._find(file, name)[()])
-        if array.dtype.kind in "SO":
-            array = np.array([_text(word) for word in array.ravel()]).reshape(array.shape)
-        array.flags.writeable = False
-        return array
+    def declared(self, name: str) -> Quantity:
+        """Shape, dimensions, units and meaning of a dataset, as the file declares them.
 
-    def _find(self, file: h5py.File, name: str) -> h5py.Dataset:
-        found = file.get(name) if name else None
-        if not isinstance(found, h5py.Dataset):
-            raise InputError(f"{self.path}: holds no dataset /{name}; there are "
-                             + ", ".join("/" + known for known in self))
-        return found
+        Raises
+        ------
+        AbsentError
+            The file does not hold it; the message says what would.
+        """
+        name = text("name", name).strip("/")
+        if name not in self._declared:
+            raise self._absent(name)
+        return self._declared[name]
+
+    def _absent(self, name: str) -> AbsentError:
+        for start, how in _REMEDIES.items():
+            if name == start or (start.endswith("/") and name.startswith(start)):
+                return AbsentError(f"{self.name}: holds no dataset /{name}: {how}")
+        return AbsentError(f"{self.name}: holds no dataset /{name}; there are "
+                           + ", ".join("/" + known for known in self))
 
     def units(self, name: str) -> str:
         """Units of a dataset; '' where the file does not say (units of the model)."""
-        name = text("name", name).strip("/")
-        with self.open() as file:
-            return _text(self._find(file, name).attrs.get("units", ""))
+        return self.declared(name).units
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -169,32 +343,47 @@ class Result:
 
     # ------------------------------------------------------------------ the run
 
+    def _attribute(self, name: str) -> Any:
+        if name not in self._attributes:
+            raise AbsentError(f"{self.name}: has no attribute {name}; a run of this version of "
+                              "fretwear writes it")
+        return self._attributes[name]
+
     @property
     def title(self) -> str:
         """Title of the case."""
-        return str(self._attributes.get("title", ""))
+        return str(self._attribute("title"))
 
     @property
     def status(self) -> str:
         """'complete', 'not converged', 'stopped', 'incomplete' or 'failed: ...'."""
-        return str(self._attributes.get("status", ""))
+        return str(self._attribute("status"))
 
     @property
     def namelist(self) -> str:
         """The effective input, every default written out."""
-        return str(self._attributes.get("namelist", ""))
+        return str(self._attribute("namelist"))
 
     @property
     def elapsed(self) -> float:
         """Time of the run [s]."""
-        return float(self._attributes.get("elapsed", 0.0))
+        if self.status == "incomplete":
+            raise AbsentError(f"{self.name}: has no time of the run: it has not come to its end, "
+                              "or was killed")
+        return float(self._attribute("elapsed"))
+
+    @property
+    def remarks(self) -> list[str]:
+        """What the program remarked on the input and the answer; empty where nothing."""
+        name = next((name for name in ("remarks/text", "remarks") if name in self), None)
+        return [] if name is None else [str(remark) for remark in self[name]]
 
     # ------------------------------------------------------------------ points
 
     @property
     def n_points(self) -> int:
         """Solution points in the file."""
-        return len(self.omega) if "omega" in self else 0
+        return len(self.omega)
 
     @property
     def n_harmonics(self) -> int:
@@ -261,11 +450,11 @@ class Result:
 
     @property
     def n_pairs(self) -> int:
-        """Contact pairs of which the file knows; 0 without any."""
-        for name, axis in (("contact/fraction", 1), ("wear/depth", 1)):
-            if name in self:
-                return int(self[name].shape[axis])
-        return 0
+        """Contact pairs of the case."""
+        for quantity in self._declared.values():
+            if "pair" in quantity.dimensions:
+                return quantity.shape[quantity.dimensions.index("pair")]
+        return int(namelist_values(self.namelist).get("contact%n_pairs", ["0"])[0])
 
     @property
     def force(self) -> Floats:
@@ -285,9 +474,9 @@ class Result:
     # ------------------------------------------------------------------ stability
 
     @property
-    def stable(self) -> NDArray[np.int_] | None:
-        """1 stable, 0 unstable, -1 not known (n_points); None where it was not asked for."""
-        return self["floquet/stable"].astype(int) if "floquet/stable" in self else None
+    def stable(self) -> NDArray[np.int_]:
+        """1 stable, 0 unstable, -1 not known (n_points)."""
+        return self["floquet/stable"].astype(int)
 
     # ------------------------------------------------------------------ wear
 
@@ -312,13 +501,15 @@ class Result:
         return self["wear/volume"]
 
     @property
-    def steady_state(self) -> str | None:
-        """'reached', 'not reached' or 'none: gross slip'; None without a wear analysis."""
-        if "wear/depth" not in self:
-            return None
+    def steady_state(self) -> str:
+        """'reached', 'not reached' or 'none: gross slip'."""
+        self.declared("wear/depth")
         with self.open() as file:
             found = file["wear"].attrs.get("steady_state", file.attrs.get("steady_state"))
-        return None if found is None else _text(found)
+        if found is None:
+            raise AbsentError(f"{self.name}: does not say whether a steady state was reached: the "
+                              "run has not come to its end")
+        return _text(found)
 
     # ------------------------------------------------------------------ one quantity
 
@@ -335,11 +526,12 @@ class Result:
             observe = 0
         if isinstance(observe, str):
             if observe not in names:
-                raise InputError(f"{self.path}: '{observe}' is not observed; available: "
+                raise InputError(f"{self.name}: '{observe}' is not observed; available: "
                                  + ", ".join(names))
             return names.index(observe)
         if not names:
-            raise InputError(f"{self.path}: nothing is observed")
+            raise AbsentError(f"{self.name}: nothing is observed; name something in "
+                              "output%observe")
         return whole("observe, a column,", observe, 0, len(names) - 1)
 
     def amplitude_of(self, observe: str | int | None = None) -> Floats:
@@ -367,7 +559,7 @@ class Result:
         """Number (from 0) of the converged point of largest amplitude."""
         values = self.amplitude_of(observe)
         if not np.isfinite(values).any():
-            raise InputError(f"{self.path}: no converged point")
+            raise AbsentError(f"{self.name}: has no peak: no point has converged")
         return int(np.nanargmax(values))
 
     # ------------------------------------------------------------------ notebooks
@@ -379,53 +571,16 @@ class Result:
         -------
         xarray.Dataset
             Dimensions point (step in a wear analysis), coefficient, observed, pair, direction,
-            state and patch; coordinates omega, frequency and cycles. Names as in the file with
-            `_` for `/`.
+            state and patch, as the file declares them; names as in the file with `_` for `/`.
+            Of the coordinates, omega and frequency are indices:
+            ``data.sel(frequency=1022, method="nearest")``.
 
         Raises
         ------
         ImportError
             xarray is not installed.
         """
-        import xarray
-
-        variables = {}
-        for name in self:
-            if name not in _DIMENSIONS:
-                continue
-            units = self.units(name)
-            values = self.converged if name == "converged" else self[name]
-            dimensions = [self._row if dimension in ("point", "step") else dimension
-                          for dimension in _DIMENSIONS[name]]
-            variables[name.replace("/", "_")] = xarray.Variable(
-                dimensions, values, {"units": units} if units else {})
-        return xarray.Dataset(variables, self._coordinates(), {
-            key: value for key, value in self._attributes.items() if key != "format_version"})
-
-    @property
-    def _row(self) -> str:
-        """What a row is: a point of a sweep, or a step of wear."""
-        return "step" if "wear/cycles" in self else "point"
-
-    def _coordinates(self) -> dict[str, Any]:
-        known: dict[str, Any] = {
-            "observed": ("observed", list(self.observed)), "direction": list(DIRECTIONS),
-            "state": list(STATES)}
-        if "omega" in self:
-            known["omega"] = (self._row, self.omega, {"units": "rad/s"})
-            known["frequency"] = (self._row, self.frequency, {"units": "Hz"})
-        if "coefficients" in self:
-            harmonics = range(1, self.n_harmonics + 1)
-            known["coefficient"] = ["0", *(f"{part}{n}" for n in harmonics for part in "cs")]
-        if self.n_pairs:
-            known["pair"] = np.arange(1, self.n_pairs + 1)
-        else:
-            del known["direction"], known["state"]
-        if "wear/cycles" in self:
-            known["cycles"] = ("step", self.cycles, {"units": self.units("wear/cycles") or "1"})
-        if "wear/patch" in self:
-            known["patch"] = self["wear/patch"].tolist()
-        return known
+        return result_dataset(self)
 
 
 def _text(value: object) -> str:

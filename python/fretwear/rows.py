@@ -21,13 +21,13 @@ def choose_point(result: Result, number: int | None) -> int:
     """
     n = len(result.depth) if "wear/depth" in result else result.n_points
     if n == 0:
-        raise InputError(f"{result.path}: holds no points")
+        raise InputError(f"{result.name}: holds no points")
     if number is None:
         if "wear/depth" in result:
             return n - 1
         return result.peak() if result.converged.any() else int(np.nanargmin(result.residual))
     if number == 0 or abs(number) > n:
-        raise InputError(f"{result.path}: point {number}: there are {n}, counted from 1")
+        raise InputError(f"{result.name}: point {number}: there are {n}, counted from 1")
     return number - 1 if number > 0 else n + number
 
 

@@ -96,12 +96,12 @@ def sampled(coarse_case: Path) -> Result:
 
 
 @pytest.fixture(scope="session")
-def worn(coarse: Result) -> Result:
+def worn(sampled: Result) -> Result:
     """The same with the datasets of a wear analysis: depths that settle, one row a point."""
-    path = coarse.path.with_name("worn.h5")
-    path.write_bytes(coarse.path.read_bytes())
-    cycles = np.concatenate(([0.0], np.geomspace(1e3, 1e9, coarse.n_points - 1)))
-    final = 1e-3 * coarse.dissipation[coarse.peak()] / coarse.dissipation.max()
+    path = sampled.path.with_name("worn.h5")
+    path.write_bytes(sampled.path.read_bytes())
+    cycles = np.concatenate(([0.0], np.geomspace(1e3, 1e9, sampled.n_points - 1)))
+    final = 1e-3 * sampled.dissipation[sampled.peak()] / sampled.dissipation.max()
     rate = final * np.exp(-cycles[:, None] / 1e7) / 1e7
     with h5py.File(path, "r+") as file:
         file["wear/cycles"] = cycles

@@ -164,7 +164,7 @@ def test_models_without_mesh_are_refused(examples: Path, tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     result = run(examples.parent / "coulomb" / "coulomb.nml", tmp_path / "a.h5")
     assert main(["export", str(result.path), str(tmp_path / "a.vtu")]) == 3
-    assert "inline models have no mesh" in capsys.readouterr().err
+    assert "has no model file" in capsys.readouterr().err
 
 
 def test_command_line_refuses(coarse: Result, tmp_path: Path,

@@ -10,13 +10,10 @@ import numpy as np
 import pytest
 from program import run
 
+import fretwear as fw
 from fretwear import InputError
-from fretwear.export.recovery import (
-    namelist_values,
-    read_structure,
-    recover_displacement,
-    relative_displacement,
-)
+from fretwear._native import namelist_values
+from fretwear.export import read_structure, recover_displacement, relative_displacement
 from fretwear.result import Result
 
 # The forces of a result are known to the tolerance of its solver, 1e-8 of the vibratory load.
@@ -93,5 +90,21 @@ def test_namelist_values() -> None:
     text = ("&case\n   title = 'it''s, = !'               ! a text\n/\n&model\n"
             "   mass = 1, 0,\n      0, 2.5e-3\n   on = .true.\n   gap = 3*0.5, 1\n/\n")
     assert namelist_values(text) == {
-        "case%title": ["it's, = !"], "model%mass": [1.0, 0.0, 0.0, 2.5e-3],
-        "model%on": [".true."], "model%gap": [0.5, 0.5, 0.5, 1.0]}
+        "case%title": ["it's, = !"], "model%mass": ["1", "0", "0", "2.5e-3"],
+        "model%on": [".true."], "model%gap": ["0.5", "0.5", "0.5", "1"]}
+    with pytest.raises(InputError, match="the = is missing"):
+        namelist_values("&case title")
+
+
+def test_a_model_in_memory_is_recovered_too(examples: Path) -> None:
+    """Every dof of a case that no file tells of, against a run that observes them all."""
+    model = fw.Model.from_hdf5(examples / "sector_16.h5")
+    settings = {
+        "structure": {"modal_damping": 1e-3, "rotation_speed": 460.8}, "contact": {"mu": 0.5},
+        "load": {"harmonic_scale": 0.5}, "harmonics": {"n_harmonics": 3, "n_time": 128}}
+    tip = fw.frf(model, 1022, 1023, 2, unit="Hz", output={"observe": ["tip"]}, **settings)
+    every = list(range(1, model.n_dof + 1))
+    whole = fw.frf(model, 1022, 1023, 2, unit="Hz", output={"observe": every}, **settings)
+    found = recover_displacement(tip)
+    assert np.abs(found[:, 1:] - whole.coefficients[:, 1:]).max() < SOLVED * np.abs(
+        whole.coefficients[:, 1:]).max()

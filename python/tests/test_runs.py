@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 
 import fretwear as fw
 from fretwear import settings
+from fretwear._native import Session
 from fretwear.settings import Groups
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -280,12 +282,110 @@ def test_a_model_file_is_not_written_without_what_it_cannot_hold(tmp_path: Path)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_result_without_a_name_disappears_with_its_object() -> None:
-    result = fw.frf(RUBBING, 0.6, 1.6, 2, contact={"law": "penalty"})
-    path = result.path
-    assert path.exists()
-    del result
-    assert not path.parent.exists()
+# Not one byte may go to a file: the system ends a process that tries.
+NO_FILES = """
+import resource, sys
+import fretwear as fw
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+pair = fw.ContactPairs([[1, 0, 0]], mu=1.0, normal_load=0.5, tangential_stiffness=1.0)
+model = fw.Model([[1.0]], [[0.04]], [[1.0]], contact=pair, cosine=[1.0])
+result = fw.frf(model, 0.6, 1.6, 3, contact={"law": "penalty"})
+print(repr(result.amplitude.ravel().tolist()))
+"""
+
+
+def test_a_model_runs_without_a_file() -> None:
+    done = subprocess.run([sys.executable, "-c", NO_FILES], capture_output=True, text=True,
+                          check=False)
+    assert done.returncode == 0, done.stderr
+    result = fw.frf(RUBBING, 0.6, 1.6, 3, contact={"law": "penalty"})
+    assert eval(done.stdout) == result.amplitude.ravel().tolist()
+
+
+def test_a_result_in_memory_is_that_of_the_file(tmp_path: Path) -> None:
+    model = fw.Model.from_hdf5(EXAMPLES / "blade_sector" / "sector_16.h5")
+    here = fw.frf(model, 1017, 1029, 5, unit="Hz", **SECTOR)
+    written = fw.frf(model, 1017, 1029, 5, unit="Hz", file=tmp_path / "sector.h5", **SECTOR)
+    assert_same_numbers(here, written)
+    for name in here:
+        assert here.declared(name) == written.declared(name)
+    assert here.units("amplitude") == "mm"  # the unit system of the model reaches the result
+    saved = here.save(tmp_path / "saved.h5")
+    assert_same_numbers(here, saved)
+    assert_same_numbers(here, pickle.loads(pickle.dumps(here)))
+    with pytest.raises(fw.AbsentError, match="in memory"):
+        _ = here.path
+    with pytest.raises(fw.OutputError, match="cannot be written"):
+        here.save(tmp_path / "none" / "saved.h5")
+
+
+def test_a_stop_from_another_thread_ends_the_run() -> None:
+    stop = threading.Event()
+    ended: list[fw.Result | None] = []
+
+    def run_until_stopped() -> None:
+        try:
+            fw.run(long_run(), stop=stop)
+        except fw.RunInterrupted as interrupted:
+            ended.append(interrupted.result)
+
+    worker = threading.Thread(target=run_until_stopped)
+    worker.start()
+    worker.join(0.5)
+    assert worker.is_alive()
+    stop.set()
+    worker.join(30.0)
+    assert not worker.is_alive()
+    assert ended and ended[0] is not None and ended[0].status == "stopped"
+
+
+# -------------------------------------------------------------------------------- the session
+
+
+def test_a_misspelt_part_of_a_model_is_refused_and_replaces_nothing() -> None:
+    with Session() as session:
+        session.new_model(1, 1)
+        with pytest.raises(fw.InputError, match="'masss' is no real part of a model"):
+            session.put("masss", np.eye(1))
+        with pytest.raises(fw.InputError, match="contact/position has 1 values: must be 3"):
+            session.put("contact/position", np.eye(1))
+        with pytest.raises(fw.InputError, match="'side_1' is no integer part"):
+            session.put("side_1", np.ones((1, 3), dtype=np.int32))
+        with pytest.raises(fw.InputError, match="'titel' is no text part"):
+            session.put_texts("titel", ["x"])
+        with pytest.raises(fw.InputError, match="a case has no part 'masss'"):
+            session.part("masss")
+        with pytest.raises(KeyError):
+            session.text("mesage")
+
+
+def test_steps_give_the_numbers_of_a_run() -> None:
+    case = fw.Case(RUBBING, contact={"law": "penalty"}, sweep={
+        "start": 0.6, "end": 1.6, "n_points": 7}, output={"histories": True})
+    whole = fw.run(case)
+    with fw.Steps(case) as steps:
+        assert steps.frequencies.tobytes() == whole.omega.tobytes()
+        assert steps.observed == whole.observed
+        points = [steps.solve(omega) for omega in steps.frequencies]
+    for k, point in enumerate(points):
+        assert point.converged and point.omega == whole.omega[k]
+        for name in ("coefficients", "amplitude", "contact/force", "contact/fraction",
+                     "history/force", "history/relative_displacement"):
+            assert point[name].tobytes() == whole[name][k].tobytes(), name
+            assert point[name].shape == whole[name][k].shape, name
+    with pytest.raises(fw.AbsentError, match=r"no 'wear/depth'.*there are omega, "):
+        _ = points[0]["wear/depth"]
+
+
+def test_what_does_not_go_step_by_step_is_refused() -> None:
+    with pytest.raises(fw.InputError, match="must be a Case"):
+        fw.Steps(RUBBING)  # type: ignore[arg-type]
+    case = fw.Case(RUBBING, contact={"law": "penalty"}, sweep={
+        "start": 0.6, "end": 1.6, "n_points": 3})
+    with pytest.raises(fw.InputError, match="run the case as a whole"):
+        fw.Steps(case.replace(harmonics={"accuracy": 1e-2}))
+    with fw.Steps(case) as steps, pytest.raises(fw.InputError, match="omega = -1"):
+        steps.solve(-1.0)
 
 
 # ------------------------------------------------------------------- interruption, threads

@@ -1,5 +1,6 @@
 !> Run a case: the one entry for the command line, C and Python.
 module fw_run
+   use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_combinations, only: check_combinations
@@ -46,13 +47,16 @@ contains
    !> Run a case and write its result file. Points that did not converge make the outcome
    !> status_not_converged, an observer that asks for it status_stopped; `error` is for what ends
    !> the run.
-   subroutine run_case(case, observer, outcome, error, write_file)
+   subroutine run_case(case, observer, outcome, error, write_file, image)
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(outcome_type), intent(out) :: outcome
       type(error_type), allocatable, intent(out) :: error
       !> False: results leave through the observer only (default: true).
       logical, intent(in), optional :: write_file
+      !> The bytes of the result file, which is not written then; not allocated where the run has
+      !> not come to a point.
+      integer(c_int8_t), allocatable, intent(out), optional :: image(:)
       type(result_writer), target :: writer
       type(summary_type), target :: summary
       type(run_state) :: state
@@ -68,7 +72,11 @@ contains
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
       observer%stop_requested = .false.
-      if (is_wanted(write_file)) call writer%open(case, error)
+      if (present(image)) then
+         call writer%open(case, error, in_memory=.true.)
+      else if (is_wanted(write_file)) then
+         call writer%open(case, error)
+      end if
       if (allocated(error)) return
       call threads%enter(case%threads)
       summary = new_summary(case)
@@ -86,10 +94,12 @@ contains
             call writer%discard()
          else
             call writer%close('failed: '//error%message, elapsed, close_error)
+            if (present(image)) call move_alloc(writer%image, image)
          end if
          return
       end if
       call writer%close(trim(state%words()), elapsed, error, summary%skipped, summary%sampling)
+      if (present(image)) call move_alloc(writer%image, image)
       outcome%summary = summary%lines(state, elapsed)
    end subroutine run_case
 

@@ -4,6 +4,7 @@
 !> Sessions share nothing: each may live in a thread of its own. One session serves one thread at
 !> a time.
 module fw_session
+   use, intrinsic :: iso_c_binding, only: c_int8_t
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_point
    use fw_case, only: case_type
@@ -48,6 +49,8 @@ module fw_session
       type(outcome_type) :: outcome
       !> The points of the last run, or of the steps since `start`.
       type(point_list) :: points
+      !> What messages call a key that was set.
+      character(:), allocatable :: origin
       !> Namelist text, its path or name, and `group%key=value` on top of it.
       character(:), allocatable, private :: text, path
       type(string_type), allocatable, private :: keys(:)
@@ -61,8 +64,9 @@ module fw_session
       procedure :: load_text
       procedure :: set
       procedure :: new_model
-      generic :: put => put_reals, put_integers
+      generic :: put => put_reals, put_integers, put_texts
       procedure :: observe
+      procedure :: observe_all
       procedure :: prepare
       procedure :: is_ready
       procedure :: check
@@ -74,6 +78,7 @@ module fw_session
       procedure :: get
       procedure, private :: put_reals
       procedure, private :: put_integers
+      procedure, private :: put_texts
    end type session_type
 
 contains
@@ -117,7 +122,7 @@ contains
       assignment = trim(adjustl(key))//'='
       ! The texts of the reader serve one thread at a time.
       !$omp critical (fretwear_io)
-      call parse_override(assignment//trim(value), entry, error, key_origin)
+      call parse_override(assignment//trim(value), entry, error, origin_of(self))
       !$omp end critical (fretwear_io)
       if (allocated(error)) return
       allocate (kept(0))
@@ -169,6 +174,30 @@ contains
       call forget(self)
    end subroutine put_integers
 
+   !> Give texts of the model: 'title', 'unit_system', or 'contact/patch', one per pair.
+   subroutine put_texts(self, name, texts, error)
+      class(session_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      type(string_type), intent(in) :: texts(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call require_model(self, error)
+      if (.not. allocated(error)) call self%model%put(name, texts, error)
+      call forget(self)
+   end subroutine put_texts
+
+   !> Observe linear combinations of the dofs (n_dof, n_observed) all at once, beside earlier ones.
+   subroutine observe_all(self, names, columns, error)
+      class(session_type), intent(inout) :: self
+      type(string_type), intent(in) :: names(:)
+      real(wp), intent(in) :: columns(:, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      call require_model(self, error)
+      if (.not. allocated(error)) call self%model%observe_all(names, columns, error)
+      call forget(self)
+   end subroutine observe_all
+
    !> Observe a linear combination of the dofs (n_dof); without any, every dof is observed.
    subroutine observe(self, name, row, error)
       class(session_type), intent(inout) :: self
@@ -200,7 +229,7 @@ contains
       input%path = self%path
       input%overrides = self%keys
       input%text = self%text
-      input%origin = key_origin
+      input%origin = origin_of(self)
       ! Damping and checks of a model must not depend on the threads of the BLAS.
       call threads%enter(0)
       if (allocated(self%model)) then
@@ -313,21 +342,31 @@ contains
    end subroutine solve
 
    !> Run the whole case; a result file is written where the input names one (output%file).
-   subroutine run(self, observer, error)
+   subroutine run(self, observer, error, write_file, image)
       class(session_type), intent(inout), target :: self
       class(observer_type), intent(inout), target :: observer
       !> What ends the run; not converging is an outcome.
       type(error_type), allocatable, intent(out) :: error
+      !> Write the result file whether the input names it or not (default: where it does).
+      logical, intent(in), optional :: write_file
+      !> Instead of a file and of `points`: the bytes that the file would have.
+      integer(c_int8_t), allocatable, intent(out), optional :: image(:)
       type(point_recorder) :: recorder
+      logical :: writes
 
       call self%prepare(error)
       if (allocated(error)) return
       call forget_system(self)
       call self%points%clear()
-      recorder%list => self%points
-      recorder%observer => observer
-      call run_case(self%case, recorder, self%outcome, error, &
-                    write_file=self%case%output%names_file)
+      writes = self%case%output%names_file
+      if (present(write_file)) writes = write_file
+      if (present(image)) then
+         call run_case(self%case, observer, self%outcome, error, image=image)
+      else
+         recorder%list => self%points
+         recorder%observer => observer
+         call run_case(self%case, recorder, self%outcome, error, write_file=writes)
+      end if
    end subroutine run
 
    !> Values of a point by the name of their dataset in a result file; see fw_point_quantities.
@@ -349,6 +388,14 @@ contains
          call get_point_values(self%points%item(k)%point, name, self%case, values, error)
       end if
    end subroutine get
+
+   pure function origin_of(self) result(origin)
+      class(session_type), intent(in) :: self
+      character(:), allocatable :: origin
+
+      origin = key_origin
+      if (allocated(self%origin)) origin = self%origin
+   end function origin_of
 
    subroutine require_model(self, error)
       class(session_type), intent(in) :: self

@@ -4,6 +4,10 @@
 !> dimensions in reversed order, because HDF5 counts the slowest dimension first.
 !> HDF5 itself is not thread-safe here: one thread at a time may use this layer.
 module fw_hdf5_file
+   use, intrinsic :: iso_c_binding, only: c_int8_t
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use, intrinsic :: iso_c_binding, only: c_null_ptr
+   use, intrinsic :: iso_c_binding, only: c_ptr
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -11,6 +15,7 @@ module fw_hdf5_file
    use hdf5, only: h5dont_atexit_f
    use hdf5, only: hid_t
    use hdf5, only: hsize_t
+   use hdf5, only: size_t
    use hdf5, only: h5open_f
    use hdf5, only: h5eset_auto_f
    use hdf5, only: h5iis_valid_f
@@ -19,10 +24,15 @@ module fw_hdf5_file
    use hdf5, only: h5fclose_f
    use hdf5, only: h5fflush_f
    use hdf5, only: h5fis_hdf5_f
+   use hdf5, only: h5fget_file_image_f
    use hdf5, only: h5f_acc_rdonly_f
    use hdf5, only: h5f_acc_excl_f
    use hdf5, only: h5f_acc_trunc_f
    use hdf5, only: h5f_scope_local_f
+   use hdf5, only: h5p_file_access_f
+   use hdf5, only: h5pclose_f
+   use hdf5, only: h5pcreate_f
+   use hdf5, only: h5pset_fapl_core_f
    use hdf5, only: h5lexists_f
    use hdf5, only: h5oexists_by_name_f
    use hdf5, only: h5t_native_double
@@ -30,6 +40,12 @@ module fw_hdf5_file
    private
 
    public :: hdf5_file, dataset_failure, shape_text
+
+   !> Files in memory grow by so much [bytes].
+   integer(size_t), parameter :: memory_step = 262144_size_t
+   !> So many files in memory are told apart, under names that no file can have.
+   integer, parameter :: most_in_memory = 100000
+   character(*), parameter :: memory_name = '/dev/null/fretwear.'
 
    !> An open file. A copy shares the handle: pass it along, never store two.
    type :: hdf5_file
@@ -40,6 +56,8 @@ module fw_hdf5_file
    contains
       procedure :: open_read
       procedure :: create
+      procedure :: create_in_memory
+      procedure :: image
       procedure :: flush
       procedure :: close
       procedure :: exists
@@ -98,6 +116,59 @@ contains
       call fatal_error(error, path//': cannot be created (does the folder exist, is it '// &
                        'writable, is the file in use?)', status_io)
    end subroutine create
+
+   !> Create a file that lives in memory only, and is gone when it is closed.
+   subroutine create_in_memory(self, error)
+      class(hdf5_file), intent(out) :: self
+      type(error_type), allocatable, intent(out) :: error
+      character(12) :: number
+      integer(hid_t) :: access
+      integer :: i, ignored, status
+
+      self%status = status_io
+      call start_library()
+      call h5pcreate_f(h5p_file_access_f, access, status)
+      if (status >= 0) then
+         call h5pset_fapl_core_f(access, memory_step, .false., status)
+         ! HDF5 takes two open files of one name for one file, and refuses the second.
+         do i = 1, most_in_memory
+            if (status < 0) exit
+            write (number, '(i0)') i
+            self%path = memory_name//trim(number)
+            call h5fcreate_f(self%path, h5f_acc_trunc_f, self%id, status, access_prp=access)
+            if (status >= 0) exit
+            status = 0
+            self%id = -1_hid_t
+         end do
+         call h5pclose_f(access, ignored)
+      end if
+      if (self%id < 0) call fatal_error(error, 'no memory for a result file in memory', status_io)
+   end subroutine create_in_memory
+
+   !> The bytes that the file would have on a disk.
+   subroutine image(self, bytes, error)
+      class(hdf5_file), intent(in) :: self
+      integer(c_int8_t), allocatable, target, intent(out) :: bytes(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(c_ptr) :: address
+      integer(size_t) :: n
+      integer :: problem, status
+
+      call self%flush(error)
+      if (allocated(error)) return
+      n = 0_size_t
+      address = c_null_ptr
+      call h5fget_file_image_f(self%id, address, 0_size_t, status, n)
+      problem = 0
+      if (status >= 0) allocate (bytes(n), stat=problem)
+      if (status >= 0 .and. problem == 0) then
+         address = c_loc(bytes)
+         call h5fget_file_image_f(self%id, address, n, status)
+      end if
+      if (status < 0 .or. problem /= 0) then
+         call fatal_error(error, 'no memory for a copy of a result file in memory', status_io)
+      end if
+   end subroutine image
 
    !> Hand everything written so far to the operating system.
    subroutine flush(self, error)

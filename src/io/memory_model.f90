@@ -9,6 +9,7 @@ module fw_memory_model
    use fw_kinds, only: i8
    use fw_kinds, only: wp
    use fw_model_file, only: file_model_type
+   use fw_text, only: string_type
    use fw_text, only: to_text
    use fw_text_list, only: append
    implicit none (type, external)
@@ -28,6 +29,8 @@ module fw_memory_model
       [character(20) :: 'contact/mu', 'contact/gap', 'contact/area', 'contact/position']
    character(*), parameter :: integer_names(*) = &
       [character(20) :: 'contact/side_1', 'contact/side_2']
+   character(*), parameter :: text_names(*) = &
+      [character(20) :: 'title', 'unit_system', 'contact/patch']
 
    type :: memory_model_type
       integer :: n_dof = 0
@@ -35,11 +38,13 @@ module fw_memory_model
       type(file_model_type) :: parts
    contains
       procedure :: start
-      generic :: put => put_reals, put_integers
+      generic :: put => put_reals, put_integers, put_texts
       procedure :: observe
+      procedure :: observe_all
       procedure :: check
       procedure, private :: put_reals
       procedure, private :: put_integers
+      procedure, private :: put_texts
    end type memory_model_type
 
 contains
@@ -131,34 +136,68 @@ contains
       if (name == 'contact/side_2') self%parts%side_2 = reshape(values, [3, self%n_pairs])
    end subroutine put_integers
 
+   !> A text, or a list of them with one for each pair.
+   subroutine put_texts(self, name, texts, error)
+      class(memory_model_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      type(string_type), intent(in) :: texts(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. any(text_names == name)) then
+         call unknown_name(name, text_names, 'text', error)
+         return
+      end if
+      call check_size(name, size(texts, kind=i8), 1, merge(self%n_pairs, 1, &
+                                                           name == 'contact/patch'), error)
+      if (allocated(error)) return
+      if (name == 'title') self%parts%title = texts(1)%text
+      if (name == 'unit_system') self%parts%unit_system = texts(1)%text
+      if (name == 'contact/patch') self%parts%patch = texts
+   end subroutine put_texts
+
    !> Add an observed quantity: a linear combination of the dofs (n_dof).
    subroutine observe(self, name, row, error)
       class(memory_model_type), intent(inout) :: self
       character(*), intent(in) :: name
       real(wp), intent(in) :: row(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: rows(:, :)
-      integer :: n
+      type(string_type) :: names(1)
 
-      call check_size(name, size(row, kind=i8), self%n_dof, 1, error)
-      if (allocated(error)) return
-      if (len_trim(name) == 0) then
-         call fatal_error(error, 'the name of an observed quantity is empty', status_input)
-         return
-      end if
+      names(1)%text = name
+      call self%observe_all(names, reshape(row, [size(row), 1]), error)
+   end subroutine observe
+
+   !> Add observed quantities, a column of factors each (n_dof, n_observed).
+   subroutine observe_all(self, names, columns, error)
+      class(memory_model_type), intent(inout) :: self
+      type(string_type), intent(in) :: names(:)
+      real(wp), intent(in) :: columns(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: rows(:, :)
+      integer :: i, n
+
+      do i = 1, size(names)
+         call check_size(names(i)%text, size(columns, 1, kind=i8), self%n_dof, 1, error)
+         if (.not. allocated(error) .and. len_trim(names(i)%text) == 0) then
+            call fatal_error(error, 'the name of an observed quantity is empty', status_input)
+         end if
+         if (allocated(error)) return
+      end do
       associate (parts => self%parts)
          if (.not. allocated(parts%observe_name)) then
             allocate (parts%observe_name(0))
             allocate (parts%observe_matrix(0, self%n_dof))
          end if
-         call append(parts%observe_name, trim(name))
          n = size(parts%observe_name)
-         allocate (rows(n, self%n_dof))
-         rows(:n - 1, :) = parts%observe_matrix
-         rows(n, :) = row
+         do i = 1, size(names)
+            call append(parts%observe_name, trim(names(i)%text))
+         end do
+         allocate (rows(n + size(names), self%n_dof))
+         rows(:n, :) = parts%observe_matrix
+         rows(n + 1:, :) = transpose(columns)
          call move_alloc(rows, parts%observe_matrix)
       end associate
-   end subroutine observe
+   end subroutine observe_all
 
    !> Refuse a model that lacks what every one needs.
    subroutine check(self, error)

@@ -5,6 +5,7 @@
 !> the time: then a killed run loses at most the points of the last 20 times the time a flush
 !> takes (some milliseconds). Rows follow the order of Fortran reversed, as h5py shows them.
 module fw_result
+   use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -44,6 +45,9 @@ module fw_result
       character(:), allocatable, private :: path
       type(row_set), private :: rows
       integer(int64), private :: last_flush = 0_int64, flush_duration = 0_int64
+      !> The result stays in memory; once it is closed, its bytes are `image`.
+      logical, private :: in_memory = .false.
+      integer(c_int8_t), allocatable :: image(:)
    contains
       procedure :: open
       procedure :: add_point
@@ -56,14 +60,17 @@ module fw_result
 contains
 
    !> Create the file with everything but the points.
-   subroutine open(self, case, error)
+   subroutine open(self, case, error, in_memory)
       class(result_writer), intent(out) :: self
       !> Case whose output file, title, namelist, sizes and choices of output are taken.
       type(case_type), intent(in) :: case
       !> status_input where the file is one that the case was read from; status_io where it
       !> cannot be written or is anything but an earlier result.
       type(error_type), allocatable, intent(out) :: error
+      !> Touch no file: leave the bytes of one in `image` (default: no).
+      logical, intent(in), optional :: in_memory
 
+      if (present(in_memory)) self%in_memory = in_memory
       !$omp critical (fretwear_io)
       call create_file(self, case, error)
       !$omp end critical (fretwear_io)
@@ -74,7 +81,9 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. allocated(case%output%file)) then
+      if (self%in_memory) then
+         call self%file%create_in_memory(error)
+      else if (.not. allocated(case%output%file)) then
          call fatal_error(error, 'no result file is named: set output%file', status_input)
       else if (allocated(case%inputs)) then
          call create_part(case%output%file, self%path, self%file, error, case%inputs)
@@ -190,11 +199,13 @@ contains
          call write_attribute(self%file, '/', 'status', trim(status), error)
       end if
       call self%rows%close()
+      if (self%in_memory .and. .not. allocated(error)) call self%file%image(self%image, error)
       call self%file%close(close_error)
       if (allocated(close_error) .and. .not. allocated(error)) then
          call move_alloc(close_error, error)
       end if
-      if (.not. allocated(error)) call publish_part(self%file%path, self%path, error)
+      if (allocated(error) .or. self%in_memory) return
+      call publish_part(self%file%path, self%path, error)
    end subroutine close_file
 
    !> Give the file up: nothing of it stays.
@@ -213,7 +224,7 @@ contains
       if (self%file%id < 0) return
       call self%rows%close()
       call self%file%close(ignored)
-      call delete_part(self%file%path)
+      if (.not. self%in_memory) call delete_part(self%file%path)
    end subroutine discard_file
 
    subroutine write_header(file, case, error)

@@ -13,7 +13,7 @@ from ..mesh import RecoveryMesh
 from ..result import Result
 from ..rows import choose_point, pair_fields, synthesis
 from .mesh import read_mesh
-from .recovery import model_path, recover_displacement
+from .recovery import recover_displacement
 
 if TYPE_CHECKING:
     import meshio
@@ -61,17 +61,14 @@ class Fields:
     """What one point of a result shows on the mesh of its model."""
 
     def __init__(self, result: Result, point: int) -> None:
-        path = model_path(result)
-        if path is None:
-            raise InputError(f"{result.path}: inline models have no mesh to export")
         self.result, self.point = result, point
-        self.mesh: RecoveryMesh = read_mesh(path)
+        self.mesh: RecoveryMesh = read_mesh(result.model_file)
         self.pairs = pair_fields(result, point)
         self.coefficients: Floats | None = None
         if "contact/force" in result or "wear/depth" not in result:
             recovered = recover_displacement(result, points=[point])[point]
             if not np.isfinite(recovered).all():
-                raise InputError(f"{result.path}: point {point + 1} holds no solution")
+                raise InputError(f"{result.name}: point {point + 1} holds no solution")
             shape = (len(recovered), *self.mesh.points.shape)
             self.coefficients = (recovered @ self.mesh.basis.T).reshape(shape)
 
@@ -117,7 +114,7 @@ class Fields:
     def summary(self) -> str:
         """Fields with their units and largest values, one line each."""
         length = self.result.units("amplitude")
-        lines = [f"{self.result.path}: point {self.point + 1}, {len(self.mesh.points)} points, "
+        lines = [f"{self.result.name}: point {self.point + 1}, {len(self.mesh.points)} points, "
                  f"{len(self.mesh.cells)} hexahedra, {len(self.mesh.facets)} facets in contact"]
         shown = {name: (np.linalg.norm(values, axis=1) if values.ndim == 2 else values, length)
                  for name, values in self._point_data(None).items()}

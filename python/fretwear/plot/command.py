@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
-from ..errors import InputError, OutputError
+from ..errors import AbsentError, InputError, OutputError
 from ..result import Result
 from ..rows import choose_point
 from .kinds import KINDS, Choices, fitting
@@ -41,7 +42,7 @@ def main(options: argparse.Namespace) -> int:
     choices = Choices(
         None if options.point is None else choose_point(result, options.point),
         _numbers(options.pairs), options.observe, options.linear, options.modal_mass)
-    target = Path(options.output or f"{result.path.stem}.png")
+    target = Path(options.output or f"{Path(result.name).stem}.png")
     if not target.absolute().parent.is_dir():
         raise OutputError(f"{target}: there is no folder {target.absolute().parent}")
     for name in kinds:
@@ -49,6 +50,11 @@ def main(options: argparse.Namespace) -> int:
         path = target if alone else target.with_name(f"{target.stem}_{name}{target.suffix}")
         try:
             KINDS[name].draw(result, choices).savefig(path)
+        except AbsentError as error:
+            if options.kind is not None:
+                raise
+            print(f"fretwear plot: {name}: {error}", file=sys.stderr)
+            continue
         except ValueError as error:
             if isinstance(error, InputError):
                 raise

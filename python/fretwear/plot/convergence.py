@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from .._native import namelist_values
 from ..errors import InputError
-from ..export.recovery import namelist_values
 from .style import CURVE, FAILED, Source, as_result, label, new_figure, tidy
 
 __all__ = ["plot_convergence"]
@@ -24,7 +24,7 @@ def plot_convergence(source: Source) -> Figure:
     """
     result = as_result(source)
     if result.n_points == 0:
-        raise InputError(f"{result.path}: holds no points")
+        raise InputError(f"{result.name}: holds no points")
     number = np.arange(1, result.n_points + 1)
     failed = ~result.converged
     figure = new_figure(8.0, 6.0)
@@ -55,5 +55,6 @@ def plot_convergence(source: Source) -> Figure:
     panels[2].set_xlabel("point [1]")
     panels[2].locator_params(axis="x", integer=True)
     figure.suptitle(f"Convergence: {(~failed).sum()} of {result.n_points} points, "
-                    f"{result.iterations.sum()} iterations, {result.elapsed:.3g} s", fontsize=11)
+                    f"{result.iterations.sum()} iterations, {result.seconds.sum():.3g} s",
+                    fontsize=11)
     return figure

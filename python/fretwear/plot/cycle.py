@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..cycle import Cycle
 from ..errors import InputError
-from ..export.recovery import relative_displacement
 from ..result import DIRECTIONS, Result
 from ..rows import choose_point, synthesis
 from .style import (
     CURVE,
     PALETTE,
-    Floats,
     Source,
     as_result,
     label,
@@ -26,59 +24,12 @@ from .style import (
     units_of,
 )
 
-__all__ = ["Cycle", "plot_cycle", "plot_harmonics", "plot_hysteresis", "read_cycle"]
+__all__ = ["plot_cycle", "plot_harmonics", "plot_hysteresis"]
 
-#: Instants of a period where the file holds no histories.
+#: Instants of a period of an observed quantity.
 _INSTANTS = 256
 #: Pairs drawn unless others are asked for.
 _MOST_PAIRS = 6
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """One period of the contact, closed: the last instant repeats the first.
-
-    Attributes
-    ----------
-    degrees : (n_time + 1,)
-        Phase of the excitation [degrees].
-    displacement, force : (n_time + 1, n_pairs, 3)
-        Relative displacement [length] and contact force [force] in (t1, t2, n).
-    sampled : bool
-        Forces as the march gave them; otherwise sums of the stored harmonics.
-    """
-
-    degrees: Floats
-    displacement: Floats
-    force: Floats
-    sampled: bool
-
-
-def read_cycle(result: Result, point: int) -> Cycle:
-    """One period at a point (from 0), from the histories of the file or from its harmonics.
-
-    Raises
-    ------
-    InputError
-        There are neither histories nor forces and a model to recover displacements from.
-    """
-    sampled = "history/relative_displacement" in result
-    if sampled:
-        displacement = result["history/relative_displacement"][point]
-        force = result["history/force"][point]
-        sampled = bool(np.isfinite(force).all())
-    if not sampled:
-        if "contact/force" not in result:
-            raise InputError(f"{result.path}: holds no contact forces; run with output%contact = "
-                             ".true.")
-        tau = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
-        series = synthesis(result.coefficients.shape[1], tau)
-        relative = relative_displacement(result, [point])[point]
-        displacement = np.einsum("cij,ct->tij", relative, series)
-        force = np.einsum("cij,ct->tij", result.force[point], series)
-    degrees = np.linspace(0.0, 360.0, len(force) + 1)
-    return Cycle(degrees, np.concatenate((displacement, displacement[:1])),
-                 np.concatenate((force, force[:1])), sampled)
 
 
 def _chosen(result: Result, cycle: Cycle, point: int, pairs: Sequence[int] | None) -> list[int]:
@@ -86,7 +37,7 @@ def _chosen(result: Result, cycle: Cycle, point: int, pairs: Sequence[int] | Non
     if pairs is not None:
         wrong = [pair + 1 for pair in pairs if not 0 <= pair < cycle.force.shape[1]]
         if wrong:
-            raise InputError(f"{result.path}: pair {wrong[0]}: there are {cycle.force.shape[1]}, "
+            raise InputError(f"{result.name}: pair {wrong[0]}: there are {cycle.force.shape[1]}, "
                              "counted from 1")
         return list(pairs)
     order = np.argsort(-result.dissipation[point], kind="stable")
@@ -115,8 +66,8 @@ def plot_hysteresis(source: Source, point: int | None = None,
     Parameters
     ----------
     source : Result or path
-        With histories (`&output histories`), forces are drawn as sampled; without, as the sum of
-        their harmonics.
+        With contact. What is drawn is what the law gives, never a sum of harmonics: from the
+        histories (`&output histories`), or from the point solved once more.
     point : int, optional
         Point from 0; that of the largest amplitude without it.
     pairs : sequence of int, optional
@@ -125,7 +76,7 @@ def plot_hysteresis(source: Source, point: int | None = None,
     """
     result = as_result(source)
     point = choose_point(result, None) if point is None else point
-    cycle = read_cycle(result, point)
+    cycle = result.cycle(point)
     drawn = _chosen(result, cycle, point, pairs)
     columns = min(3, len(drawn))
     rows = math.ceil(len(drawn) / columns)
@@ -141,8 +92,7 @@ def plot_hysteresis(source: Source, point: int | None = None,
         axes.set_visible(False)
     figure.supxlabel(label("relative displacement", units_of(result, "amplitude")), fontsize=10)
     figure.supylabel(label("contact force", units_of(result, "contact/force")), fontsize=10)
-    kind = "" if cycle.sampled else f"\n(forces up to harmonic {_highest(result, point)})"
-    figure.suptitle(f"Hysteresis at {_at(result, point)}{kind}", fontsize=11)
+    figure.suptitle(f"Hysteresis at {_at(result, point)}", fontsize=11)
     return figure
 
 
@@ -172,7 +122,7 @@ def plot_cycle(source: Source, point: int | None = None, pairs: Sequence[int] | 
     panels[0].set_ylabel(label(name, units_of(result, "amplitude")))
     panels[0].set_title(f"One cycle at {_at(result, point)}", fontsize=11)
     if has_contact:
-        cycle = read_cycle(result, point)
+        cycle = result.cycle(point)
         for k, pair in enumerate(_chosen(result, cycle, point, pairs)):
             c = _direction(cycle, pair)
             panels[1].plot(cycle.degrees, cycle.displacement[:, pair, c],

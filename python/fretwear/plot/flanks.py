@@ -69,7 +69,7 @@ def find_flanks(result: Result) -> list[Flank]:
         The file holds no positions.
     """
     if "contact/position" not in result:
-        raise InputError(f"{result.path}: holds no /contact/position, so there is no map to draw; "
+        raise InputError(f"{result.name}: holds no /contact/position, so there is no map to draw; "
                          "the model file has to hold it")
     position = result["contact/position"]
     patch = (result["contact/patch"] if "contact/patch" in result
@@ -137,7 +137,7 @@ def plot_flanks(source: Source, point: int | None = None) -> Figure:
     fields = {name: field for name, field in pair_fields(result, point).items()
               if not name.startswith("wear")}
     if not fields:
-        raise InputError(f"{result.path}: holds no contact states; run with output%contact = "
+        raise InputError(f"{result.name}: holds no contact states; run with output%contact = "
                          ".true.")
     title = f"Contact at point {point + 1}"
     if point < result.n_points:

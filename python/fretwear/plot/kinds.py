@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from ..errors import InputError
-from ..export.recovery import model_path
 from ..result import Result
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
@@ -58,17 +56,12 @@ def _has(*names: str) -> Callable[[Result], bool]:
 
 
 def _has_cycle(result: Result) -> bool:
-    """Whether the period of the pairs is stored or can be recovered."""
-    if "contact/force" not in result:
+    """Whether there are pairs that have a period to show."""
+    if "contact/force" not in result or not (
+            result.converged.any() or "history/force" in result):
         return False
     # A wear analysis has one row of both for each of its steps.
-    if "wear/depth" in result and len(result.depth) != result.n_points:
-        return False
-    try:
-        return "history/force" in result or model_path(result) is None or (
-            "spring%n_springs" not in result.namelist)
-    except InputError:
-        return False
+    return "wear/depth" not in result or len(result.depth) == result.n_points
 
 
 #: Every kind of picture, in the order in which a report shows them.

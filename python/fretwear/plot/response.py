@@ -90,7 +90,7 @@ def read_response(source: Source, observe: str | None = None) -> Response:
     result = as_result(source)
     for name in ("omega", "amplitude", "converged", "observed/name"):
         if name not in result:
-            raise InputError(f"{result.path}: dataset /{name} is missing (only sweeps have a "
+            raise InputError(f"{result.name}: dataset /{name} is missing (only sweeps have a "
                              "frequency response)")
     column = result.index(observe)
     fraction = result.fraction if "contact/fraction" in result else None
@@ -98,7 +98,8 @@ def read_response(source: Source, observe: str | None = None) -> Response:
     return Response(
         result.observed[column], result.frequency, result.amplitude[:, column], result.converged,
         None if fraction is None else fraction.mean(axis=1),
-        None if loss is None else loss.sum(axis=1), result.stable, units_of(result, "amplitude"))
+        None if loss is None else loss.sum(axis=1),
+        result.stable if "floquet/stable" in result else None, units_of(result, "amplitude"))
 
 
 def half_power_damping(response: Response) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..errors import InputError
+from ..errors import AbsentError, InputError
 from ..result import Result
 from ..rows import choose_point, pair_fields
 from .flanks import plot_maps
@@ -30,7 +30,7 @@ _MOST_PAIRS = 6
 def _worn(source: Source) -> Result:
     result = as_result(source)
     if "wear/depth" not in result:
-        raise InputError(f"{result.path}: holds no wear; run with case%analysis = 'wear'")
+        raise InputError(f"{result.name}: holds no wear; run with case%analysis = 'wear'")
     return result
 
 
@@ -136,7 +136,9 @@ def plot_wear_evolution(source: Source) -> Figure:
     panels[-1].set_xlabel(label(_abscissa(result), "1"))
     for axes in panels:
         tidy(axes)
-    state = result.steady_state
-    figure.suptitle("Wear over the cycles" + (f", steady state {state}" if state else ""),
-                    fontsize=11)
+    try:
+        state = f", steady state {result.steady_state}"
+    except AbsentError:  # the run is at work, or was killed
+        state = ""
+    figure.suptitle(f"Wear over the cycles{state}", fontsize=11)
     return figure

@@ -5,18 +5,15 @@ from __future__ import annotations
 import importlib
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import Any
 
 from ..errors import InputError
 from .run import Job, Record, RunStopped, run_job
 
-__all__ = ["core_count", "each", "run_jobs"]
-
-_Item = TypeVar("_Item")
-_Answer = TypeVar("_Answer")
+__all__ = ["core_count", "run_jobs"]
 
 
 def core_count() -> int:
@@ -24,13 +21,6 @@ def core_count() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def each(function: Callable[[_Item], _Answer], items: Sequence[_Item],
-         workers: int) -> list[_Answer]:
-    """Apply a function that waits for a program to every item, some at once."""
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(function, items))
 
 
 def run_jobs(jobs: Sequence[Job], scheduler: str, workers: int) -> Iterator[Record]:

@@ -11,7 +11,7 @@ from typing import Optional, Union
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import AbsentError, InputError
 from ..result import Result
 
 __all__ = ["QUANTITIES", "Value", "check_quantity", "evaluate"]
@@ -34,6 +34,13 @@ def _slipping(result: Result, observed: str | None) -> float:
 
 def _opening(result: Result, observed: str | None) -> float:
     return float(result.fraction[result.peak(observed), :, 2].mean())
+
+
+def _steady_state(result: Result, _: str | None) -> str:
+    try:
+        return result.steady_state
+    except AbsentError:  # the run has not come to its end
+        return ""
 
 
 #: Quantity: function, whether it is of an observed quantity, dataset that it needs, meaning.
@@ -68,7 +75,7 @@ QUANTITIES: dict[str, tuple[_Quantity, bool, str, str]] = {
     "max_wear_rate": (lambda r, _: float(r.rate[-1].max()), False, "wear/rate",
                       "largest wear rate at the end [L per cycle]"),
     "cycles": (lambda r, _: float(r.cycles[-1]), False, "wear/cycles", "cycles at the end"),
-    "steady_state": (lambda r, _: r.steady_state or "", False, "wear/depth",
+    "steady_state": (_steady_state, False, "wear/depth",
                      "'reached', 'not reached' or 'none: gross slip'"),
     "status": (lambda r, _: r.status, False, "omega", "status in the result file"),
     "elapsed": (lambda r, _: r.elapsed, False, "omega", "time of the run [s]"),

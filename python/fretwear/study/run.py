@@ -10,7 +10,6 @@ import contextlib
 import hashlib
 import json
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -21,20 +20,20 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ..errors import InputError
+from .._namelist import literal
+from .._native import Session, library_version, namelist_values
+from ..errors import FretwearError, InputError
 from .plan import Setting, override
 
-__all__ = ["Job", "Record", "RunStopped", "find_program", "identify", "recorded", "run_job"]
+__all__ = ["Job", "Record", "RunStopped", "check_program", "find_program", "identify", "recorded",
+           "run_job"]
 
 STATUS = {0: "ok", 3: "bad input", 4: "not converged"}
 #: Runs that ended so would end so again.
 _FINAL = ("ok", "not converged")
 _TIMEOUT_STATUS = 124
-_ROLES = re.compile(r"[._/]?(mass|stiffness|damping)\.mtx$")
-# What does not change the numbers of a run.
-_INDIFFERENT = re.compile(r"^ *(threads|title) = .*$", re.MULTILINE)
-_MODEL_FILE = re.compile(r"(&model\n(?:(?!^/).*\n)*? *file = )'((?:[^']|'')*)'", re.MULTILINE)
-_OUTPUT_FILE = re.compile(r"(&output\n(?:(?!^/).*\n)*? *file = )'(?:[^']|'')*'.*", re.MULTILINE)
+#: What does not change the numbers of a run, or counts by its content.
+_INDIFFERENT = ("case%threads", "case%title", "output%file", "model%file", "contact%worn")
 
 
 class RunStopped(Exception):
@@ -112,18 +111,46 @@ def find_program(given: str = "") -> str:
                      "program under [run]")
 
 
+def check_program(program: str) -> None:
+    """Raise where fw_run is of another version than this package.
+
+    The points are read and checked by the library of the package, which must be that of fw_run.
+    """
+    try:
+        told = subprocess.run([program, "--version"], capture_output=True, text=True,
+                              check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise InputError(f"run.program = '{program}' does not tell its version: {error}") from None
+    if library_version() not in told.split():
+        raise InputError(f"{program} is '{told}', this package is of version {library_version()}: "
+                         "they must be the same; name the fw_run of this installation by FW_RUN "
+                         "or by program under [run]")
+
+
 def identify(program: str, case: Path, folder: Path, values: Mapping[str, Setting],
              fixed: Mapping[str, Setting], timeout: float) -> Job | Record:
-    """The job of a point, named by its effective input; a record where fw_run refuses it."""
-    overrides = tuple(override(key, value) for key, value in {**fixed, **values}.items())
-    command = [program, "--check", *_options(overrides), str(case)]
-    done = subprocess.run(command, capture_output=True, text=True, env=_environment(), check=False)
-    if done.returncode != 0:
-        name = _digest([case.read_text(errors="replace"), *overrides])
-        return Record(name, dict(values), done.returncode,
-                      STATUS.get(done.returncode, "failed"), _message(done.stderr), 0.0, "")
-    return Job(_digest([_version(program), *_effective(done.stdout)]), program, str(case),
-               str(folder), dict(values), overrides, timeout)
+    """The job of a point, named by its effective input; a record where the library refuses it.
+
+    The point is read and checked in this process.
+    """
+    settings = {**fixed, **values}
+    overrides = tuple(override(key, value) for key, value in settings.items())
+    text = case.read_bytes().decode(errors="surrogateescape")
+    try:
+        with Session() as session:
+            session.read(text, str(case), [(key, literal(value, key))
+                                           for key, value in settings.items()])
+            session.check()
+            effective = namelist_values(session.text("namelist"))
+            inputs = session.text("inputs").splitlines()
+    except FretwearError as error:
+        return Record(_digest([text, *overrides]), dict(values), error.exit_status,
+                      STATUS.get(error.exit_status, "failed"), str(error), 0.0, "")
+    kept = {key: value for key, value in effective.items() if key not in _INDIFFERENT}
+    # Of the namelist its effect counts, of every other file that is read what it holds.
+    contents = [_content(Path(path)) for path in inputs if Path(path) != case]
+    name = _digest([library_version(), json.dumps(kept, sort_keys=True), *contents])
+    return Job(name, program, str(case), str(folder), dict(values), overrides, timeout)
 
 
 def recorded(job: Job) -> Record | None:
@@ -201,27 +228,9 @@ def _environment() -> dict[str, str]:
     return {**os.environ, **one}
 
 
-def _version(program: str) -> str:
-    return subprocess.run([program, "--version"], capture_output=True, text=True,
-                          check=True).stdout
-
-
-def _effective(text: str) -> list[str]:
-    """Effective input without what does not change the numbers, and the files that it names."""
-    files = [part.replace("''", "'") for _, part in _MODEL_FILE.findall(text)]
-    text = _OUTPUT_FILE.sub(r"\1", _MODEL_FILE.sub(r"\1", _INDIFFERENT.sub("", text)))
-    return [text, *(_content(Path(file)) for file in files)]
-
-
 def _content(path: Path) -> str:
-    """Digest of a model file, or of all Matrix Market files of one name."""
-    # As fw_run takes it: a prefix, a folder, or one of the files.
-    prefix = _ROLES.sub("", str(path))
-    files = [path] if path.is_file() and path.suffix != ".mtx" else sorted(
-        file for file in Path(prefix).parent.glob("*.mtx") if str(file).startswith(prefix))
-    if Path(prefix).is_dir():
-        files += sorted(Path(prefix).glob("*.mtx"))
-    return _digest(file.read_bytes() for file in files)
+    """Digest of a file."""
+    return _digest([path.read_bytes()])
 
 
 def _digest(parts: Iterable[str | bytes]) -> str:

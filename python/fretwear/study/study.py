@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from .plan import Plan
-from .pool import core_count, each, run_jobs
-from .run import Job, Record, find_program, identify, recorded
+from .pool import core_count, run_jobs
+from .run import Job, Record, check_program, find_program, identify, recorded
 from .table import build_table, need_writer, write_table
 
 __all__ = ["Progress", "run_study"]
@@ -46,8 +46,9 @@ def run_study(plan: Plan, progress: Progress | None = None, *,
     program, workers = find_program(plan.program), plan.workers or core_count()
     case, folder = plan.case.resolve(), plan.results.resolve()
 
-    found = each(lambda point: identify(program, case, folder, point, plan.fixed, plan.timeout),
-                 plan.points, workers)
+    check_program(program)
+    found = [identify(program, case, folder, point, plan.fixed, plan.timeout)
+             for point in plan.points]
     points: dict[str, list[int]] = {}  # by the name of the run: some points may be the same
     for k, one in enumerate(found):
         points.setdefault(one.name, []).append(k)

@@ -1,0 +1,130 @@
+!> What Python asks of input: the structure of a case as it is computed, with what the namelist adds,
+!> scales and overrides, and the keys of a namelist that need not be a valid case any more.
+module fw_python_parts
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_usage
+   use fw_kinds, only: wp
+   use fw_namelist, only: parse_namelist
+   use fw_namelist_data, only: namelist_type
+   use fw_point_quantities, only: point_quantities
+   use fw_point_quantities, only: quantity_type
+   use fw_text, only: string_type
+   use fw_text, only: to_text
+   use fw_text_list, only: append
+   implicit none (type, external)
+   private
+
+   public :: case_part, namelist_words, quantity_lines
+
+   character(*), parameter :: names = 'mass, stiffness, damping, load/static, load/cosine, '// &
+                              'load/sine, contact/side_1, contact/side_2, contact/gap, '// &
+                              'contact/depth, contact/mu, observe/matrix, n_springs, solver_tolerance'
+
+contains
+
+   !> A part of a case that was read, by the name of its dataset in a model file where there is
+   !> one; the last index runs fastest. Nothing where the case has no such part.
+   subroutine case_part(case, name, values, error)
+      type(case_type), intent(in) :: case
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: values(:)
+      !> status_usage for a name that is not known.
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (model => case%model, contact => case%contact)
+         select case (name)
+         case ('mass')
+            if (allocated(model%mass)) values = flat(model%mass)
+         case ('stiffness')
+            if (allocated(model%stiffness)) values = flat(model%stiffness)
+         case ('damping')
+            if (allocated(model%damping)) values = flat(model%damping)
+         case ('load/static')
+            if (allocated(model%load_static)) values = model%load_static
+         case ('load/cosine')
+            if (allocated(model%load_cosine)) values = model%load_cosine
+         case ('load/sine')
+            if (allocated(model%load_sine)) values = model%load_sine
+         case ('observe/matrix')
+            if (allocated(model%observe_matrix)) values = flat(transpose(model%observe_matrix))
+         case ('contact/side_1')
+            if (allocated(contact%side_1)) values = flat(real(contact%side_1, wp))
+         case ('contact/side_2')
+            if (allocated(contact%side_2)) values = flat(real(contact%side_2, wp))
+         case ('contact/gap')
+            if (allocated(contact%gap)) values = contact%gap
+         case ('contact/depth')
+            if (allocated(contact%depth)) values = contact%depth
+         case ('contact/mu')
+            if (allocated(contact%mu)) values = contact%mu
+         case ('n_springs')
+            values = [real(case%springs%n_springs, wp)]
+         case ('solver_tolerance')
+            values = [case%solver%tolerance]
+         case default
+            call fatal_error(error, "a case has no part '"//name//"': must be one of "//names, &
+                             status_usage)
+         end select
+      end associate
+      if (.not. allocated(values)) allocate (values(0))
+   end subroutine case_part
+
+   !> Every key of a namelist as it is written there: 'group%key', how many values, the values.
+   subroutine namelist_words(text, words, error)
+      character(*), intent(in) :: text
+      type(string_type), allocatable, intent(out) :: words(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(namelist_type) :: input
+      integer :: i, k, n
+
+      allocate (words(0))
+      ! The texts of the reader serve one thread at a time.
+      !$omp critical (fretwear_io)
+      call parse_namelist(text, 'namelist', input, error)
+      if (.not. allocated(error)) then
+         do i = 1, input%n_entries
+            associate (entry => input%entries(i))
+               call append(words, entry%group//'%'//entry%key)
+               call append(words, to_text(sum(entry%values%repeat)))
+               do k = 1, size(entry%values)
+                  do n = 1, entry%values(k)%repeat
+                     call append(words, entry%values(k)%text)
+                  end do
+               end do
+            end associate
+         end do
+      end if
+      !$omp end critical (fretwear_io)
+   end subroutine namelist_words
+
+   !> The quantities of a point: a line each, with the name and the shape of its array, where -1 is
+   !> a size that only the numbers tell.
+   function quantity_lines(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      type(quantity_type), allocatable :: list(:)
+      integer, allocatable :: sizes(:)
+      integer :: i, k
+
+      call point_quantities(list)
+      text = ''
+      do i = 1, size(list)
+         text = text//trim(list(i)%name)
+         sizes = list(i)%row_shape(case)
+         do k = size(sizes), 1, -1
+            text = text//' '//to_text(sizes(k))
+         end do
+         text = text//new_line('a')
+      end do
+   end function quantity_lines
+
+   pure function flat(array) result(values)
+      real(wp), intent(in) :: array(:, :)
+      real(wp) :: values(size(array))
+
+      values = reshape(array, [size(array)])
+   end function flat
+
+end module fw_python_parts

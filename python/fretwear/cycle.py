@@ -1,0 +1,146 @@
+"""One period of the contact: what the law gives at the instants, never a sum of harmonics.
+
+The contact force of a pair that slips or opens has kinks and jumps; the sum of a few harmonics
+overshoots them and shows tension or more than the friction limit, which no law gives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._native import namelist_values
+from .errors import AbsentError, FretwearError
+from .steps import Point, Steps
+
+if TYPE_CHECKING:
+    from .result import Result
+
+__all__ = ["Cycle", "read_cycle"]
+
+Floats = NDArray[np.float64]
+
+#: Largest difference of a point that is solved again, over the largest value, and in multiples of
+#: the tolerance of the solver: a solution known to this tolerance is off by it times the condition
+#: of the problem, and another solution is far away. The greater one holds.
+_SAME, _SAME_OF_SOLVER = 1e-6, 1e3
+#: Instants of a period where the law may be asked at any.
+_INSTANTS = 256
+#: Points before the one in question from which its solution is followed, where it does not come
+#: out by itself.
+_BEFORE = 10
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One period of the contact, closed: the last instant repeats the first.
+
+    Attributes
+    ----------
+    degrees : (n_time + 1,)
+        Phase of the excitation [degrees].
+    displacement, force : (n_time + 1, n_pairs, 3)
+        Relative displacement [length] and contact force [force] in (t1, t2, n), as the law gives
+        them.
+    """
+
+    degrees: Floats
+    displacement: Floats
+    force: Floats
+
+
+def read_cycle(result: Result, point: int) -> Cycle:
+    """One period at a point (from 0); see `Result.cycle`."""
+    if "history/force" in result:
+        displacement = result["history/relative_displacement"][point]
+        force = result["history/force"][point]
+        if np.isfinite(force).all():
+            return _closed(displacement, force)
+    if not result.converged[point]:
+        raise AbsentError(f"{result.name}: point {point + 1} has not converged: it has no period "
+                          "to show")
+    result.declared("contact/force")
+    try:
+        solved = _again(result, point)
+    except AbsentError:
+        raise
+    except FretwearError as error:
+        raise AbsentError(_excuse(result, point, str(error))) from None
+    return _closed(solved["history/relative_displacement"], solved["history/force"])
+
+
+def _closed(displacement: Floats, force: Floats) -> Cycle:
+    return Cycle(np.linspace(0.0, 360.0, len(force) + 1),
+                 np.concatenate((displacement, displacement[:1])),
+                 np.concatenate((force, force[:1])))
+
+
+def _excuse(result: Result, point: int, why: str) -> str:
+    return (f"{result.name}: point {point + 1} holds no histories, and the law cannot be evaluated "
+            f"there again ({why}); run with output%histories = .true.")
+
+
+def _again(result: Result, point: int) -> Point:
+    """The same solution with its histories, or the reason why it cannot be had."""
+    values = namelist_values(result.namelist)
+    if values.get("case%analysis") == ["time"]:
+        raise AbsentError(_excuse(result, point, "integration in time has no harmonic balance to "
+                                  "solve"))
+    tolerance = float(values.get("solver%tolerance", ["1e-8"])[0])
+    settings = _settings(result, point)
+    finer = {**settings, "harmonics": {**settings["harmonics"], "n_time": _INSTANTS}}
+    # Located events are exact whatever the instants, in one tangential direction.
+    by_events = result.attributes.get("sampling") == "events"
+    for groups, first in ((finer, point), (settings, point), (settings, max(0, point - _BEFORE))):
+        if groups is finer and not by_events:
+            continue
+        with Steps(result.case.replace(**groups)) as steps:
+            for before in range(first, point):
+                steps.solve(result.omega[before])
+            solved = steps.solve(result.omega[point])
+        if _is_same(result, point, solved, tolerance):
+            return solved
+    raise AbsentError(_excuse(result, point, "solving it again leads to another solution"))
+
+
+def _settings(result: Result, point: int) -> dict[str, Any]:
+    """What lets the case of a result be solved at one of its points, with histories.
+
+    The bounds of the sweep stay: the numerical stiffness of rigid contact follows from them.
+    """
+    groups: dict[str, Any] = {
+        "sweep": {"continuation": "natural", "stability": False},
+        "harmonics": {"adaptive": False, "accuracy": 0.0},
+        "output": {"histories": True, "contact": True}}
+    if "sampling" in result.attributes:  # left to the program, histories would ask for instants
+        groups["harmonics"]["sampling"] = result.attributes["sampling"]
+    if "harmonics" in result:
+        groups["harmonics"]["n_harmonics"] = int(result["harmonics"][point])
+    if "instants" in result and result["instants"][point] > 0:
+        groups["harmonics"]["n_time"] = int(result["instants"][point])
+    if "wear/depth" in result:
+        groups["case"] = {"analysis": "point"}
+        if len(result.depth) != result.n_points:
+            raise AbsentError(_excuse(result, point, "the worn depth of the point is not known"))
+        with result.case.open() as session:
+            gap, before = session.part("contact/gap"), session.part("contact/depth")
+        # A worn pair acts like one of a larger gap; the case begins with the depth before.
+        worn = result.depth[point] - (before if before.size else 0.0)
+        groups["contact"] = {"gap": gap + worn}
+    return groups
+
+
+def _is_same(result: Result, point: int, solved: Point, tolerance: float) -> bool:
+    if not solved.converged:
+        return False
+    limit = max(_SAME, _SAME_OF_SOLVER * tolerance)
+    for name, stored in (("coefficients", result.coefficients[point]),
+                         ("contact/force", result.force[point])):
+        found = np.zeros_like(stored)
+        found[:len(solved[name])] = solved[name][:len(stored)]
+        if np.abs(found - stored).max() > limit * np.abs(stored).max():
+            return False
+    return True
