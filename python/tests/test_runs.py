@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import typing
 from pathlib import Path
 from typing import Any
@@ -450,6 +451,7 @@ except KeyboardInterrupt as stopped:
         part = tmp_path / "stopped.h5.part"
         while not part.exists() and process.poll() is None:
             pass
+        time.sleep(0.2)  # for some points
         process.send_signal(signal.SIGINT)
         said, errors = process.communicate(timeout=60)
     assert process.returncode == 0, errors
