@@ -459,7 +459,7 @@ except KeyboardInterrupt as stopped:
     status, n_points = said.split()
     assert status == "stopped"
     assert fw.Result(tmp_path / "stopped.h5").n_points == int(n_points) > 0
-    assert not part.exists()
+    assert not (tmp_path / "stopped.h5.part").exists()
 
 
 def test_an_error_of_the_progress_function_stops_the_run(tmp_path: Path) -> None:
