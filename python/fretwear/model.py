@@ -147,8 +147,7 @@ class Model:
                  static_rotation: ArrayLike | None = None,
                  observe: Mapping[str, Observation] | None = None,
                  title: str = "", unit_system: str = "") -> None:
-        stiffness = array("K", K, (None, None))
-        n = self.n_dof = len(stiffness)
+        n = self.n_dof = _order(M, C, K)
         if n == 0:
             raise InputError("K: is empty, must have at least one degree of freedom")
         square = (n, n)
@@ -364,6 +363,14 @@ _CONTACT = tuple(f"contact/{name}" for name in (
 _IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness")
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
+
+
+def _order(M: ArrayLike, C: ArrayLike | None, K: ArrayLike) -> int:
+    """Number of dofs: that of two of the three matrices, so that the third is refused."""
+    mass, stiffness = len(array("M", M, (None, None))), len(array("K", K, (None, None)))
+    if C is None and mass != stiffness:
+        raise InputError(f"M and K: are of order {mass} and {stiffness}, must be the same")
+    return stiffness if C is not None and np.shape(C) == (stiffness, stiffness) else mass
 
 
 def _rows(observe: Mapping[str, Observation], n_dof: int) -> tuple[tuple[str, ...], Floats]:

@@ -75,9 +75,11 @@ class Contact(TypedDict, total=False):
     area: ArrayLike
     #: [F] constant compressive force; only: pairs without a normal dof (required with friction)
     normal_load: ArrayLike
-    #: [F/L] contact stiffness; only: law = 'penalty' (required with tangential dofs)
+    #: [F/L] contact stiffness; 0 with a parallel pair that has one, or without a tangential dof;
+    #: only: law = 'penalty' (required with tangential dofs)
     tangential_stiffness: ArrayLike
-    #: [F/L] the same, for the normal; only: law = 'penalty' (required with normal dofs)
+    #: [F/L] contact stiffness; 0 without a normal dof; only: law = 'penalty' (required with normal
+    #: dofs)
     normal_stiffness: ArrayLike
     #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity' (default:
     #: 1)

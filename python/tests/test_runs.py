@@ -247,6 +247,14 @@ def test_fortran_ordered_arrays_are_not_copied() -> None:
     assert model.C is None
 
 
+@pytest.mark.parametrize(("mass", "damping", "stiffness", "blamed"), [
+    (2, 2, 3, "K"), (3, 2, 2, "M"), (2, 3, 2, "C"), (2, None, 3, "M and K")])
+def test_the_matrix_of_another_size_is_blamed(mass: int, damping: int | None, stiffness: int,
+                                              blamed: str) -> None:
+    with pytest.raises(fw.InputError, match=rf"^{blamed}: "):
+        fw.Model(np.eye(mass), None if damping is None else np.eye(damping), np.eye(stiffness))
+
+
 def test_a_model_file_holds_the_model(tmp_path: Path) -> None:
     file = EXAMPLES / "blade_sector" / "sector_16.h5"
     model = fw.Model.from_hdf5(file)

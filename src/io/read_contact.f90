@@ -208,6 +208,7 @@ contains
                             is_penalty .and. any(has_normal(contact)))
       call finish_one('tangential_stiffness', contact%tangential_stiffness)
       call finish_one('normal_stiffness', contact%normal_stiffness)
+      if (is_penalty .and. .not. reader%failed()) call check_zeros(reader, contact)
 
    contains
 
@@ -224,6 +225,45 @@ contains
       end subroutine finish_one
 
    end subroutine read_stiffnesses
+
+   !> A stiffness of 0 is none: the pair has no such dof, or is one of several sliders between the
+   !> same dofs of which others have one.
+   subroutine check_zeros(reader, contact)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(in) :: contact
+      logical :: is_idle(contact%n_pairs)
+      integer :: i
+
+      is_idle = has_normal(contact) .and. contact%normal_stiffness <= 0.0_wp
+      i = findloc(is_idle, .true., 1)
+      if (i > 0) call reader%refuse('contact', 'normal_stiffness', '= 0 for pair '// &
+                                    to_text(i)//': must be above 0 where there is a normal dof')
+      do i = 1, contact%n_pairs
+         is_idle = .false.
+         is_idle(i) = contact%tangential_stiffness(i) <= 0.0_wp
+         if (.not. any(is_idle .and. has_tangent(contact))) cycle
+         if (any(contact%tangential_stiffness > 0.0_wp .and. is_parallel(contact, i))) cycle
+         call reader%refuse('contact', 'tangential_stiffness', '= 0 for pair '//to_text(i)// &
+                            ': must be above 0, unless the pair has no tangential dof, or '// &
+                            'another pair of the same tangential dofs has a stiffness')
+         return
+      end do
+   end subroutine check_zeros
+
+   !> Which pairs join the same tangential dofs as pair i, in either direction.
+   pure function is_parallel(contact, i) result(is)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: i
+      logical :: is(contact%n_pairs)
+      integer :: k
+
+      associate (a => contact%side_1(t1:t2, :), b => contact%side_2(t1:t2, :))
+         do k = 1, contact%n_pairs
+            is(k) = (all(a(:, k) == a(:, i)) .and. all(b(:, k) == b(:, i))) .or. &
+                    (all(a(:, k) == b(:, i)) .and. all(b(:, k) == a(:, i)))
+         end do
+      end associate
+   end function is_parallel
 
    !> Which pairs have a tangential dof on either side.
    pure function has_tangent(contact) result(has)

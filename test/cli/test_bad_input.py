@@ -306,3 +306,25 @@ def test_existing_result_survives_a_refused_run(fw_run):
     fw_run.refused("--set", "contact%mu=-1", "case.nml")
     assert hashlib.sha256(result.read_bytes()).digest() == before
     assert sorted(path.name for path in fw_run.directory.iterdir()) == ["case.h5", "case.nml"]
+
+
+def test_no_stiffness_is_no_slider(fw_run):
+    """Zero without a tangential dof is taken; among parallel sliders it is as if there were none."""
+    shown = {}
+    for name, contact in (
+            ("two.h5", "n_pairs=2 tangential_stiffness=0.5 0 normal_stiffness=1.5 0.5"),
+            ("three.h5", "n_pairs=3 side_1(:,3)=1 0 0 normal_load=0 0 1 "
+                         "tangential_stiffness=0.5 0 0 normal_stiffness=1.5 0.5 0")):
+        fw_run.write(f"""&model n_dof=2 mass=1 0 0 1 stiffness=2 -1 -1 2 damping=0.05 0 0 0.05 /
+&contact law='penalty' side_1(:,1) = 1 0 2 side_1(:,2) = 0 0 2 mu=0.3 {contact} /
+&load cosine=1 0.1 static = 0 -1 /
+&harmonics n_harmonics=5 /
+&sweep start=1 end=2 n_points=5 /
+""")
+        done = fw_run("-o", name, "case.nml")
+        assert done.returncode == 0, done.stderr
+        with h5py.File(fw_run.directory / name) as file:
+            shown[name] = file["amplitude"][()]
+    # A force of zero more may change the order of sums, and so the round-off that the solution
+    # to 1e-8 enlarges.
+    assert np.allclose(shown["two.h5"], shown["three.h5"], rtol=1e-6, atol=0)
