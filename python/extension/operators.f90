@@ -5,9 +5,9 @@ module fw_python_operators
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
-   use fw_forces, only: forces_type
-   use fw_forces, only: pair_mixed
-   use fw_forces, only: pair_stuck
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_stuck
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_relative, only: relative_type
@@ -56,20 +56,22 @@ contains
 
    !> Derivative of the force coefficients by those of the prediction, pair by pair, with nothing
    !> left out: (coefficient, component) of the prediction, then of the force, pair.
-   subroutine unpack_jacobian(contact, n_coefficients, jacobian)
-      type(forces_type), intent(in) :: contact
+   subroutine unpack_jacobian(work, present_components, n_coefficients, jacobian)
+      type(force_workspace), intent(in) :: work
+      !> (3, n_pairs)
+      logical, intent(in) :: present_components(:, :)
       integer, intent(in) :: n_coefficients
-      real(wp), intent(out) :: jacobian(3*n_coefficients, 3*n_coefficients, contact%n_pairs)
+      real(wp), intent(out) :: jacobian(3*n_coefficients, 3*n_coefficients, size(work%state))
       integer :: i, k
 
       jacobian = 0.0_wp
-      do i = 1, contact%n_pairs
-         if (contact%state(i) == pair_stuck) then
+      do i = 1, size(work%state)
+         if (work%state(i) == pair_stuck) then
             do k = 1, 3*n_coefficients
-               if (contact%present((k - 1)/n_coefficients + 1, i)) jacobian(k, k, i) = 1.0_wp
+               if (present_components((k - 1)/n_coefficients + 1, i)) jacobian(k, k, i) = 1.0_wp
             end do
-         else if (contact%state(i) == pair_mixed) then
-            jacobian(:, :, i) = contact%jacobian(:, :, i)
+         else if (work%state(i) == pair_mixed) then
+            jacobian(:, :, i) = work%jacobian(:, :, i)
          end if
       end do
    end subroutine unpack_jacobian

@@ -5,10 +5,12 @@ module fw_python
    use fw_condensation, only: condensation_type
    use fw_error, only: error_type
    use fw_error, only: status_ok
-   use fw_forces, only: forces_type
-   use fw_forces, only: new_forces
+   use fw_force_law, only: force_workspace
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
+   use fw_friction, only: friction_law
+   use fw_friction, only: rigid_friction
+   use fw_friction, only: rigid_friction_of_rates
    use fw_kinds, only: i8
    use fw_kinds, only: wp
    use fw_model, only: model_type
@@ -583,25 +585,31 @@ contains
       !> (3 n_coefficients, 3 n_coefficients, n_pairs), or (0, 0, 0) where it is not wanted.
       real(wp), intent(inout) :: jacobian(n_jacobian, n_jacobian, n_blocks)
       type(fourier_type) :: fourier
-      type(forces_type) :: contact
+      type(friction_law) :: law
+      type(force_workspace) :: work
       !f2py threadsafe
 
       fourier = new_fourier(n_harmonics, n_time, odd_only /= 0)
-      contact = new_forces(mu, present_components /= 0, fourier)
-      contact%remembers = remembers /= 0
-      contact%offset = offset
-      contact%x_start = start
-      contact%prediction = prediction
-      call contact%evaluate(fourier)
-      force = contact%force
-      force_time = contact%force_time
-      finish = contact%x
-      state = contact%state
-      call contact%fractions(fraction)
-      periodic = merge(1, 0, contact%all_periodic())
+      if (remembers /= 0) then
+         law = rigid_friction()
+      else
+         law = rigid_friction_of_rates()
+      end if
+      call law%take_pairs(mu, present_components /= 0)
+      call law%reserve(fourier, work)
+      work%offset = offset
+      work%x_start = start
+      work%prediction = prediction
+      call law%evaluate(fourier, work)
+      force = work%force
+      force_time = work%force_time
+      finish = work%x
+      state = work%state
+      call law%fractions(work, fraction)
+      periodic = merge(1, 0, work%all_periodic())
       if (with_jacobian == 0) return
-      call contact%linearize(fourier)
-      call unpack_jacobian(contact, n_coefficients, jacobian)
+      call law%linearize(fourier, work)
+      call unpack_jacobian(work, present_components /= 0, n_coefficients, jacobian)
    end subroutine contact_forces
 
 end module fw_python
