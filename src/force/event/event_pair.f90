@@ -38,10 +38,12 @@ module fw_event_pair
       !> Workspace: waves of an angle (0:2 degree), waves at an origin and integrals of one stick.
       real(wp), allocatable, private :: cosines(:), sines(:), origin(:), integral(:)
       real(wp), allocatable, private :: rate(:, :), normal_rate(:, :)
-      type(moments_type), private :: one
+      !> Of a set that is used for a moment.
+      type(moments_type) :: one
    contains
       procedure :: reserve
       procedure :: follow
+      procedure :: fill_moments
       procedure :: force
       procedure :: derivative
       procedure :: values_at
@@ -83,11 +85,12 @@ contains
       else
          call self%path%trace_rates(self%curves)
       end if
-      call fill_moments(self)
+      call self%fill_moments()
    end subroutine follow
 
+   !> The moments of the sets of the path.
    pure subroutine fill_moments(self)
-      type(event_pair_type), intent(inout) :: self
+      class(event_pair_type), intent(inout) :: self
       real(wp) :: before(4), behind(4)
       integer :: j
 

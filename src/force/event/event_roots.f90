@@ -14,6 +14,7 @@ module fw_event_roots
    private
 
    public :: find_roots, root_between
+   public :: bounds_type, new_bounds, knot_type, changes_sign, monotone, keeps_sign
 
    !> Bounds of a polynomial.
    type :: bounds_type
