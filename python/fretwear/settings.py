@@ -159,11 +159,14 @@ class Harmonics(TypedDict, total=False):
 class Sweep(TypedDict, total=False):
     """Group &sweep: frequencies."""
 
+    #: a list of frequencies in any order, in place of start, end and n_points; only: analysis =
+    #: 'frf', 'time', continuation = 'natural' (default: none)
+    frequencies: ArrayLike
     #: first frequency, or the only one (required)
     start: float
     #: last frequency; below start the sweep goes down (required for frf, else 0)
     end: float
-    #: of start and end; results are in rad/s (default: 'rad/s')
+    #: of frequencies, start and end; results are in rad/s (default: 'rad/s')
     unit: Literal["rad/s", "Hz"]
     #: points at given frequencies, or a branch through folds (default: 'natural')
     continuation: Literal["natural", "arclength"]

@@ -73,9 +73,7 @@ contains
       call choose_harmonics(case, harmonics, joint, forces, fourier, error)
       if (allocated(error)) return
       range = case%sweep%start
-      if (case%analysis == analysis_frf) then
-         range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
-      end if
+      if (case%analysis == analysis_frf) range = case%sweep%range()
       if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
          range = follow_range*range
       end if

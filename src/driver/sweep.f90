@@ -129,14 +129,15 @@ contains
       omega = [(sweep_frequency(case%sweep, k, n_points), k=1, n_points)]
    end function sweep_frequencies
 
-   !> Point k of a sweep: evenly spaced from start to end, both exact [rad/s].
+   !> Point k of a sweep: of the list, or evenly spaced from start to end, both exact [rad/s].
    pure real(wp) function sweep_frequency(sweep, k, n_points) result(omega)
       type(sweep_options), intent(in) :: sweep
       integer, intent(in) :: k, n_points
       real(wp) :: share
 
       omega = sweep%start
-      if (n_points == 1) return
+      if (allocated(sweep%frequencies)) omega = sweep%frequencies(k)
+      if (n_points == 1 .or. allocated(sweep%frequencies)) return
       share = real(k - 1, wp)/real(n_points - 1, wp)
       omega = (1.0_wp - share)*sweep%start + share*sweep%end
    end function sweep_frequency

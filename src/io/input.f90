@@ -34,6 +34,7 @@ module fw_input
       procedure :: find_scalar
       procedure :: find_last
       procedure :: find_elements
+      procedure :: find_list
       procedure :: refuse
       procedure :: refuse_value
       procedure :: blame
@@ -191,6 +192,28 @@ contains
       end if
       if (self%failed()) deallocate (source%entry)
    end subroutine find_elements
+
+   !> The values of an array of any length, which is assigned as a whole.
+   subroutine find_list(self, group, key, accepts, dims, source)
+      class(input_type), intent(inout) :: self
+      character(*), intent(in) :: group, key, accepts
+      !> As many as are given.
+      integer, allocatable, intent(out) :: dims(:)
+      type(source_type), intent(out) :: source
+      character(:), allocatable :: message
+      integer :: i
+
+      call self%find_last(group, key, accepts, i)
+      dims = [0]
+      if (i == 0) return
+      dims = [value_count(self%namelist%entries(i))]
+      if (dims(1) > largest_array) then
+         call self%refuse(group, key, 'has '//dims_text(dims)//' values: too many')
+         return
+      end if
+      allocate (source%entry(dims(1)), source%value(dims(1)), source=0)
+      call spread_entry(self%namelist, i, dims, .false., source, message)
+   end subroutine find_list
 
    !> Record a problem with the value of a key; the place is found here.
    subroutine refuse(self, group, key, message)

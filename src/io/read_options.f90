@@ -1,6 +1,6 @@
 !> What the keys of the namelist groups with options mean together.
 module fw_read_options
-   use fw_case, only: analysis_frf
+   use fw_case, only: analysis_frf, analysis_time
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
                                    instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
@@ -81,11 +81,41 @@ contains
       call reader%require_group('sweep', 'the frequency: start (and end and n_points of a sweep)')
       call options%bind_keys(reader, analysis == analysis_frf)
       call check_ends(reader, analysis, options)
+      if (allocated(options%frequencies)) call take_list(reader, analysis, options)
       if (options%unit == unit_hertz) then
+         if (allocated(options%frequencies)) options%frequencies = 2.0_wp*pi*options%frequencies
          options%start = 2.0_wp*pi*options%start
          options%end = 2.0_wp*pi*options%end
       end if
    end subroutine read_sweep
+
+   !> A list stands for start, end and n_points.
+   subroutine take_list(reader, analysis, options)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: analysis
+      type(sweep_options), intent(inout) :: options
+      character(*), parameter :: others(*) = [character(8) :: 'start', 'end', 'n_points']
+      integer :: i
+
+      do i = 1, size(others)
+         if (reader%given('sweep', trim(others(i)))) then
+            call reader%refuse('sweep', trim(others(i)), 'is given beside frequencies, which '// &
+                               'says it: keep one of the two')
+         end if
+         call reader%amend('sweep', trim(others(i)), '')
+      end do
+      if (all(analysis /= [analysis_frf, analysis_time])) then
+         call reader%refuse('sweep', 'frequencies', "goes with analysis = 'frf' or 'time': "// &
+                            'give start, the one frequency, instead')
+      else if (options%continuation == continuation_arclength) then
+         call reader%refuse('sweep', 'frequencies', "does not go with continuation = "// &
+                            "'arclength', whose points are its own: give start and end")
+      end if
+      if (size(options%frequencies) == 0) return
+      options%n_points = size(options%frequencies)
+      options%start = options%frequencies(1)
+      options%end = options%frequencies(options%n_points)
+   end subroutine take_list
 
    !> A branch is followed from one end to the other: it needs two.
    subroutine check_ends(reader, analysis, options)

@@ -309,13 +309,18 @@ contains
       call note(self, key, name_of(kind), accepts, text)
       k = last_entry(self%namelist, self%group, trim(key%name))
       if (k == 0) call blame_missing(self, key, accepts, dims, needed)
-      if (k > 0 .and. key%shape == ':') dims = [value_count(self%namelist%entries(k))]
       if (present(default) .and. .not. allocated(numbers)) then
          allocate (numbers(product(dims)), source=default)
       end if
       if (k == 0) return
-      call self%find_elements(self%group, trim(key%name), accepts, dims, key%repeats, &
-                              allocated(numbers), source)
+      if (key%shape == ':') then
+         call self%find_list(self%group, trim(key%name), accepts, dims, source)
+         ! Empty where it is refused: it was given.
+         if (.not. allocated(source%entry)) allocate (numbers(0))
+      else
+         call self%find_elements(self%group, trim(key%name), accepts, dims, key%repeats, &
+                                 allocated(numbers), source)
+      end if
       if (.not. allocated(source%entry)) return
       if (.not. allocated(numbers)) allocate (numbers(size(source%entry)), source=0.0_wp)
       do k = 1, size(numbers)
@@ -396,7 +401,7 @@ contains
       end do
    end function extents
 
-   !> Set the text of a key in the effective input.
+   !> Set the text of a key in the effective input; an empty one takes it out.
    subroutine amend(self, group, key, text)
       class(reader_type), intent(inout) :: self
       character(*), intent(in) :: group, key, text

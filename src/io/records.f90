@@ -62,14 +62,19 @@ contains
       self%records = [self%records, record]
    end subroutine add
 
-   !> Set the effective value of a registered key.
+   !> Set the effective value of a registered key; an empty one is none.
    pure subroutine set(self, group, key, value)
       class(record_list), intent(inout) :: self
       character(*), intent(in) :: group, key, value
       integer :: i
 
       i = self%find(group, key)
-      if (i > 0) self%records(i)%value = value
+      if (i == 0) return
+      if (len(value) > 0) then
+         self%records(i)%value = value
+      else if (allocated(self%records(i)%value)) then
+         deallocate (self%records(i)%value)
+      end if
    end subroutine set
 
    pure logical function has(self, group, key)

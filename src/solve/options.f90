@@ -81,6 +81,8 @@ module fw_solver_options
       real(wp) :: start = 0.0_wp
       real(wp) :: end = 0.0_wp
       integer :: n_points = 1
+      !> Frequencies one by one, which start, end and n_points then follow from.
+      real(wp), allocatable :: frequencies(:)
       integer :: unit = unit_rad_per_second
       integer :: continuation = continuation_natural
       integer :: max_points = 1000
@@ -88,6 +90,7 @@ module fw_solver_options
       logical :: stability = .false.
    contains
       procedure :: bind_keys => bind_sweep_keys
+      procedure :: range => sweep_range
    end type sweep_options
 
 contains
@@ -138,25 +141,42 @@ contains
       class(key_visitor), intent(inout) :: keys
       !> Whether the analysis is one of a range.
       logical, intent(in) :: is_sweep
+      logical :: is_range
 
       call keys%open('sweep', 'frequencies')
+      call keys%bind(key('frequencies', 'a list of frequencies in any order, in place of '// &
+                         'start, end and n_points', above(0.0_wp), unit='unit', shape=':', &
+                         repeats=.false., absent='none', only="analysis = 'frf', 'time', "// &
+                         "continuation = 'natural'"), self%frequencies)
+      is_range = is_sweep .and. .not. allocated(self%frequencies)
       call keys%bind(key('start', 'first frequency, or the only one', above(0.0_wp), &
-                         unit='unit', absent='required'), self%start, needed=.true.)
+                         unit='unit', absent='required'), self%start, &
+                     needed=.not. allocated(self%frequencies))
       call keys%bind(key('end', 'last frequency; below start the sweep goes down', &
                          at_least(0.0_wp), unit='unit', absent='required for frf'), self%end, &
-                     needed=is_sweep)
-      call keys%bind_word(key('unit', 'of start and end; results are in rad/s'), &
+                     needed=is_range)
+      call keys%bind_word(key('unit', 'of frequencies, start and end; results are in rad/s'), &
                           self%unit, unit_words)
       call keys%bind_word(key('continuation', 'points at given frequencies, or a branch '// &
                               'through folds'), self%continuation, continuation_words)
       call keys%bind(key('n_points', 'points, evenly spaced, both ends included; of a branch: '// &
                          'sets the first step', at_least(1), absent='required for a natural '// &
                          'frf'), self%n_points, &
-                     needed=is_sweep .and. self%continuation == continuation_natural)
+                     needed=is_range .and. self%continuation == continuation_natural)
       call keys%bind(key('max_points', 'points of a branch at most', at_least(1), &
                          only="continuation = 'arclength'"), self%max_points)
       call keys%bind(key('stability', 'compute the Floquet multipliers of every point', &
                          only="springs and law = 'penalty'"), self%stability)
    end subroutine bind_sweep_keys
+
+   !> The lowest and the highest frequency.
+   pure function sweep_range(self) result(range)
+      class(sweep_options), intent(in) :: self
+      real(wp) :: range(2)
+
+      range = [min(self%start, self%end), max(self%start, self%end)]
+      if (.not. allocated(self%frequencies)) return
+      range = [minval(self%frequencies), maxval(self%frequencies)]
+   end function sweep_range
 
 end module fw_solver_options

@@ -160,3 +160,21 @@ def test_status_of_a_run_that_does_not_converge(fw_run):
                   "--set", "solver%fallback=F", "case.nml")
     assert done.returncode == 4, done.stderr
     assert (fw_run.directory / "case.h5").exists(), "what was computed is saved"
+
+
+def test_a_list_of_frequencies_is_a_sweep_through_them(fw_run):
+    """Evenly spaced it is the sweep itself; an override may have another length."""
+    h5py = pytest.importorskip("h5py")
+    found = {}
+    for name, sweep, more in (("sweep.h5", "start = 0.5 end = 0.8 n_points = 4", []),
+                              ("list.h5", "frequencies = 1, 2", [
+                                  "--set", "sweep%frequencies=0.5, 0.6, 0.7, 0.8"])):
+        fw_run.write(f"&model n_dof = 1 mass = 1 stiffness = 1 damping = 0.1 /\n"
+                     f"&load cosine = 1 /\n&sweep {sweep} /\n")
+        done = fw_run(*more, "-o", name, "case.nml")
+        assert done.returncode == 0, done.stderr
+        with h5py.File(fw_run.directory / name) as file:
+            found[name] = file["omega"][()], file["amplitude"][()]
+    for expected, given in zip(found["sweep.h5"], found["list.h5"]):
+        # The sweep works its frequencies out; the list has them rounded from decimals.
+        assert given == pytest.approx(expected, rel=1e-13)
