@@ -154,14 +154,22 @@ contains
             p_out = self%place(self%incidence%coordinate_of(row(c_out)))
             p_in = self%place(self%incidence%coordinate_of(row(c_in)))
             if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then
-               m(p_out, :na) = cmplx(m(p_out, :na) - mean*self%active_stiffness(p_in, :na, h), &
-                                     kind=sp)
+               call subtract_row(na, mean, self%active_stiffness(p_in, :, h), m(p_out, :))
             end if
          end if
          call self%incidence%add_mapped_block(row(c_out), row(c_in), h, self%place, na, &
                                               p%stiffness(element, c_in)*factor*mean, m)
       end associate
    end subroutine add_rows
+
+   !> row = row - factor other.
+   pure subroutine subtract_row(n, factor, other, row)
+      integer, intent(in) :: n
+      complex(wp), intent(in) :: factor, other(:)
+      complex(sp), intent(inout) :: row(:)
+
+      row(:n) = cmplx(row(:n) - factor*other(:n), kind=sp)
+   end subroutine subtract_row
 
    module procedure precondition
       integer :: h, k, na
