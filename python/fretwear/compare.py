@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from .errors import InputError, OutputError
 from .plot.response import Response, read_response
-from .plot.style import PALETTE, Floats, Source, as_result, label, new_figure, tidy, units_of
+from .plot.style import PALETTE, Floats, Source, as_result, label_y, new_figure, tidy, units_of
 from .result import Result
 from .rows import choose_point, synthesis
 
@@ -223,16 +223,14 @@ def plot_comparison(first: Source, second: Source, observe: str | None = None) -
     upper.legend(frameon=False)
     lower.axhline(0.0, color="0.4", linewidth=0.8)
     for axes in (upper, lower):
-        axes.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
         tidy(axes)
     return figure
 
 
 def _names(a: Result, b: Result) -> tuple[str, str]:
     """How the legend calls them: file names, with the folder where these are the same."""
-    if a.path.name != b.path.name:
-        return a.path.name, b.path.name
-    return str(a.path), str(b.path)
+    short = Path(a.name).name, Path(b.name).name
+    return short if short[0] != short[1] else (a.name, b.name)
 
 
 def _draw_wear(upper: Axes, lower: Axes, a: Result, b: Result) -> None:
@@ -241,11 +239,11 @@ def _draw_wear(upper: Axes, lower: Axes, a: Result, b: Result) -> None:
         upper.bar(np.arange(len(depth)) + 0.8 + 0.4 * k, depth, width=0.38, color=PALETTE[k],
                   label=name)
     units = units_of(a, "wear/depth")
-    upper.set_ylabel(label("wear depth", units))
+    label_y(upper, "wear depth", units)
     if len(x) == len(y):
         lower.bar(np.arange(len(x)) + 1, y - x, width=0.7, color=PALETTE[2])
-    lower.set_ylabel(label("difference", units))
-    lower.set_xlabel("pair [1]")
+    label_y(lower, "difference", units)
+    lower.set_xlabel("pair")
 
 
 def _draw_sweeps(upper: Axes, lower: Axes, a: Result, b: Result, observe: str | None) -> None:
@@ -255,7 +253,7 @@ def _draw_sweeps(upper: Axes, lower: Axes, a: Result, b: Result, observe: str | 
     for k, (response, name) in enumerate(zip((one, two), _names(a, b))):
         upper.plot(response.frequency, np.where(response.converged, response.amplitude, np.nan),
                    styles[k], color=PALETTE[k], label=name)
-    upper.set_ylabel(label(f"amplitude of {one.name}", one.units))
+    label_y(upper, f"amplitude of {one.name}", one.units)
     upper.set_ylim(bottom=0.0)
     if one.is_branch or two.is_branch:
         lower.set_visible(False)
@@ -264,7 +262,7 @@ def _draw_sweeps(upper: Axes, lower: Axes, a: Result, b: Result, observe: str | 
         return
     f, difference = _difference(one, two)
     lower.plot(f, difference, ".-", color=PALETTE[2], markersize=3)
-    lower.set_ylabel(label("difference", one.units))
+    label_y(lower, "difference", one.units)
     lower.set_xlabel("frequency [Hz]")
 
 
@@ -286,9 +284,9 @@ def _draw_cycles(upper: Axes, lower: Axes, a: Result, b: Result, observe: str | 
         c = result.coefficients[choose_point(result, None), :, result.index(name)]
         curves.append(c @ synthesis(len(c), np.radians(degrees)))
         upper.plot(degrees, curves[-1], ("-", "--")[k], color=PALETTE[k], label=title)
-    upper.set_ylabel(label(name, units_of(a, "amplitude")))
+    label_y(upper, name, units_of(a, "amplitude"))
     lower.plot(degrees, curves[1] - curves[0], color=PALETTE[2])
-    lower.set_ylabel(label("difference", units_of(a, "amplitude")))
+    label_y(lower, "difference", units_of(a, "amplitude"))
     lower.set_xlabel("phase of the excitation [degrees]")
     lower.set(xlim=(0.0, 360.0), xticks=range(0, 361, 60))
 

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from ._native import namelist_values
 from .errors import AbsentError, InputError, OutputError
 from .plot import KINDS, Choices, fitting
-from .plot.style import units_of
+from .plot.style import label, units_of
 from .result import Result
 
 __all__ = ["add_arguments", "main", "render_report", "write_report"]
@@ -187,7 +187,7 @@ def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
                   "Hz")]
         if name == result.observed[0] and "contact/fraction" in result:
             shares = result.fraction[peak].mean(axis=0)
-            rows += [(f"pairs and period in {state}, at this peak", float(share), "1")
+            rows += [(f"pairs and period in {state}, at this peak", float(share), "")
                      for state, share in zip(("stick", "slip", "open"), shares)]
             rows.append(("friction energy per cycle, at this peak",
                          float(result.dissipation[peak].sum()),
@@ -198,7 +198,7 @@ def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
 def _wear_numbers(result: Result) -> list[tuple[str, object, str]]:
     depth, worst = result.depth[-1], int(np.argmax(result.depth[-1]))
     return [("wear steps", len(result.depth), ""),
-            ("cycles", float(result.cycles[-1]), "1"),
+            ("cycles", float(result.cycles[-1]), ""),
             ("steady state", _or_not_known(lambda: result.steady_state), ""),
             (f"largest depth, pair {worst + 1}", float(depth[worst]),
              units_of(result, "wear/depth")),
@@ -232,16 +232,16 @@ def _points(result: Result) -> str:
     head = ["point", "frequency [Hz]"]
     columns: list[np.ndarray] = [shown + 1, result.frequency[shown]]
     for k, name in enumerate(result.observed):
-        head.append(f"{name} [{units}]")
+        head.append(label(name, units))
         columns.append(result.amplitude[shown, k])
     if "contact/fraction" in result:
-        head += ["stick [1]", "slip [1]", "open [1]",
-                 f"dissipation [{units_of(result, 'contact/dissipation')}]"]
+        head += ["stick", "slip", "open",
+                 label("dissipation", units_of(result, "contact/dissipation"))]
         columns += [*result.fraction[shown].mean(axis=1).T, result.dissipation[shown].sum(axis=1)]
     if "floquet/stable" in result:
         head.append("stable")
         columns.append(np.array(["no", "yes", "?"])[result.stable[shown]])
-    head += ["iterations", "residual [1]"]
+    head += ["iterations", "residual"]
     columns += [result.iterations[shown], result.residual[shown]]
     note = ("" if len(shown) == result.n_points else
             f"<p>{len(shown)} of {result.n_points} points.</p>")
@@ -250,9 +250,9 @@ def _points(result: Result) -> str:
 
 def _steps(result: Result) -> str:
     """One row a wear step."""
-    head = ["step", "cycles [1]", f"largest depth [{units_of(result, 'wear/depth')}]",
-            f"mean depth [{units_of(result, 'wear/depth')}]",
-            f"largest depth per cycle [{units_of(result, 'wear/rate')}]"]
+    depths, rates = units_of(result, "wear/depth"), units_of(result, "wear/rate")
+    head = ["step", "cycles", label("largest depth", depths), label("mean depth", depths),
+            label("largest depth per cycle", rates)]
     n = len(result.depth)
     shown = np.unique(np.linspace(0, n - 1, min(n, _MOST_ROWS)).astype(int))
     depth, rate = result.depth[shown], result.rate[shown]

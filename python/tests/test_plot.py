@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import h5py
@@ -10,6 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 from program import run
 
+import fretwear
 from fretwear import InputError
 from fretwear.cli import main
 from fretwear.plot import (
@@ -27,6 +29,7 @@ from fretwear.plot import (
     plot_wear_maps,
 )
 from fretwear.plot.flanks import find_flanks
+from fretwear.plot.style import label_y, new_figure, scale
 from fretwear.result import Result
 from fretwear.rows import pair_fields, synthesis
 
@@ -41,11 +44,16 @@ def _maps(figure: Figure) -> list[np.ndarray]:
 
 
 def _labelled(figure: Figure) -> None:
-    """Every number axis says what it shows, with its unit."""
+    """Every number axis says what it shows, with its unit where it has one."""
     texts = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes if axes.get_visible()]
     texts += [text.get_text() for text in (figure._supxlabel, figure._supylabel) if text]
-    assert all("[" in text for text in texts if text)
     assert any(texts)
+    for text in texts:
+        assert not {"[1]", "[L]", "[F]", "[]"} & set(re.findall(r"\[.*?\]", text)), text
+    # No power of ten stands above a panel, where it would meet the title.
+    figure.canvas.draw()
+    assert not [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)
+                if axis.get_offset_text().get_text()]
 
 
 def test_response_of_a_run(coarse: Result) -> None:
@@ -277,3 +285,29 @@ def test_command_line_refuses(coarse: Result, options: list[str], status: int, m
     monkeypatch.chdir(tmp_path)
     assert main(["plot", str(coarse.path), *options]) == status
     assert message in capsys.readouterr().err
+
+
+def test_values_are_shown_in_a_readable_unit() -> None:
+    """The data stay; the numbers at the ticks are those of the unit."""
+    assert scale(0.88, "mm") == (1.0, "mm")
+    assert scale(4.2e-4, "mm") == (pytest.approx(1e6), "nm")
+    assert scale(4.2e-3, "mm") == (pytest.approx(1e3), "µm")
+    assert scale(3e5, "N") == (pytest.approx(1e-3), "kN")
+    assert scale(2e-3, "N mm") == (pytest.approx(1e3), "10⁻³ N mm")
+    assert scale(2e-8, "") == (pytest.approx(1e9), "10⁻⁹")
+    assert scale(0.0, "mm") == (1.0, "mm")
+    figure = new_figure()
+    axes = figure.subplots()
+    axes.plot([0.0, 1.0], [0.0, 4e-3])
+    label_y(axes, "depth", "mm")
+    figure.canvas.draw()
+    assert axes.get_ylabel() == "depth [µm]"
+    shown = {tick.get_text() for tick in axes.get_yticklabels()}
+    assert {"0", "1", "2", "3", "4"} <= shown or {"0.0", "1.0", "2.0", "3.0", "4.0"} <= shown
+
+
+def test_a_notebook_shows_the_picture(coarse: Result) -> None:
+    assert plot_response(coarse)._repr_png_().startswith(b"\x89PNG")
+    assert fretwear.plot_response is plot_response  # without an import of fretwear.plot
+    with pytest.raises(AttributeError, match="no attribute 'plot_nothing'"):
+        _ = fretwear.plot_nothing

@@ -99,7 +99,7 @@ def test_the_curve_is_the_result(tmp_path: Path) -> None:
     assert np.array_equal(lines["stuck (linear)"].get_ydata(), read_response(stuck).amplitude)
     assert "shift -0.200 %" in upper.texts[0].get_text()
     assert lower.get_xlabel() == "frequency [Hz]"
-    assert upper.get_ylabel() == "amplitude of tip [L]"
+    assert upper.get_ylabel() == "amplitude of tip [10⁻⁶]"
     tops = [area.get_paths()[0].vertices[:, 1].max() for area in lower.collections]
     keep = response.converged
     assert tops == pytest.approx([response.fraction[keep].cumsum(axis=1)[:, k].max()

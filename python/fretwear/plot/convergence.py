@@ -52,7 +52,7 @@ def plot_convergence(source: Source) -> Figure:
     if failed.any():
         panels[0].legend(frameon=False, fontsize=8)
     panels[2].set_ylim(bottom=0.0)
-    panels[2].set_xlabel("point [1]")
+    panels[2].set_xlabel("point")
     panels[2].locator_params(axis="x", integer=True)
     figure.suptitle(f"Convergence: {(~failed).sum()} of {result.n_points} points, "
                     f"{result.iterations.sum()} iterations, {result.seconds.sum():.3g} s",

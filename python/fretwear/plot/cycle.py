@@ -18,8 +18,10 @@ from .style import (
     Source,
     as_result,
     label,
+    largest_of,
     new_figure,
     pair_name,
+    scale_axis,
     tidy,
     units_of,
 )
@@ -86,12 +88,18 @@ def plot_hysteresis(source: Source, point: int | None = None,
         c = _direction(cycle, pair)
         axes.plot(cycle.displacement[:, pair, c], cycle.force[:, pair, c], color=CURVE)
         axes.set_title(f"{pair_name(result, pair)}, {DIRECTIONS[c]}", fontsize=10)
-        axes.ticklabel_format(scilimits=(-3, 3), useMathText=True)
         tidy(axes)
+    # One unit for all panels, so that they can be compared.
+    moved = largest_of(*(line.get_xdata() for axes in panels for line in axes.lines))
+    pressed = largest_of(*(line.get_ydata() for axes in panels for line in axes.lines))
+    for axes in panels[:len(drawn)]:
+        length = scale_axis(axes.xaxis, moved, units_of(result, "amplitude"))
+        force = scale_axis(axes.yaxis, pressed, units_of(result, "contact/force"))
+        axes.locator_params(axis="x", nbins=5)
     for axes in panels[len(drawn):]:
         axes.set_visible(False)
-    figure.supxlabel(label("relative displacement", units_of(result, "amplitude")), fontsize=10)
-    figure.supylabel(label("contact force", units_of(result, "contact/force")), fontsize=10)
+    figure.supxlabel(label("relative displacement", length), fontsize=10)
+    figure.supylabel(label("contact force", force), fontsize=10)
     figure.suptitle(f"Hysteresis at {_at(result, point)}", fontsize=11)
     return figure
 
@@ -117,9 +125,10 @@ def plot_cycle(source: Source, point: int | None = None, pairs: Sequence[int] | 
     panels = figure.subplots(2 if has_contact else 1, 1, sharex=True, squeeze=False).ravel()
     degrees = np.linspace(0.0, 360.0, _INSTANTS + 1)
     series = synthesis(result.coefficients.shape[1], np.radians(degrees))
-    panels[0].plot(degrees, result.coefficients[point, :, column] @ series, color=CURVE)
-    name = result.observed[column]
-    panels[0].set_ylabel(label(name, units_of(result, "amplitude")))
+    units, name = units_of(result, "amplitude"), result.observed[column]
+    history = result.coefficients[point, :, column] @ series
+    panels[0].plot(degrees, history, color=CURVE)
+    panels[0].set_ylabel(label(name, scale_axis(panels[0].yaxis, largest_of(history), units)))
     panels[0].set_title(f"One cycle at {_at(result, point)}", fontsize=11)
     if has_contact:
         cycle = result.cycle(point)
@@ -128,8 +137,9 @@ def plot_cycle(source: Source, point: int | None = None, pairs: Sequence[int] | 
             panels[1].plot(cycle.degrees, cycle.displacement[:, pair, c],
                            color=PALETTE[k % len(PALETTE)], linestyle=("-", "--")[k // 6 % 2],
                            label=f"{pair_name(result, pair)}, {DIRECTIONS[c]}")
-        panels[1].set_ylabel(label("relative displacement", units_of(result, "amplitude")))
-        panels[1].ticklabel_format(axis="y", scilimits=(-3, 3), useMathText=True)
+        moved = largest_of(*(line.get_ydata() for line in panels[1].lines))
+        panels[1].set_ylabel(label("relative displacement",
+                                   scale_axis(panels[1].yaxis, moved, units)))
         panels[1].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     panels[-1].set_xlabel("phase of the excitation [degrees]")
     panels[-1].set(xlim=(0.0, 360.0), xticks=range(0, 361, 60))
@@ -155,7 +165,7 @@ def plot_harmonics(source: Source, point: int | None = None, observe: str | None
     axes.set_ylim(bottom=0.3 * shown[present].min())
     axes.set_xlim(-0.6, highest + 0.6)
     axes.locator_params(axis="x", integer=True)
-    axes.set_xlabel("harmonic [1]")
+    axes.set_xlabel("harmonic")
     axes.set_ylabel(label(f"amplitude of {result.observed[column]}",
                           units_of(result, "amplitude")))
     axes.set_title(f"Harmonics at {_at(result, point)}", fontsize=11)

@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..result import Result
 from ..rows import choose_point, pair_areas, pair_fields
-from .style import Floats, Source, as_result, label, new_figure, units_of
+from .style import (
+    Floats,
+    ScaledFormatter,
+    Source,
+    as_result,
+    label,
+    largest_of,
+    new_figure,
+    scale,
+    units_of,
+)
 
 __all__ = ["Flank", "find_flanks", "plot_flanks", "plot_maps"]
 
@@ -29,8 +39,6 @@ _SHOWN = {
     "wear_depth": ("wear depth", "YlOrBr"),
     "wear_rate": ("wear depth per cycle", "PuRd"),
 }
-#: Units where the file knows none.
-_GENERIC = {"pressure": "F/L^2", "dissipation": "F/L", "wear_depth": "L", "wear_rate": "L"}
 #: Numbers are written into the cells of flanks with no more pairs than this.
 _MOST_NUMBERS = 12
 
@@ -174,25 +182,29 @@ def plot_maps(result: Result, fields: Mapping[str, tuple[Floats, str]], title: s
         block, column = divmod(number, columns)
         text, colours = _SHOWN.get(name, (name, "viridis"))
         share = name in ("stick", "slip", "open")
+        factor, shown_units = (1.0, "") if share else scale(largest_of(values), units)
         limits = (0.0, 1.0) if share else (min(0.0, values.min()), max(values.max(), 1e-300))
         shown = [panels[block * len(flanks) + row, column] for row in range(len(flanks))]
         for axes, flank in zip(shown, flanks):
-            drawn = _draw_map(axes, flank, _cells(flank, area), values, colours, limits)
+            drawn = _draw_map(axes, flank, _cells(flank, area), values, colours, limits,
+                              factor)
             axes.set_ylabel(label(f"{flank.name}\n{flank.axes[1]}",
                                   units_of(result, "contact/position")), fontsize=9)
         shown[0].set_title(text, fontsize=10)
         shown[-1].set_xlabel(label(flanks[-1].axes[0], units_of(result, "contact/position")),
                              fontsize=9)
         bar = figure.colorbar(drawn, ax=shown, shrink=0.9, aspect=25, pad=0.02)
-        bar.set_label(f"[{(units or _GENERIC.get(name, '1')).replace('^2', '²')}]", fontsize=9)
+        bar.set_label(label("", shown_units).strip(), fontsize=9)
+        bar.formatter = ScaledFormatter(factor)
+        bar.update_ticks()
         bar.ax.tick_params(labelsize=8)
-        bar.formatter.set_powerlimits((-3, 4))  # type: ignore[attr-defined]
     figure.suptitle(title, fontsize=11)
     return figure
 
 
 def _draw_map(axes: Axes, flank: Flank, size: Floats, values: Floats, colours: str,
-              limits: tuple[float, float]) -> PatchCollection:
+              limits: tuple[float, float], factor: float) -> PatchCollection:
+    """One map; the numbers in its cells are multiplied by the factor."""
     axes.set_visible(True)
     cells = [Rectangle((x - 0.5 * w, y - 0.5 * h), w, h)
              for (x, y), (w, h) in zip(flank.place, size)]
@@ -209,7 +221,7 @@ def _draw_map(axes: Axes, flank: Flank, size: Floats, values: Floats, colours: s
             colour = drawn.cmap(drawn.norm(value))
             dark = np.dot(colour[:3], (0.299, 0.587, 0.114)) < 0.5
             # What is round-off beside the largest value says no more than a zero.
-            text = "0" if abs(value) < 1e-9 * limits[1] else f"{value:.2g}"
+            text = "0" if abs(value) < 1e-9 * limits[1] else f"{factor * value:.2g}"
             axes.text(x, y, text, ha="center", va="center", fontsize=7,
                       color="white" if dark else "black")
     return drawn

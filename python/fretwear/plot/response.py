@@ -21,6 +21,8 @@ from .style import (
     as_result,
     label,
     new_figure,
+    scale,
+    scale_axis,
     tidy,
     units_of,
 )
@@ -50,7 +52,7 @@ class Response:
     stable : (n_points,) int or None
         1 stable, 0 unstable, -1 not known.
     units : str
-        Of the amplitude.
+        Of the amplitude; "" where they are not known.
     """
 
     name: str
@@ -60,7 +62,7 @@ class Response:
     fraction: Floats | None = None
     dissipation: Floats | None = None
     stable: NDArray[np.int_] | None = None
-    units: str = "L"
+    units: str = ""
 
     @property
     def is_branch(self) -> bool:
@@ -194,16 +196,16 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
         upper, lower = figure.subplots(2, 1, sharex=not response.is_branch,
                                        height_ratios=(2.4, 1.0))
         _draw_states(lower, response)
-    _draw_amplitude(upper, response, stuck)
+    largest = _draw_amplitude(upper, response, stuck)
     if response.converged.any():
-        _annotate_peak(upper, response, stuck, modal_mass)
+        _annotate_peak(upper, response, stuck, modal_mass, largest)
     if not has_states or response.is_branch:
         upper.set_xlabel("frequency [Hz]")
     return figure
 
 
-def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> None:
-    """Curves in the order computed, so that a fold of the branch shows as one."""
+def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> float:
+    """Curves in the order computed, so that a fold of the branch shows as one; the largest."""
     if stuck is not None:
         axes.plot(stuck.frequency, np.where(stuck.converged, stuck.amplitude, np.nan), "--",
                   color="0.45", linewidth=1.3, label="stuck (linear)")
@@ -225,10 +227,12 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> N
         largest = max(largest, height[bad].max())
         axes.plot(response.frequency[bad], height[bad], "x", color=FAILED, markersize=6,
                   label=f"not converged ({bad.sum()})")
-    axes.set_ylabel(label(f"amplitude of {response.name}", response.units))
+    axes.set_ylabel(label(f"amplitude of {response.name}",
+                          scale_axis(axes.yaxis, largest, response.units)))
     axes.set_ylim(0.0, 1.12 * largest or None)
     tidy(axes)
     axes.legend(frameon=False, loc="upper left")
+    return largest
 
 
 def _draw_unstable(axes: Axes, response: Response, good: Floats,
@@ -244,10 +248,13 @@ def _draw_unstable(axes: Axes, response: Response, good: Floats,
 
 
 def _annotate_peak(axes: Axes, response: Response, stuck: Response | None,
-                   modal_mass: float | None) -> None:
+                   modal_mass: float | None, largest: float) -> None:
+    """What the peak is, in the unit of an axis that shows values up to `largest`."""
     peak = response.peak
     f, a = response.frequency[peak], response.amplitude[peak]
-    lines = [f"peak {a:.4g} {response.units} at {f:.{_digits(response.frequency)}f} Hz"]
+    factor, units = scale(largest, response.units)
+    height = f"{factor * a:.4g} {units}".strip()
+    lines = [f"peak {height} at {f:.{_digits(response.frequency)}f} Hz"]
     if stuck is not None:
         shift = 100.0 * (f / stuck.frequency[stuck.peak] - 1.0)
         lines.append(f"shift {shift:+.3f} %")
@@ -272,13 +279,13 @@ def _draw_states(axes: Axes, response: Response) -> None:
     keep = np.flatnonzero(response.converged)
     if response.is_branch:
         abscissa = keep + 1.0
-        axes.set_xlabel("point of the branch [1]")
+        axes.set_xlabel("point of the branch")
     else:
         keep = keep[np.argsort(response.frequency[keep], kind="stable")]
         abscissa = response.frequency[keep]
         axes.set_xlabel("frequency [Hz]")
     axes.stackplot(abscissa, response.fraction[keep].T, labels=STATES, colors=STATE_COLOURS,
                    alpha=0.9)
-    axes.set(ylim=(0.0, 1.0), ylabel="share of pairs\nand period [1]")
+    axes.set(ylim=(0.0, 1.0), ylabel="share of pairs\nand period")
     axes.margins(x=0.0)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)

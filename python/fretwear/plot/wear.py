@@ -15,8 +15,11 @@ from .style import (
     Source,
     as_result,
     label,
+    label_y,
+    largest_of,
     new_figure,
     pair_name,
+    scale_axis,
     tidy,
     units_of,
 )
@@ -25,6 +28,8 @@ __all__ = ["plot_wear_bars", "plot_wear_evolution", "plot_wear_maps"]
 
 #: Curves of single pairs in the evolution: those that are worn most.
 _MOST_PAIRS = 6
+#: Rates that differ by more are shown on a logarithmic axis.
+_DECADE = 10.0
 
 
 def _worn(source: Source) -> Result:
@@ -85,10 +90,10 @@ def plot_wear_bars(source: Source, step: int | None = None) -> Figure:
         axes.set_title(name, fontsize=10, loc="left")
         axes.set_xlim(pairs[0] + 0.4, pairs[-1] + 1.6)
         axes.locator_params(axis="x", integer=True)
-        axes.ticklabel_format(axis="y", scilimits=(-3, 3), useMathText=True)
+        units = scale_axis(axes.yaxis, largest_of(depth), units_of(result, "wear/depth"))
         tidy(axes)
-    panels[-1].set_xlabel("pair [1]")
-    figure.supylabel(label("wear depth", units_of(result, "wear/depth")), fontsize=10)
+    panels[-1].set_xlabel("pair")
+    figure.supylabel(label("wear depth", units), fontsize=10)
     figure.suptitle(f"Wear depth at {_when(result, step)}", fontsize=11)
     return figure
 
@@ -112,28 +117,32 @@ def plot_wear_evolution(source: Source) -> Figure:
     for k, pair in enumerate(sorted(int(pair) for pair in worst)):
         panels[0].plot(cycles, depth[:, pair], ".-", color=PALETTE[k],
                        label=pair_name(result, pair))
-    panels[0].set_ylabel(label("wear depth", units_of(result, "wear/depth")))
+    panels[0].set_ylabel(label("wear depth", scale_axis(
+        panels[0].yaxis, largest_of(depth), units_of(result, "wear/depth"))))
     panels[0].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     largest = rate.max(axis=1)
     wears = bool((largest > 0.0).any())
     # A joint that sticks has a rate of exactly zero, which has no place on a logarithmic axis.
     shown = np.where(largest > 0.0, largest, np.nan) if wears else largest
     panels[1].plot(cycles, shown, ".-", color=CURVE)
-    if wears:
+    units = units_of(result, "wear/rate")
+    if wears and np.nanmax(shown) > _DECADE * np.nanmin(shown):
         panels[1].set_yscale("log")
-    panels[1].set_ylabel(label("largest depth\nper cycle", units_of(result, "wear/rate")))
+        panels[1].set_ylabel(label("largest depth\nper cycle", units))
+    else:
+        label_y(panels[1], "largest depth\nper cycle", units)
     if has_amplitude:
         panels[2].plot(cycles, result.amplitude[:, 0], ".-", color=CURVE)
-        panels[2].set_ylabel(label(f"amplitude\nof {result.observed[0]}",
-                                   units_of(result, "amplitude")))
+        panels[2].set_ylabel(label(f"amplitude\nof {result.observed[0]}", scale_axis(
+            panels[2].yaxis, largest_of(result.amplitude[:, 0]), units_of(result, "amplitude"))))
     positive = cycles[cycles > 0.0]
     if positive.size and positive[-1] > 100.0 * positive[0]:
         # The rate falls over decades of cycles; the start, at zero, stays in the picture.
         panels[-1].set_xscale("symlog", linthresh=positive[0])
+        abscissa = ""
     else:
-        panels[-1].ticklabel_format(axis="x", scilimits=(-3, 4), useMathText=True)
-    panels[0].ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
-    panels[-1].set_xlabel(label(_abscissa(result), "1"))
+        abscissa = scale_axis(panels[-1].xaxis, largest_of(cycles), "")
+    panels[-1].set_xlabel(label(_abscissa(result), abscissa))
     for axes in panels:
         tidy(axes)
     try:
