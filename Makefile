@@ -57,7 +57,7 @@ $(RUN)/frf_stuck.h5: $(EXAMPLE)/frf_stuck.nml $(wildcard $(EXAMPLE)/*.h5) $(BUIL
 	@mkdir -p $(RUN)
 	$(BUILD)/fw_run -o $@ $<
 
-$(RUN)/frf.png: $(RUN)/frf.h5 $(RUN)/frf_stuck.h5 $(wildcard python/fretwear/*.py)
+$(RUN)/frf.png: $(RUN)/frf.h5 $(RUN)/frf_stuck.h5 $(wildcard python/fretwear/*.py python/fretwear/plot/*.py)
 	PYTHONPATH=python MPLBACKEND=Agg $(PYTHON) -m fretwear plot $(RUN)/frf.h5 \
 	   --kind response --linear $(RUN)/frf_stuck.h5 -o $@
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from .errors import InputError
@@ -25,13 +26,15 @@ def array(name: str, value: ArrayLike, shape: Sequence[int | None], *,
     name : str
         Name of the argument, for messages.
     value : array_like
-        Numbers. A scalar is taken for every element of a vector of known length.
+        Numbers; sparse matrices of SciPy become dense. A scalar is taken for every element of a
+        vector of known length.
     shape : sequence of int or None
         Wanted shape; None where any length will do.
     dtype : dtype
         float64 or complex128.
     """
-    given = np.asarray(value)
+    plain: Any = value
+    given = np.asarray(plain.toarray() if scipy.sparse.issparse(plain) else plain)
     wanted = np.dtype(dtype)
     if given.dtype.kind not in ("iufc" if wanted.kind == "c" else "iuf"):
         raise InputError(f"{name}: its elements are of type {given.dtype}, must be "

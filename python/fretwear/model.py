@@ -114,7 +114,8 @@ class Model:
     Parameters
     ----------
     M, K : (n_dof, n_dof)
-        Mass and stiffness, symmetric; both may be singular.
+        Mass and stiffness, symmetric; both may be singular. Here and in every other matrix, sparse
+        ones of SciPy are taken and become dense; `fretwear.reduction` makes large ones small.
     C : (n_dof, n_dof), optional
         Viscous damping, symmetric; None for none here (a case may add modal or Rayleigh damping).
     contact : ContactPairs, optional

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse
 
 import fretwear as fw
 from fretwear import settings
@@ -226,6 +227,19 @@ def test_a_wrong_array_is_named(argument: str, change: dict[str, Any]) -> None:
     arguments: dict[str, Any] = {"M": np.eye(2), "C": None, "K": np.eye(2), **change}
     with pytest.raises(fw.InputError, match=rf"^{argument}"):
         fw.Model(**arguments)
+
+
+@pytest.mark.parametrize("kind", ["csr_array", "csc_matrix", "coo_array"])
+def test_sparse_matrices_are_those_of_numpy(kind: str) -> None:
+    sparse = getattr(scipy.sparse, kind)
+    mass, damping, stiffness = np.diag([1.0, 2.0]), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 1.0]]
+    dense = fw.Model(mass, damping, stiffness, cosine=[1.0, 0.0], stiffness_rotation=np.eye(2))
+    taken = fw.Model(sparse(mass), sparse(damping), sparse(stiffness), cosine=[1.0, 0.0],
+                     stiffness_rotation=sparse(np.eye(2)))
+    for name in ("M", "C", "K", "stiffness_rotation"):
+        assert np.array_equal(getattr(taken, name), getattr(dense, name))
+    with pytest.raises(fw.InputError, match=r"shape is \(2, 3\)"):
+        fw.Model(sparse(np.ones((2, 3))), None, stiffness)
 
 
 def test_matrices_that_are_not_symmetric_are_refused_by_the_library() -> None:

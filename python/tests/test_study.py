@@ -275,6 +275,37 @@ def test_dask_scheduler_by_its_address(study: Study) -> None:
     assert study.table()["exit_status"].tolist() == [0, 3, 4, 3]
 
 
+# A scheduler that cannot import the package, wherever that is installed.
+BARE_SCHEDULER = """
+import sys
+sys.modules["fretwear"] = None
+from distributed.cli.dask_scheduler import main
+main(["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", sys.argv[1]])
+"""
+
+
+def test_a_scheduler_without_the_package_is_one_message(
+        study: Study, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("distributed")
+    study.write(GRID.format(table="study.h5"))
+    told = study.folder / "scheduler.json"
+    with subprocess.Popen([sys.executable, "-c", BARE_SCHEDULER, told],
+                          stderr=subprocess.DEVNULL) as process:
+        try:
+            while not told.exists():
+                assert process.poll() is None
+                time.sleep(0.1)
+            address = json.loads(told.read_text())["address"]
+            assert study("--scheduler", address) == 3
+        finally:
+            process.kill()
+    errors = capsys.readouterr().err.strip().splitlines()
+    assert [line for line in errors if "error:" in line] == [
+        f"fretwear study: error: run.scheduler = '{address}': the scheduler cannot import "
+        "fretwear: install it there, in the same version as here"]
+    assert not any("Traceback" in line for line in errors)
+
+
 HYPERCUBE = """design = "latin_hypercube"
 n_samples = 10
 seed = 7

@@ -78,6 +78,8 @@ def _run_on_dask(jobs: Sequence[Job], scheduler: str, workers: int) -> Iterator[
         raise InputError(f"run.scheduler = '{scheduler}': no Dask scheduler answers there: {error}"
                          ) from None
     try:
+        if not local:
+            _require_package(client, scheduler)
         futures = client.map(run_job, jobs, key=[job.name for job in jobs], retries=0, pure=False)
         try:
             for future in distributed.as_completed(futures):
@@ -88,6 +90,20 @@ def _run_on_dask(jobs: Sequence[Job], scheduler: str, workers: int) -> Iterator[
         client.close()
         if cluster is not None:
             cluster.close()
+
+
+#: Evaluated elsewhere: nothing of this package may be needed to read it.
+_HAS_PACKAGE = "__import__('importlib.util').util.find_spec('fretwear') is not None"
+
+
+def _require_package(client: Any, scheduler: str) -> None:
+    """Say before the runs that the scheduler, or a worker, could not read them."""
+    lacking = [] if client.run_on_scheduler(eval, _HAS_PACKAGE) else ["the scheduler"]
+    found: dict[str, bool] = client.run(eval, _HAS_PACKAGE)
+    lacking += [f"the worker {address}" for address, has in found.items() if not has]
+    if lacking:
+        raise InputError(f"run.scheduler = '{scheduler}': {', '.join(lacking)} cannot import "
+                         "fretwear: install it there, in the same version as here")
 
 
 def _distributed() -> Any:
