@@ -98,7 +98,7 @@ def test_pictures(coarse: Result, rough: Result, worn: Result) -> None:
         assert np.array_equal(line.get_ydata(), result.amplitude[:, 0])
     assert lower.lines[0].get_ydata() == pytest.approx(
         rough.amplitude[:, 0] - coarse.amplitude[:, 0], abs=1e-15)
-    assert lower.get_ylabel() == "difference [mm]"
+    assert lower.get_ylabel() == "difference [µm]"
     upper, lower = plot_comparison(worn, worn).axes
     assert [bar.get_height() for bar in upper.patches] == [*worn.depth[-1]] * 2
     assert [bar.get_height() for bar in lower.patches] == [0.0] * 8

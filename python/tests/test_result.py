@@ -81,6 +81,44 @@ def test_xarray_names_every_axis(result: Result) -> None:
         result.coefficients[:, 2, 0], rel=0, abs=0)
 
 
+def test_xarray_finds_the_nearest_frequency(result: Result) -> None:
+    data = result.to_xarray()
+    wanted = 0.5 * (result.frequency[1] + result.frequency[2]) * 1.01
+    nearest = int(np.abs(result.frequency - wanted).argmin())
+    for name, value in (("frequency", wanted), ("omega", 2.0 * np.pi * wanted)):
+        point = data.sel({name: value}, method="nearest")
+        assert float(point["omega"]) == result.omega[nearest]
+        assert point["amplitude"].values == pytest.approx(result.amplitude[nearest], rel=0, abs=0)
+
+
+def test_every_quantity_of_the_points_is_in_xarray(result: Result) -> None:
+    """What the file declares, is there: nothing has to be listed twice."""
+    data = result.to_xarray()
+    declared = [name for name in result if result.declared(name).dimensions[:1] == ("point",)]
+    assert {"coefficients", "contact/force", "served_by"} <= set(declared)
+    for name in declared:
+        found = data[name.replace("/", "_")]
+        assert found.shape == result.declared(name).shape
+        if name not in ("omega", "frequency"):
+            assert found.attrs["long_name"] == result.declared(name).long_name
+
+
+def test_a_dataset_is_what_its_file_declares(result: Result) -> None:
+    force = result.declared("/contact/force")
+    assert force.dimensions == ("point", "coefficient", "pair", "direction")
+    assert force.shape == result.force.shape and force.name == "contact/force"
+    assert force.long_name == "Fourier coefficients of the contact forces t1, t2, n"
+    assert result.declared("omega").units == "rad/s"
+
+
+def test_a_notebook_shows_a_table(result: Result) -> None:
+    page = result._repr_html_()
+    assert page.startswith("<table>") and "complete" in page and "5, 5 converged" in page
+    peak = f"{result.amplitude.max():.6g} at {result.frequency[result.peak()]:.6g} Hz"
+    assert "largest u1" in page and peak in page
+    assert "<script" not in page
+
+
 def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no such file"):
         Result(tmp_path / "none.h5")

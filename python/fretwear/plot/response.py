@@ -169,8 +169,8 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
     """Amplitude, and below it the contact states, against frequency.
 
     The peak is annotated with its shift from the stuck peak and the equivalent damping ratio of
-    friction as ``friction_damping`` defines it (half-power damping of the whole peak where that
-    cannot be evaluated). Points that did not converge are crosses, unstable ones are drawn thin
+    friction as ``friction_damping`` defines it (the half-power width of the peak where that cannot
+    be evaluated). Points that did not converge are crosses, unstable ones are drawn thin
     and dashed on shaded ground. The lower panel shows stick, slip and open fractions, averaged
     over the pairs; along a branch that folds, against the number of the point.
 
@@ -262,7 +262,8 @@ def _annotate_peak(axes: Axes, response: Response, stuck: Response | None,
     if damping is not None:
         lines.append(f"friction damping {100.0 * damping:.4f} %")
     elif not response.is_branch and np.isfinite(width := half_power_damping(response)):
-        lines.append(f"half-power damping {100.0 * width:.4f} %")
+        # Of a peak that friction bends to one side it is a width, and no damping.
+        lines.append(f"half-power width {200.0 * width:.4f} % of the frequency")
     axes.plot(f, a, "o", color=CURVE, markersize=6)
     axes.text(0.985, 0.97, "\n".join(lines), transform=axes.transAxes, ha="right", va="top",
               bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": "0.8"})

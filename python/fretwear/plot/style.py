@@ -36,7 +36,7 @@ _FAMILIES = (
     ("m", {-9: "nm", -6: "µm", -3: "mm", 0: "m", 3: "km"}),
     ("N", {-6: "µN", -3: "mN", 0: "N", 3: "kN", 6: "MN"}))
 #: Values whose largest lies between these are shown in the unit of the model.
-_READABLE = (1e-2, 1e5)
+_READABLE = (0.1, 1e5)
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
