@@ -33,6 +33,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from comparison_cases import GROUPS, Case
+
 from measure import ROOT, processor_time, watch_memory
 
 #: Largest difference of a real, over the largest of its dataset: round-off of the same operations
@@ -56,7 +57,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A case with both builds: largest difference and its dataset, and what else there is to say."""
+    """A case with both builds: the largest difference, its dataset, and what else there is."""
 
     difference: float
     dataset: str

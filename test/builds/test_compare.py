@@ -1,4 +1,5 @@
-"""The comparison of two builds sees a changed number, a changed count and a dataset that is gone."""
+"""The comparison of two builds sees a changed number, a changed count and a dataset that is
+gone."""
 import sys
 from dataclasses import replace
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Run every test and count each case: `N passed, N failed` (and skipped) is the last line.
 
-    run_tests.py --build BUILD_DIRECTORY [--python INTERPRETER] [TESTS...]
+    run_tests.py --build BUILD_DIRECTORY [--python INTERPRETER] [--unit-only | TESTS...]
 
 Stages: the self-test of the stand-in, the unit tests (each .pf file in a process of its own under
 the stand-in), pytest over test/ and python/tests, or over TESTS. A stage that crashes, or that
@@ -105,6 +105,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, required=True, help="directory of the CMake build")
     parser.add_argument("--python", default=sys.executable, help="interpreter that has pytest")
+    parser.add_argument("--unit-only", action="store_true", help="without pytest")
     parser.add_argument("tests", type=Path, nargs="*", help="directories of pytest",
                         default=[ROOT / "test", ROOT / "python" / "tests"])
     arguments = parser.parse_args()
@@ -114,7 +115,9 @@ def main():
     total = Counter()
     for counts in unit_stages(build / "test" / "support"):
         total += counts
-    total += pytest_stage(arguments.python, build, [path.resolve() for path in arguments.tests])
+    if not arguments.unit_only:
+        tests = [path.resolve() for path in arguments.tests]
+        total += pytest_stage(arguments.python, build, tests)
     line = f"{total['passed']} passed, {total['failed']} failed"
     if total["skipped"]:
         line += f", {total['skipped']} skipped"

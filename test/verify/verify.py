@@ -9,6 +9,8 @@ clean. A part that was clean with the same sources is left out, unless --again i
     traps     floating-point traps, signalling NaN, array bounds: every test
     sanitize  address and undefined-behaviour sanitizers: unit tests, program, reference solutions
     builds    all optimisation: every test, and the results of the examples beside those without
+    march     builds for the oldest processor, and without optimisation: numbers of the program
+    kernels   every kernel of OpenBLAS that this processor runs: unit tests
     memcheck  a point of the blade sector under valgrind
     flang     a second compiler on the sources without modules of gfortran
     races     handles in threads of their own under the thread sanitizer
@@ -28,6 +30,7 @@ from pathlib import Path
 import line_coverage
 import memory
 import optimisation
+import processors
 import race_detectors
 import second_compiler
 from common import ROOT, Setting, checksum, report
@@ -37,8 +40,8 @@ from revision import revision
 from sections import write_section
 
 PARTS = {"traps": memory.traps, "sanitize": memory.sanitize, "builds": optimisation.builds,
-         "memcheck": memory.memcheck, "flang": second_compiler.flang,
-         "races": race_detectors.races, "helgrind": race_detectors.helgrind,
+         "march": processors.march, "kernels": processors.kernels,
+         "memcheck": memory.memcheck, "flang": second_compiler.flang, "races": race_detectors.races, "helgrind": race_detectors.helgrind,
          "coverage": line_coverage.coverage}
 
 
