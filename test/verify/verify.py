@@ -41,7 +41,8 @@ from sections import write_section
 
 PARTS = {"traps": memory.traps, "sanitize": memory.sanitize, "builds": optimisation.builds,
          "march": processors.march, "kernels": processors.kernels,
-         "memcheck": memory.memcheck, "flang": second_compiler.flang, "races": race_detectors.races, "helgrind": race_detectors.helgrind,
+         "memcheck": memory.memcheck, "flang": second_compiler.flang,
+         "races": race_detectors.races, "helgrind": race_detectors.helgrind,
          "coverage": line_coverage.coverage}
 
 
