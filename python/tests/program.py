@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 from pathlib import Path
 
-from fretwear.result import Result
+from project import PROGRAM
 
-PROGRAM = os.environ.get(
-    "FW_RUN", str(Path(__file__).resolve().parents[2] / "build" / "release" / "fw_run"))
+from fretwear.result import Result
 
 
 def run(namelist: Path, target: Path, *settings: str) -> Result:

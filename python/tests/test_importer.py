@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 from import_models import LABELS, matrices
+from project import PROGRAM
 
 from fretwear.cli import main
 from fretwear.errors import InputError
@@ -21,8 +21,6 @@ from fretwear.importer.spectrum import lowest_modes, negative_directions
 from fretwear.sector import FullModel as SectorModel
 from fretwear.sector import ReducedModel
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 FILES = Path(__file__).parent / "import_files"
 MASS, STIFFNESS = matrices()
 # What one coordinate left out of fifteen changes close to a resonance: 1.6e-4 was found.

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from project import PROGRAM, ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("FW_RUN", str(ROOT / "build" / "release" / "fw_run"))
 #: Profiles of wear that count as the same, as a part of the largest depth.
 SAME_PROFILE = 0.01
 #: Part of the linear solutions of the implicit scheme that pseudo-time may take: 29 % in the paper.
@@ -31,7 +29,7 @@ def bench(tmp_path: Path):
     """Runs cases once and coarse."""
     from measure import Bench
 
-    return Bench(Path(PROGRAM), tmp_path, quick=True)
+    return Bench(PROGRAM, tmp_path, quick=True)
 
 
 def check_pictures(text: str, folder: Path) -> None:

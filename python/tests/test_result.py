@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import subprocess
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from project import PROGRAM
 
 import fretwear
 from fretwear import InputError, OutputError
@@ -22,9 +22,8 @@ CASE = Path(__file__).resolve().parents[2] / "example" / "jenkins" / "jenkins.nm
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
     """Response of the elastic rubbing oscillator over a few points."""
-    program = os.environ.get("FW_RUN", str(CASE.parents[2] / "build" / "release" / "fw_run"))
     target = tmp_path_factory.mktemp("result") / "jenkins.h5"
-    subprocess.run([program, "-q", "--set", "sweep%n_points=5", "-o", target, CASE], check=True)
+    subprocess.run([PROGRAM, "-q", "--set", "sweep%n_points=5", "-o", target, CASE], check=True)
     return Result(target)
 
 

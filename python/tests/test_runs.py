@@ -15,15 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse
+from project import EXAMPLE, PROGRAM
 
 import fretwear as fw
 from fretwear import settings
 from fretwear._native import Session
 from fretwear.settings import Groups
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
-EXAMPLES = ROOT / "example"
 SECTOR: Groups = {
     "structure": {"modal_damping": 1e-3, "rotation_speed": 460.8}, "contact": {"mu": 0.5},
     "load": {"harmonic_scale": 0.5}, "harmonics": {"n_harmonics": 3, "n_time": 128},
@@ -57,13 +55,13 @@ def assert_same_numbers(one: fw.Result, other: fw.Result) -> None:
 
 @pytest.mark.parametrize("name", ["jenkins", "coulomb", "duffing", "gap"])
 def test_a_namelist_gives_the_numbers_of_fw_run(name: str, tmp_path: Path) -> None:
-    namelist = EXAMPLES / name / f"{name}.nml"
+    namelist = EXAMPLE / name / f"{name}.nml"
     result = fw.run(fw.Case.from_file(namelist, sweep={"n_points": 7}), tmp_path / "here.h5")
     assert_same_numbers(result, by_program(tmp_path, namelist, "--set", "sweep%n_points=7"))
 
 
 def test_a_branch_gives_the_numbers_of_fw_run(tmp_path: Path) -> None:
-    namelist = EXAMPLES / "duffing" / "duffing.nml"
+    namelist = EXAMPLE / "duffing" / "duffing.nml"
     case = fw.Case.from_file(namelist, sweep={"continuation": "arclength", "stability": True},
                              output={"histories": True})
     other = by_program(tmp_path, namelist, "--set", "sweep%continuation=arclength", "--set",
@@ -73,10 +71,10 @@ def test_a_branch_gives_the_numbers_of_fw_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("in_memory", [False, True])
 def test_the_sector_gives_the_numbers_of_fw_run(in_memory: bool, tmp_path: Path) -> None:
-    file = EXAMPLES / "blade_sector" / "sector_16.h5"
+    file = EXAMPLE / "blade_sector" / "sector_16.h5"
     model = fw.Model.from_hdf5(file) if in_memory else file
     result = fw.frf(model, 1017, 1029, 25, unit="Hz", **SECTOR)
-    other = by_program(tmp_path, EXAMPLES / "blade_sector" / "frf.nml", "--set",
+    other = by_program(tmp_path, EXAMPLE / "blade_sector" / "frf.nml", "--set",
                        "sweep%n_points=25")
     assert (result.fraction[:, :, 1] > 0.0).any()  # pairs slip: not only linear algebra
     assert_same_numbers(result, other)
@@ -85,7 +83,7 @@ def test_the_sector_gives_the_numbers_of_fw_run(in_memory: bool, tmp_path: Path)
 def test_a_model_of_arrays_is_that_of_a_namelist(tmp_path: Path) -> None:
     result = fw.frf(RUBBING, 0.6, 1.6, 5, contact={"law": "penalty"},
                     harmonics={"n_harmonics": 15, "n_time": 1024})
-    other = by_program(tmp_path, EXAMPLES / "jenkins" / "jenkins.nml", "--set", "sweep%n_points=5")
+    other = by_program(tmp_path, EXAMPLE / "jenkins" / "jenkins.nml", "--set", "sweep%n_points=5")
     assert_same_numbers(result, other)
 
 
@@ -93,13 +91,13 @@ def test_springs_of_a_model_are_those_of_a_namelist(tmp_path: Path) -> None:
     model = fw.Model([[1.0]], [[0.1]], [[1.0]], springs=[fw.Spring(1, coefficient=0.5)],
                      cosine=[0.25], observe={"u1": 1})
     result = fw.frf(model, 0.3, 1.43, 12, harmonics={"n_harmonics": 7})
-    other = by_program(tmp_path, EXAMPLES / "duffing" / "duffing.nml", "--set",
+    other = by_program(tmp_path, EXAMPLE / "duffing" / "duffing.nml", "--set",
                        "sweep%n_points=12")
     assert_same_numbers(result, other)
 
 
 def test_the_effective_input_is_that_of_fw_run() -> None:
-    namelist = EXAMPLES / "blade_sector" / "frf.nml"
+    namelist = EXAMPLE / "blade_sector" / "frf.nml"
     shown = subprocess.run([PROGRAM, "--check", namelist], check=True, capture_output=True,
                            text=True).stdout
     case = fw.Case.from_file(namelist)
@@ -116,7 +114,7 @@ def complaint(group: str, key: str) -> str:
     """What the library says of a key with a nonsensical value, '' where it takes even that."""
     nonsense: Any = {group: {key: ["?", "?"]}}
     try:
-        fw.Case.from_file(EXAMPLES / "jenkins" / "jenkins.nml", **nonsense).namelist()
+        fw.Case.from_file(EXAMPLE / "jenkins" / "jenkins.nml", **nonsense).namelist()
     except fw.InputError as error:
         return str(error)
     return ""
@@ -131,7 +129,7 @@ def test_a_group_has_the_keys_that_the_library_knows() -> None:
         for key in keys:
             assert unknown not in complaint(group, key), (group, key)
     group = ""
-    case = fw.Case(EXAMPLES / "blade_sector" / "sector_16.h5",
+    case = fw.Case(EXAMPLE / "blade_sector" / "sector_16.h5",
                    sweep={"start": 1.0, "end": 2.0, "n_points": 2})
     for line in case.namelist().splitlines():
         if line.startswith("&"):
@@ -189,14 +187,14 @@ def test_files_that_are_not_there(tmp_path: Path) -> None:
 def test_points_that_fail_are_an_error_that_carries_what_was_computed() -> None:
     strict: Groups = {**SECTOR, "solver": {"max_iterations": 1, "fallback": False}}
     with pytest.raises(fw.ConvergenceError, match=r"of 13 points did not converge") as failed:
-        fw.frf(EXAMPLES / "blade_sector" / "sector_16.h5", 1017, 1029, 13, unit="Hz", **strict)
+        fw.frf(EXAMPLE / "blade_sector" / "sector_16.h5", 1017, 1029, 13, unit="Hz", **strict)
     result = failed.value.result
     assert result is not None
     assert result.n_points == 13
     assert result.status == "not converged"
     assert not result.converged.all()
     assert any(line.startswith("converged ") for line in failed.value.report)
-    again = fw.frf(EXAMPLES / "blade_sector" / "sector_16.h5", 1017, 1029, 13, unit="Hz",
+    again = fw.frf(EXAMPLE / "blade_sector" / "sector_16.h5", 1017, 1029, 13, unit="Hz",
                    check=False, **strict)
     assert np.array_equal(again.converged, result.converged)
 
@@ -270,7 +268,7 @@ def test_the_matrix_of_another_size_is_blamed(mass: int, damping: int | None, st
 
 
 def test_a_model_file_holds_the_model(tmp_path: Path) -> None:
-    file = EXAMPLES / "blade_sector" / "sector_16.h5"
+    file = EXAMPLE / "blade_sector" / "sector_16.h5"
     model = fw.Model.from_hdf5(file)
     model.to_hdf5(tmp_path / "again.h5")
     again = fw.Model.from_hdf5(tmp_path / "again.h5")
@@ -325,7 +323,7 @@ def test_a_model_runs_without_a_file() -> None:
 
 
 def test_a_result_in_memory_is_that_of_the_file(tmp_path: Path) -> None:
-    model = fw.Model.from_hdf5(EXAMPLES / "blade_sector" / "sector_16.h5")
+    model = fw.Model.from_hdf5(EXAMPLE / "blade_sector" / "sector_16.h5")
     here = fw.frf(model, 1017, 1029, 5, unit="Hz", **SECTOR)
     written = fw.frf(model, 1017, 1029, 5, unit="Hz", file=tmp_path / "sector.h5", **SECTOR)
     assert_same_numbers(here, written)
@@ -444,7 +442,7 @@ def test_an_interrupt_stops_wear(tmp_path: Path) -> None:
 
     groups: Groups = {**SECTOR, "wear": {"max_depth_step": 1e-12, "max_steps": 10_000_000}}
     with pytest.raises(fw.RunInterrupted) as stopped:
-        fw.wear(EXAMPLES / "blade_sector" / "sector_16.h5", 1022.5, 1e-9, 1e9, unit="Hz",
+        fw.wear(EXAMPLE / "blade_sector" / "sector_16.h5", 1022.5, 1e-9, 1e9, unit="Hz",
                 scheme="explicit", file=tmp_path / "wear.h5", progress=interrupt, **groups)
     result = stopped.value.result
     assert result is not None
@@ -517,7 +515,7 @@ def test_python_goes_on_while_the_library_computes() -> None:
 
 
 def test_runs_in_several_threads_do_not_disturb_each_other() -> None:
-    case = fw.Case(EXAMPLES / "blade_sector" / "sector_16.h5", **SECTOR).replace(
+    case = fw.Case(EXAMPLE / "blade_sector" / "sector_16.h5", **SECTOR).replace(
         sweep={"start": 1017, "end": 1029, "n_points": 13, "unit": "Hz"}, case={"threads": 1})
     alone = fw.run(case)
     results: list[fw.Result] = []
@@ -536,11 +534,11 @@ def test_runs_in_several_threads_do_not_disturb_each_other() -> None:
 
 def test_wear_gives_the_numbers_of_fw_run(tmp_path: Path) -> None:
     groups: Groups = {**SECTOR, "wear": {"max_depth_step": 2e-5}}
-    result = fw.wear(EXAMPLES / "blade_sector" / "sector_16.h5", 1022.5, 1e-9, 1e7, unit="Hz",
+    result = fw.wear(EXAMPLE / "blade_sector" / "sector_16.h5", 1022.5, 1e-9, 1e7, unit="Hz",
                      scheme="explicit", **groups)
     options = ["case%analysis=wear", "sweep%start=1022.5", "sweep%end=0", "wear%scheme=explicit",
                "wear%coefficient=1e-9", "wear%n_cycles=1e7", "wear%max_depth_step=2e-5"]
-    other = by_program(tmp_path, EXAMPLES / "blade_sector" / "frf.nml",
+    other = by_program(tmp_path, EXAMPLE / "blade_sector" / "frf.nml",
                        *(word for option in options for word in ("--set", option)))
     assert_same_numbers(result, other)
     n_steps = len(result.cycles)

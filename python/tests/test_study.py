@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from project import PROGRAM, ROOT
 
 from fretwear.cli import main
 from fretwear.errors import FretwearError, InputError
@@ -22,8 +23,6 @@ from fretwear.study.plan import override
 from fretwear.study.pool import run_jobs
 from fretwear.study.run import Job, identify, recorded, run_job
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 # Two runs solved to 1e-8 each.
 SIMILAR = 1e-6
 # The steady state is reached where the rate has fallen by 1e-6, and the rest to wear with it.

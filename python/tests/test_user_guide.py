@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -11,11 +10,10 @@ import typing
 from pathlib import Path
 
 import pytest
+from project import PROGRAM, ROOT
 
 from fretwear import settings
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("FW_RUN", str(ROOT / "build" / "release" / "fw_run"))
 GUIDE = (ROOT / "docs" / "user-guide.md").read_text()
 
 

@@ -1,13 +1,9 @@
 """What the tests of the command line share: the program, a small valid case, a model file."""
-import os
 import subprocess
-from pathlib import Path
 
 import pytest
 from limits import limit
-
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
+from project import PROGRAM, require_program
 
 CASE = """&case title = 'test' /
 &model
@@ -64,6 +60,5 @@ class Runner:
 
 @pytest.fixture
 def fw_run(tmp_path):
-    if not PROGRAM.exists():
-        pytest.fail(f"{PROGRAM} is not there: build the project, or set FW_RUN")
+    require_program()
     return Runner(tmp_path)

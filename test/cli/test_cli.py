@@ -144,7 +144,7 @@ def test_bar_on_a_terminal(fw_run):
     pty = pytest.importorskip("pty")
     import subprocess
 
-    from wear_cases import PROGRAM
+    from project import PROGRAM
     master, slave = pty.openpty()
     done = subprocess.run([PROGRAM, "case.nml"], cwd=fw_run.directory, stdout=subprocess.PIPE,
                           stderr=slave, timeout=60, check=False)

@@ -1,7 +1,6 @@
 """Every example runs and gives the number that its README promises."""
 from __future__ import annotations
 
-import os
 import subprocess
 from pathlib import Path
 
@@ -9,12 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from limits import limit
-
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLE = ROOT / "example"
-FW_RUN = os.environ.get("FW_RUN", str(ROOT / "build" / "release" / "fw_run"))
-# Threads that spin while they wait starve each other where other tests run at the same time.
-ENVIRONMENT = {**os.environ, "OMP_WAIT_POLICY": "passive"}
+from project import EXAMPLE, PATIENT, PROGRAM
 
 # Namelist: (dataset, rows, column, number, relative tolerance). `rows` is a frequency [rad/s], or
 # None for the largest value of the sweep. Numbers of oscillators are exact solutions (see the
@@ -52,8 +46,8 @@ def results(tmp_path_factory):
         if name not in done:
             path = folder / (Path(name).stem + ".h5")
             process = subprocess.run(
-                [FW_RUN, "-q", "-o", str(path), str(EXAMPLE / name)],
-                capture_output=True, text=True, check=False, timeout=limit(120), env=ENVIRONMENT)
+                [PROGRAM, "-q", "-o", str(path), str(EXAMPLE / name)],
+                capture_output=True, text=True, check=False, timeout=limit(120), env=PATIENT)
             assert process.returncode == 0, process.stderr
             done[name] = path
         return done[name]

@@ -5,9 +5,9 @@ an oscillator whose friction wears away.
 """
 import numpy as np
 import pytest
+from cases import merged, read, run
 from limits import limit
-from wear_cases import REFERENCE, joint, merged, oscillator, prescribed_slip, read, result, run, \
-    shared_load
+from wear_cases import REFERENCE, joint, oscillator, prescribed_slip, result, shared_load
 
 # Asked for; with this tolerance of a step the depths are off by 3e-6 at most.
 REQUIRED = 1e-4
@@ -296,7 +296,7 @@ def test_effective_input_with_worn_reads_back(worn):
     first = result(folder, point)
     import subprocess
 
-    from wear_cases import PROGRAM
+    from project import PROGRAM
     subprocess.run([PROGRAM, "-q", "again.nml"], cwd=folder, check=True, timeout=limit(60))
     # The name of the result is part of the effective input.
     again = read(folder / "case.h5")

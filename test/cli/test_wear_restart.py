@@ -7,8 +7,9 @@ import subprocess
 import h5py
 import numpy as np
 import pytest
-from wear_cases import PROGRAM, ROOT, assert_same, merged, oscillator, prescribed_slip, read, \
-    result, run, shared_load, write_namelist
+from cases import merged, read, run, write_namelist
+from project import PROGRAM, ROOT
+from wear_cases import assert_same, oscillator, prescribed_slip, result, shared_load
 
 CASES = {
     "implicit": shared_load(scheme="implicit", error_tolerance=1e-4, n_cycles=300.0),

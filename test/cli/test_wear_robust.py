@@ -7,8 +7,10 @@ import subprocess
 import h5py
 import numpy as np
 import pytest
+from cases import merged, run
 from limits import limit
-from wear_cases import PROGRAM, ROOT, merged, oscillator, prescribed_slip, result, run, shared_load
+from project import PROGRAM, ROOT
+from wear_cases import oscillator, prescribed_slip, result, shared_load
 
 N_PAIRS = 3
 TANGENTIAL, NORMAL = 20.0, 30.0

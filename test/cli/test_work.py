@@ -6,7 +6,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from conftest import ROOT
+from project import ROOT
 
 ALLOWANCE = 1.05
 

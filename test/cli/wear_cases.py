@@ -1,75 +1,13 @@
 """Small worn joints as cases of fw_run, with the reference solutions where there are any."""
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
-import h5py
 import numpy as np
+from cases import read, run
+from project import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "test" / "support"))
-from limits import limit
-
-PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 REFERENCE = json.loads((ROOT / "test" / "reference" / "oracle_g_wear.json").read_text())
 # What depends on the clock or on the name of the run.
 CLOCK = {"seconds", "attributes"}
-
-
-def literal(value):
-    """A value as a namelist takes it."""
-    if isinstance(value, bool):
-        return ".true." if value else ".false."
-    if isinstance(value, str):
-        return f"'{value}'"
-    if isinstance(value, (int, np.integer)):
-        return str(value)
-    if isinstance(value, (float, np.floating)):
-        return repr(float(value))
-    return ", ".join(literal(item) for item in np.ravel(value).tolist())
-
-
-def write_namelist(path, groups):
-    """Write {group: {key: value}} as a namelist."""
-    lines = []
-    for group, keys in groups.items():
-        lines += [f"&{group}", *(f"  {key} = {literal(value)}" for key, value in keys.items()), "/"]
-    path.write_text("\n".join(lines) + "\n")
-
-
-def merged(groups, changes):
-    """Groups with changes to some keys; None takes a key out."""
-    result = {name: dict(keys) for name, keys in groups.items()}
-    for name, keys in changes.items():
-        result.setdefault(name, {}).update(keys)
-        result[name] = {key: value for key, value in result[name].items() if value is not None}
-    return result
-
-
-def run(folder, groups, *arguments, name="case", status=0):
-    """Run a case given as groups; return what it printed."""
-    path = folder / f"{name}.nml"
-    write_namelist(path, groups)
-    done = subprocess.run([PROGRAM, "-q", *map(str, arguments), str(path)], cwd=folder, text=True,
-                          capture_output=True, timeout=limit(120), check=False,
-                          env={**os.environ, "OMP_WAIT_POLICY": "passive"})
-    assert done.returncode == status, (done.returncode, done.stderr)
-    return done
-
-
-def read(path):
-    """Every dataset of a result, and the attributes of the file and of /wear."""
-    found = {}
-    with h5py.File(path, "r") as file:
-        def take(name, item):
-            if isinstance(item, h5py.Dataset):
-                found[name] = item[()]
-        file.visititems(take)
-        found["attributes"] = dict(file.attrs)
-        found["wear"] = dict(file["wear"].attrs) if "wear" in file else {}
-    return found
 
 
 def result(folder, groups, *arguments, name="case", status=0):

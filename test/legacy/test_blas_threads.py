@@ -1,13 +1,10 @@
 """Threads of OpenBLAS: one inside a run, beside the threads of the run; afterwards what was set."""
 import ctypes
-import os
-from pathlib import Path
 
 import pytest
+from project import BUILD
 
-ROOT = Path(__file__).resolve().parents[2]
-LIBRARY = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve().with_name(
-    "libfretwear.so")
+LIBRARY = BUILD / "libfretwear.so"
 OUTSIDE = 2
 CASE = b"""
 &case analysis = 'frf' threads = 2 /

@@ -10,12 +10,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from project import BUILD, ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 EXAMPLE = ROOT / "example" / "legacy"
 SECTOR = ROOT / "example" / "blade_sector"
-BUILD = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve().parent
 N_POINTS, N_PAIRS, N_COEFFICIENTS = 25, 16, 7
 
 pytestmark = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))),

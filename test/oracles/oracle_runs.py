@@ -2,16 +2,13 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 from dataclasses import dataclass
-from pathlib import Path
 
 import h5py
 import numpy as np
+from cases import run
+from project import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
-FW_RUN = os.environ.get("FW_RUN", str(ROOT / "build" / "release" / "fw_run"))
 # A case takes milliseconds; this only ends one that hangs.
 TIME_LIMIT = 120.0
 
@@ -37,27 +34,6 @@ def read_reference(letter):
     return json.loads(path.read_text())
 
 
-def literal(value):
-    """A value as a namelist takes it."""
-    if isinstance(value, bool):
-        return ".true." if value else ".false."
-    if isinstance(value, str):
-        return f"'{value}'"
-    if isinstance(value, (int, np.integer)):
-        return str(value)
-    if isinstance(value, (float, np.floating)):
-        return repr(float(value))
-    return ", ".join(literal(item) for item in np.ravel(value).tolist())
-
-
-def write_namelist(path, groups):
-    """Write {group: {key: value}} as a namelist."""
-    lines = []
-    for group, keys in groups.items():
-        lines += [f"&{group}", *(f"  {key} = {literal(value)}" for key, value in keys.items()), "/"]
-    path.write_text("\n".join(lines) + "\n")
-
-
 def read_result(path):
     """Read a result file."""
     with h5py.File(path, "r") as file:
@@ -76,14 +52,5 @@ def run_case(folder, groups, converged=True):
 
     With converged=False points may have failed (exit status 4); the caller looks at them.
     """
-    write_namelist(folder / "case.nml", groups)
-    done = subprocess.run(
-        [FW_RUN, "-q", "-o", str(folder / "case.h5"), str(folder / "case.nml")],
-        capture_output=True, text=True, check=False, timeout=TIME_LIMIT,
-        # Threads that spin while they wait starve each other where other tests run as well.
-        env={**os.environ, "OMP_WAIT_POLICY": "passive"})
-    accepted = (0,) if converged else (0, 4)
-    assert done.returncode in accepted, (
-        f"fw_run ended with status {done.returncode}: {done.stderr}\n"
-        + (folder / "case.nml").read_text())
+    run(folder, groups, status=(0,) if converged else (0, 4), seconds=TIME_LIMIT)
     return read_result(folder / "case.h5")

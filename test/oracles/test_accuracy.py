@@ -9,8 +9,10 @@ import h5py
 import numpy as np
 import oracle_cases as cases
 import pytest
+from cases import write_namelist
 from oracle_cases import coefficients_of
-from oracle_runs import FW_RUN, TIME_LIMIT, read_reference, write_namelist
+from oracle_runs import TIME_LIMIT, read_reference
+from project import PROGRAM
 
 DUFFING, COULOMB, JENKINS, TWO_DOF, GAP, PLANAR = map(read_reference, "abcdef")
 ACCURACIES = (1e-2, 1e-3, 1e-4)
@@ -31,7 +33,7 @@ def solve(folder, groups, status=0, **harmonics):
     """Run a point; its coefficients and what the file says of them."""
     groups = {**groups, "harmonics": harmonics, "solver": {"tolerance": 1e-9}}
     write_namelist(folder / "case.nml", groups)
-    done = subprocess.run([FW_RUN, "-o", folder / "case.h5", folder / "case.nml"],
+    done = subprocess.run([PROGRAM, "-o", folder / "case.h5", folder / "case.nml"],
                           capture_output=True, text=True, check=False, timeout=TIME_LIMIT,
                           env={**os.environ, "OMP_WAIT_POLICY": "passive"})
     assert done.returncode == status, done.stderr

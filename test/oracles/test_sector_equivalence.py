@@ -5,7 +5,8 @@ import h5py
 import numpy as np
 import pytest
 import slow_balance as slow
-from oracle_runs import ROOT, run_case
+from oracle_runs import run_case
+from project import ROOT
 
 MODEL = ROOT / "example" / "blade_sector" / "sector_16.h5"
 SPEED = 460.8

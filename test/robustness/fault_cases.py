@@ -1,12 +1,9 @@
 """A run that takes its time, and the ways to end it."""
-import os
 import subprocess
-from pathlib import Path
 
 import h5py
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
 #: Long enough that no machine finishes it before it is stopped.
 N_POINTS = 1000000
 #: A run has saved something by this point.
@@ -23,10 +20,6 @@ CASE = """&case threads = 1 /
 &harmonics n_harmonics = 5 n_time = 256 /
 &sweep start = 0.5 end = 0.5001 n_points = 40 /
 """
-
-
-def program():
-    return (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 
 
 class Case:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import fault_cases
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
-import wear_cases
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / name) for name in ("cli", "support")]
+import wear_cases  # noqa: E402
+from cases import read  # noqa: E402
+from project import PROGRAM  # noqa: E402
 
 #: Points of a sweep and limit of the clock [s]; both leave an idle machine much room.
 LENGTH, TIME_LIMIT = 300, 120
@@ -39,7 +41,7 @@ class Sweep:
     """A sweep beside an earlier result of its name, and the time that it takes."""
 
     def __init__(self, folder):
-        self.case = fault_cases.Case(fault_cases.program(), folder)
+        self.case = fault_cases.Case(PROGRAM, folder)
         start = time.monotonic()
         assert self.case.run(length=LENGTH).returncode == 0
         self.seconds = time.monotonic() - start
@@ -94,7 +96,7 @@ class Wear:
 
     def start(self, restart=None):
         arguments = [] if restart is None else ["--restart", restart.name]
-        return subprocess.Popen([wear_cases.PROGRAM, "-q", *arguments, "case.nml"], text=True,
+        return subprocess.Popen([PROGRAM, "-q", *arguments, "case.nml"], text=True,
                                 cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def furthest(self):
@@ -106,7 +108,7 @@ class Wear:
     def check_result(self):
         demand(fault_cases.saved(self.folder / "case.h5") > 0, "half")
         try:
-            wear_cases.assert_same(wear_cases.read(self.folder / "case.h5"), self.whole)
+            wear_cases.assert_same(read(self.folder / "case.h5"), self.whole)
         except AssertionError:
             raise Fault("numbers") from None
 

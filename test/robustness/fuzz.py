@@ -35,12 +35,12 @@ import fuzz_command
 import fuzz_matrix_market
 import fuzz_model
 import fuzz_namelist
-import fuzz_result
 import h5py
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "support"))
+import fuzz_result  # noqa: E402
 from limited import limited  # noqa: E402
 from revision import revision  # noqa: E402
 

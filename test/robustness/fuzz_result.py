@@ -4,13 +4,13 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-import fault_cases
 import h5py
 from fuzz_bases import WEAR
 from fuzz_model import cut
+from project import PROGRAM
 
-#: Makes the sound result: a run goes on from one of the same program only.
-PROGRAM = fault_cases.program()
+# PROGRAM makes the sound result, and the fuzzing puts its own in the place: a run goes on from one
+# of the same program only.
 
 
 @functools.cache

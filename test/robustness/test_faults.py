@@ -16,14 +16,12 @@ sys.path[:0] = [str(HERE)]
 import fault_cases  # noqa: E402
 import fault_trials  # noqa: E402
 import faults  # noqa: E402
-
-PROGRAM = fault_cases.program()
+from project import PROGRAM, require_program  # noqa: E402
 
 
 @pytest.fixture
 def case(tmp_path):
-    if not PROGRAM.exists():
-        pytest.fail(f"{PROGRAM} is not there: build the project, or set FW_RUN")
+    require_program()
     return fault_cases.Case(PROGRAM, tmp_path)
 
 

@@ -11,12 +11,10 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE)]
-import fault_cases  # noqa: E402
 import fuzz_bases  # noqa: E402
 import fuzz_model  # noqa: E402
 import fuzz_result  # noqa: E402
-
-PROGRAM = fault_cases.program()
+from project import PROGRAM  # noqa: E402
 
 
 def check(folder, *options):

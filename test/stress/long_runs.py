@@ -58,7 +58,7 @@ def measure(case):
     with tempfile.TemporaryDirectory(prefix="fw_long_") as name:
         folder = Path(name)
         runs.write_case(case, folder)
-        process = subprocess.Popen([runs.FW_RUN, "-q", str(folder / "case.nml")],
+        process = subprocess.Popen([runs.PROGRAM, "-q", str(folder / "case.nml")],
                                    env=runs.ENVIRONMENT)
         memory = []
         while process.poll() is None:

@@ -167,7 +167,7 @@ def main():
     parser.add_argument("--state", type=Path, help="folder where a suite that is stopped goes on")
     parser.add_argument("-o", "--output", type=Path, help="document whose tables are replaced")
     arguments = parser.parse_args()
-    results, store = {}, Store(arguments.state, runs.FW_RUN)
+    results, store = {}, Store(arguments.state, runs.PROGRAM)
     for name, ends in outcomes(arguments.family, arguments.jobs, arguments.short, store):
         results[name] = ends
         count = Counter(end.verdict for end in ends)

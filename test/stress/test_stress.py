@@ -12,7 +12,7 @@ from stress_store import Store
 
 
 def test_every_end_is_converged_or_in_words():
-    families = stress.outcomes([], 2, True, Store(None, runs.FW_RUN))
+    families = stress.outcomes([], 2, True, Store(None, runs.PROGRAM))
     ends = [end for _, family in families for end in family]
     bad = [f"{end.verdict}: {end.case.title}\n{end.text}" for end in ends
            if end.verdict in stress.BAD]
@@ -29,7 +29,7 @@ def solved(tmp_path_factory):
     folder = tmp_path_factory.mktemp("solved")
     case = cases.make("judge", "sliding", interface(2, preload=0.5))
     runs.write_case(case, folder)
-    subprocess.run([runs.FW_RUN, "-q", str(folder / "case.nml")], check=True)
+    subprocess.run([runs.PROGRAM, "-q", str(folder / "case.nml")], check=True)
     with h5py.File(folder / "case.h5") as file:
         return (case, file["omega"][0], file["coefficients"][0], file["contact/force"][0],
                 file["contact/dissipation"][0])

@@ -28,7 +28,7 @@ def test_numbers_do_not_depend_on_the_threads(tmp_path, law, solver):
         case.groups["case"]["threads"] = threads
         runs.write_case(case, folder)
         # Threads that spin while they wait starve each other on a busy machine.
-        subprocess.run([runs.FW_RUN, "-q", str(folder / "case.nml")], check=True,
+        subprocess.run([runs.PROGRAM, "-q", str(folder / "case.nml")], check=True,
                        env={**os.environ, "OMP_WAIT_POLICY": "passive", "OMP_NUM_THREADS": "4",
                             "OMP_DYNAMIC": "false"})
         with h5py.File(folder / "case.h5") as file:

@@ -25,13 +25,14 @@ def merged(groups, changes):
     return result
 
 
-def run(folder, groups, *arguments, name="case", status=(0,), program=PROGRAM, seconds=120.0):
-    """Write a case into a folder, run it there and want one of the statuses; the process."""
+def run(folder, groups, *arguments, name="case", status=0, program=PROGRAM, seconds=120.0):
+    """Run a case in a folder and want a status, or one of several; the process."""
     path = folder / f"{name}.nml"
     write_namelist(path, groups)
     done = subprocess.run([program, "-q", *map(str, arguments), path.name], cwd=folder, text=True,
                           capture_output=True, timeout=limit(seconds), check=False, env=PATIENT)
-    assert done.returncode in status, (
+    wanted = (status,) if isinstance(status, int) else status
+    assert done.returncode in wanted, (
         f"fw_run ended with status {done.returncode}: {done.stderr}\n{path.read_text()}")
     return done
 

@@ -18,6 +18,6 @@ if str(ROOT / "python") not in sys.path:
     sys.path.insert(0, str(ROOT / "python"))
 
 
-def require_program():
+def require_program() -> None:
     """Say what to do where there is no program."""
     assert PROGRAM.exists(), f"{PROGRAM} is not there: build the project, or set FW_RUN"
