@@ -68,8 +68,8 @@ test: build ## every test; the last line counts the cases
 lint: build/deps.stamp ## linters of the Fortran and the Python code, type checker
 	@$(PYTHON) -m fortitude check --quiet
 	@$(PYTHON) -m mypy
-	@$(PYTHON) -m ruff check python conftest.py bench/python_overhead.py bench tools docs \
-	   test/robustness test/stress test/verify
+	@$(PYTHON) -m ruff check python conftest.py bench tools docs \
+	   test/builds test/robustness test/stress test/verify
 
 keys: build ## tables of keys in the user guide, settings of the Python package
 	@$(PYTHON) tools/write_keys.py $(BUILD)/fw_run
@@ -97,47 +97,43 @@ verify: build/deps.stamp ## tests in PARTS (all) of the builds in docs/robustnes
 	$(PYTHON) test/verify/verify.py --python $(PYTHON) $(PARTS)
 
 bench: build ## times of points and sweeps, written to docs/benchmarks.md
-	PYTHONPATH=python $(PYTHON) bench/run.py speed
+	PYTHONPATH=python $(PYTHON) -m bench.run speed
 
 bench-precision: build ## error against run time of every method, and of wear
-	PYTHONPATH=python $(PYTHON) bench/run.py precision events
+	PYTHONPATH=python $(PYTHON) -m bench.run precision events
 
 bench-solvers: build ## every solver, flow and scheme from many starts
-	PYTHONPATH=python $(PYTHON) bench/run.py solvers
+	PYTHONPATH=python $(PYTHON) -m bench.run solvers
 
-bench-# make compare OTHER=/path/to/fw_run TIMES=9
-TIMES ?= 0
-compare: build ## numbers and work of OTHER (another fw_run) and of this build, TIMES paired runs
-	@$(PYTHON) bench/compare/compare_builds.py --of $(BUILD)/fw_run --with $(OTHER) --times $(TIMES)
-
-paper: build ## methods, iterations against frequency, aliasing
-	PYTHONPATH=python $(PYTHON) bench/run.py paper iterations aliasing
+bench-paper: build ## methods, iterations against frequency, aliasing
+	PYTHONPATH=python $(PYTHON) -m bench.run paper iterations aliasing
 
 bench-time: build ## harmonic balance against integration in time
-	PYTHONPATH=python $(PYTHON) bench/run.py time
+	PYTHONPATH=python $(PYTHON) -m bench.run time
 
 # Models that are not there yet are generated into build/bench first; 768 pairs take long.
 bench-scaling: build ## time and memory of a frequency, 16 to 768 pairs and 1 to 31 harmonics
-	PYTHONPATH=python $(PYTHON) bench/run.py scaling
+	PYTHONPATH=python $(PYTHON) -m bench.run scaling
 
 bench-limit: build ## where the time goes against its floor, and what is skipped
-	PYTHONPATH=python $(PYTHON) bench/run.py limit skips
+	PYTHONPATH=python $(PYTHON) -m bench.run limit skips
 
 # Another environment's Python where pyharm-os is installed: make bench-peers PEER_PYTHON=...
 PEER_PYTHON ?= $(PYTHON)
 bench-peers: build ## pyHarm on the same problems, where it is installed
-	PYTHONPATH=python $(PYTHON) bench/run.py peers --peer-python $(PEER_PYTHON)
+	PYTHONPATH=python $(PYTHON) -m bench.run peers --peer-python $(PEER_PYTHON)
 
 bench-full: build ## every part of docs/benchmarks.md
-	PYTHONPATH=python $(PYTHON) bench/run.py all --peer-python $(PEER_PYTHON)
+	PYTHONPATH=python $(PYTHON) -m bench.run all --peer-python $(PEER_PYTHON)
 
 # make compare OTHER=/path/to/fw_run TIMES=9
 TIMES ?= 0
 compare: build ## numbers and work of OTHER (another fw_run) and of this build, TIMES paired runs
-	@$(PYTHON) bench/compare/compare_builds.py --of $(BUILD)/fw_run --with $(OTHER) --times $(TIMES)
+	@PYTHONPATH=python $(PYTHON) -m bench.compare.compare_builds --of $(BUILD)/fw_run \
+	   --with $(OTHER) --times $(TIMES)
 
 paper: build ## figures and tables of the paper on the sector, in docs/paper
-	PYTHONPATH=python $(PYTHON) bench/gallery.py
+	PYTHONPATH=python $(PYTHON) -m bench.paper.gallery
 
 faults: build ## kills, signals, full disks, two runs at a time, written to docs/robustness.md
 	$(OVERVIEW) PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \

@@ -1,6 +1,6 @@
 """Measure, and write docs/benchmarks.md with its pictures.
 
-    python bench/run.py [PART ...] [--build build/release] [--quick] [-o docs]
+    python -m bench.run [PART ...] [--build build/release] [--quick] [-o docs]
 
 Parts: speed, precision, events, solvers, paper, iterations, aliasing, time, scaling, limit, skips,
 peers, or all; without any, speed. A part replaces its section of the document and leaves the
@@ -20,26 +20,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from aliasing import measure_aliasing, write_aliasing
-from document import ORDER, update_document
-from events import measure_events, write_events
-from filtering import measure_filtering, write_filtering
-from integration import measure_integration, write_integration
-from iterations import measure_iterations, write_iterations
-from limit import measure_limit, write_limit
-from measure import ROOT, Bench, describe_machine
-from paper import measure_methods, write_methods
-from peers import measure_peers, write_peers
-from precision import measure_precision
-from precision_report import write_precision
-from precision_wear import measure_wear_precision, write_wear_precision
-from programs import build_programs, run_program
-from scaling import measure_scaling, write_scaling
-from sector import measure_crossing, measure_points, measure_sweeps, measure_threads
-from skips import measure_skips, write_skips
-from solvers import measure_solvers
-from solvers_report import write_solvers
-from speed_report import Measurements, write_speed
+from bench.common.document import ORDER, update_document
+from bench.common.measure import ROOT, Bench, describe_machine
+from bench.common.programs import build_programs, run_program
+from bench.common.sector import measure_crossing, measure_points, measure_sweeps, measure_threads
+from bench.paper.aliasing import measure_aliasing, write_aliasing
+from bench.paper.filtering import measure_filtering, write_filtering
+from bench.paper.methods import measure_methods, write_methods
+from bench.peers.sector_and_chain import measure_peers, write_peers
+from bench.precision.events import measure_events, write_events
+from bench.precision.integration import measure_integration, write_integration
+from bench.precision.report import write_precision
+from bench.precision.responses import measure_precision
+from bench.precision.worn import measure_wear_precision, write_wear_precision
+from bench.solvers.iterations import measure_iterations, write_iterations
+from bench.solvers.many_starts import measure_solvers
+from bench.solvers.report import write_solvers
+from bench.speed.limit import measure_limit, write_limit
+from bench.speed.report import Measurements, write_speed
+from bench.speed.scaling import measure_scaling, write_scaling
+from bench.speed.skips import measure_skips, write_skips
 
 
 @dataclass(frozen=True)

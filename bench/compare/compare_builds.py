@@ -31,10 +31,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from comparison_cases import GROUPS, Case
-
-from measure import ROOT, processor_time, watch_memory
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from bench.common.measure import ROOT, processor_time, watch_memory
+from bench.compare.comparison_cases import GROUPS, Case
 
 #: Largest difference of a real, over the largest of its dataset: round-off of the same operations
 #: in another order.

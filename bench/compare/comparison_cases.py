@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from measure import ROOT
+from bench.common.measure import ROOT
 
 EXAMPLE = ROOT / "example"
 SECTOR = EXAMPLE / "blade_sector" / "frf.nml"

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import shutil
 import subprocess
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +15,8 @@ BENCH = Path(__file__).resolve().parents[2] / "bench"
 MACHINE = {"processor": "P", "compiler": "C", "flags": "-O3", "commit": "abc", "date": "today"}
 
 
-@pytest.fixture(autouse=True)
-def bench_on_path() -> Iterator[None]:
-    """The scripts import each other by name."""
-    sys.path.insert(0, str(BENCH))
-    yield
-    sys.path.remove(str(BENCH))
-
-
 def test_a_part_replaces_itself_and_nothing_else(tmp_path: Path) -> None:
-    from document import update_document
+    from bench.common.document import update_document
 
     path = tmp_path / "benchmarks.md"
     update_document(path, "time", "## Time\n\nold", MACHINE)
@@ -40,7 +30,7 @@ def test_a_part_replaces_itself_and_nothing_else(tmp_path: Path) -> None:
 
 
 def test_update_is_stable(tmp_path: Path) -> None:
-    from document import update_document
+    from bench.common.document import update_document
 
     path = tmp_path / "benchmarks.md"
     update_document(path, "paper", "## Methods\n\n| a |\n| --- |\n| 1 |", MACHINE)
@@ -50,7 +40,7 @@ def test_update_is_stable(tmp_path: Path) -> None:
 
 
 def test_error_is_relative_to_the_reference() -> None:
-    from oscillators import relative_error
+    from bench.common.oscillators import relative_error
 
     reference = np.array([1.0, 2.0, 0.0])
     # Mean square: 1 + 2 = 3 of the reference, 0.5 of the difference in the cosine.
@@ -62,14 +52,14 @@ def test_error_is_relative_to_the_reference() -> None:
 
 
 def row(number: int, converged: int, coefficients: str, message: str = "") -> dict[str, str]:
-    """A line of bench/starts.f90."""
+    """A line of bench/solvers/starts.f90."""
     return {"omega": "1.300000000000001E+00", "start": str(number), "converged": str(converged),
             "iterations": str(10 * number), "seconds": "1.0E-3", "residual": "1.0E-9",
             "message": message, "coefficients": coefficients}
 
 
 def test_a_start_is_compared_with_the_nearest_solution() -> None:
-    from solvers import Problem, read_start
+    from bench.solvers.many_starts import Problem, read_start
 
     problem = Problem("p", {}, {}, {1.3: [np.array([0.0, 1.0, 0.0]), np.array([0.0, 3.0, 0.0])]})
     assert read_start(row(1, 1, "0.0 3.3 0.0"), problem).error == pytest.approx(0.1)
@@ -77,7 +67,7 @@ def test_a_start_is_compared_with_the_nearest_solution() -> None:
 
 
 def test_figures_of_a_table_row() -> None:
-    from solvers import SOLVERS, Outcome, Problem, read_start, summarize
+    from bench.solvers.many_starts import SOLVERS, Outcome, Problem, read_start, summarize
 
     problem = Problem("p", {}, {}, {1.3: [np.array([0.0, 1.0, 0.0])]})
     lines = [row(1, 1, "0.0 1.0 0.0"), row(2, 1, "0.0 1.2 0.0"),
@@ -92,14 +82,14 @@ def test_figures_of_a_table_row() -> None:
 
 
 def test_every_combination_once() -> None:
-    from solvers import SOLVERS
+    from bench.solvers.many_starts import SOLVERS
 
     assert len({solver.name for solver in SOLVERS}) == len(SOLVERS) == 3 + 3 * 4
 
 
 def test_peak_ignores_points_that_failed() -> None:
-    from integration import find_peak
-    from measure import Run
+    from bench.common.measure import Run
+    from bench.precision.integration import find_peak
 
     omega = 2.0 * np.pi * np.array([10.0, 11.0, 12.0])
     amplitude = np.array([[1.0], [9.0], [2.0]])
@@ -112,8 +102,8 @@ def test_peak_ignores_points_that_failed() -> None:
 
 @pytest.mark.parametrize(("at_7", "word"), [(1.03, "truncation"), (1.0005, "within twice")])
 def test_the_difference_is_attributed(at_7: float, word: str) -> None:
-    from integration import INSTANTS, MANY_INSTANTS, Comparison, verdict
-    from measure import Run
+    from bench.common.measure import Run
+    from bench.precision.integration import INSTANTS, MANY_INSTANTS, Comparison, verdict
 
     def integrated(amplitude: float) -> Run:
         one = np.ones(1)
@@ -130,7 +120,7 @@ def test_the_difference_is_attributed(at_7: float, word: str) -> None:
 
 def measured(pairs: int, n_harmonics: int, seconds: float, memory: float = 100.0) -> Any:
     """A size of the scaling."""
-    from scaling import Measured
+    from bench.speed.scaling import Measured
 
     unknowns = 3 * pairs * (2 * n_harmonics + 1)
     return Measured(pairs, n_harmonics, seconds, 0.1, memory, unknowns, unknowns, 4.0, 40.0, 9, 9,
@@ -139,7 +129,7 @@ def measured(pairs: int, n_harmonics: int, seconds: float, memory: float = 100.0
 
 @pytest.mark.parametrize(("power", "word"), [(1.9, "met"), (2.3, "missed by 0.30")])
 def test_exponents_judge_the_targets(power: float, word: str) -> None:
-    from scaling import exponents
+    from bench.speed.scaling import exponents
 
     rows = [measured(pairs, n, pairs**power * n) for pairs in (16, 48, 768) for n in (1, 31)]
     lines = exponents(rows)
@@ -150,7 +140,7 @@ def test_exponents_judge_the_targets(power: float, word: str) -> None:
 
 
 def test_memory_tells_whether_there_is_a_matrix_of_the_order_of_the_unknowns() -> None:
-    from scaling import largest_matrix
+    from bench.speed.scaling import largest_matrix
 
     small, large = measured(16, 3, 1.0), measured(96, 31, 1.0)
     assert small.full_matrix == pytest.approx(8e-6 * 336**2)
@@ -160,7 +150,7 @@ def test_memory_tells_whether_there_is_a_matrix_of_the_order_of_the_unknowns() -
 
 
 def test_peak_memory_of_a_program_is_its_own() -> None:
-    from measure import watch_memory
+    from bench.common.measure import watch_memory
 
     ballast = np.ones(30_000_000)
     sleep = Path(shutil.which("sleep") or "").resolve()
@@ -170,7 +160,7 @@ def test_peak_memory_of_a_program_is_its_own() -> None:
 
 
 def test_a_peer_that_did_not_end_has_no_ratio() -> None:
-    from peers import PeerCase, row_of
+    from bench.peers.sector_and_chain import PeerCase, row_of
 
     done = PeerCase("chain", 3, 256, 0.001, 0.1, 3.0, 4.0, 1e-12, 30.0, 0.012)
     assert row_of(done) == ("chain", 3, "1", "100", "100", "30: met", "3.0", "4.0", "1e-12", "12")
@@ -180,8 +170,8 @@ def test_a_peer_that_did_not_end_has_no_ratio() -> None:
 
 
 def test_scaling_asks_for_the_coarse_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import sector
-    from scaling import COARSE, coarse_options
+    from bench.common import sector
+    from bench.speed.scaling import COARSE, coarse_options
 
     asked: list[list[str]] = []
     monkeypatch.setattr(sector.subprocess, "run", lambda command, **_: asked.append(command))
@@ -197,7 +187,7 @@ def test_scaling_asks_for_the_coarse_mesh(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_the_floor_is_judged_without_what_runs_before_a_sweep() -> None:
-    from limit import CONSTRUCTION, Part, floor_part
+    from bench.speed.limit import CONSTRUCTION, Part, floor_part
 
     parts = [Part("residual", 9, 1.4, 1.0), Part(CONSTRUCTION, 1, 9.0, 0.0)]
     assert "met everywhere" in floor_part({(16, 3): parts})
@@ -209,7 +199,7 @@ def test_the_floor_is_judged_without_what_runs_before_a_sweep() -> None:
 def test_skips_name_tests_that_exist() -> None:
     import re
 
-    text = (BENCH / "skips.py").read_text(encoding="utf-8")
+    text = (BENCH / "speed" / "skips.py").read_text(encoding="utf-8")
     named = re.findall(r"(test_\w+\.(?:py|pf))(?:::(test_\w+))?", text)
     assert len(named) > 9
     for module, name in named:
@@ -218,7 +208,7 @@ def test_skips_name_tests_that_exist() -> None:
 
 
 def test_a_saving_is_the_time_without_over_that_with() -> None:
-    from skips import Saving, Spared, write_skips
+    from bench.speed.skips import Saving, Spared, write_skips
 
     text = write_skips([Saving("a skip", "a case", 0.1, 0.25, "test_a.py::b, test_c.pf")],
                        [Spared("a thing", "a case", 2, 64, "test_d.pf")])
@@ -227,7 +217,7 @@ def test_a_saving_is_the_time_without_over_that_with() -> None:
 
 
 def test_targets_are_collected_from_the_parts() -> None:
-    from document import targets
+    from bench.common.document import targets
 
     parts = ["## One\n\nTarget: at most 1.5; missed in 2 of 3 cases, 2.25 times at worst. More.",
              "## Two\n\n### A, B and C\n\n| 16 | 2: met |\n| 48 | 2: missed by 0.5 |\n"

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from project import PROGRAM, ROOT
+from project import PROGRAM
 
 #: Profiles of wear that count as the same, as a part of the largest depth.
 SAME_PROFILE = 0.01
@@ -16,18 +14,10 @@ SAME_PROFILE = 0.01
 LARGEST_SHARE = 0.35
 
 
-@pytest.fixture(autouse=True)
-def bench_on_path() -> Iterator[None]:
-    """The scripts import each other by name."""
-    sys.path.insert(0, str(ROOT / "bench"))
-    yield
-    sys.path.remove(str(ROOT / "bench"))
-
-
 @pytest.fixture
 def bench(tmp_path: Path):
     """Runs cases once and coarse."""
-    from measure import Bench
+    from bench.common.measure import Bench
 
     return Bench(PROGRAM, tmp_path, quick=True)
 
@@ -41,8 +31,8 @@ def check_pictures(text: str, folder: Path) -> None:
 
 
 def test_wear_at_3600_rpm(bench, tmp_path: Path) -> None:
-    from gallery_wear import measure_wear, write_wear
-    from wear_runs import difference
+    from bench.common.wear_runs import difference
+    from bench.paper.gallery_wear import measure_wear, write_wear
 
     wear = measure_wear(bench)
     assert wear.implicit.is_steady and wear.pseudo.is_steady
@@ -58,7 +48,7 @@ def test_wear_at_3600_rpm(bench, tmp_path: Path) -> None:
 
 
 def test_wear_at_2500_rpm(bench, tmp_path: Path) -> None:
-    from gallery_path import STANDARD, measure_path, write_path
+    from bench.paper.gallery_path import STANDARD, measure_path, write_path
 
     path = measure_path(bench)
     assert all(run.is_steady for run in path.runs.values())
@@ -71,7 +61,7 @@ def test_wear_at_2500_rpm(bench, tmp_path: Path) -> None:
 
 
 def test_cost_of_a_profile(bench, tmp_path: Path) -> None:
-    from gallery_cost import IMPLICIT, measure_cost, write_cost
+    from bench.paper.gallery_cost import IMPLICIT, measure_cost, write_cost
 
     cost = measure_cost(bench)
     assert cost.floor < SAME_PROFILE
@@ -85,7 +75,7 @@ def test_cost_of_a_profile(bench, tmp_path: Path) -> None:
 
 
 def test_effects_of_the_discretisation(bench) -> None:
-    from gallery_effects import measure_effects, write_effects
+    from bench.paper.gallery_effects import measure_effects, write_effects
 
     effects = measure_effects(bench)
     assert 0.0 < effects.change(("harmonics", "n_time", 64)) < SAME_PROFILE
@@ -93,7 +83,7 @@ def test_effects_of_the_discretisation(bench) -> None:
 
 
 def test_responses(bench, tmp_path: Path) -> None:
-    from gallery_response import measure_response, value_of, write_response
+    from bench.paper.gallery_response import measure_response, value_of, write_response
 
     response = measure_response(bench)
     # One harmonic seen at three instants is no response; three harmonics at seven come close.
@@ -108,7 +98,7 @@ def test_responses(bench, tmp_path: Path) -> None:
 def test_half_the_swing_leaves_the_static_part_out() -> None:
     import numpy as np
 
-    from wear_runs import half_swing
+    from bench.common.wear_runs import half_swing
 
     assert half_swing(np.array([[7.0, 3.0, 4.0]])) == pytest.approx([5.0], rel=1e-4)
     assert half_swing(np.array([[1.0, 0.0, 0.0, 2.0, 0.0]])) == pytest.approx([2.0], rel=1e-4)

@@ -144,7 +144,7 @@ contains
 
    !> Whether FFTW beats the matrix product for this many coefficients, whatever the instants: the
    !> product runs at the speed of dgemm, the strided transform does not. Measured by
-   !> bench/transforms.f90.
+   !> bench/speed/transforms.f90.
    pure logical function fft_pays(n_coefficients)
       integer, intent(in) :: n_coefficients
 

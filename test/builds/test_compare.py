@@ -1,14 +1,12 @@
 """The comparison of two builds sees a changed number, a changed count and a dataset that is
 gone."""
-import sys
 from dataclasses import replace
 
 import numpy as np
 from project import PROGRAM, ROOT, require_program
 
-sys.path.insert(0, str(ROOT / "bench" / "compare"))
-from compare_builds import compare, outcome
-from comparison_cases import Case
+from bench.compare.compare_builds import compare, outcome
+from bench.compare.comparison_cases import Case
 
 
 def changed(found, name, value):

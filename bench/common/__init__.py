@@ -1,0 +1,1 @@
+"""What the measurements share: running and weighing cases, tables, pictures, the document."""

@@ -1,0 +1,1 @@
+"""Another program on the same problems."""

@@ -1,0 +1,1 @@
+"""Every solver from many starts, and from point to point."""

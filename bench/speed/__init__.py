@@ -1,0 +1,1 @@
+"""Times of points, sweeps and threads; how they grow, and how far they are from a floor."""
