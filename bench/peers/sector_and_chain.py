@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.common.layout import table
-from bench.common.measure import ROOT, Bench, Floats, Groups
+from bench.common.measure import Bench, Floats, Groups
 
 __all__ = ["PeerCase", "measure_peers", "write_peers"]
 

@@ -52,7 +52,7 @@ program starts
    call stop_on(error)
    call build_system(input, system, error)
    call stop_on(error)
-   call method%start(input)
+   call method%start(input, input%harmonics)
    call seed_random(options%seed)
    write (output_unit, '(a)') 'omega;start;converged;iterations;seconds;residual;message;'// &
       'coefficients'
