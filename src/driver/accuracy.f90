@@ -22,6 +22,7 @@ module fw_accuracy
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
+   use fw_strategy, only: solver_memory
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -65,6 +66,8 @@ module fw_accuracy
       procedure :: start
       procedure :: solve
       procedure :: describe
+      procedure :: remember
+      procedure :: recall
    end type accuracy_solver
 
 contains
@@ -368,5 +371,26 @@ contains
          trim(adjustl(reached))//' (at '//trim(adjustl(where))//' rad/s)'
       message = message//': raise harmonics%n_harmonics, or ask for less'
    end subroutine describe
+
+   subroutine remember(self, memory)
+      class(accuracy_solver), intent(in) :: self
+      type(solver_memory), intent(out) :: memory
+
+      memory%level = [self%current, self%doublings]
+      associate (solver => self%level(self%current, self%doublings)%solver)
+         if (solver%n_converged == 0) return
+         memory%x = solver%last
+         memory%omega = solver%omega_last
+      end associate
+   end subroutine remember
+
+   subroutine recall(self, memory)
+      class(accuracy_solver), intent(inout) :: self
+      type(solver_memory), intent(in) :: memory
+
+      self%current = memory%level(1)
+      self%doublings = memory%level(2)
+      call self%level(self%current, self%doublings)%solver%know(memory%x, memory%omega)
+   end subroutine recall
 
 end module fw_accuracy

@@ -13,6 +13,7 @@ module fw_adaptive
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
+   use fw_strategy, only: solver_memory
    use fw_summary, only: summary_type
    implicit none (type, external)
    private
@@ -34,6 +35,8 @@ module fw_adaptive
       procedure :: start
       procedure :: solve
       procedure :: describe
+      procedure :: remember
+      procedure :: recall
    end type adaptive_solver
 
 contains
@@ -112,5 +115,25 @@ contains
       call self%level(next)%take_over(self%level(self%current))
       self%current = next
    end subroutine change
+
+   subroutine remember(self, memory)
+      class(adaptive_solver), intent(in) :: self
+      type(solver_memory), intent(out) :: memory
+
+      memory%level(1) = self%current
+      associate (solver => self%level(self%current)%solver)
+         if (solver%n_converged == 0) return
+         memory%x = solver%last
+         memory%omega = solver%omega_last
+      end associate
+   end subroutine remember
+
+   subroutine recall(self, memory)
+      class(adaptive_solver), intent(inout) :: self
+      type(solver_memory), intent(in) :: memory
+
+      self%current = memory%level(1)
+      call self%level(self%current)%solver%know(memory%x, memory%omega)
+   end subroutine recall
 
 end module fw_adaptive

@@ -11,6 +11,8 @@ module fw_frequency_response
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
+   use fw_peak, only: peak_type
+   use fw_peak_finder, only: peak_finder
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
    use fw_sinks, only: observer_sink
@@ -41,10 +43,11 @@ contains
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
       class(point_strategy), allocatable, target :: strategy
-      class(point_source), allocatable :: source
+      class(point_source), allocatable, target :: source
       type(writer_sink), target :: to_file
       type(summary_sink), target :: to_summary
       type(observer_sink), target :: to_observer
+      type(peak_finder), target :: finder
       type(sink_list) :: sinks
       character(:), allocatable :: message
 
@@ -59,11 +62,47 @@ contains
       call sinks%add(to_summary)
       call sinks%add(to_observer)
       call observer%on_start(case%title, to_observer%n_points)
+      if (has_peaks(case, source)) then
+         call finder%start(case, source, strategy)
+         call sinks%add(finder)
+      end if
       call run_sweep(case, source, sinks, observer, state, error)
       call observer%on_end()
       call strategy%describe(case, state, summary, message)
       if (len(message) > 0 .and. .not. allocated(error)) call observer%on_message(message)
+      if (.not. (allocated(error) .or. state%was_stopped)) then
+         call find_peaks(case, finder, writer, summary, error)
+      end if
+      call finder%clear()
    end subroutine run_frequency_response
+
+   !> Whether maxima are looked for: in a sweep of given frequencies.
+   logical function has_peaks(case, source)
+      type(case_type), intent(in) :: case
+      class(point_source), intent(in) :: source
+
+      has_peaks = .false.
+      select type (source)
+      type is (frequency_source)
+         has_peaks = case%analysis == analysis_frf .and. size(source%omega) > 1
+      end select
+   end function has_peaks
+
+   !> The maxima between the rows go to the result and the summary.
+   subroutine find_peaks(case, finder, writer, summary, error)
+      type(case_type), intent(in) :: case
+      type(peak_finder), intent(inout) :: finder
+      type(result_writer), intent(inout) :: writer
+      type(summary_type), intent(inout) :: summary
+      type(error_type), allocatable, intent(out) :: error
+      type(peak_type), allocatable :: peaks(:)
+
+      call finder%search(case, error)
+      if (allocated(error)) return
+      call finder%peaks(peaks)
+      call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
+      call writer%add_peaks(peaks, case%model%unit_system, error)
+   end subroutine find_peaks
 
    !> How the case wants its points solved.
    subroutine new_strategy(case, strategy)

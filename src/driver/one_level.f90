@@ -9,6 +9,7 @@ module fw_one_level
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
+   use fw_strategy, only: solver_memory
    use fw_summary, only: summary_type
    implicit none (type, external)
    private
@@ -21,6 +22,8 @@ module fw_one_level
       procedure :: start
       procedure :: solve
       procedure :: describe
+      procedure :: remember
+      procedure :: recall
    end type one_level
 
 contains
@@ -70,5 +73,21 @@ contains
          message = 'not converged: '//message
       end associate
    end subroutine describe
+
+   subroutine remember(self, memory)
+      class(one_level), intent(in) :: self
+      type(solver_memory), intent(out) :: memory
+
+      if (self%level%solver%n_converged == 0) return
+      memory%x = self%level%solver%last
+      memory%omega = self%level%solver%omega_last
+   end subroutine remember
+
+   subroutine recall(self, memory)
+      class(one_level), intent(inout) :: self
+      type(solver_memory), intent(in) :: memory
+
+      call self%level%solver%know(memory%x, memory%omega)
+   end subroutine recall
 
 end module fw_one_level

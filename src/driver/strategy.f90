@@ -10,7 +10,7 @@ module fw_strategy
    implicit none (type, external)
    private
 
-   public :: point_strategy, point_request, new_request
+   public :: point_strategy, point_request, new_request, solver_memory
 
    !> What is asked of a point.
    type :: point_request
@@ -22,6 +22,16 @@ module fw_strategy
       logical :: stability = .false., contact = .false., histories = .false.
    end type point_request
 
+   !> A solution to go on from, wherever the points have gone since.
+   type :: solver_memory
+      !> Unknowns at the frequency; not allocated where there is no solution.
+      real(wp), allocatable :: x(:)
+      !> [rad/s]
+      real(wp) :: omega = 0.0_wp
+      !> Harmonics and instants that it is of, where these differ from point to point.
+      integer :: level(2) = 0
+   end type solver_memory
+
    type, abstract :: point_strategy
       !> What is worth telling of the last point; not allocated where nothing is.
       character(:), allocatable :: note
@@ -29,6 +39,8 @@ module fw_strategy
       procedure(start_strategy), deferred :: start
       procedure(solve_point), deferred :: solve
       procedure(describe_work), deferred :: describe
+      procedure :: remember => remember_nothing
+      procedure :: recall => recall_nothing
    end type point_strategy
 
    abstract interface
@@ -67,6 +79,24 @@ module fw_strategy
    end interface
 
 contains
+
+   !> The last solution; none of a strategy that does not go on from solutions of its choice.
+   subroutine remember_nothing(self, memory)
+      class(point_strategy), intent(in) :: self
+      type(solver_memory), intent(out) :: memory
+
+      associate (unused => self, unused_memory => memory)
+      end associate
+   end subroutine remember_nothing
+
+   !> Start the next point from a solution that `remember` gave.
+   subroutine recall_nothing(self, memory)
+      class(point_strategy), intent(inout) :: self
+      type(solver_memory), intent(in) :: memory
+
+      associate (unused => self, unused_memory => memory)
+      end associate
+   end subroutine recall_nothing
 
    !> What a case asks of its points.
    pure function new_request(case, omega) result(request)

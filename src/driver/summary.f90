@@ -8,6 +8,10 @@ module fw_summary
    use fw_harmonics_options, only: sampling_uniform
    use fw_hbm, only: hbm_system
    use fw_linear_step, only: linear_step_type
+   use fw_peak, only: found_bound
+   use fw_peak, only: found_jump
+   use fw_peak, only: found_unresolved
+   use fw_peak, only: peak_type
    use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_solver_options, only: solver_newton
@@ -31,6 +35,8 @@ module fw_summary
       type(string_type), allocatable :: name(:)
       !> Largest amplitude of each observed quantity among converged points, and where [rad/s].
       real(wp), allocatable :: peak(:), peak_omega(:)
+      !> What else there is to say of the peak of each; not allocated where nothing is.
+      type(string_type), allocatable :: peak_note(:)
       type(string_type), allocatable :: work(:)
       !> What the case did not need, in words.
       type(string_type), allocatable :: skipped(:)
@@ -40,6 +46,7 @@ module fw_summary
       procedure :: add
       procedure :: add_transient
       procedure :: describe_work
+      procedure :: describe_peaks
       procedure :: note_fallback
       procedure :: describe_harmonics
       procedure :: describe_accuracy
@@ -133,6 +140,50 @@ contains
                    ' linear problems: the joint stays stuck')
       end if
    end subroutine describe_work
+
+   !> The maxima between the points, which stand for those of the points.
+   subroutine describe_peaks(self, peaks, n_solved, iterations)
+      class(summary_type), intent(inout) :: self
+      type(peak_type), intent(in) :: peaks(:)
+      !> Points solved to find them, and their iterations.
+      integer, intent(in) :: n_solved, iterations
+      integer :: i, k, n_inside
+
+      allocate (self%peak_note(size(self%peak)))
+      do i = 1, size(self%peak)
+         self%peak_note(i)%text = ''
+         n_inside = 0
+         do k = 1, size(peaks)
+            if (peaks(k)%observed /= i) cycle
+            if (peaks(k)%found_by /= found_bound) n_inside = n_inside + 1
+            if (peaks(k)%amplitude < self%peak(i)) cycle
+            self%peak(i) = peaks(k)%amplitude
+            self%peak_omega(i) = peaks(k)%omega
+            self%peak_note(i)%text = note_of(peaks(k))
+         end do
+         if (n_inside > 1) self%peak_note(i)%text = self%peak_note(i)%text//', '// &
+                                                    to_text(n_inside)//' maxima'
+      end do
+      if (n_solved > 0) call add_line(self%work, 'peaks', to_text(n_solved)//' more points, '// &
+                                      to_text(iterations)//' iterations')
+   end subroutine describe_peaks
+
+   !> What a reader should know of a peak.
+   pure function note_of(peak) result(words)
+      type(peak_type), intent(in) :: peak
+      character(:), allocatable :: words
+
+      select case (peak%found_by)
+      case (found_bound)
+         words = ', at the end of the sweep'
+      case (found_jump)
+         words = ', where the response jumps'
+      case (found_unresolved)
+         words = ', not resolved'
+      case default
+         words = ''
+      end select
+   end function note_of
 
    subroutine skip(self, words)
       class(summary_type), intent(inout) :: self
@@ -240,7 +291,12 @@ contains
          write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', &
             self%peak_omega(i), &
             ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'
-         call add_line(table, 'peak '//self%name(i)%text, trim(adjustl(text)))
+         if (allocated(self%peak_note)) then
+            call add_line(table, 'peak '//self%name(i)%text, trim(adjustl(text))// &
+                          self%peak_note(i)%text)
+         else
+            call add_line(table, 'peak '//self%name(i)%text, trim(adjustl(text)))
+         end if
       end do
       if (size(self%name) > max_shown) then
          call add_line(table, '...', to_text(size(self%name) - max_shown)// &

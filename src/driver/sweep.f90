@@ -12,6 +12,7 @@ module fw_sweep
    use fw_solver_options, only: sweep_options
    use fw_strategy, only: new_request
    use fw_strategy, only: point_strategy
+   use fw_strategy, only: solver_memory
    implicit none (type, external)
    private
 
@@ -22,6 +23,7 @@ module fw_sweep
       procedure(next_point), deferred :: next
       procedure(is_covered), deferred :: is_covered
       procedure :: finish
+      procedure :: remember
    end type point_source
 
    abstract interface
@@ -56,6 +58,7 @@ module fw_sweep
    contains
       procedure :: next => next_frequency
       procedure :: is_covered => all_given
+      procedure :: remember => remember_strategy
    end type frequency_source
 
 contains
@@ -92,6 +95,22 @@ contains
       associate (unused => self, unused_case => case, unused_observer => observer)
       end associate
    end subroutine finish
+
+   !> The solution of the last point, to go on from; none of a source that gives no such.
+   subroutine remember(self, memory)
+      class(point_source), intent(in) :: self
+      type(solver_memory), intent(out) :: memory
+
+      associate (unused => self, unused_memory => memory)
+      end associate
+   end subroutine remember
+
+   subroutine remember_strategy(self, memory)
+      class(frequency_source), intent(in) :: self
+      type(solver_memory), intent(out) :: memory
+
+      call self%strategy%remember(memory)
+   end subroutine remember_strategy
 
    subroutine next_frequency(self, case, observer, point, more, error)
       class(frequency_source), intent(inout) :: self

@@ -17,6 +17,8 @@ module fw_result
    use fw_hdf5, only: write_dataset
    use fw_hdf5, only: write_text
    use fw_kinds, only: wp
+   use fw_peak, only: peak_type
+   use fw_peak_group, only: write_peaks
    use fw_point, only: point_type
    use fw_result_labels, only: label_dataset
    use fw_result_part, only: create_part
@@ -52,6 +54,7 @@ module fw_result
       procedure :: open
       procedure :: add_point
       procedure :: copy_points
+      procedure :: add_peaks
       procedure :: flush
       procedure :: close
       procedure :: discard
@@ -123,6 +126,20 @@ contains
       call self%rows%copy(self%file, source, n, error)
       !$omp end critical (fretwear_io)
    end subroutine copy_points
+
+   !> What is known of the maxima of the response.
+   subroutine add_peaks(self, peaks, unit_system, error)
+      class(result_writer), intent(inout) :: self
+      type(peak_type), intent(in) :: peaks(:)
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call write_peaks(self%file, peaks, unit_system, error)
+      !$omp end critical (fretwear_io)
+   end subroutine add_peaks
 
    subroutine append_point(self, point, error)
       class(result_writer), intent(inout) :: self

@@ -30,6 +30,13 @@ module fw_result_labels
       label_type('/contact/position', '<length>', 'pair axis', 'centre of the pair x, y, z'), &
       label_type('/contact/area', '<area>', 'pair', 'area of the pair'), &
       label_type('/contact/patch', '', 'pair', 'patch that the pair belongs to'), &
+      label_type('/peak/omega', 'rad/s', 'peak', 'angular frequency of the maximum'), &
+      label_type('/peak/amplitude', '<length>', 'peak', 'largest magnitude over the period'), &
+      label_type('/peak/bandwidth', 'rad/s', 'peak', 'width at half of the power'), &
+      label_type('/peak/coefficients', '<length>', 'peak coefficient', &
+                 'Fourier coefficients 0, c1, s1, ... of the quantity'), &
+      label_type('/peak/observed', '', 'peak', 'observed quantity, its column from 0'), &
+      label_type('/peak/found_by', '', 'peak', 'how it was found, an index into names'), &
       label_type('/wear/depth_halved', '<length>', 'pair', &
                  'final wear depth with steps of half the size')]
 

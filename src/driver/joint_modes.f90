@@ -1,0 +1,139 @@
+!> Modes of a structure with its joint in three linear states: free (no contact at all), sliding
+!> (held along the normals) and stuck (held in every direction).
+module fw_joint_modes
+   use fw_case, only: case_type
+   use fw_contact_data, only: law_penalty
+   use fw_kinds, only: wp
+   use fw_modes, only: find_modes
+   use fw_modes, only: mode_type
+   implicit none (type, external)
+   private
+
+   public :: joint_mode_type, find_joint_modes, state_words, state_free, state_sliding, state_stuck
+
+   !> What the joint does, in the order of the constants.
+   character(*), parameter :: state_words(*) = [character(7) :: 'free', 'sliding', 'stuck']
+   integer, parameter :: state_free = 1, state_sliding = 2, state_stuck = 3
+
+   type, extends(mode_type) :: joint_mode_type
+      integer :: state = state_free
+   end type joint_mode_type
+
+   !> Stiffness that stands for a rigid hold, in parts of the largest of the structure: modes are
+   !> that much below those of a rigid one, and round-off of an eigenvalue stays far below.
+   real(wp), parameter :: hold = 1.0e6_wp
+   !> Dofs up to which modes are looked for: their eigenvalue problems cost the cube of that, the
+   !> solution of a point far less with as many.
+   integer, parameter :: most_dofs = 2000
+
+contains
+
+   !> Modes within a range of frequencies; none of a structure that is too large.
+   subroutine find_joint_modes(case, range, modes)
+      type(case_type), intent(in) :: case
+      !> [rad/s]
+      real(wp), intent(in) :: range(2)
+      type(joint_mode_type), allocatable, intent(out) :: modes(:)
+      real(wp), allocatable :: stiffness(:, :), load(:, :)
+      type(mode_type), allocatable :: found(:)
+      integer :: state
+
+      allocate (modes(0))
+      if (case%model%n_dof > most_dofs) return
+      load = reshape([case%model%load_cosine, case%model%load_sine], [case%model%n_dof, 2])
+      do state = state_free, state_stuck
+         if (.not. differs(case, state)) cycle
+         call held_stiffness(case, state, stiffness)
+         call find_modes(case%model%mass, case%model%damping, stiffness, load, &
+                         case%model%observe_matrix, range, found)
+         call join(found, state, modes)
+      end do
+   end subroutine find_joint_modes
+
+   !> Add the modes of a state. Element by element: gfortran 12 loses allocatable components of an
+   !> array constructor in places.
+   subroutine join(found, state, modes)
+      type(mode_type), intent(in) :: found(:)
+      integer, intent(in) :: state
+      type(joint_mode_type), allocatable, intent(inout) :: modes(:)
+      type(joint_mode_type), allocatable :: longer(:)
+      integer :: i, n
+
+      n = size(modes)
+      allocate (longer(n + size(found)))
+      do i = 1, n
+         longer(i) = modes(i)
+      end do
+      do i = 1, size(found)
+         longer(n + i)%mode_type = found(i)
+         longer(n + i)%state = state
+      end do
+      call move_alloc(longer, modes)
+   end subroutine join
+
+   !> Whether a state holds more than the one before.
+   pure logical function differs(case, state)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: state
+
+      differs = .true.
+      if (state == state_free) return
+      differs = case%contact%n_pairs > 0
+      if (.not. differs) return
+      if (state == state_sliding) then
+         differs = any(case%contact%side_1(3, :) /= 0 .or. case%contact%side_2(3, :) /= 0)
+      else
+         differs = any(case%contact%side_1(1:2, :) /= 0 .or. case%contact%side_2(1:2, :) /= 0)
+      end if
+   end function differs
+
+   !> The stiffness with linear springs and with what the contact holds.
+   subroutine held_stiffness(case, state, stiffness)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: state
+      real(wp), allocatable, intent(out) :: stiffness(:, :)
+      real(wp) :: rigid
+      integer :: i, c
+
+      stiffness = case%model%stiffness
+      do i = 1, case%springs%n_springs
+         if (case%springs%power(i) == 1) call add_spring(case%springs%side_1(i), &
+            case%springs%side_2(i), case%springs%coefficient(i), stiffness)
+      end do
+      if (state == state_free) return
+      rigid = hold*maxval(abs(stiffness))
+      associate (contact => case%contact)
+         do i = 1, contact%n_pairs
+            do c = merge(1, 3, state == state_stuck), 3
+               if (contact%law /= law_penalty) then
+                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), rigid, stiffness)
+               else if (c == 3) then
+                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), &
+                                  contact%normal_stiffness(i), stiffness)
+               else
+                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), &
+                                  contact%tangential_stiffness(i), stiffness)
+               end if
+            end do
+         end do
+      end associate
+   end subroutine held_stiffness
+
+   !> A spring between two signed dofs, 0 for the ground.
+   pure subroutine add_spring(side_1, side_2, coefficient, stiffness)
+      integer, intent(in) :: side_1, side_2
+      real(wp), intent(in) :: coefficient
+      real(wp), intent(inout) :: stiffness(:, :)
+      integer :: dof(2), turn(2), a, b
+
+      dof = abs([side_1, side_2])
+      turn = [sign(1, side_1), -sign(1, side_2)]
+      do b = 1, 2
+         do a = 1, 2
+            if (dof(a) == 0 .or. dof(b) == 0) cycle
+            stiffness(dof(a), dof(b)) = stiffness(dof(a), dof(b)) + turn(a)*turn(b)*coefficient
+         end do
+      end do
+   end subroutine add_spring
+
+end module fw_joint_modes

@@ -1,0 +1,488 @@
+!> The true maxima of a response between the rows of its sweep.
+!>
+!> A sweep passes its points by; what may hide a peak is noted on the way: a local maximum of an
+!> observed amplitude, and an interval in which a resonance may have been stepped over, because the
+!> phase turns back by about pi there or because a mode of the joint, in the state that it is in,
+!> lies there and is narrow for the interval. After the sweep a few more solutions find the maxima;
+!> rows do not change by it.
+module fw_peak_finder
+   use fw_case, only: case_type
+   use fw_contact_data, only: memory_carried
+   use fw_error, only: error_type
+   use fw_joint_modes, only: find_joint_modes
+   use fw_joint_modes, only: joint_mode_type
+   use fw_joint_modes, only: state_free
+   use fw_joint_modes, only: state_sliding
+   use fw_joint_modes, only: state_stuck
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   use fw_peak, only: found_bound
+   use fw_peak, only: found_jump
+   use fw_peak, only: found_row
+   use fw_peak, only: found_search
+   use fw_peak, only: found_unresolved
+   use fw_peak, only: peak_type
+   use fw_peak_rules, only: find_next
+   use fw_peak_rules, only: is_maximum
+   use fw_peak_rules, only: lies_on_jump
+   use fw_peak_rules, only: width_of
+   use fw_point, only: point_type
+   use fw_samples, only: balance_point
+   use fw_samples, only: new_sample
+   use fw_samples, only: phase_step
+   use fw_samples, only: sample_list
+   use fw_samples, only: sample_type
+   use fw_sinks, only: point_sink
+   use fw_strategy, only: point_request
+   use fw_strategy, only: point_strategy
+   use fw_sweep, only: point_source
+   implicit none (type, external)
+   private
+
+   public :: peak_finder
+
+   !> Phase that an interval turns back by where it is taken for a skipped resonance.
+   real(wp), parameter :: turn = 0.6_wp*pi
+   !> Mode whose resonance is wider than this many intervals shows in the rows.
+   real(wp), parameter :: intervals_of_width = 3.0_wp
+   !> Linear response at a mode, over the present one, below which it hides no maximum.
+   real(wp), parameter :: least_part = 0.1_wp
+   !> Mean share of the period in one state from which the joint counts as in it.
+   real(wp), parameter :: mostly = 0.9_wp
+   !> Solutions for the resonance of an interval, and failures next to a maximum that end its
+   !> search.
+   integer, parameter :: most_trials = 6, most_failures = 2
+   !> Solutions of a search in all: so many, or this part of the rows.
+   integer, parameter :: least_budget = 40, budget_share = 4
+   !> Neighbouring samples, relative.
+   real(wp), parameter :: same_frequency = 1.0e-7_wp
+
+   !> An interval between two rows [rad/s].
+   type :: interval_type
+      real(wp) :: below = 0.0_wp, above = 0.0_wp
+   end type interval_type
+
+   type, extends(point_sink) :: peak_finder
+      !> Where points come from, and who solves more of them.
+      class(point_source), pointer :: source => null()
+      class(point_strategy), pointer :: strategy => null()
+      !> Modes of the joint in the range of the sweep.
+      type(joint_mode_type), allocatable :: modes(:)
+      !> Solutions of the search, and their iterations.
+      integer :: n_solved = 0, iterations = 0
+      type(sample_list), private :: samples
+      type(interval_type), allocatable, private :: suspects(:)
+      !> Frequencies at which rows failed [rad/s].
+      real(wp), allocatable, private :: failed(:)
+      !> Rows taken, and those of them since the last that failed.
+      integer, private :: n_rows = 0, n_following = 0
+      logical, private :: is_active = .false.
+   contains
+      procedure :: start
+      procedure :: take
+      procedure :: search
+      procedure :: peaks
+      procedure :: clear
+   end type peak_finder
+
+contains
+
+   !> Get ready for a sweep of a case.
+   subroutine start(self, case, source, strategy)
+      class(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      class(point_source), intent(in), target :: source
+      class(point_strategy), intent(in), target :: strategy
+      real(wp) :: range(2)
+
+      self%source => source
+      self%strategy => strategy
+      self%is_active = .true.
+      range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
+      call find_joint_modes(case, range, self%modes)
+      allocate (self%suspects(0), self%failed(0))
+   end subroutine start
+
+   !> A row of the sweep.
+   subroutine take(self, point, error)
+      class(peak_finder), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(sample_type) :: sample
+      integer :: place
+
+      self%n_rows = self%n_rows + 1
+      if (.not. self%is_active) return
+      if (.not. point%converged) then
+         self%failed = [self%failed, point%omega]
+         self%n_following = 0
+         return
+      end if
+      sample = new_sample(point)
+      sample%row = self%n_rows
+      call self%source%remember(sample%memory)
+      call self%samples%insert(sample, place)
+      self%n_following = self%n_following + 1
+      if (self%samples%n >= 2 .and. self%n_following >= 2) call look_back(self, place)
+   end subroutine take
+
+   !> Whether the last row and those before hide something; what is not needed is forgotten.
+   subroutine look_back(self, place)
+      type(peak_finder), intent(inout) :: self
+      !> Of the last row, at one end of the samples.
+      integer, intent(in) :: place
+      integer :: back, i
+      logical :: is_peak
+
+      back = merge(-1, 1, place > 1)
+      associate (item => self%samples%item, n => self%samples%n)
+         associate (below => item(min(place, place + back))%at, &
+                    above => item(max(place, place + back))%at)
+            if (hides_resonance(self%modes, below, above)) then
+               self%suspects = [self%suspects, interval_type(below%omega, above%omega)]
+               below%is_needed = .true.
+               above%is_needed = .true.
+            end if
+         end associate
+         if (n < 3) return
+         is_peak = .false.
+         do i = 1, size(item(place)%at%amplitude)
+            is_peak = is_peak .or. is_maximum(self%samples, place + back, i)
+         end do
+         if (is_peak) then
+            item(place)%at%is_needed = .true.
+            item(place + back)%at%is_needed = .true.
+            item(place + 2*back)%at%is_needed = .true.
+         end if
+         ! The first row and the last may hold the largest amplitude.
+         if (n > 3) call item(place + 2*back)%at%forget()
+      end associate
+   end subroutine look_back
+
+   !> Whether a resonance may lie between two rows that does not show in either.
+   pure logical function hides_resonance(modes, below, above)
+      type(joint_mode_type), intent(in) :: modes(:)
+      type(sample_type), intent(in) :: below, above
+      integer :: i
+
+      hides_resonance = .false.
+      do i = 1, size(below%amplitude)
+         hides_resonance = hides_resonance .or. turns_back(below, above, i)
+      end do
+      do i = 1, size(modes)
+         hides_resonance = hides_resonance .or. hides_mode(modes(i), below, above)
+      end do
+   end function hides_resonance
+
+   !> Whether the first harmonic turns back by about pi, as it does over a resonance.
+   pure logical function turns_back(below, above, i)
+      type(sample_type), intent(in) :: below, above
+      integer, intent(in) :: i
+
+      turns_back = min(below%first(i), above%first(i)) > 0.0_wp .and. &
+                   phase_step(below, above, i) < -turn
+   end function turns_back
+
+   pure logical function hides_mode(mode, below, above)
+      type(joint_mode_type), intent(in) :: mode
+      type(sample_type), intent(in) :: below, above
+
+      hides_mode = mode%omega > below%omega .and. mode%omega < above%omega .and. &
+                   intervals_of_width*(above%omega - below%omega) > mode%width
+      if (.not. hides_mode) return
+      hides_mode = any(mode%amplitude > least_part*max(below%amplitude, above%amplitude)) .and. &
+                   (is_in_state(mode%state, below) .or. is_in_state(mode%state, above))
+   end function hides_mode
+
+   !> Whether the joint is in a state for most of the period, as far as that is known.
+   pure logical function is_in_state(state, sample)
+      integer, intent(in) :: state
+      type(sample_type), intent(in) :: sample
+      integer, parameter :: stick = 1, slip = 2, open = 3
+
+      is_in_state = .true.
+      if (sample%fraction(stick) < 0.0_wp) return
+      select case (state)
+      case (state_stuck)
+         is_in_state = sample%fraction(stick) >= mostly
+      case (state_sliding)
+         is_in_state = sample%fraction(slip) >= 1.0_wp - mostly .and. &
+                       sample%fraction(open) < mostly
+      case (state_free)
+         is_in_state = sample%fraction(open) + sample%fraction(slip) >= mostly
+      end select
+   end function is_in_state
+
+   !> Look for every maximum that the rows leave open.
+   subroutine search(self, case, error)
+      class(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k, budget
+
+      if (.not. self%is_active .or. case%contact%memory == memory_carried) return
+      budget = max(least_budget, self%n_rows/budget_share)
+      do k = 1, size(self%suspects)
+         call look_into(self, case, self%suspects(k), budget, error)
+         if (allocated(error)) return
+      end do
+      call climb(self, case, budget, error)
+   end subroutine search
+
+   !> Solve where a resonance may hide in an interval, until a maximum shows in it.
+   subroutine look_into(self, case, suspect, budget, error)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(interval_type), intent(in) :: suspect
+      integer, intent(in) :: budget
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: omega
+      integer :: trial, j
+      logical :: found
+
+      do j = 1, size(self%modes)
+         associate (mode => self%modes(j))
+            if (mode%omega <= suspect%below .or. mode%omega >= suspect%above) cycle
+            omega = sqrt(mode%omega**2 - 0.5_wp*min(mode%width, mode%omega)**2)
+         end associate
+         if (.not. is_open(self, self%modes(j), omega)) cycle
+         call solve_at(self, case, omega, budget, error)
+         if (allocated(error)) return
+      end do
+      do trial = 1, most_trials
+         call find_turn(self, suspect, omega, found)
+         if (.not. found) exit
+         call solve_at(self, case, omega, budget, error)
+         if (allocated(error)) return
+      end do
+   end subroutine look_into
+
+   !> Whether a mode may still hide between the samples on both sides of a frequency.
+   pure logical function is_open(self, mode, omega)
+      type(peak_finder), intent(in) :: self
+      type(joint_mode_type), intent(in) :: mode
+      real(wp), intent(in) :: omega
+      integer :: k
+
+      is_open = .false.
+      do k = 1, self%samples%n - 1
+         associate (below => self%samples%item(k)%at, above => self%samples%item(k + 1)%at)
+            if (below%omega >= omega .or. above%omega <= omega) cycle
+            is_open = hides_mode(mode, below, above) .and. &
+                      min(omega - below%omega, above%omega - omega) > same_frequency*omega
+         end associate
+      end do
+   end function is_open
+
+   !> The place in an interval where the phase turns back and no maximum shows yet.
+   pure subroutine find_turn(self, suspect, omega, found)
+      type(peak_finder), intent(in) :: self
+      type(interval_type), intent(in) :: suspect
+      real(wp), intent(out) :: omega
+      logical, intent(out) :: found
+      integer :: i, k
+
+      omega = 0.0_wp
+      do k = 1, self%samples%n - 1
+         associate (below => self%samples%item(k)%at, above => self%samples%item(k + 1)%at)
+            if (below%omega < suspect%below .or. above%omega > suspect%above) cycle
+            if (above%omega - below%omega <= same_frequency*above%omega) cycle
+            do i = 1, size(below%amplitude)
+               found = turns_back(below, above, i) .and. .not. is_maximum(self%samples, k, i) &
+                       .and. .not. is_maximum(self%samples, k + 1, i)
+               if (.not. found) cycle
+               omega = balance_point(below, above, i)
+               return
+            end do
+         end associate
+      end do
+      found = .false.
+   end subroutine find_turn
+
+   !> Solve at the summit that promises most, again and again, until all are known.
+   subroutine climb(self, case, budget, error)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: budget
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: omega
+      integer :: k
+      logical :: found
+
+      do while (self%n_solved < budget)
+         call find_summit(self, k, omega, found)
+         if (.not. found) exit
+         call solve_at(self, case, omega, budget, error, k)
+         if (allocated(error)) return
+      end do
+   end subroutine climb
+
+   !> The maximum that is not known well enough and may be the highest, relative to what is known of
+   !> its quantity.
+   pure subroutine find_summit(self, place, omega, found)
+      type(peak_finder), intent(in) :: self
+      !> Its sample.
+      integer, intent(out) :: place
+      !> Where to solve for it [rad/s].
+      real(wp), intent(out) :: omega
+      logical, intent(out) :: found
+      real(wp) :: best, candidate, promise, highest
+      integer :: i, k
+      logical :: done
+
+      found = .false.
+      place = 0
+      omega = 0.0_wp
+      best = 0.0_wp
+      if (self%samples%n < 3) return
+      do i = 1, size(self%samples%item(1)%at%amplitude)
+         highest = highest_of(self%samples, i)
+         do k = 2, self%samples%n - 1
+            if (.not. is_maximum(self%samples, k, i)) cycle
+            if (self%samples%item(k)%at%n_failed >= most_failures) cycle
+            call find_next(self%samples, k, i, candidate, promise, done)
+            if (done .or. promise/highest <= best) cycle
+            best = promise/highest
+            omega = candidate
+            place = k
+            found = .true.
+         end do
+      end do
+   end subroutine find_summit
+
+   pure real(wp) function highest_of(samples, i) result(highest)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: i
+      integer :: k
+
+      highest = tiny(1.0_wp)
+      do k = 1, samples%n
+         highest = max(highest, samples%item(k)%at%amplitude(i))
+      end do
+   end function highest_of
+
+   !> One more solution, started from the sample given, else from the nearest that can be.
+   subroutine solve_at(self, case, omega, budget, error, from)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      real(wp), intent(in) :: omega
+      integer, intent(in) :: budget
+      type(error_type), allocatable, intent(out) :: error
+      integer, intent(in), optional :: from
+      type(sample_type) :: sample
+      type(point_type) :: point
+      integer :: start, place
+
+      if (self%n_solved >= budget) return
+      start = nearest_to(self%samples, omega)
+      if (present(from)) then
+         if (allocated(self%samples%item(from)%at%memory%x)) start = from
+      end if
+      if (start == 0) return
+      call self%strategy%recall(self%samples%item(start)%at%memory)
+      call self%strategy%solve(case, point_request(omega=omega, fallback=.false.), point, error)
+      if (allocated(error)) return
+      self%n_solved = self%n_solved + 1
+      self%iterations = self%iterations + point%iterations
+      if (.not. point%converged) then
+         self%samples%item(start)%at%n_failed = self%samples%item(start)%at%n_failed + 1
+         if (present(from)) self%samples%item(from)%at%n_failed = most_failures
+         return
+      end if
+      sample = new_sample(point)
+      sample%is_needed = .true.
+      sample%fraction = self%samples%item(start)%at%fraction
+      call self%strategy%remember(sample%memory)
+      call self%samples%insert(sample, place)
+   end subroutine solve_at
+
+   !> The sample with a solution to go on from that is nearest to a frequency; 0 where none has one.
+   pure integer function nearest_to(samples, omega) result(place)
+      type(sample_list), intent(in) :: samples
+      real(wp), intent(in) :: omega
+      integer :: k
+
+      place = 0
+      do k = 1, samples%n
+         if (.not. allocated(samples%item(k)%at%memory%x)) cycle
+         if (place > 0) then
+            if (abs(samples%item(k)%at%omega - omega) >= &
+                abs(samples%item(place)%at%omega - omega)) cycle
+         end if
+         place = k
+      end do
+   end function nearest_to
+
+   !> The maxima of every quantity by ascending frequency, and the ends of the range where the
+   !> amplitude still rises.
+   subroutine peaks(self, list)
+      class(peak_finder), intent(in) :: self
+      type(peak_type), allocatable, intent(out) :: list(:)
+      type(peak_type), allocatable :: found(:)
+      integer :: i, k, n
+
+      allocate (list(0))
+      n = self%samples%n
+      if (n == 0) return
+      allocate (found(n*size(self%samples%item(1)%at%amplitude)))
+      n = 0
+      do i = 1, size(self%samples%item(1)%at%amplitude)
+         do k = 1, self%samples%n
+            if (.not. (is_maximum(self%samples, k, i) .or. is_bound(self%samples, k, i))) cycle
+            if (.not. allocated(self%samples%item(k)%at%coefficients)) cycle
+            n = n + 1
+            found(n) = describe(self, k, i)
+         end do
+      end do
+      deallocate (list)
+      allocate (list(n))
+      do k = 1, n
+         list(k) = found(k)
+      end do
+   end subroutine peaks
+
+   !> Whether the amplitude rises towards an end of the range, which this sample stands on.
+   pure logical function is_bound(samples, k, i)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      integer :: inside
+
+      is_bound = k == 1 .or. k == samples%n
+      if (.not. is_bound .or. samples%n == 1) return
+      inside = merge(2, samples%n - 1, k == 1)
+      is_bound = samples%item(k)%at%amplitude(i) >= samples%item(inside)%at%amplitude(i)
+   end function is_bound
+
+   !> What is known of a maximum.
+   function describe(self, k, i) result(peak)
+      class(peak_finder), intent(in) :: self
+      integer, intent(in) :: k, i
+      type(peak_type) :: peak
+      real(wp) :: omega, promise
+      logical :: done
+
+      associate (at => self%samples%item(k)%at)
+         peak%observed = i
+         peak%omega = at%omega
+         peak%amplitude = at%amplitude(i)
+         peak%coefficients = at%coefficients(:, i)
+         peak%bandwidth = width_of(self%samples, k, i)
+         peak%found_by = found_bound
+         if (k == 1 .or. k == self%samples%n) return
+         call find_next(self%samples, k, i, omega, promise, done)
+         peak%found_by = merge(found_row, found_search, at%row > 0)
+         if (lies_on_jump(self%samples, k, i)) peak%found_by = found_jump
+         if (.not. done .or. any(self%failed > self%samples%item(k - 1)%at%omega .and. &
+                                 self%failed < self%samples%item(k + 1)%at%omega)) then
+            peak%found_by = found_unresolved
+         end if
+      end associate
+   end function describe
+
+   subroutine clear(self)
+      class(peak_finder), intent(inout) :: self
+
+      call self%samples%clear()
+   end subroutine clear
+
+end module fw_peak_finder

@@ -1,0 +1,167 @@
+!> What is known of a maximum from the samples around it: whether it is one, whether it is known
+!> well enough, where to look next, and how wide it is.
+module fw_peak_rules
+   use fw_kinds, only: wp
+   use fw_samples, only: sample_list
+   use fw_samples, only: sample_type
+   use fw_samples, only: vertex_of
+   implicit none (type, external)
+   private
+
+   public :: is_maximum, find_next, width_of, lies_on_jump
+
+   !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
+   real(wp), parameter :: round_off = 1.0e-7_wp
+   !> A peak is known where the parabola promises no more than this, relative.
+   real(wp), parameter :: small_gain = 1.0e-4_wp
+   !> A neighbour of at least this part of the height belongs to the peak: half of the power.
+   real(wp), parameter :: near = 0.7_wp
+   !> Samples closer than this, relative, are one frequency.
+   real(wp), parameter :: same_frequency = 1.0e-7_wp
+   !> Part of an interval that is kept between samples.
+   real(wp), parameter :: margin = 0.02_wp
+
+contains
+
+   !> Whether sample k is a maximum of quantity i among its neighbours.
+   pure logical function is_maximum(samples, k, i)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      real(wp) :: a
+
+      is_maximum = .false.
+      if (k <= 1 .or. k >= samples%n) return
+      a = samples%item(k)%at%amplitude(i)
+      is_maximum = a >= samples%item(k - 1)%at%amplitude(i) .and. &
+                   a > (1.0_wp + round_off)*samples%item(k + 1)%at%amplitude(i) .or. &
+                   a > (1.0_wp + round_off)*samples%item(k - 1)%at%amplitude(i) .and. &
+                   a >= samples%item(k + 1)%at%amplitude(i)
+   end function is_maximum
+
+   !> Where to solve next for the maximum of quantity i at sample k; `done` where it is known.
+   pure subroutine find_next(samples, k, i, omega, promise, done)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      !> [rad/s]
+      real(wp), intent(out) :: omega
+      !> Amplitude that may be found.
+      real(wp), intent(out) :: promise
+      logical, intent(out) :: done
+      real(wp) :: curvature, vertex
+      logical :: left_is_known, right_is_known
+
+      associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
+                 right => samples%item(k + 1)%at)
+         call vertex_of(left, middle, right, i, vertex, promise, curvature)
+         left_is_known = side_is_known(left, middle, right, i)
+         right_is_known = side_is_known(right, middle, left, i)
+         omega = within(vertex, left%omega, middle%omega, right%omega)
+         done = promise <= (1.0_wp + small_gain)*middle%amplitude(i)
+         if (.not. done) then
+            ! A vertex next to the middle tells nothing where a neighbour is far below.
+            done = abs(omega - middle%omega) <= same_frequency*middle%omega
+            if (.not. done) return
+         end if
+         done = left_is_known .and. right_is_known
+         if (done) return
+         if (right_is_known) then
+            omega = beside(left, middle, i, curvature)
+         else
+            omega = beside(right, middle, i, curvature)
+         end if
+         done = abs(omega - middle%omega) <= same_frequency*middle%omega
+      end associate
+   end subroutine find_next
+
+   !> Whether nothing higher can lie between the middle and a neighbour: it belongs to the peak, or
+   !> what rises towards the middle from the other side cannot gain more on the way.
+   pure logical function side_is_known(side, middle, other, i) result(known)
+      type(sample_type), intent(in) :: side, middle, other
+      integer, intent(in) :: i
+      real(wp) :: slope
+
+      known = side%amplitude(i) >= near*middle%amplitude(i) .or. &
+              abs(side%omega - middle%omega) <= same_frequency*middle%omega
+      if (known .or. other%amplitude(i) < near*middle%amplitude(i)) return
+      slope = (middle%amplitude(i) - other%amplitude(i))/ &
+              max(abs(middle%omega - other%omega), tiny(1.0_wp))
+      known = slope*abs(side%omega - middle%omega) <= small_gain*middle%amplitude(i)
+   end function side_is_known
+
+   !> A frequency towards a neighbour that is far below, where the peak would have fallen a little.
+   pure real(wp) function beside(side, middle, i, curvature) result(omega)
+      type(sample_type), intent(in) :: side, middle
+      integer, intent(in) :: i
+      real(wp), intent(in) :: curvature
+      !> Rise of 1/A**2 that is looked for, as a part of itself.
+      real(wp), parameter :: rise = 0.3_wp
+      real(wp) :: distance, half
+
+      half = 0.5_wp*abs(side%omega - middle%omega)
+      distance = half
+      if (curvature > 0.0_wp) then
+         distance = sqrt(rise/curvature)/middle%amplitude(i)/(2.0_wp*middle%omega)
+      end if
+      distance = min(max(distance, 2.0_wp*margin*half), half)
+      omega = middle%omega + sign(distance, side%omega - middle%omega)
+   end function beside
+
+   !> Keep a frequency off the samples.
+   pure real(wp) function within(omega, left, middle, right) result(inside)
+      real(wp), intent(in) :: omega, left, middle, right
+
+      inside = min(max(omega, left + margin*(middle - left)), right - margin*(right - middle))
+   end function within
+
+   !> Whether the response falls from the peak all at once.
+   pure logical function lies_on_jump(samples, k, i)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+
+      associate (a => samples%item(k)%at%amplitude(i))
+         lies_on_jump = samples%item(k - 1)%at%amplitude(i) < near*a .or. &
+                        samples%item(k + 1)%at%amplitude(i) < near*a
+      end associate
+   end function lies_on_jump
+
+   !> Width at half of the power [rad/s], below 0 where there is none: between samples the root of
+   !> what 1/A**2 rises by is a straight line in omega**2, as it is for a single mode.
+   pure real(wp) function width_of(samples, k, i) result(width)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      real(wp) :: edge(2)
+      integer :: side
+
+      width = -1.0_wp
+      do side = 1, 2
+         edge(side) = edge_of(samples, k, i, 2*side - 3)
+         if (edge(side) < 0.0_wp) return
+      end do
+      width = edge(2) - edge(1)
+   end function width_of
+
+   !> Where the amplitude has fallen to that over the root of 2, going up or down from sample k.
+   pure real(wp) function edge_of(samples, k, i, direction) result(omega)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i, direction
+      real(wp) :: peak, inner(2), outer(2), share
+      integer :: j
+
+      omega = -1.0_wp
+      peak = samples%item(k)%at%amplitude(i)
+      inner = [samples%item(k)%at%omega**2, 0.0_wp]
+      j = k
+      do
+         j = j + direction
+         if (j < 1 .or. j > samples%n) return
+         associate (at => samples%item(j)%at)
+            outer = [at%omega**2, sqrt(max((peak/at%amplitude(i))**2 - 1.0_wp, 0.0_wp))]
+         end associate
+         if (outer(2) >= 1.0_wp) exit
+         inner = outer
+      end do
+      share = (1.0_wp - inner(2))/(outer(2) - inner(2))
+      omega = sqrt(inner(1) + share*(outer(1) - inner(1)))
+   end function edge_of
+
+end module fw_peak_rules

@@ -1,0 +1,73 @@
+!> Group /peak of a result file: one row for every maximum of an observed quantity.
+module fw_peak_group
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use fw_error, only: error_type
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: write_dataset
+   use fw_kinds, only: wp
+   use fw_peak, only: found_words
+   use fw_peak, only: peak_type
+   use fw_result_labels, only: label_dataset
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: write_peaks
+
+contains
+
+   !> Write the group; nothing without peaks.
+   subroutine write_peaks(file, peaks, unit_system, error)
+      type(hdf5_file), intent(in) :: file
+      type(peak_type), intent(in) :: peaks(:)
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: coefficients(:, :), width(:)
+      type(string_type) :: words(size(found_words))
+      integer :: k
+
+      if (size(peaks) == 0) return
+      allocate (coefficients(size(peaks(1)%coefficients), size(peaks)))
+      do k = 1, size(peaks)
+         coefficients(:, k) = peaks(k)%coefficients
+      end do
+      width = peaks%bandwidth
+      where (width < 0.0_wp) width = ieee_value(1.0_wp, ieee_quiet_nan)
+      call write_dataset(file, '/peak/omega', peaks%omega, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/amplitude', peaks%amplitude, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/bandwidth', width, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/coefficients', coefficients, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/observed', peaks%observed - 1, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/found_by', peaks%found_by, error)
+      if (allocated(error)) return
+      do k = 1, size(words)
+         words(k)%text = trim(found_words(k - 1))
+      end do
+      call write_attribute(file, '/peak/found_by', 'names', words, error)
+      if (.not. allocated(error)) call label(file, 'omega')
+      if (.not. allocated(error)) call label(file, 'amplitude')
+      if (.not. allocated(error)) call label(file, 'bandwidth')
+      if (.not. allocated(error)) call label(file, 'coefficients')
+      if (.not. allocated(error)) call label(file, 'observed')
+      if (.not. allocated(error)) call label(file, 'found_by')
+
+   contains
+
+      subroutine label(file, name)
+         type(hdf5_file), intent(in) :: file
+         character(*), intent(in) :: name
+
+         call label_dataset(file, '/peak/'//name, unit_system, error)
+      end subroutine label
+
+   end subroutine write_peaks
+
+end module fw_peak_group

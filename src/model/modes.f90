@@ -1,0 +1,85 @@
+!> Natural frequencies and damping of a linear structure, from M x = theta (K + s M) x: massless
+!> dofs, and a stiffness that holds the structure only in part, are no exceptions.
+module fw_modes
+   use fw_kinds, only: wp
+   use fw_linalg, only: solve_symmetric_eigen
+   implicit none (type, external)
+   private
+
+   public :: mode_type, find_modes
+
+   type :: mode_type
+      !> Natural frequency [rad/s].
+      real(wp) :: omega = 0.0_wp
+      !> Width of its resonance at half of the power, c/m [rad/s]: 2 zeta omega; below 0 where the
+      !> damping feeds it.
+      real(wp) :: width = 0.0_wp
+      !> Amplitude at resonance of every observed quantity under the vibratory load alone, bounded
+      !> as if the width were no less than `least_width` (n_observed).
+      real(wp), allocatable :: amplitude(:)
+   end type mode_type
+
+   !> Width that an undamped resonance counts with, as a part of its frequency: what a peak of a
+   !> curve can be as good as undamped.
+   real(wp), parameter :: least_width = 1.0e-6_wp
+   !> Shifts that are tried, in parts of K over M.
+   real(wp), parameter :: shift_trials(*) = [0.0_wp, 1.0e-3_wp, 1.0_wp]
+   !> Eigenvalues below this part of the largest are massless directions: round-off.
+   real(wp), parameter :: massless = 1.0e-13_wp
+
+contains
+
+   !> The modes with frequencies within a range; none where the pencil has no solution.
+   subroutine find_modes(mass, damping, stiffness, load, observe, range, modes)
+      !> (n, n), symmetric.
+      real(wp), intent(in) :: mass(:, :), damping(:, :), stiffness(:, :)
+      !> Cosine and sine load (n, 2).
+      real(wp), intent(in) :: load(:, :)
+      !> Rows of observed quantities (n_observed, n).
+      real(wp), intent(in) :: observe(:, :)
+      !> Lowest and highest frequency [rad/s].
+      real(wp), intent(in) :: range(2)
+      type(mode_type), allocatable, intent(out) :: modes(:)
+      real(wp), allocatable :: theta(:), shapes(:, :)
+      real(wp) :: shift, square
+      logical :: done
+      integer, allocatable :: in_range(:)
+      integer :: i, j, trial
+
+      allocate (modes(0))
+      allocate (in_range(0))
+      do trial = 1, size(shift_trials)
+         shift = shift_trials(trial)*norm2(stiffness)/max(norm2(mass), tiny(1.0_wp))
+         call solve_symmetric_eigen(mass, stiffness + shift*mass, theta, shapes, done)
+         if (done) exit
+      end do
+      if (.not. done) return
+      do j = size(theta), 1, -1
+         if (theta(j) <= massless*theta(size(theta))) exit
+         square = 1.0_wp/theta(j) - shift
+         if (square < range(1)**2 .or. square > range(2)**2 .or. square <= 0.0_wp) cycle
+         in_range = [in_range, j]
+      end do
+      deallocate (modes)
+      allocate (modes(size(in_range)))
+      do i = 1, size(in_range)
+         j = in_range(i)
+         modes(i) = new_mode(sqrt(1.0_wp/theta(j) - shift), shapes(:, j)/sqrt(theta(j)), damping, &
+                             load, observe)
+      end do
+   end subroutine find_modes
+
+   !> A mode of unit modal mass.
+   function new_mode(omega, shape_of, damping, load, observe) result(mode)
+      real(wp), intent(in) :: omega, shape_of(:), damping(:, :), load(:, :), observe(:, :)
+      type(mode_type) :: mode
+      real(wp) :: drive
+
+      mode%omega = omega
+      mode%width = dot_product(shape_of, matmul(damping, shape_of))
+      drive = norm2(matmul(shape_of, load))
+      mode%amplitude = abs(matmul(observe, shape_of))*drive/ &
+                       (omega*max(mode%width, least_width*omega))
+   end function new_mode
+
+end module fw_modes
