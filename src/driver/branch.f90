@@ -109,10 +109,12 @@ contains
       class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout) :: observer
+      character(:), allocatable :: words
 
       if (.not. self%has_begun .or. self%has_no_start) return
       call self%level%solver%method%newton%linear%add_work(self%branch%curve%linear)
-      call observer%on_message(self%branch%closing_words(case))
+      call self%branch%closing_words(case, words)
+      call observer%on_message(words)
    end subroutine finish
 
    !> Start at a converged point x of the system at sweep%start, which counts as the first of
@@ -171,10 +173,10 @@ contains
    end subroutine next
 
    !> Why the branch ended, once it has.
-   function closing_words(self, case) result(words)
+   subroutine closing_words(self, case, words)
       class(branch_type), intent(in) :: self
       type(case_type), intent(in) :: case
-      character(:), allocatable :: words
+      character(:), allocatable, intent(out) :: words
 
       if (.not. self%curve%ended) then
          words = 'branch: stopped by the user'
@@ -186,7 +188,7 @@ contains
                  'in place: all of it slips, and no periodic response exists without a support '// &
                  'in that direction'
       end if
-   end function closing_words
+   end subroutine closing_words
 
    !> The size of displacements to expect, for a branch that may start fully stuck: what the load
    !> makes of the stiffness of the joint.

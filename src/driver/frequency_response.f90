@@ -101,7 +101,7 @@ contains
       if (allocated(error)) return
       call finder%peaks(peaks)
       call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
-      call writer%add_peaks(peaks, case%model%unit_system, error)
+      call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, error)
    end subroutine find_peaks
 
    !> How the case wants its points solved.

@@ -50,10 +50,12 @@ module fw_peak_finder
    !> Mean share of the period in one state from which the joint counts as in it.
    real(wp), parameter :: mostly = 0.9_wp
    !> Solutions for the resonance of an interval, and failures next to a maximum that end its
-   !> search.
-   integer, parameter :: most_trials = 6, most_failures = 2
+   !> search; each halves the way that is tried.
+   integer, parameter :: most_trials = 6, most_failures = 5
    !> Solutions of a search in all: so many, or this part of the rows.
    integer, parameter :: least_budget = 40, budget_share = 4
+   !> Part of the first interval at which it is seen whether the amplitude rises into the range.
+   real(wp), parameter :: step_inside = 0.1_wp
    !> Neighbouring samples, relative.
    real(wp), parameter :: same_frequency = 1.0e-7_wp
 
@@ -226,8 +228,39 @@ contains
          call look_into(self, case, self%suspects(k), budget, error)
          if (allocated(error)) return
       end do
-      call climb(self, case, budget, error)
+      call look_inside(self, case, budget, error)
+      if (.not. allocated(error)) call climb(self, case, budget, error)
    end subroutine search
+
+   !> Where an end of the range seems to hold the highest amplitude, the maximum may lie just inside.
+   subroutine look_inside(self, case, budget, error)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: budget
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: omega(2)
+      logical :: is_high(2)
+      integer :: i, side, n
+
+      n = self%samples%n
+      if (n < 2) return
+      is_high = .false.
+      do i = 1, size(self%samples%item(1)%at%amplitude)
+         associate (item => self%samples%item, highest => highest_of(self%samples, i))
+            is_high = is_high .or. [is_bound(self%samples, 1, i), is_bound(self%samples, n, i)] &
+                      .and. [item(1)%at%amplitude(i), item(n)%at%amplitude(i)] >= 0.5_wp*highest
+         end associate
+      end do
+      associate (item => self%samples%item)
+         omega(1) = item(1)%at%omega + step_inside*(item(2)%at%omega - item(1)%at%omega)
+         omega(2) = item(n)%at%omega + step_inside*(item(n - 1)%at%omega - item(n)%at%omega)
+      end associate
+      do side = 1, 2
+         if (.not. is_high(side)) cycle
+         call solve_at(self, case, omega(side), budget, error)
+         if (allocated(error)) return
+      end do
+   end subroutine look_inside
 
    !> Solve where a resonance may hide in an interval, until a maximum shows in it.
    subroutine look_into(self, case, suspect, budget, error)
@@ -343,7 +376,9 @@ contains
             call find_next(self%samples, k, i, candidate, promise, done)
             if (done .or. promise/highest <= best) cycle
             best = promise/highest
-            omega = candidate
+            associate (at => self%samples%item(k)%at)
+               omega = at%omega + (candidate - at%omega)*0.5_wp**at%n_failed
+            end associate
             place = k
             found = .true.
          end do
@@ -385,8 +420,9 @@ contains
       self%n_solved = self%n_solved + 1
       self%iterations = self%iterations + point%iterations
       if (.not. point%converged) then
-         self%samples%item(start)%at%n_failed = self%samples%item(start)%at%n_failed + 1
-         if (present(from)) self%samples%item(from)%at%n_failed = most_failures
+         if (present(from)) then
+            self%samples%item(from)%at%n_failed = self%samples%item(from)%at%n_failed + 1
+         end if
          return
       end if
       sample = new_sample(point)

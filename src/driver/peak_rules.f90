@@ -14,8 +14,9 @@ module fw_peak_rules
    real(wp), parameter :: round_off = 1.0e-7_wp
    !> A peak is known where the parabola promises no more than this, relative.
    real(wp), parameter :: small_gain = 1.0e-4_wp
-   !> A neighbour of at least this part of the height belongs to the peak: half of the power.
-   real(wp), parameter :: near = 0.7_wp
+   !> A neighbour of at least this part of the height belongs to the peak: what is left of the
+   !> parabola, of third order in the distance, is below the gain there.
+   real(wp), parameter :: near = 0.9_wp
    !> Samples closer than this, relative, are one frequency.
    real(wp), parameter :: same_frequency = 1.0e-7_wp
    !> Part of an interval that is kept between samples.
@@ -94,7 +95,7 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in) :: curvature
       !> Rise of 1/A**2 that is looked for, as a part of itself.
-      real(wp), parameter :: rise = 0.3_wp
+      real(wp), parameter :: rise = 0.15_wp
       real(wp) :: distance, half
 
       half = 0.5_wp*abs(side%omega - middle%omega)

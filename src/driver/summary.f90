@@ -147,22 +147,26 @@ contains
       type(peak_type), intent(in) :: peaks(:)
       !> Points solved to find them, and their iterations.
       integer, intent(in) :: n_solved, iterations
-      integer :: i, k, n_inside
+      integer :: i, k, n_inside, n_open
 
       allocate (self%peak_note(size(self%peak)))
       do i = 1, size(self%peak)
          self%peak_note(i)%text = ''
          n_inside = 0
+         n_open = 0
          do k = 1, size(peaks)
             if (peaks(k)%observed /= i) cycle
             if (peaks(k)%found_by /= found_bound) n_inside = n_inside + 1
+            if (peaks(k)%found_by == found_unresolved) n_open = n_open + 1
             if (peaks(k)%amplitude < self%peak(i)) cycle
             self%peak(i) = peaks(k)%amplitude
             self%peak_omega(i) = peaks(k)%omega
-            self%peak_note(i)%text = note_of(peaks(k))
+            self%peak_note(i)%text = trim(note_of(peaks(k)))
          end do
          if (n_inside > 1) self%peak_note(i)%text = self%peak_note(i)%text//', '// &
                                                     to_text(n_inside)//' maxima'
+         if (n_inside > 1 .and. n_open > 0) self%peak_note(i)%text = self%peak_note(i)%text// &
+            ', '//to_text(n_open)//' of them not resolved'
       end do
       if (n_solved > 0) call add_line(self%work, 'peaks', to_text(n_solved)//' more points, '// &
                                       to_text(iterations)//' iterations')
@@ -171,7 +175,7 @@ contains
    !> What a reader should know of a peak.
    pure function note_of(peak) result(words)
       type(peak_type), intent(in) :: peak
-      character(:), allocatable :: words
+      character(27) :: words
 
       select case (peak%found_by)
       case (found_bound)

@@ -19,9 +19,11 @@ module fw_peak_group
 contains
 
    !> Write the group; nothing without peaks.
-   subroutine write_peaks(file, peaks, unit_system, error)
+   subroutine write_peaks(file, peaks, n_harmonics, unit_system, error)
       type(hdf5_file), intent(in) :: file
       type(peak_type), intent(in) :: peaks(:)
+      !> Of the case: those that a peak does not carry read as zero.
+      integer, intent(in) :: n_harmonics
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
@@ -30,9 +32,9 @@ contains
       integer :: k
 
       if (size(peaks) == 0) return
-      allocate (coefficients(size(peaks(1)%coefficients), size(peaks)))
+      allocate (coefficients(2*n_harmonics + 1, size(peaks)), source=0.0_wp)
       do k = 1, size(peaks)
-         coefficients(:, k) = peaks(k)%coefficients
+         coefficients(:size(peaks(k)%coefficients), k) = peaks(k)%coefficients
       end do
       width = peaks%bandwidth
       where (width < 0.0_wp) width = ieee_value(1.0_wp, ieee_quiet_nan)

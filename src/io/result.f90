@@ -128,16 +128,18 @@ contains
    end subroutine copy_points
 
    !> What is known of the maxima of the response.
-   subroutine add_peaks(self, peaks, unit_system, error)
+   subroutine add_peaks(self, peaks, n_harmonics, unit_system, error)
       class(result_writer), intent(inout) :: self
       type(peak_type), intent(in) :: peaks(:)
+      !> Of the case.
+      integer, intent(in) :: n_harmonics
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
 
       if (self%file%id < 0) return
       !$omp critical (fretwear_io)
-      call write_peaks(self%file, peaks, unit_system, error)
+      call write_peaks(self%file, peaks, n_harmonics, unit_system, error)
       !$omp end critical (fretwear_io)
    end subroutine add_peaks
 
