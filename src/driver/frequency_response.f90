@@ -62,10 +62,13 @@ contains
       call sinks%add(to_summary)
       call sinks%add(to_observer)
       call observer%on_start(case%title, to_observer%n_points)
-      if (has_peaks(case, source)) then
-         call finder%start(case, source, strategy)
-         call sinks%add(finder)
-      end if
+      select type (source)
+      type is (frequency_source)
+         if (case%analysis == analysis_frf .and. size(source%omega) > 1) then
+            call finder%start(case, source%omega, source, strategy)
+            call sinks%add(finder)
+         end if
+      end select
       call run_sweep(case, source, sinks, observer, state, error)
       call observer%on_end()
       call strategy%describe(case, state, summary, message)
@@ -75,18 +78,6 @@ contains
       end if
       call finder%clear()
    end subroutine run_frequency_response
-
-   !> Whether maxima are looked for: in a sweep of given frequencies.
-   logical function has_peaks(case, source)
-      type(case_type), intent(in) :: case
-      class(point_source), intent(in) :: source
-
-      has_peaks = .false.
-      select type (source)
-      type is (frequency_source)
-         has_peaks = case%analysis == analysis_frf .and. size(source%omega) > 1
-      end select
-   end function has_peaks
 
    !> The maxima between the rows go to the result and the summary.
    subroutine find_peaks(case, finder, writer, summary, error)

@@ -2,10 +2,11 @@
 !> (held along the normals) and stuck (held in every direction).
 module fw_joint_modes
    use fw_case, only: case_type
-   use fw_contact_data, only: law_penalty
    use fw_kinds, only: wp
    use fw_modes, only: find_modes
+   use fw_laws, only: new_law
    use fw_modes, only: mode_type
+   use fw_pair_law, only: pair_law
    implicit none (type, external)
    private
 
@@ -92,6 +93,7 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: state
       real(wp), allocatable, intent(out) :: stiffness(:, :)
+      class(pair_law), allocatable :: law
       real(wp) :: rigid
       integer :: i, c
 
@@ -103,16 +105,15 @@ contains
       if (state == state_free) return
       rigid = hold*maxval(abs(stiffness))
       associate (contact => case%contact)
+         call new_law(contact%law, law)
+         call law%build(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0)
          do i = 1, contact%n_pairs
             do c = merge(1, 3, state == state_stuck), 3
-               if (contact%law /= law_penalty) then
-                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), rigid, stiffness)
-               else if (c == 3) then
+               if (.not. law%prediction%takes_balance .and. law%prediction%order(c) == 0) then
                   call add_spring(contact%side_1(c, i), contact%side_2(c, i), &
-                                  contact%normal_stiffness(i), stiffness)
+                                  law%prediction%stiffness(i, c), stiffness)
                else
-                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), &
-                                  contact%tangential_stiffness(i), stiffness)
+                  call add_spring(contact%side_1(c, i), contact%side_2(c, i), rigid, stiffness)
                end if
             end do
          end do

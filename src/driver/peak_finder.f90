@@ -78,7 +78,8 @@ module fw_peak_finder
       real(wp), allocatable, private :: failed(:)
       !> Rows taken, and those of them since the last that failed.
       integer, private :: n_rows = 0, n_following = 0
-      logical, private :: is_active = .false.
+      !> Whether rows are taken at all, and whether their frequencies only rise or only fall.
+      logical, private :: is_active = .false., in_order = .false.
    contains
       procedure :: start
       procedure :: take
@@ -89,19 +90,22 @@ module fw_peak_finder
 
 contains
 
-   !> Get ready for a sweep of a case.
-   subroutine start(self, case, source, strategy)
+   !> Get ready for a sweep over frequencies.
+   subroutine start(self, case, omega, source, strategy)
       class(peak_finder), intent(inout) :: self
       type(case_type), intent(in) :: case
+      !> In the order of the rows (n_points) [rad/s].
+      real(wp), intent(in) :: omega(:)
       class(point_source), intent(in), target :: source
       class(point_strategy), intent(in), target :: strategy
-      real(wp) :: range(2)
+      integer :: n
 
       self%source => source
       self%strategy => strategy
       self%is_active = .true.
-      range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
-      call find_joint_modes(case, range, self%modes)
+      n = size(omega)
+      self%in_order = all(omega(2:) > omega(:n - 1)) .or. all(omega(2:) < omega(:n - 1))
+      call find_joint_modes(case, [minval(omega), maxval(omega)], self%modes)
       allocate (self%suspects(0), self%failed(0))
    end subroutine start
 
@@ -122,10 +126,11 @@ contains
       end if
       sample = new_sample(point)
       sample%row = self%n_rows
+      sample%is_needed = .not. self%in_order
       call self%source%remember(sample%memory)
       call self%samples%insert(sample, place)
       self%n_following = self%n_following + 1
-      if (self%samples%n >= 2 .and. self%n_following >= 2) call look_back(self, place)
+      if (self%in_order .and. self%n_following >= 2) call look_back(self, place)
    end subroutine take
 
    !> Whether the last row and those before hide something; what is not needed is forgotten.
@@ -160,6 +165,20 @@ contains
          if (n > 3) call item(place + 2*back)%at%forget()
       end associate
    end subroutine look_back
+
+   !> Intervals between rows that came in no order.
+   subroutine suspect_all(self)
+      type(peak_finder), intent(inout) :: self
+      integer :: k
+
+      do k = 1, self%samples%n - 1
+         associate (below => self%samples%item(k)%at, above => self%samples%item(k + 1)%at)
+            if (hides_resonance(self%modes, below, above)) then
+               self%suspects = [self%suspects, interval_type(below%omega, above%omega)]
+            end if
+         end associate
+      end do
+   end subroutine suspect_all
 
    !> Whether a resonance may lie between two rows that does not show in either.
    pure logical function hides_resonance(modes, below, above)
@@ -223,6 +242,7 @@ contains
       integer :: k, budget
 
       if (.not. self%is_active .or. case%contact%memory == memory_carried) return
+      if (.not. self%in_order) call suspect_all(self)
       budget = max(least_budget, self%n_rows/budget_share)
       do k = 1, size(self%suspects)
          call look_into(self, case, self%suspects(k), budget, error)

@@ -6,7 +6,7 @@ module fw_lapack
    private
 
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
-   public :: dgeev, ztrsv, cgetrf, claswp, ctrsv
+   public :: dgeev, dpotrf, ztrsv, cgetrf, claswp, ctrsv
 
    interface
       subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
@@ -101,6 +101,15 @@ module fw_lapack
          complex(wp), intent(inout) :: b(ldb, *)
          integer, intent(out) :: info
       end subroutine zgetrs
+
+      subroutine dpotrf(uplo, n, a, lda, info)
+         import :: wp
+         implicit none (type, external)
+         character, intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: info
+      end subroutine dpotrf
 
       subroutine dsyevd(jobz, uplo, n, a, lda, w, work, lwork, iwork, liwork, info)
          import :: wp

@@ -1,0 +1,179 @@
+!> What is allowed and seldom meant: it is said, in the summary and in the result, and never ends a
+!> run.
+module fw_remarks
+   use fw_case, only: case_type
+   use fw_joint_modes, only: joint_mode_type
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   use fw_lapack, only: dpotrf
+   use fw_peak, only: found_bound
+   use fw_peak, only: found_unresolved
+   use fw_peak, only: peak_type
+   use fw_text, only: string_type
+   use fw_text, only: to_text
+   use fw_text_list, only: append
+   use fw_values, only: number_text
+   implicit none (type, external)
+   private
+
+   public :: remark_list, remark_input, remark_range, remark_peaks
+
+   !> Friction coefficients above it are no dry friction of metals.
+   real(wp), parameter :: highest_friction = 2.0_wp
+   !> Part of its entries by which a matrix may miss being positive: round-off of the reductions
+   !> that models come from.
+   real(wp), parameter :: round_off = 1.0e-9_wp
+
+   !> Names by which programs know remarks, and their texts.
+   type :: remark_list
+      type(string_type), allocatable :: name(:), text(:)
+   contains
+      procedure :: add
+      procedure :: count => count_remarks
+   end type remark_list
+
+contains
+
+   subroutine add(self, name, text)
+      class(remark_list), intent(inout) :: self
+      character(*), intent(in) :: name, text
+
+      if (.not. allocated(self%name)) allocate (self%name(0), self%text(0))
+      call append(self%name, name)
+      call append(self%text, text)
+   end subroutine add
+
+   pure integer function count_remarks(self) result(n)
+      class(remark_list), intent(in) :: self
+
+      n = 0
+      if (allocated(self%name)) n = size(self%name)
+   end function count_remarks
+
+   !> Of the structure, its joint and its loads.
+   subroutine remark_input(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      logical :: acts
+
+      if (is_negative(case%model%stiffness)) call remarks%add('negative stiffness', &
+         'the stiffness matrix is not positive: some deformation gives off energy, and without '// &
+         'contact the structure does not stay where it is')
+      if (is_negative(case%model%damping)) call remarks%add('negative damping', &
+         'the damping matrix is not positive: some motion gains energy (flutter, where it is '// &
+         'meant); a periodic response need not be the one that is seen')
+      if (case%contact%n_pairs > 0) then
+         if (maxval(case%contact%mu) > highest_friction) call remarks%add('high friction', &
+            'contact%mu is up to '//number_text(maxval(case%contact%mu))//': dry friction of '// &
+            'metals is below '//number_text(highest_friction))
+      end if
+      acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
+             any(abs(case%model%load_sine) > 0.0_wp)
+      if (.not. acts) call remarks%add('no load', 'no vibratory load acts: the response is that '// &
+         'at rest; set load%cosine or load%sine (with a model file, load%harmonic_scale)')
+      call remark_harmonics(case, remarks)
+   end subroutine remark_input
+
+   !> One harmonic says little of a joint.
+   subroutine remark_harmonics(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+
+      if (case%harmonics%n_harmonics > 1) return
+      if (case%contact%n_pairs + case%springs%n_springs == 0) return
+      if (case%springs%n_springs > 0 .and. case%contact%n_pairs == 0) then
+         if (all(case%springs%power == 1)) return
+      end if
+      call remarks%add('one harmonic', 'the balance keeps one harmonic, and friction or gaps '// &
+                       'may be off by half with it: set harmonics%accuracy, or compare with '// &
+                       'more harmonics%n_harmonics')
+   end subroutine remark_harmonics
+
+   !> Of the range of a sweep.
+   subroutine remark_range(case, modes, remarks)
+      type(case_type), intent(in) :: case
+      !> Those within the range.
+      type(joint_mode_type), intent(in) :: modes(:)
+      type(remark_list), intent(inout) :: remarks
+      character(:), allocatable :: text
+      real(wp) :: range(2)
+
+      if (size(modes) > 0) return
+      range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
+      text = 'no natural frequency of the free or the stuck structure lies in the sweep, '// &
+             number_text(rounded(range(1)/(2.0_wp*pi)))//' to '// &
+             number_text(rounded(range(2)/(2.0_wp*pi)))//' Hz: is sweep%unit the one meant?'
+      call remarks%add('no mode', text)
+   end subroutine remark_range
+
+   !> Of what was found.
+   subroutine remark_peaks(peaks, names, remarks)
+      type(peak_type), intent(in) :: peaks(:)
+      !> Observed quantities.
+      type(string_type), intent(in) :: names(:)
+      type(remark_list), intent(inout) :: remarks
+      integer :: i, k, best, n_bound, n_open
+      character(:), allocatable :: first
+
+      n_bound = 0
+      do i = 1, size(names)
+         best = 0
+         do k = 1, size(peaks)
+            if (peaks(k)%observed /= i) cycle
+            if (best == 0) best = k
+            if (peaks(k)%amplitude > peaks(best)%amplitude) best = k
+         end do
+         if (best == 0) cycle
+         if (peaks(best)%found_by /= found_bound) cycle
+         n_bound = n_bound + 1
+         if (n_bound == 1) first = names(i)%text
+      end do
+      if (n_bound > 0) call remarks%add('peak at the end', 'the largest amplitude of '//first// &
+         others(n_bound - 1)//' is at an end of the sweep: it may rise further outside')
+      n_open = count(peaks%found_by == found_unresolved)
+      if (n_open > 0) call remarks%add('peak not resolved', to_text(n_open)// &
+         ' of '//to_text(size(peaks))//' maxima are not resolved: take more points around them '// &
+         '(/peak/omega), or continuation = ''arclength''')
+   end subroutine remark_peaks
+
+   pure function others(n) result(words)
+      integer, intent(in) :: n
+      character(32) :: padded
+      character(:), allocatable :: words
+
+      padded = ''
+      if (n > 0) write (padded, '(a, i0, a)') ' and of ', n, ' more'
+      words = trim(padded)
+   end function others
+
+   !> Whether a symmetric matrix has negative directions beyond round-off, its rows being scaled.
+   logical function is_negative(matrix)
+      real(wp), intent(in) :: matrix(:, :)
+      real(wp), allocatable :: factor(:, :)
+      real(wp) :: scale(size(matrix, 1))
+      integer :: i, j, n, info
+
+      n = size(matrix, 1)
+      allocate (factor(n, n))
+      do i = 1, n
+         scale(i) = sqrt(maxval(abs(matrix(:, i))))
+      end do
+      where (scale <= 0.0_wp) scale = 1.0_wp
+      do j = 1, n
+         factor(:, j) = matrix(:, j)/(scale*scale(j))
+         factor(j, j) = factor(j, j) + round_off
+      end do
+      call dpotrf('U', n, factor, n, info)
+      is_negative = info > 0
+   end function is_negative
+
+   !> Four digits are enough to read.
+   real(wp) function rounded(number)
+      real(wp), intent(in) :: number
+      character(24) :: buffer
+
+      write (buffer, '(es24.3e3)') number
+      read (buffer, *) rounded
+   end function rounded
+
+end module fw_remarks
