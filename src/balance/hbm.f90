@@ -24,6 +24,7 @@ module fw_hbm
    use fw_lapack, only: zgemv
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
+   use fw_split, only: split_coordinate
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
@@ -182,7 +183,6 @@ contains
       self%n = m*nc
       self%forces = forces
       self%n_pairs = forces%entry(forces%pairs)%law%n_elements
-      call forces%reserve(fourier, self%work)
       allocate (self%depth(self%n_pairs), source=0.0_wp)
       if (allocated(depth)) self%depth = depth
       do k = 1, self%forces%n_laws
@@ -190,6 +190,7 @@ contains
             if (law%prediction%takes_balance) call set_stiffness(self, law%prediction)
          end associate
       end do
+      call self%forces%reserve(fourier, self%work)
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       allocate (self%complex_in(m, nh), self%complex_out(m, nh), source=(0.0_wp, 0.0_wp))
       allocate (self%active_out(m, nc), self%used(m), self%place(m), self%preconditioned(m))
@@ -221,7 +222,63 @@ contains
          where (stiffness <= 0.0_wp .and. self%joint%row(:, i) > 0) stiffness = maxval(stiffness)
          prediction%stiffness(i, :) = prediction%scale*stiffness
       end do
+      if (prediction%has_inertia) call set_inertia(self, prediction)
    end subroutine set_stiffness
+
+   !> What the structure is to motions above the harmonics of the balance, in place of its static
+   !> stiffness; its mass and damping where they matter to a pair with one tangential direction.
+   subroutine set_inertia(self, prediction)
+      type(hbm_system), intent(in) :: self
+      type(prediction_type), intent(inout) :: prediction
+      real(wp) :: m(3), c(3), k(3)
+      logical :: counts(3)
+      integer :: i, j, n
+
+      allocate (prediction%inertia(self%n_pairs, 3), prediction%damping(self%n_pairs, 3), &
+                source=0.0_wp)
+      n = maxval(self%fourier%harmonic)
+      do i = 1, self%n_pairs
+         counts = self%joint%row(:, i) > 0 .and. .not. self%joint%idle(:, i)
+         k = 0.0_wp
+         do j = 1, 3
+            if (.not. counts(j)) cycle
+            call split_coordinate(self%structure%basis, self%coordinate_of(j, i), &
+                                  (n + 1)*self%structure%omega, m(j), c(j), k(j))
+            if (k(j) > 0.0_wp) prediction%stiffness(i, j) = prediction%scale*k(j)
+         end do
+         if (count(counts(1:2)) == 2) then
+            ! One stiffness for both: friction is isotropic.
+            if (all(k(1:2) > 0.0_wp)) then
+               prediction%stiffness(i, 1:2) = prediction%scale*0.5_wp*sum(k(1:2))
+            end if
+            cycle
+         end if
+         j = findloc(counts(1:2), .true., dim=1)
+         if (j == 0) cycle
+         if (all(self%joint%row(1:2, i) > 0)) cycle
+         if (.not. k(j) > 0.0_wp) cycle
+         call take_inertia(4*n*self%structure%omega, m(j), c(j), k(j))
+         prediction%inertia(i, j) = prediction%scale*m(j)
+         prediction%damping(i, j) = prediction%scale*c(j)
+      end do
+   end subroutine set_inertia
+
+   !> Mass and damping of an oscillator as its law takes them: none where neither matters up to a
+   !> frequency, else a mass above zero, and a damping that keeps resonances finite.
+   pure subroutine take_inertia(frequency, m, c, k)
+      real(wp), intent(in) :: frequency, k
+      real(wp), intent(inout) :: m, c
+      real(wp), parameter :: mass_matters = 0.02_wp, damping_matters = 0.05_wp
+      real(wp), parameter :: least_mass = 1.0e-3_wp, least_damping = 1.0e-9_wp
+
+      if (m*frequency**2 < mass_matters*k .and. c*frequency < damping_matters*k) then
+         m = 0.0_wp
+         c = 0.0_wp
+         return
+      end if
+      m = max(m, least_mass*k/frequency**2)
+      c = max(c, least_damping*sqrt(k*m))
+   end subroutine take_inertia
 
    !> Largest static stiffness of all coordinates, or 1.
    real(wp) function largest_stiffness(self) result(stiffness)
@@ -310,6 +367,7 @@ contains
       call multiply_stiffness(self, m, nc, x)
       do k = 1, self%forces%n_laws
          associate (entry => self%forces%entry(k), work => self%work(k))
+            work%rate = self%structure%omega
             call predict(self, entry, m, nc, x, work)
             if (k == self%forces%pairs) call entry%law%set_offset(self%depth, work)
             call entry%law%evaluate(self%fourier, work)
@@ -358,6 +416,7 @@ contains
             y(:, :, j) = p%stiffness*y(:, :, j)
          end do
          if (any(p%order > 0)) call take_rates(self%fourier, self%rate_unit(p), p%order, y)
+         if (p%has_inertia) call take_inertias(self%fourier, self%structure%omega, p, y)
          if (p%takes_balance) call add_balance(self, entry%row, y)
       end associate
    end subroutine predict
@@ -396,6 +455,29 @@ contains
          end do
       end do
    end subroutine take_rates
+
+   !> Bring inputs from displacements times a stiffness to those times E_n.
+   subroutine take_inertias(fourier, omega, prediction, y)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: omega
+      type(prediction_type), intent(in) :: prediction
+      real(wp), intent(inout) :: y(:, :, :)
+      complex(wp) :: turned
+      integer :: i, c, h, k
+
+      do h = 1, fourier%n_retained
+         k = fourier%column(h)
+         if (fourier%harmonic(h) == 0) cycle
+         do c = 1, size(y, 2)
+            do i = 1, size(y, 1)
+               turned = prediction%impedance_ratio(i, c, fourier%harmonic(h), omega)* &
+                        cmplx(y(i, c, k), -y(i, c, k + 1), wp)
+               y(i, c, k) = real(turned, wp)
+               y(i, c, k + 1) = -aimag(turned)
+            end do
+         end do
+      end do
+   end subroutine take_inertias
 
    !> What elements must transmit for equilibrium.
    subroutine add_balance(self, row, y)

@@ -151,6 +151,7 @@ contains
                   place = self%place(j)
                   if (place > 0 .and. place <= self%n_active) cycle
                   step(j, :) = -r(j, :)/p%stiffness(i, c)
+                  if (p%has_inertia) call turn_row(self, p, i, c, .true., step(j, :))
                end do
             end do
          end associate
@@ -250,8 +251,34 @@ contains
          end associate
          call multiply_derivative(self%work(k))
          call add_outputs(self, self%forces%entry(k), self%work(k), self%incidence%identity, m, dr)
+         if (self%forces%entry(k)%law%prediction%has_inertia) then
+            call add_law_by_frequency(self, self%forces%entry(k), self%work(k), m, nc, dr)
+         end if
       end do
    end subroutine derivative_with_forces
+
+   !> A law with inertia in units of time depends on the frequency by itself: a central difference,
+   !> its inputs being held.
+   subroutine add_law_by_frequency(self, entry, work, m, nc, dr)
+      type(hbm_system), intent(inout) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(inout) :: work
+      integer, intent(in) :: m, nc
+      real(wp), intent(inout) :: dr(m, nc)
+      !> Where truncation and round-off of a difference meet.
+      real(wp), parameter :: relative_step = 1.0e-5_wp
+      real(wp) :: step
+      integer :: side
+
+      step = relative_step*self%structure%omega
+      do side = -1, 1, 2
+         work%rate = self%structure%omega + side*step
+         call entry%law%evaluate(self%fourier, work)
+         call self%incidence%scatter(entry%rows, m, nc, 0.5_wp*side/step, work%force, dr)
+      end do
+      work%rate = self%structure%omega
+      call entry%law%evaluate(self%fourier, work)
+   end subroutine add_law_by_frequency
 
    !> Derivatives of the inputs by the frequency.
    subroutine inputs_by_frequency(self, entry, m, nc, q, dr, input)
@@ -273,12 +300,40 @@ contains
                                                     p%stiffness(i, c), q, y)
                      call take_rate(self, .false., 1.0_wp, y)
                   end if
+                  if (p%has_inertia) then
+                     call add_inertia_by_frequency(self, p, row(c, i), i, c, m, q, y)
+                  end if
                   if (p%takes_balance) y = y - dr(self%incidence%coordinate_of(row(c, i)), :)
                end associate
             end do
          end do
       end associate
    end subroutine inputs_by_frequency
+
+   !> Add dE_n/d omega times the displacement of a row.
+   subroutine add_inertia_by_frequency(self, prediction, row, element, component, m, q, y)
+      type(hbm_system), intent(in) :: self
+      type(prediction_type), intent(in) :: prediction
+      integer, intent(in) :: row, element, component, m
+      real(wp), intent(in) :: q(m, *)
+      real(wp), intent(inout) :: y(:)
+      complex(wp) :: slope
+      real(wp) :: u(size(y))
+      integer :: h, k, n
+
+      if (.not. prediction%inertia(element, component) > 0.0_wp) return
+      call self%incidence%gather_row(row, self%incidence%identity, m, 1.0_wp, q, u)
+      do h = 1, self%fourier%n_retained
+         n = self%fourier%harmonic(h)
+         if (n == 0) cycle
+         k = self%fourier%column(h)
+         slope = cmplx(-2.0_wp*n**2*self%structure%omega*prediction%inertia(element, component), &
+                       n*prediction%damping(element, component), wp)* &
+                 cmplx(u(k), -u(k + 1), wp)
+         y(k) = y(k) + real(slope, wp)
+         y(k + 1) = y(k + 1) - aimag(slope)
+      end do
+   end subroutine add_inertia_by_frequency
 
    module procedure apply
       integer :: h, k, na, nu, ld
@@ -437,12 +492,35 @@ contains
             call self%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), vector, &
                                            inputs(:, c))
             if (p%order(c) > 0) call take_rate(self, is_stuck, self%rate_unit(p), inputs(:, c))
+            if (p%has_inertia) call turn_row(self, p, element, c, .false., inputs(:, c))
             if (.not. p%takes_balance) cycle
             place = self%place(self%incidence%coordinate_of(row))
             if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
          end do
       end associate
    end subroutine gather_inputs
+
+   !> Coefficients of one row times E_n over the stiffness, or divided by it.
+   pure subroutine turn_row(self, prediction, element, component, divides, row)
+      type(hbm_system), intent(in) :: self
+      type(prediction_type), intent(in) :: prediction
+      integer, intent(in) :: element, component
+      logical, intent(in) :: divides
+      real(wp), intent(inout) :: row(:)
+      complex(wp) :: ratio, turned
+      integer :: h, k
+
+      do h = 1, self%fourier%n_retained
+         if (self%fourier%harmonic(h) == 0) cycle
+         k = self%fourier%column(h)
+         ratio = prediction%impedance_ratio(element, component, self%fourier%harmonic(h), &
+                                            self%structure%omega)
+         if (divides) ratio = one/ratio
+         turned = ratio*cmplx(row(k), -row(k + 1), wp)
+         row(k) = real(turned, wp)
+         row(k + 1) = -aimag(turned)
+      end do
+   end subroutine turn_row
 
    !> Derivative in place, unit times that by tau; the mean of a stuck pair stays, see
    !> hold_stuck_means.

@@ -36,8 +36,8 @@ contains
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
 
-      call keys%bind_word(key('law', 'rigid, rigid at velocity level (friction on dofs with '// &
-                              'mass), or elastic'), contact%law, law_words)
+      call keys%bind_word(key('law', 'rigid, rigid at velocity level, elastic, or rigid of '// &
+                              'high order (friction on dofs with mass)'), contact%law, law_words)
    end subroutine bind_law
 
    subroutine bind_sides(keys, contact, needed)
@@ -109,7 +109,7 @@ contains
       type(contact_type), intent(inout) :: contact
 
       call keys%bind(key('penalty_scale', 'multiplies the automatic eps of the rigid laws', &
-                         above(0.0_wp), only="law = 'dlft', 'dlft_velocity'"), &
+                         above(0.0_wp), only="law = 'dlft', 'dlft_velocity', 'rigid'"), &
                      contact%penalty_scale)
       call keys%bind_word(key('memory', 'where pairs that never slip start: unstrained, or as '// &
                               'the last point ended'), contact%memory, memory_words)

@@ -37,9 +37,16 @@ module fw_force_law
       real(wp), allocatable :: stiffness(:, :)
       !> Multiplies the stiffness that the structure gives a law that takes the balance.
       real(wp) :: scale = 1.0_wp
+      !> Beside the stiffness stand a mass and a damping of the structure, for derivatives by t
+      !> (n_elements, 3) [force time**2/length], [force time/length]; 0 where they do not matter:
+      !> y takes E_n = stiffness - (n omega)**2 inertia + i n omega damping of each harmonic.
+      logical :: has_inertia = .false.
+      real(wp), allocatable :: inertia(:, :), damping(:, :)
       !> Added to the displacement of the last component [length], and what its input is where it
       !> does not exist: minus the dead load [force] (n_elements).
       real(wp), allocatable :: gap(:), load(:)
+   contains
+      procedure :: impedance_ratio
    end type prediction_type
 
    !> What holds of a law wherever it is used.
@@ -59,6 +66,8 @@ module fw_force_law
       logical :: has_events = .false.
       !> They are followed so: forces at the instants are there after `sample` only.
       logical :: follows_events = .false.
+      !> Its forces are the projection of their histories alone, not a collocation.
+      logical :: needs_projection = .false.
       !> Sliding under pressure, with its derivative: what wear takes.
       logical :: measures_slip = .false.
       !> A perturbation can be followed through the period: Floquet multipliers.
@@ -107,6 +116,8 @@ module fw_force_law
       !> input (coefficient, component; element): only where asked for.
       logical :: measures_slip = .false.
       real(wp), allocatable :: slip(:), slip_derivative(:, :)
+      !> Angular frequency of the period: makes a derivative by tau one by t.
+      real(wp) :: rate = 1.0_wp
       class(law_room), allocatable :: room
    contains
       procedure :: reserve => reserve_workspace
@@ -193,6 +204,24 @@ contains
       allocate (self%slip(size(self%input, 2)), source=0.0_wp)
       allocate (self%slip_derivative, source=self%input)
    end subroutine measure_slip
+
+   !> E_n over the stiffness, a factor of the complex coefficient uc - i us of a displacement.
+   elemental complex(wp) function impedance_ratio(self, element, component, harmonic, omega) &
+      result(ratio)
+      class(prediction_type), intent(in) :: self
+      integer, intent(in) :: element, component, harmonic
+      !> Angular frequency [rad/s].
+      real(wp), intent(in) :: omega
+      real(wp) :: s
+
+      ratio = (1.0_wp, 0.0_wp)
+      if (.not. allocated(self%inertia)) return
+      if (.not. self%inertia(element, component) > 0.0_wp) return
+      s = omega*harmonic
+      ratio = ratio + cmplx(-s**2*self%inertia(element, component), &
+                            s*self%damping(element, component), wp) &
+              /self%stiffness(element, component)
+   end function impedance_ratio
 
    !> Elements without gap, load or stiffness.
    pure subroutine take_elements(self, present)

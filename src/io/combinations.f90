@@ -5,7 +5,10 @@ module fw_combinations
    use fw_error, only: error_type, fatal_error, status_input
    use fw_force_law, only: law_facts
    use fw_kinds, only: wp
+   use fw_harmonics_options, only: method_hbm
+   use fw_harmonics_options, only: sampling_uniform
    use fw_laws, only: facts_of
+   use fw_laws, only: law_words
    use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: continuation_natural
    use fw_solver_options, only: jacobian_analytic
@@ -36,8 +39,31 @@ contains
       if (.not. allocated(error)) call check_adaptive(case, error)
       if (.not. allocated(error)) call check_accuracy(case, error)
       if (.not. allocated(error)) call check_stability(case, error)
+      if (.not. allocated(error)) call check_law(case, error)
       if (.not. allocated(error)) call check_wear(case, error)
    end subroutine check_combinations
+
+   !> What the law of the pairs cannot do.
+   subroutine check_law(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(law_facts) :: facts
+      character(:), allocatable :: law
+
+      if (case%contact%n_pairs == 0) return
+      facts = facts_of(case%contact%law)
+      law = "contact%law = '"//trim(law_words(case%contact%law))//"'"
+      if (facts%needs_projection .and. case%harmonics%method /= method_hbm) then
+         call fatal_error(error, law//" needs harmonics%method = 'hbm': its forces are integrals "// &
+                          "between events, which collocation does not take", status_input)
+      else if (facts%needs_projection .and. case%harmonics%sampling == sampling_uniform) then
+         call fatal_error(error, law//" follows events: leave harmonics%sampling out, or take "// &
+                          "'events'", status_input)
+      else if (case%analysis == analysis_wear .and. .not. facts%measures_slip) then
+         call fatal_error(error, law//" does not wear yet: use 'dlft' (nodes without mass), "// &
+                          "'dlft_velocity' or 'penalty' for analysis = 'wear'", status_input)
+      end if
+   end subroutine check_law
 
    !> What wear needs, and which schemes step it.
    subroutine check_wear(case, error)

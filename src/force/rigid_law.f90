@@ -1,0 +1,358 @@
+!> Rigid friction of high order. A balance with the prediction y = F - Z q + E q and the law
+!> lambda + E x = y corrects the motion q to x, which has all harmonics; above those of the
+!> balance it obeys E_n x_n + lambda_n = 0. The law so takes -E_n**-1 lambda_n for what the
+!> structure answers to the force there, -Z_n**-1 lambda_n, and E is chosen like Z: an oscillator
+!> with the mass, damping and stiffness that the structure has above the balance (fw_split),
+!>
+!>   E_n = k - (n omega)**2 m + i n omega c.
+!>
+!> Pairs with one tangential direction where that mass matters follow it (fw_oscillator_pair). All
+!> others, and all normal directions, keep the displacement law with the stiffness k alone.
+module fw_rigid_law
+   use fw_event_contact, only: event_contact_type
+   use fw_event_contact, only: new_event_contact
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: law_facts
+   use fw_force_law, only: law_room
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_open
+   use fw_force_law, only: pair_stuck
+   use fw_force_law, only: prediction_type
+   use fw_fourier, only: fourier_type
+   use fw_kinds, only: wp
+   use fw_oscillator, only: new_oscillator
+   use fw_oscillator_pair, only: oscillator_pair_type
+   use fw_pair_law, only: pair_law
+   use fw_threads, only: pairs_for_threads
+   implicit none (type, external)
+   private
+
+   public :: rigid_law, friction_of_high_order
+
+   type, extends(pair_law) :: rigid_law
+   contains
+      procedure :: reserve
+      procedure :: evaluate
+      procedure :: linearize
+      procedure :: sample
+      procedure :: coefficients
+      procedure :: fractions
+      procedure :: located
+   end type rigid_law
+
+   type, extends(law_room) :: rigid_room
+      !> All pairs, without the tangential directions that have mass.
+      type(event_contact_type) :: paths
+      !> Pairs with mass: their numbers, tangential directions and paths.
+      integer :: n_massive = 0
+      integer, allocatable :: pair(:), direction(:)
+      type(oscillator_pair_type), allocatable :: massive(:)
+      !> P, P', P'', N, N', N'' of each: coefficients and values at the instants.
+      real(wp), allocatable :: rows(:, :), values(:, :)
+      !> Force of each (n_coefficients, tangential and normal, n_massive).
+      real(wp), allocatable :: force(:, :, :)
+   end type rigid_room
+
+contains
+
+   pure type(rigid_law) function friction_of_high_order() result(law)
+      law%prediction = prediction_type(takes_balance=.true., has_inertia=.true.)
+      law%facts = law_facts(remembers=.true., can_stick=.true., can_open=.true., &
+                            needs_independent=.true., has_events=.true., follows_events=.true., &
+                            needs_projection=.true., is_integrated=.true.)
+   end function friction_of_high_order
+
+   !> Room; the masses are known.
+   subroutine reserve(self, fourier, work)
+      class(rigid_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(out) :: work
+
+      call work%reserve(self%n_elements, self%n_components, fourier)
+      allocate (rigid_room :: work%room)
+      select type (room => work%room)
+      type is (rigid_room)
+         call fill_room(self, fourier, room)
+      end select
+   end subroutine reserve
+
+   subroutine fill_room(self, fourier, room)
+      type(rigid_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(rigid_room), intent(out) :: room
+      logical :: massive(2, self%n_elements), present(3, self%n_elements)
+      integer :: i, j
+
+      massive = .false.
+      if (allocated(self%prediction%inertia)) then
+         massive = transpose(self%prediction%inertia(:, 1:2)) > 0.0_wp
+      end if
+      present = self%present
+      present(1:2, :) = present(1:2, :) .and. .not. massive
+      call new_event_contact(self%mu, present, .true., fourier, room%paths)
+      room%pair = pack([(i, i=1, self%n_elements)], any(massive, dim=1))
+      room%n_massive = size(room%pair)
+      room%direction = findloc(massive(:, room%pair), .true., dim=1)
+      allocate (room%massive(room%n_massive))
+      do j = 1, room%n_massive
+         call room%massive(j)%reserve_oscillator(maxval(fourier%harmonic), fourier%n_time, &
+                                                 fourier%n_coefficients)
+         room%massive(j)%curves%mu = self%mu(room%pair(j))
+      end do
+      allocate (room%rows(6*room%n_massive, fourier%n_coefficients), source=0.0_wp)
+      allocate (room%values(6*room%n_massive, fourier%n_time), source=0.0_wp)
+      allocate (room%force(fourier%n_coefficients, 2, room%n_massive), source=0.0_wp)
+   end subroutine fill_room
+
+   subroutine evaluate(self, fourier, work)
+      class(rigid_law), intent(in) :: self
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (rigid_room)
+         call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
+                                  work%force, work%x)
+         work%turns = 1
+         work%drift = room%paths%drift
+         call work%measure_scale()
+         call classify(room, work)
+         if (room%n_massive > 0) call evaluate_massive(self, fourier, work, room)
+      end select
+   end subroutine evaluate
+
+   !> Of the pressure, only whether it ever vanishes is known.
+   pure subroutine classify(room, work)
+      type(rigid_room), intent(in) :: room
+      type(force_workspace), intent(inout) :: work
+      integer :: i
+
+      do i = 1, size(work%state)
+         work%pressure(i) = merge(1.0_wp, 0.0_wp, room%paths%closed(i))
+         work%state(i) = state_of(room%paths%open(i), room%paths%closed(i), room%paths%moved(i))
+      end do
+   end subroutine classify
+
+   elemental integer function state_of(open, closed, moved) result(state)
+      logical, intent(in) :: open, closed, moved
+
+      state = pair_mixed
+      if (open) state = pair_open
+      if (closed .and. .not. moved) state = pair_stuck
+   end function state_of
+
+   subroutine evaluate_massive(self, fourier, work, room)
+      class(rigid_law), intent(in) :: self
+      type(fourier_type), intent(inout) :: fourier
+      type(force_workspace), intent(inout) :: work
+      type(rigid_room), intent(inout) :: room
+      integer :: i, j
+
+      do j = 1, room%n_massive
+         call fill_rows(fourier, work, room%pair(j), room%direction(j), &
+                        room%rows(6*j - 5:6*j, :))
+      end do
+      call fourier%to_time(6*room%n_massive, room%rows, room%values)
+      !$omp parallel do default(none) shared(self, fourier, work, room) private(i, j) &
+      !$omp schedule(dynamic) if(room%n_massive >= pairs_for_threads)
+      do j = 1, room%n_massive
+         i = room%pair(j)
+         call follow_pair(self, fourier, work, i, room%direction(j), room%rows(6*j - 5:6*j, :), &
+                          room%values(6*j - 5:6*j, :), room%massive(j), room%force(:, :, j))
+      end do
+      !$omp end parallel do
+   end subroutine evaluate_massive
+
+   !> Coefficients of P, N and their first two derivatives.
+   subroutine fill_rows(fourier, work, pair, direction, rows)
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: pair, direction
+      real(wp), intent(inout) :: rows(:, :)
+
+      rows(1, :) = work%prediction(pair, direction, :)
+      rows(4, :) = -work%prediction(pair, 3, :)
+      rows(2:3, :) = 0.0_wp
+      rows(5:6, :) = 0.0_wp
+      call take_slopes(fourier, rows)
+   end subroutine fill_rows
+
+   subroutine take_slopes(fourier, rows)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: rows(:, :)
+      integer :: c, h, k, n
+
+      do h = 1, fourier%n_retained
+         n = fourier%harmonic(h)
+         k = fourier%column(h)
+         if (n == 0) cycle
+         do c = 1, 4, 3
+            rows(c + 1, k) = n*rows(c, k + 1)
+            rows(c + 1, k + 1) = -n*rows(c, k)
+            rows(c + 2, k:k + 1) = -real(n, wp)**2*rows(c, k:k + 1)
+         end do
+      end do
+   end subroutine take_slopes
+
+   !> The path, the force and the state of one pair with mass.
+   subroutine follow_pair(self, fourier, work, i, direction, rows, values, pair, force)
+      class(rigid_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+      integer, intent(in) :: i, direction
+      real(wp), intent(in) :: rows(:, :), values(:, :)
+      type(oscillator_pair_type), intent(inout) :: pair
+      real(wp), intent(inout) :: force(:, :)
+      integer :: h, k, n
+
+      associate (p => self%prediction, c => pair%curves)
+         pair%waves%oscillator = new_oscillator(work%rate**2*p%inertia(i, direction), &
+                                                work%rate*p%damping(i, direction), &
+                                                p%stiffness(i, direction))
+         do h = 1, fourier%n_retained
+            n = fourier%harmonic(h)
+            k = fourier%column(h)
+            c%tangential(n, 1) = rows(1, k)
+            c%normal(n, 1) = rows(4, k)
+            if (n == 0) cycle
+            c%tangential(n, 2) = rows(1, k + 1)
+            c%normal(n, 2) = rows(4, k + 1)
+         end do
+         if (.not. fourier%has_constant()) c%normal(0, 1) = 0.0_wp
+         c%normal(0, 1) = c%normal(0, 1) - work%offset(i)
+         do k = 1, 6
+            c%samples(:, k) = values(k, :)
+         end do
+         c%samples(:, 4) = c%samples(:, 4) - work%offset(i)
+         call c%combine(c%mu)
+      end associate
+      call pair%follow(work%x_start(i, direction))
+      call pair%force(fourier%n_retained, fourier%harmonic, fourier%column, force(:, 1), &
+                      force(:, 2))
+      work%force(i, direction, :) = force(:, 1)
+      work%x(i, direction) = pair%path%z_end
+      work%turns(i) = pair%n_turns
+      work%drift(i) = pair%drift*work%scale(i)
+      work%state(i) = state_of(pair%path%open, pair%path%closed, pair%path%moved)
+   end subroutine follow_pair
+
+   subroutine linearize(self, fourier, work)
+      class(rigid_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+      integer :: nc
+
+      work%linear_state = work%state
+      if (.not. any(work%state == pair_mixed)) return
+      nc = fourier%n_coefficients
+      if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
+      select type (room => work%room)
+      type is (rigid_room)
+         call linearize_pairs(self, fourier, room, work)
+      end select
+   end subroutine linearize
+
+   subroutine linearize_pairs(self, fourier, room, work)
+      class(rigid_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(rigid_room), intent(inout) :: room
+      type(force_workspace), intent(inout) :: work
+      integer :: j, nc
+
+      nc = fourier%n_coefficients
+      call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, work%jacobian)
+      !$omp parallel do default(none) shared(self, fourier, work, room, nc) private(j) &
+      !$omp schedule(dynamic) if(room%n_massive >= pairs_for_threads)
+      do j = 1, room%n_massive
+         if (work%state(room%pair(j)) /= pair_mixed) cycle
+         call linearize_pair(fourier, nc, (room%direction(j) - 1)*nc, &
+                             self%present(3, room%pair(j)), room%massive(j), &
+                             work%jacobian(:, :, room%pair(j)))
+      end do
+      !$omp end parallel do
+   end subroutine linearize_pairs
+
+   !> What the tangential force of a pair with mass depends on.
+   subroutine linearize_pair(fourier, nc, t, has_normal, pair, jacobian)
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: nc
+      !> Coefficients before those of the direction.
+      integer, intent(in) :: t
+      logical, intent(in) :: has_normal
+      type(oscillator_pair_type), intent(inout) :: pair
+      real(wp), intent(inout) :: jacobian(:, :)
+      real(wp) :: by_tangential(nc, nc), by_normal(nc, nc), normal(nc, nc)
+
+      call pair%derivative(fourier%n_retained, fourier%harmonic, fourier%column, by_tangential, &
+                           by_normal, normal)
+      jacobian(t + 1:t + nc, t + 1:t + nc) = by_tangential
+      if (has_normal) jacobian(2*nc + 1:, t + 1:t + nc) = by_normal
+   end subroutine linearize_pair
+
+   subroutine sample(self, work)
+      class(rigid_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      real(wp), allocatable :: out(:, :)
+      integer :: j
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (rigid_room)
+         call room%paths%values(work%force_time)
+         allocate (out(size(work%force_time, 3), 2))
+         do j = 1, room%n_massive
+            call room%massive(j)%values_at(size(out, 1), out(:, 1), out(:, 2))
+            work%force_time(room%pair(j), room%direction(j), :) = out(:, 1)
+         end do
+      end select
+   end subroutine sample
+
+   subroutine coefficients(self, work, computed, fourier, force)
+      class(rigid_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(fourier_type), intent(in) :: computed
+      type(fourier_type), intent(inout) :: fourier
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp) :: out(fourier%n_coefficients, 2)
+      integer :: j, n
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (rigid_room)
+         call room%paths%coefficients(fourier, computed%harmonic, force)
+         do j = 1, room%n_massive
+            out = 0.0_wp
+            n = count(fourier%harmonic <= room%massive(j)%curves%degree)
+            call room%massive(j)%force(n, fourier%harmonic, fourier%column, out(:, 1), out(:, 2))
+            force(room%pair(j), room%direction(j), :) = out(:, 1)
+         end do
+      end select
+   end subroutine coefficients
+
+   pure subroutine fractions(self, work, share)
+      class(rigid_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(out) :: share(:, :)
+      integer :: j
+
+      share = 0.0_wp
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (rigid_room)
+         call room%paths%fractions(share)
+         do j = 1, room%n_massive
+            share(:, room%pair(j)) = room%massive(j)%shares()
+         end do
+      end select
+   end subroutine fractions
+
+   !> It follows events already.
+   subroutine located(self, law)
+      class(rigid_law), intent(in) :: self
+      class(pair_law), allocatable, intent(out) :: law
+
+      allocate (law, source=self)
+   end subroutine located
+
+end module fw_rigid_law
