@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,6 @@ from .errors import ConvergenceError, InputError, RunInterrupted
 from .result import Result
 
 if TYPE_CHECKING:
-    import sys
     from typing import Literal
 
     from .settings import CaseGroup, Groups, Sweep, Wear
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
 
 __all__ = ["frf", "run", "wear"]
 
-#: Called with the number of points done and of points to come (0: not known).
-Progress = Callable[[int, int], object]
+#: Called with the number of points done and of points to come (0: not known); True for a line on
+#: the standard error.
+Progress = Union[bool, Callable[[int, int], object]]
 
 #: Time between two calls of a progress function [s].
 _BETWEEN_CALLS = 0.1
@@ -55,7 +57,8 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     check : bool, optional
         Raise ConvergenceError where points have not converged (default).
     progress : callable, optional
-        Called now and then with the points done and the points to come (0: not known).
+        Called now and then with the points done and the points to come (0: not known); True shows
+        them in a line, in a notebook too.
     stop : threading.Event, optional
         Set it, in any thread, to stop the run as Ctrl-C does.
 
@@ -75,16 +78,19 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     RunInterrupted
         The run was stopped (a KeyboardInterrupt); its `result` holds the points up to there.
     """
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress: is a {type(progress).__name__}, must be a function of the "
-                         "points done and the points to come")
+    if progress is not None and not isinstance(progress, bool) and not callable(progress):
+        raise InputError(f"progress: is a {type(progress).__name__}, must be True or a function of "
+                         "the points done and the points to come")
     if not isinstance(case, Case):
         case = Case.from_file(case)
     if file is not None:
         case = case.replace(output={"file": os.path.abspath(file)})
     in_memory = not case.names_output
     with case.open() as session:
-        status, interrupted = _watched(session, progress, stop, in_memory=in_memory)
+        tell = _Line() if progress is True else progress or None
+        status, interrupted = _watched(session, tell, stop, in_memory=in_memory)
+        if isinstance(tell, _Line):
+            tell.end()
         report = (session.text("remarks") + session.text("summary")).splitlines()
         message, path, image = session.text("message"), session.text("output"), session.image()
     if status not in (NOT_CONVERGED, STOPPED):
@@ -201,7 +207,32 @@ def _refuse_twice(group: str, own: Mapping[str, object], given: Mapping[str, obj
                          "it out, or make a Case and run it")
 
 
-def _watched(session: Session, progress: Progress | None, stop: threading.Event | None, *,
+class _Line:
+    """Points done, in one line of the standard error that changes."""
+
+    def __init__(self) -> None:
+        self._started, self._width = time.monotonic(), 0
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show how far the run is, and how long the rest may take."""
+        passed = time.monotonic() - self._started
+        text = f"{done} of {total} points" if total else f"{done} points"
+        text += f", {passed:.0f} s"
+        if 0 < done < total:
+            text += f", {passed / done * (total - done):.0f} s to go"
+        print("\r" + text.ljust(self._width), end="", file=sys.stderr, flush=True)
+        self._width = len(text)
+
+    def end(self) -> None:
+        """Leave the line as it is."""
+        print(file=sys.stderr, flush=True)
+
+
+#: What is told of the points done and to come.
+_Tell = Callable[[int, int], object]
+
+
+def _watched(session: Session, progress: _Tell | None, stop: threading.Event | None, *,
              in_memory: bool) -> tuple[int, bool]:
     """Run a session so that it can be interrupted; its status, and whether it was.
 
@@ -226,19 +257,22 @@ def _watched(session: Session, progress: Progress | None, stop: threading.Event 
     return status[0], bool(interrupted)
 
 
-def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: Progress | None,
+def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: _Tell | None,
           stop: threading.Event | None) -> None:
     if progress is None and stop is None:
         worker.join()
         return
     told = -1
-    while worker.is_alive():
+    while True:
         worker.join(_BETWEEN_CALLS)
+        at_work = worker.is_alive()
         if stop is not None and stop.is_set():
             control[0] = 1
         if progress is not None and told != control[1]:
             told = int(control[1])
             progress(told, int(control[2]))
+        if not at_work:
+            return
 
 
 @contextmanager

@@ -482,6 +482,17 @@ except KeyboardInterrupt as stopped:
     assert not (tmp_path / "stopped.h5.part").exists()
 
 
+def test_progress_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    fw.frf(RUBBING, 0.6, 1.6, 25, contact={"law": "penalty"}, progress=True)
+    told = capsys.readouterr().err
+    assert told.startswith("\r") and told.endswith("\n")
+    assert "25 of 25 points" in told.split("\r")[-1]
+    fw.frf(RUBBING, 0.6, 1.6, 3, contact={"law": "penalty"}, progress=False)
+    assert capsys.readouterr().err == ""
+    with pytest.raises(fw.InputError, match="progress: is a int, must be True or a function"):
+        fw.frf(RUBBING, 0.6, 1.6, 3, progress=1)  # type: ignore[arg-type]
+
+
 def test_an_error_of_the_progress_function_stops_the_run(tmp_path: Path) -> None:
     def fail(done: int, _total: int) -> None:
         raise RuntimeError(f"seen {done}")
