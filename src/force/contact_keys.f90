@@ -94,8 +94,8 @@ contains
       logical, intent(in) :: slides, closes
       character(*), parameter :: only = "law = 'penalty'"
 
-      call keys%bind(key('tangential_stiffness', 'contact stiffness; 0 with a parallel pair that '// &
-                         'has one, or without a tangential dof', at_least(0.0_wp), 'F/L', &
+      call keys%bind(key('tangential_stiffness', 'contact stiffness; 0 with a parallel pair '// &
+                         'that has one, or without a tangential dof', at_least(0.0_wp), 'F/L', &
                          'n_pairs', absent='required with tangential dofs', only=only), &
                      contact%tangential_stiffness, slides)
       call keys%bind(key('normal_stiffness', 'contact stiffness; 0 without a normal dof', &

@@ -26,6 +26,8 @@ module fw_input
    type, abstract, extends(key_visitor) :: input_type
       type(namelist_type) :: namelist
       type(string_type), allocatable :: problems(:)
+      !> The calling program holds the model: it is read from no file.
+      logical :: in_memory = .false.
    contains
       procedure :: parse
       procedure :: given
@@ -36,6 +38,7 @@ module fw_input
       procedure :: find_elements
       procedure :: find_list
       procedure :: refuse
+      procedure :: refuse_model
       procedure :: refuse_value
       procedure :: blame
       procedure :: failed
@@ -227,6 +230,19 @@ contains
       call self%blame(last_entry(self%namelist, group, key), &
                       '&'//trim(group//' '//key)//' '//message)
    end subroutine refuse
+
+   !> Record that a model file, or the model of the calling program, holds something wrong.
+   subroutine refuse_model(self, message)
+      class(input_type), intent(inout) :: self
+      !> What it holds and what must be.
+      character(*), intent(in) :: message
+
+      if (self%in_memory) then
+         call self%refuse('model', 'source', "= 'memory' holds "//message)
+      else
+         call self%refuse('model', 'file', 'holds '//message)
+      end if
+   end subroutine refuse_model
 
    !> Record that a value is not what is accepted.
    subroutine refuse_value(self, i_entry, accepts, value, element, dims)

@@ -32,8 +32,6 @@ module fw_model_file
    !> What a model file holds; a component is not allocated where the file has none.
    type :: file_model_type
       character(:), allocatable :: title, unit_system
-      !> The calling program holds it: it was read from no file.
-      logical :: in_memory = .false.
       !> Paths of the files it was read from.
       type(string_type), allocatable :: files(:)
       !> Structure (n_dof, n_dof), not checked for symmetry.

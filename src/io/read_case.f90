@@ -173,13 +173,10 @@ contains
       type(file_model_type), intent(in), optional :: memory_model
       type(model_options) :: options
       character(:), allocatable :: worn
-      integer :: n_dof
 
       call read_model(reader, directory_of(path), options, raw, error, memory_model)
       if (allocated(error)) return
-      n_dof = 0
-      if (allocated(raw%stiffness)) n_dof = size(raw%stiffness, 1)
-      call read_contact(reader, n_dof, raw, case%analysis == analysis_wear, case%contact)
+      call read_contact(reader, raw, case%analysis == analysis_wear, case%contact)
       call read_worn(reader, directory_of(path), case%contact, worn, error)
       if (allocated(error)) return
       if (allocated(worn)) then

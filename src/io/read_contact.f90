@@ -1,16 +1,13 @@
 !> Contact pairs and nonlinear springs: groups &contact and &spring on top of a model file.
 module fw_read_contact
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
                               bind_normal_load, bind_stiffnesses, bind_march, bind_springs
    use fw_kinds, only: wp
    use fw_laws, only: law_words, is_rigid
    use fw_model_file, only: file_model_type
-   use fw_read_model, only: refuse_model
    use fw_reader, only: reader_type
    use fw_text, only: to_text
-   use fw_values, only: number_text
    implicit none (type, external)
    private
 
@@ -21,9 +18,8 @@ module fw_read_contact
 contains
 
    !> Group &contact. Every array but area, position and patch leaves allocated.
-   subroutine read_contact(reader, n_dof, file_model, needs_area, contact)
+   subroutine read_contact(reader, file_model, needs_area, contact)
       type(reader_type), intent(inout) :: reader
-      integer, intent(in) :: n_dof
       !> What the model file holds; overridden here.
       type(file_model_type), intent(in) :: file_model
       !> Whether the analysis is one of wear.
@@ -33,7 +29,7 @@ contains
 
       call read_n_pairs(reader, file_model, contact)
       call bind_law(reader, contact)
-      call read_sides(reader, n_dof, contact)
+      call read_sides(reader, contact)
       call read_constants(reader, needs_area, contact)
       call read_stiffnesses(reader, contact)
       call bind_march(reader, contact)
@@ -64,7 +60,6 @@ contains
          if (allocated(file_model%area)) contact%area = file_model%area
          if (allocated(file_model%position)) contact%position = file_model%position
          if (allocated(file_model%patch)) contact%patch = file_model%patch
-         call check_from_file(reader, file_model, contact)
       else if (n_file > 0 .and. contact%n_pairs > 0 &
                .and. .not. reader%given('contact', 'side_1')) then
          call reader%refuse('contact', 'n_pairs', '= '//to_text(contact%n_pairs)// &
@@ -77,22 +72,20 @@ contains
    end subroutine read_n_pairs
 
    !> The dofs of both sides.
-   subroutine read_sides(reader, n_dof, contact)
+   subroutine read_sides(reader, contact)
       type(reader_type), intent(inout) :: reader
-      integer, intent(in) :: n_dof
       type(contact_type), intent(inout) :: contact
       logical :: needed
 
       needed = .not. (allocated(contact%side_1) .or. reader%failed()) .and. contact%n_pairs > 0
       if (.not. allocated(contact%side_1)) allocate (contact%side_1(3, contact%n_pairs), source=0)
       call bind_sides(reader, contact, needed)
-      if (.not. reader%failed()) call check_sides(reader, n_dof, contact)
+      if (.not. reader%failed()) call check_sides(reader, contact)
    end subroutine read_sides
 
    !> Every pair must join something to something else.
-   subroutine check_sides(reader, n_dof, contact)
+   subroutine check_sides(reader, contact)
       type(reader_type), intent(inout) :: reader
-      integer, intent(in) :: n_dof
       type(contact_type), intent(in) :: contact
       integer :: i, k
 
@@ -100,10 +93,6 @@ contains
          associate (a => abs(contact%side_1(:, i)), b => abs(contact%side_2(:, i)))
             if (all(a == 0) .and. all(b == 0)) then
                call refuse_pair(reader, i, 'has no dof on either side: at least one must not be 0')
-            end if
-            if (any(a > n_dof) .or. any(b > n_dof)) then
-               call refuse_pair(reader, i, 'names dof '//to_text(max(maxval(a), maxval(b)))// &
-                                ': must be at most n_dof = '//to_text(n_dof))
             end if
             do k = t1, n
                if (a(k) == b(k) .and. a(k) > 0) then
@@ -159,43 +148,6 @@ contains
       end if
       where (closes) contact%normal_load = 0.0_wp
    end subroutine read_constants
-
-   !> Values of a model file pass no getter.
-   subroutine check_from_file(reader, file_model, contact)
-      type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(in) :: file_model
-      type(contact_type), intent(in) :: contact
-
-      if (allocated(contact%mu)) then
-         call check('mu', contact%mu, contact%mu >= 0.0_wp, 'must be at least 0')
-      end if
-      if (allocated(contact%gap)) then
-         call check('gap', contact%gap, ieee_is_finite(contact%gap), 'must be finite')
-      end if
-      if (allocated(contact%area)) then
-         call check('area', contact%area, contact%area > 0.0_wp, 'must be above 0')
-      end if
-
-   contains
-
-      subroutine check(key, values, ok, accepts)
-         character(*), intent(in) :: key
-         real(wp), intent(in) :: values(:)
-         logical, intent(in) :: ok(:)
-         character(*), intent(in) :: accepts
-         integer :: i
-
-         if (size(values) /= contact%n_pairs) then
-            call refuse_model(reader, file_model, to_text(size(values))//' values of '//key// &
-                              ': must be '//to_text(contact%n_pairs)//', one per pair')
-            return
-         end if
-         i = findloc(ok .and. ieee_is_finite(values), .false., 1)
-         if (i > 0) call refuse_model(reader, file_model, key//'('//to_text(i)//') = '// &
-                                      number_text(values(i))//': '//accepts)
-      end subroutine check
-
-   end subroutine check_from_file
 
    !> Stiffnesses belong to the penalty law, which cannot do without them.
    subroutine read_stiffnesses(reader, contact)

@@ -20,7 +20,7 @@ module fw_read_model
    implicit none (type, external)
    private
 
-   public :: read_model, read_loads, finish_model, refuse_model
+   public :: read_model, read_loads, finish_model
 
    type, extends(trial_type) :: model_trial
    contains
@@ -50,7 +50,7 @@ contains
       n_dof = 0
       if (present(memory_model)) then
          raw = memory_model
-         raw%in_memory = .true.
+         reader%in_memory = .true.
          n_dof = size(raw%stiffness, 1)
       else if (is_file .and. allocated(options%file)) then
          call read_file(reader, directory, options, raw, error)
@@ -225,6 +225,7 @@ contains
       type(reader_type), intent(inout) :: reader
       type(file_model_type), intent(inout) :: raw
       logical, intent(in) :: is_inline
+      character(:), allocatable :: message
       integer :: n_dof
 
       if (reader%failed()) return
@@ -235,11 +236,10 @@ contains
       if (allocated(raw%stiffness_rotation)) then
          call check_one('stiffness_rotation', raw%stiffness_rotation)
       end if
-      call check_load('static', raw%load_static)
-      call check_load('cosine', raw%load_cosine)
-      call check_load('sine', raw%load_sine)
-      if (allocated(raw%load_static_rotation)) then
-         call check_load('static_rotation', raw%load_static_rotation)
+      if (.not. allocated(raw%load_static_rotation)) return
+      call check_vector(raw%load_static_rotation, n_dof, message)
+      if (allocated(message)) then
+         call reader%refuse_model('a load static_rotation that '//message)
       end if
 
    contains
@@ -254,34 +254,11 @@ contains
          if (is_inline) then
             call reader%refuse('model', key, message)
          else
-            call refuse_model(reader, raw, 'a '//key//' that '//message)
+            call reader%refuse_model('a '//key//' that '//message)
          end if
       end subroutine check_one
 
-      subroutine check_load(key, load)
-         character(*), intent(in) :: key
-         real(wp), intent(in) :: load(:)
-         character(:), allocatable :: message
-
-         call check_vector(load, n_dof, message)
-         if (allocated(message)) call refuse_model(reader, raw, 'a load '//key//' that '//message)
-      end subroutine check_load
-
    end subroutine check_parts
-
-   !> Record that a model file, or the model of the calling program, holds something wrong.
-   subroutine refuse_model(reader, raw, message)
-      type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(in) :: raw
-      !> What it holds and what must be.
-      character(*), intent(in) :: message
-
-      if (raw%in_memory) then
-         call reader%refuse('model', 'source', "= 'memory' holds "//message)
-      else
-         call reader%refuse('model', 'file', 'holds '//message)
-      end if
-   end subroutine refuse_model
 
    pure function in_directory(file, directory) result(path)
       character(*), intent(in) :: file, directory

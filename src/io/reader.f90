@@ -1,19 +1,17 @@
 !> Reads the keys of the options from a namelist: checks of range, count and repetition, the nearest
 !> key for an unknown one, and the effective input, all from the declarations of the keys.
 module fw_reader
-   use fw_array_entries, only: source_type
    use fw_error, only: error_type
    use fw_input, only: input_type
    use fw_key, only: key_type
-   use fw_key_range, only: range_type
    use fw_kinds, only: wp
-   use fw_namelist_data, only: value_type, value_count, last_entry, multiply_out
+   use fw_namelist_data, only: value_type, value_count, multiply_out
    use fw_records, only: record_type, record_list
-   use fw_reader_text, only: near, did_you_mean, shown, to_strings, words_text, dims_text, &
-                             number_list
+   use fw_reader_text, only: near, did_you_mean, shown, to_strings, words_text
    use fw_text, only: string_type, lower_case, to_text
    use fw_text_list, only: append
-   use fw_values, only: range_text, read_real, read_integer, read_logical, number_text, quoted_text
+   use fw_values, only: range_text, read_logical, read_number, quoted_text
+   use fw_values, only: real_kind, integer_kind, kind_name, kind_text
    implicit none (type, external)
    private
 
@@ -21,8 +19,6 @@ module fw_reader
 
    !> A list of mixed values has no shape to be checked against.
    integer, parameter :: most_listed = 1000000
-
-   character(*), parameter :: real_kind = 'a finite real', integer_kind = 'an integer'
 
    !> An extent of arrays.
    type :: size_type
@@ -51,10 +47,28 @@ module fw_reader
       procedure :: amend
       procedure :: finish
       procedure :: effective
+      procedure, private :: note
       procedure, private :: take_number
-      procedure, private :: take_numbers
       procedure, private :: find_unknown
    end type reader_type
+
+   interface
+      module subroutine bind_reals(self, key, values, needed, default)
+         class(reader_type), intent(inout) :: self
+         type(key_type), intent(in) :: key
+         real(wp), allocatable, intent(inout) :: values(:)
+         logical, intent(in), optional :: needed
+         real(wp), intent(in), optional :: default
+      end subroutine bind_reals
+
+      module subroutine bind_integers(self, key, values, needed, default)
+         class(reader_type), intent(inout) :: self
+         type(key_type), intent(in) :: key
+         integer, allocatable, intent(inout) :: values(:)
+         logical, intent(in), optional :: needed
+         integer, intent(in), optional :: default
+      end subroutine bind_integers
+   end interface
 
 contains
 
@@ -84,7 +98,7 @@ contains
 
    !> Note down what a key of the present group is, once.
    subroutine note(self, key, kind, accepts, default, words)
-      type(reader_type), intent(inout) :: self
+      class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
       !> As of record_type.
       character(*), intent(in) :: kind, accepts
@@ -138,8 +152,8 @@ contains
       accepts = range_text(kind, key%range)
       default = ''
       ! A default outside of the range stands for "none" and cannot be written down.
-      if (key%range%holds(number)) default = text_of(number, kind)
-      call note(self, key, name_of(kind), accepts, default)
+      if (key%range%holds(number)) default = kind_text(number, kind)
+      call self%note(key, kind_name(kind), accepts, default)
       call self%find_scalar(self%group, trim(key%name), accepts, needed, i)
       if (i > 0) then
          call read_number(self%namelist%entries(i)%values(1), kind, key%range, found, ok)
@@ -147,7 +161,7 @@ contains
          if (.not. ok) call self%refuse_value(i, accepts)
       end if
       if (key%range%holds(number)) then
-         call self%amend(self%group, trim(key%name), text_of(number, kind))
+         call self%amend(self%group, trim(key%name), kind_text(number, kind))
       end if
    end subroutine take_number
 
@@ -159,7 +173,7 @@ contains
       integer :: i
       logical :: ok, flag
 
-      call note(self, key, 'logical', accepts, to_text(value))
+      call self%note(key, 'logical', accepts, to_text(value))
       call self%find_scalar(self%group, trim(key%name), accepts, .false., i)
       if (i > 0) then
          call read_logical(self%namelist%entries(i)%values(1)%text, flag, ok)
@@ -177,7 +191,7 @@ contains
       character(*), parameter :: accepts = 'a text in quotes'
       integer :: i
 
-      call note(self, key, 'text', accepts, '')
+      call self%note(key, 'text', accepts, '')
       call self%find_scalar(self%group, trim(key%name), accepts, needed, i, free_text=.true.)
       if (i > 0) then
          associate (entry => self%namelist%entries(i))
@@ -202,7 +216,7 @@ contains
       integer :: i, k, found
 
       accepts = words_text(words)
-      call note(self, key, 'word', accepts, quoted_text(trim(words(choice))), words)
+      call self%note(key, 'word', accepts, quoted_text(trim(words(choice))), words)
       call self%find_scalar(self%group, trim(key%name), accepts, .false., i)
       if (i > 0) then
          found = 0
@@ -236,7 +250,7 @@ contains
       integer :: i, k
 
       allocate (values(0), is_text(0))
-      call note(self, key, 'list', accepts, '')
+      call self%note(key, 'list', accepts, '')
       call self%find_last(self%group, trim(key%name), accepts, i)
       ! How many values there may be is not known where something failed before.
       if (i == 0 .or. self%failed()) return
@@ -258,115 +272,6 @@ contains
       is_text = found%quoted
       call self%amend(self%group, trim(key%name), text)
    end subroutine bind_list
-
-   subroutine bind_reals(self, key, values, needed, default)
-      class(reader_type), intent(inout) :: self
-      type(key_type), intent(in) :: key
-      real(wp), allocatable, intent(inout) :: values(:)
-      logical, intent(in), optional :: needed
-      real(wp), intent(in), optional :: default
-
-      call self%take_numbers(key, real_kind, values, needed, default)
-   end subroutine bind_reals
-
-   subroutine bind_integers(self, key, values, needed, default)
-      class(reader_type), intent(inout) :: self
-      type(key_type), intent(in) :: key
-      integer, allocatable, intent(inout) :: values(:)
-      logical, intent(in), optional :: needed
-      integer, intent(in), optional :: default
-      real(wp), allocatable :: numbers(:)
-
-      if (allocated(values)) numbers = real(values, wp)
-      if (present(default)) then
-         call self%take_numbers(key, integer_kind, numbers, needed, real(default, wp))
-      else
-         call self%take_numbers(key, integer_kind, numbers, needed)
-      end if
-      if (allocated(numbers)) values = nint(numbers)
-   end subroutine bind_integers
-
-   !> An array, in Fortran order.
-   subroutine take_numbers(self, key, kind, numbers, needed, default)
-      class(reader_type), intent(inout) :: self
-      type(key_type), intent(in) :: key
-      character(*), intent(in) :: kind
-      real(wp), allocatable, intent(inout) :: numbers(:)
-      logical, intent(in), optional :: needed
-      real(wp), intent(in), optional :: default
-      type(range_type) :: range
-      type(source_type) :: source
-      character(:), allocatable :: accepts, text
-      integer, allocatable :: dims(:)
-      integer :: k
-      logical :: ok
-
-      range = with_sizes(self, key%range)
-      accepts = range_text(kind, range)
-      dims = self%extents(key%shape)
-      text = ''
-      if (present(default)) text = text_of(default, kind)
-      call note(self, key, name_of(kind), accepts, text)
-      k = last_entry(self%namelist, self%group, trim(key%name))
-      if (k == 0) call blame_missing(self, key, accepts, dims, needed)
-      if (present(default) .and. .not. allocated(numbers)) then
-         allocate (numbers(product(dims)), source=default)
-      end if
-      if (k == 0) return
-      if (key%shape == ':') then
-         call self%find_list(self%group, trim(key%name), accepts, dims, source)
-         ! Empty where it is refused: it was given.
-         if (.not. allocated(source%entry)) allocate (numbers(0))
-      else
-         call self%find_elements(self%group, trim(key%name), accepts, dims, key%repeats, &
-                                 allocated(numbers), source)
-      end if
-      if (.not. allocated(source%entry)) return
-      if (.not. allocated(numbers)) allocate (numbers(size(source%entry)), source=0.0_wp)
-      do k = 1, size(numbers)
-         if (source%entry(k) == 0) cycle
-         associate (value => self%namelist%entries(source%entry(k))%values(source%value(k)))
-            call read_number(value, kind, range, numbers(k), ok)
-            if (ok) cycle
-            call self%refuse_value(source%entry(k), accepts, value, k, dims)
-            return
-         end associate
-      end do
-      call self%amend(self%group, trim(key%name), &
-                      number_list(numbers, kind == integer_kind, dims, key%repeats))
-   end subroutine take_numbers
-
-   !> Record that an array is not given, where it is needed.
-   subroutine blame_missing(self, key, accepts, dims, needed)
-      class(reader_type), intent(inout) :: self
-      type(key_type), intent(in) :: key
-      character(*), intent(in) :: accepts
-      integer, intent(in) :: dims(:)
-      logical, intent(in), optional :: needed
-      character(:), allocatable :: count
-
-      if (.not. present(needed)) return
-      if (.not. needed) return
-      count = ', '//dims_text(dims)//' of them'
-      if (key%repeats) count = ', one for all or '//dims_text(dims)//' of them'
-      if (any(dims == 0) .or. all(dims == 1)) count = ''
-      call self%blame(0, '&'//self%group//' '//trim(key%name)//' is missing: must be '//accepts// &
-                      count)
-   end subroutine blame_missing
-
-   !> A range whose bounds are all numbers.
-   pure type(range_type) function with_sizes(self, range) result(bounded)
-      class(reader_type), intent(in) :: self
-      type(range_type), intent(in) :: range
-      integer :: extent(1)
-
-      bounded = range
-      if (len_trim(range%within) == 0) return
-      extent = self%extents(range%within)
-      if (extent(1) == 0) return
-      bounded%least = -real(extent(1), wp)
-      bounded%most = real(extent(1), wp)
-   end function with_sizes
 
    !> Tell an extent that shapes name.
    subroutine set_size(self, name, extent)
@@ -458,41 +363,5 @@ contains
          call append(self%problems, others(i)%text)
       end do
    end subroutine find_unknown
-
-   !> A value as a number of a kind and within a range.
-   subroutine read_number(value, kind, range, number, ok)
-      type(value_type), intent(in) :: value
-      character(*), intent(in) :: kind
-      type(range_type), intent(in) :: range
-      real(wp), intent(out) :: number
-      logical, intent(out) :: ok
-      integer :: whole
-
-      if (kind == integer_kind) then
-         call read_integer(value%text, whole, ok)
-         number = real(whole, wp)
-      else
-         call read_real(value%text, number, ok)
-      end if
-      if (ok) ok = range%holds(number) .and. .not. value%quoted
-   end subroutine read_number
-
-   pure character(7) function name_of(kind)
-      character(*), intent(in) :: kind
-
-      name_of = merge('integer', 'real   ', kind == integer_kind)
-   end function name_of
-
-   function text_of(number, kind) result(text)
-      real(wp), intent(in) :: number
-      character(*), intent(in) :: kind
-      character(:), allocatable :: text
-
-      if (kind == integer_kind) then
-         text = to_text(nint(number))
-      else
-         text = number_text(number)
-      end if
-   end function text_of
 
 end module fw_reader

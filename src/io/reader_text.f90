@@ -3,7 +3,7 @@ module fw_reader_text
    use fw_kinds, only: wp
    use fw_namelist_data, only: value_type
    use fw_text, only: string_type, lower_case, nearest_word, to_text, join
-   use fw_values, only: number_text, quoted_text
+   use fw_values, only: kind_text, quoted_text
    implicit none (type, external)
    private
 
@@ -172,9 +172,10 @@ contains
    end function dims_text
 
    !> Numbers as namelist values; equal ones are written once.
-   function number_list(numbers, are_whole, dims, repeats) result(text)
+   function number_list(numbers, kind, dims, repeats) result(text)
       real(wp), intent(in) :: numbers(:)
-      logical, intent(in) :: are_whole
+      !> real_kind or integer_kind.
+      character(*), intent(in) :: kind
       integer, intent(in) :: dims(:)
       logical, intent(in) :: repeats
       character(:), allocatable :: text
@@ -183,30 +184,16 @@ contains
       text = ''
       if (size(numbers) == 0) return
       if (repeats .and. all(abs(numbers - numbers(1)) <= 0.0_wp)) then
-         text = one(1)
+         text = kind_text(numbers(1), kind)
          return
       end if
       per_line = merge(dims(1), 6, size(dims) > 1)
       do i = 1, size(numbers)
-         text = text//one(i)
+         text = text//kind_text(numbers(i), kind)
          if (i == size(numbers)) exit
          text = text//','//merge(new_line('a'), ' ', mod(i, per_line) == 0)
          if (mod(i, per_line) == 0) text = text//repeat(' ', 6)
       end do
-
-   contains
-
-      function one(i) result(number)
-         integer, intent(in) :: i
-         character(:), allocatable :: number
-
-         if (are_whole) then
-            number = to_text(nint(numbers(i)))
-         else
-            number = number_text(numbers(i))
-         end if
-      end function one
-
    end function number_list
 
 end module fw_reader_text

@@ -7,12 +7,17 @@ module fw_values
    use, intrinsic :: ieee_exceptions, only: ieee_usual
    use fw_key_range, only: range_type
    use fw_kinds, only: wp
+   use fw_namelist_data, only: value_type
    use fw_text, only: lower_case, to_text
    implicit none (type, external)
    private
 
-   public :: read_real, read_integer, read_logical
+   public :: read_real, read_integer, read_logical, read_number
+   public :: real_kind, integer_kind, kind_name, kind_text
    public :: number_text, quoted_text, range_text
+
+   !> The kinds of numbers, as what is accepted.
+   character(*), parameter :: real_kind = 'a finite real', integer_kind = 'an integer'
 
 contains
 
@@ -187,5 +192,41 @@ contains
       if (first > len(text)) return
       is_whole = verify(text(first:), '0123456789') == 0
    end function is_whole
+
+   !> A value as a number of a kind and within a range.
+   subroutine read_number(value, kind, range, number, ok)
+      type(value_type), intent(in) :: value
+      character(*), intent(in) :: kind
+      type(range_type), intent(in) :: range
+      real(wp), intent(out) :: number
+      logical, intent(out) :: ok
+      integer :: whole
+
+      if (kind == integer_kind) then
+         call read_integer(value%text, whole, ok)
+         number = real(whole, wp)
+      else
+         call read_real(value%text, number, ok)
+      end if
+      if (ok) ok = range%holds(number) .and. .not. value%quoted
+   end subroutine read_number
+
+   pure character(7) function kind_name(kind)
+      character(*), intent(in) :: kind
+
+      kind_name = merge('integer', 'real   ', kind == integer_kind)
+   end function kind_name
+
+   function kind_text(number, kind) result(text)
+      real(wp), intent(in) :: number
+      character(*), intent(in) :: kind
+      character(:), allocatable :: text
+
+      if (kind == integer_kind) then
+         text = to_text(nint(number))
+      else
+         text = number_text(number)
+      end if
+   end function kind_text
 
 end module fw_values

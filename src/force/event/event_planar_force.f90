@@ -164,7 +164,8 @@ contains
          before = behind
       end do
       call self%contact%finish()
-      self%share(3) = 1.0_wp - 0.5_wp/pi*self%contact%cosine(0)
+      ! What is open of a pair that never opens is round-off, of either sign.
+      self%share(3) = max(0.0_wp, 1.0_wp - 0.5_wp/pi*self%contact%cosine(0))
    end subroutine add_contact
 
    !> What stick and contact leave in the coefficients.
