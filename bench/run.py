@@ -1,10 +1,10 @@
-"""Measure, and write docs/benchmarks.md with its pictures.
+"""Measure, and write docs/benchmarks.md with its pictures and pages.
 
     python -m bench.run [PART ...] [--build build/release] [--quick] [-o docs]
 
 Parts: speed, precision, events, solvers, paper, iterations, aliasing, time, scaling, limit, skips,
-peers, or all; without any, speed. A part replaces its section of the document and leaves the
-others.
+peers, or all; without any, speed. A part replaces its page, docs/benchmarks/PART.md, and the
+first page is made anew.
 
 Uses the fw_run of a CMake build. --quick runs everything once and small, into build/bench/docs: it
 tries the scripts and measures nothing.
@@ -20,8 +20,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.common.document import ORDER, update_document
+from bench.common.document import ORDER
 from bench.common.measure import ROOT, Bench, describe_machine
+from bench.common.pages import update_page
 from bench.common.programs import build_programs, run_program
 from bench.common.sector import measure_crossing, measure_points, measure_sweeps, measure_threads
 from bench.paper.aliasing import measure_aliasing, write_aliasing
@@ -181,7 +182,7 @@ def main() -> None:
         machine = describe_machine(build)
         text = PARTS[part](job)
         machine["load after"] = f"{os.getloadavg()[0]:.1f} (the measurement itself makes 1 to 2)"
-        update_document(output / "benchmarks.md", part, text, machine)
+        update_page(output, part, text, machine)
     step(f"written: {output / 'benchmarks.md'}")
 
 

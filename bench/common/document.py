@@ -12,7 +12,7 @@ from pathlib import Path
 
 from bench.common.layout import table
 
-__all__ = ["ORDER", "update_document"]
+__all__ = ["COMMON", "ORDER", "anchor", "targets", "update_document", "with_origin"]
 
 #: Parts in the order of the document.
 ORDER = ("speed", "precision", "events", "solvers", "paper", "iterations", "aliasing", "time",

@@ -196,5 +196,5 @@ def solver_rows(data: Response) -> list[tuple[str, str, str]]:
              f"from a good start it takes {pseudo.iterations.sum()} linear solutions against "
              f"{newton.iterations.sum()} of Newton's method, and {ratio:.0f} times its time; what "
              "it buys is starts from which Newton's method fails (see "
-             "[benchmarks](../benchmarks.md#solvers-flows-and-schemes))",
+             "[benchmarks](../benchmarks/solvers.md))",
              "disagrees" if ratio > 1.0 else "agrees")]

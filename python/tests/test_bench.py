@@ -39,6 +39,46 @@ def test_update_is_stable(tmp_path: Path) -> None:
     assert path.read_text(encoding="utf-8") == first
 
 
+def test_a_measurement_replaces_its_page_and_the_first_one(tmp_path: Path) -> None:
+    from bench.common.pages import update_page
+
+    update_page(tmp_path, "time", "## Time\n\nold, see [speed](#whole)", MACHINE)
+    update_page(tmp_path, "speed", "## Speed\n\n### Whole\n\n| 1 | < 5 s: met |", MACHINE)
+    update_page(tmp_path, "time", "## Time\n\nnew, see [speed](#whole)\n\n![p](images/p.png)",
+                MACHINE | {"commit": "def"})
+    page = (tmp_path / "benchmarks" / "time.md").read_text(encoding="utf-8")
+    first = (tmp_path / "benchmarks.md").read_text(encoding="utf-8")
+    assert page.startswith("# Time\n") and "old" not in page and "commit def" in page
+    assert "](speed.md#whole)" in page and "](../images/p.png)" in page
+    assert "## Whole" in (tmp_path / "benchmarks" / "speed.md").read_text(encoding="utf-8")
+    assert "| [Whole](benchmarks/speed.md#whole) | 1 | 0 |  |" in first
+    assert "[Speed](benchmarks/speed.md)" in first
+
+
+def test_the_first_page_finds_its_answers_and_is_that_of_the_pages(tmp_path: Path) -> None:
+    from bench.common.headlines import HEADLINES, rows
+    from bench.common.pages import read_pages, unwrapped, write_overview
+
+    docs = BENCH.parent / "docs"
+    pages = {part: unwrapped(text) for part, text in read_pages(docs / "benchmarks").items()}
+    found = rows(pages)
+    assert len(found) == len(HEADLINES)
+    assert all(answer != "-" and "{" not in answer + target for _, answer, target in found)
+    shutil.copytree(docs / "benchmarks", tmp_path / "benchmarks")
+    shutil.copytree(docs / "images", tmp_path / "images")
+    write_overview(tmp_path)
+    assert (tmp_path / "benchmarks.md").read_text() == (docs / "benchmarks.md").read_text()
+
+
+def test_prose_is_wrapped_and_tables_are_not() -> None:
+    from bench.common.pages import unwrapped, wrapped
+
+    text = "# " + "h " * 90 + "\n\n" + "word " * 60 + "end\n\n| " + "cell " * 60 + "|"
+    lines = wrapped(text).split("\n")
+    assert [len(line) > 120 for line in lines].count(True) == 2
+    assert unwrapped(wrapped(text)) == text
+
+
 def test_error_is_relative_to_the_reference() -> None:
     from bench.common.oscillators import relative_error
 

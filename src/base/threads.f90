@@ -11,7 +11,7 @@ module fw_threads
 
    !> Contact pairs, and coordinates of a joint, from which parallel regions pay. One rule for all
    !> of them, because threads that wait for the next region spin, some milliseconds long: below, a
-   !> run stays in one thread altogether (docs/benchmarks.md, "Close to the limit").
+   !> run stays in one thread altogether (docs/benchmarks/limit.md).
    integer, parameter :: pairs_for_threads = 64
    integer, parameter :: coordinates_for_threads = 3*pairs_for_threads
 
