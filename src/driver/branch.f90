@@ -10,11 +10,15 @@ module fw_branch
    use fw_hbm, only: hbm_system
    use fw_hdhb, only: hdhb_system
    use fw_hdhb, only: new_hdhb
+   use fw_newton, only: newton_solver
+   use fw_newton, only: solver_report
    use fw_newton, only: tight_forcing
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_point, only: served_by_arclength
    use fw_level, only: level_type
+   use fw_problem, only: build_system
+   use fw_recovery, only: carry_solution
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_solution, only: find_stability
@@ -28,11 +32,16 @@ module fw_branch
 
    !> First step where n_points leaves the choice: this part of the interval.
    integer, parameter :: default_steps = 100
+   !> Unknowns up to which a branch is followed without condensation.
+   integer, parameter :: whole_up_to = 150
 
    !> The points of a branch as points of a result, one after the other.
    type :: branch_type
       type(arclength_type) :: curve
       type(hbm_system), pointer :: system => null()
+      !> The structure without condensation, where it is small: nothing of it is hidden from the
+      !> step control then.
+      type(hbm_system), pointer :: whole => null()
       !> The balance with values at instants as unknowns, where `hdhb` is asked for.
       type(hdhb_system) :: in_time
       logical :: is_in_time = .false.
@@ -42,6 +51,7 @@ module fw_branch
       procedure :: begin
       procedure :: next
       procedure :: closing_words
+      final :: release
    end type branch_type
 
    !> The same as a source of a sweep.
@@ -112,7 +122,7 @@ contains
       character(:), allocatable :: words
 
       if (.not. self%has_begun .or. self%has_no_start) return
-      call self%level%solver%method%newton%linear%add_work(self%branch%curve%linear)
+      call self%level%solver%method%newton%linear%add_work(self%branch%curve%corrector%linear)
       call self%branch%closing_words(case, words)
       call observer%on_message(words)
    end subroutine finish
@@ -125,30 +135,76 @@ contains
       type(hbm_system), intent(inout), target :: system
       real(wp), intent(in), contiguous :: x(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: values(:)
+      real(wp), allocatable :: values(:), whole_x(:)
 
       self%system => system
       call system_clock(self%clock)
-      allocate (self%r(system%n))
+      call build_whole(self, case, system, x, whole_x, error)
+      if (allocated(error)) return
+      allocate (self%r(self%system%n))
       associate (curve => self%curve)
          curve%options = case%solver
          curve%start = case%sweep%start
          curve%finish = case%sweep%end
          curve%max_points = case%sweep%max_points
-         curve%x_scale = displacement_scale(system)
+         curve%x_scale = displacement_scale(self%system)
          curve%step = 1.0_wp/real(default_steps, wp)
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       end associate
       self%is_in_time = case%harmonics%method == method_hdhb
       if (self%is_in_time) then
-         self%in_time = new_hdhb(system)
-         allocate (values(system%n))
-         call self%in_time%to_values(system%structure%n_coordinates, x, values)
+         self%in_time = new_hdhb(self%system)
+         allocate (values(self%system%n))
+         call self%in_time%to_values(self%system%structure%n_coordinates, whole_x, values)
          call self%curve%begin(self%in_time, values, error)
       else
-         call self%curve%begin(system, x, error)
+         call self%curve%begin(self%system, whole_x, error)
       end if
    end subroutine begin
+
+   !> Where the structure is small, take it whole: resonances of what condensation leaves out would
+   !> be passed over. The point it starts from is carried over.
+   subroutine build_whole(self, case, system, x, whole_x, error)
+      class(branch_type), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(hbm_system), intent(in) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), allocatable, intent(out) :: whole_x(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(newton_solver) :: newton
+      type(solver_report) :: report
+
+      whole_x = x
+      if (case%model%n_dof*system%fourier%n_coefficients > whole_up_to) return
+      allocate (self%whole)
+      call build_system(case, self%whole, error, keep_all=.true.)
+      if (allocated(error)) return
+      call self%whole%set_frequency(case%sweep%start, error)
+      if (allocated(error)) return
+      ! One and the same law.
+      self%whole%forces = system%forces
+      self%whole%depth = system%depth
+      associate (pairs => system%forces%pairs)
+         self%whole%work(pairs)%x_start = system%work(pairs)%x_start
+      end associate
+      deallocate (whole_x)
+      allocate (whole_x(self%whole%n))
+      call carry_solution(system, x, self%whole, whole_x)
+      newton%options = case%solver
+      call newton%solve(self%whole, whole_x, report)
+      call self%curve%corrector%linear%add_work(newton%linear)
+      if (report%converged) then
+         self%system => self%whole
+      else
+         whole_x = x
+      end if
+   end subroutine build_whole
+
+   subroutine release(self)
+      type(branch_type), intent(inout) :: self
+
+      if (associated(self%whole)) deallocate (self%whole)
+   end subroutine release
 
    !> The next point of the branch; `more` is false where there is none.
    subroutine next(self, case, point, more, error)

@@ -90,6 +90,46 @@ def test_a_branch_that_turns_back_says_so(fw_run) -> None:
         assert len(file["omega"]) == 5
 
 
+# Two masses, linear but for a spring of nothing: damping of 1.5 and of 0.5 %; n_points, load.
+LINEAR = """
+&case analysis = 'frf' /
+&model n_dof = 2, mass = 1, 0, 0, 1, stiffness = {k}, -{c}, -{c}, {k}, damping = {d} /
+&spring n_springs = 1, side_1 = 1, coefficient = 1e-9 /
+&load cosine = 1, {load} /
+&sweep start = {start}, end = 3, n_points = {n}, continuation = 'arclength' /
+"""
+
+
+@pytest.mark.parametrize(("k", "c", "d", "load", "start", "n", "peaks"), [
+    (1.5, 0.5, (0.03, 0.01), 0, 0.3, 21, 2), (1.2, 0.2, (0.012, 0.002), 1, 0.5, 41, 1)])
+def test_resonances_are_followed_in_few_points(fw_run, k, c, d, load, start, n, peaks) -> None:
+    """The corrector stays near its predictor: no resonance is jumped, and none traced twice."""
+    damping = f"{d[0]}, -{d[1]}, -{d[1]}, {d[0]}"
+    fw_run.write(LINEAR.format(k=k, c=c, d=damping, load=load, start=start, n=n), "branch.nml")
+    done = fw_run("-o", "branch.h5", "branch.nml")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(fw_run.directory / "branch.h5") as file:
+        omega, amplitude = file["omega"][:], file["amplitude"][:, 0]
+    assert (np.diff(omega) > 0).all() and omega[-1] == 3
+    assert len(omega) < 80
+
+    def exact(w):
+        dynamic = np.array([[k, -c], [-c, k]]) - w**2 * np.eye(2) + 1j * w * np.array(
+            [[d[0], -d[1]], [-d[1], d[0]]])
+        return abs(np.linalg.solve(dynamic, [1, load])[0])
+
+    # The spring of nothing moves the response by 1e-9 * 3/4 * 100^3 / 0.01 at most.
+    assert amplitude == pytest.approx([exact(w) for w in omega], rel=0.1)
+    tops = [max(exact(w) for w in np.linspace(0.97, 1.03, 6001) * mode)
+            for mode in (np.sqrt(k - c), np.sqrt(k + c))[:peaks]]
+    highest = [amplitude[k] for k in range(1, len(omega) - 1)
+               if amplitude[k] > max(amplitude[k - 1], amplitude[k + 1])]
+    # Rows stand within a fifth of the half-power width: 4 % below the top.
+    assert highest == pytest.approx(tops, rel=0.04)
+    # Progress of a branch of unknown length is some lines, and says why it ended.
+    assert "followed to the end of the sweep" in done.stderr
+
+
 SECTOR = Path(__file__).parents[2] / "example" / "blade_sector" / "frf.nml"
 
 
@@ -132,16 +172,20 @@ def test_a_blade_that_nothing_holds(fw_run, load, hertz) -> None:
     assert (fraction[-1, :, 1] > 0).all()
 
 
-@pytest.mark.parametrize("n_points", [37, 41])
-def test_the_lock_carries_the_branch_on(fw_run, n_points) -> None:
-    """The same with an axial lock, 1 N: on to the end, whatever the first step."""
+# Peaks of natural sweeps of 41 points (example/blade_sector/README.md), which end on it or beside.
+@pytest.mark.parametrize(("harmonics", "load", "n_points", "peak"), [
+    (3, 1.0, 37, 0.3811), (3, 1.0, 41, 0.3811), (3, 0.5, 41, 0.3592), (1, 1.0, 41, 0.4295),
+    (1, 0.5, 45, 0.3882)])
+def test_the_lock_carries_the_branch_on(fw_run, harmonics, load, n_points, peak) -> None:
+    """The same with an axial lock: on to the end, whatever the first step."""
     case = SECTOR.with_name("frf_2000rpm.nml")
-    done = fw_run("-o", "locked.h5", "--set", f"sweep%n_points={n_points}", case)
+    done = fw_run("-o", "locked.h5", "--set", f"sweep%n_points={n_points}", "--set",
+                  f"harmonics%n_harmonics={harmonics}", "--set", f"load%harmonic_scale={load}",
+                  case)
     assert done.returncode == 0, done.stderr
     with h5py.File(fw_run.directory / "locked.h5") as file:
         hertz = file["omega"][:] / (2 * np.pi)
         assert file["converged"][:].all()
         amplitude = file["amplitude"][:, 0]
     assert hertz[-1] == pytest.approx(1012, rel=1e-12)
-    # The peak of the natural sweep, which takes other steps; between points of 0.55 Hz.
-    assert amplitude.max() == pytest.approx(0.3811, abs=2e-4)
+    assert amplitude.max() == pytest.approx(peak, abs=2e-4)

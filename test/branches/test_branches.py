@@ -1,0 +1,70 @@
+"""Some of the branches of each family, and proof that the judges see what is wrong."""
+from __future__ import annotations
+
+import branch_chains
+import branch_joints
+import branches
+import numpy as np
+import pytest
+
+# First seeds of each family: some seconds.
+CHAINS, JOINTS = range(16), range(9)
+
+
+@pytest.mark.parametrize("n_points", branches.FIRST_STEPS)
+def test_a_linear_branch_goes_over_every_resonance(n_points):
+    for seed in CHAINS:
+        verdict = branches.judge_chain(branches.PROGRAM, seed, n_points)
+        assert not (verdict.turned or verdict.skipped or verdict.incomplete or verdict.off), (
+            seed, verdict)
+        assert verdict.interpolation < 2 * branches.TRUE, (seed, verdict)
+
+
+@pytest.mark.parametrize("seed", JOINTS)
+def test_a_branch_holds_what_fine_sweeps_find(seed):
+    kind, verdict = branches.judge_joint(branches.PROGRAM, seed)
+    assert not (verdict.incomplete or verdict.off or verdict.missed), (kind, verdict)
+
+
+def test_the_judge_of_chains_sees_what_is_wrong():
+    chain = branch_chains.random_chain(3)
+    omega = np.linspace(chain.start, chain.end, 4000)
+    u = chain.response(omega)[0]
+    rows = np.stack([np.zeros_like(u.real), u.real, -u.imag], axis=1)
+    good = branch_chains.judge(chain, omega, rows, 0)
+    assert not (good.turned or good.skipped or good.incomplete or good.off)
+    away = np.abs(omega - chain.omega[0]) > 8 * chain.width[0]
+    assert branch_chains.judge(chain, omega[away], rows[away], 0).skipped
+    assert branch_chains.judge(chain, omega[::-1], rows[::-1], 0).turned
+    assert branch_chains.judge(chain, omega[:-1], rows[:-1], 0).incomplete
+    assert branch_chains.judge(chain, omega, 1.001 * rows, 0).off
+    assert branch_chains.judge(chain, omega[::400], rows[::400], 0).interpolation > branches.TRUE
+
+
+def test_the_judge_of_joints_sees_what_is_wrong():
+    """An S that its branch cuts short, held against sweeps along its ends."""
+    joint = branch_joints.Joint("cubic", "", 0.0, 1.0)
+    a = np.linspace(-1, 1, 400)
+    omega = 0.5 + 0.75 * a**3 - 0.25 * a
+    turning = np.zeros(len(a), dtype=bool)
+    turning[np.searchsorted(a, [-1 / 3, 1 / 3])] = True
+    rows = (2 + a)[:, None, None]
+    whole = (omega, np.ones(len(a), dtype=bool), rows, turning)
+    at = np.linspace(0, 1, 201)
+
+    def sweep(order):
+        # What a natural sweep follows: the last root on its side of the folds.
+        first = 0 if order > 0 else -1
+        value = [np.sort(np.interp(0, [0], [0]) + np.real(r[np.abs(r.imag) < 1e-9]))[first]
+                 for r in (np.roots([0.75, 0, -0.25, 0.5 - w]) for w in at)]
+        good = np.ones(len(at), dtype=bool)
+        found = (at, good, 2 + np.array(value)[:, None, None], ~good)
+        return found if order > 0 else tuple(part[::-1] for part in found)
+
+    sweeps = (sweep(1), sweep(-1))
+    assert branch_joints.judge(joint, whole, sweeps, 0) == branch_joints.Verdict(400)
+    unmarked = (omega, whole[1], rows, np.zeros_like(turning))
+    assert branch_joints.judge(joint, unmarked, sweeps, 0).missed
+    cut = (a < -0.34) | (a > 0.9)
+    short = tuple(part[cut] for part in whole)
+    assert branch_joints.judge(joint, short, sweeps, 0).off
