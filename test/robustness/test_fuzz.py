@@ -1,5 +1,6 @@
 """The short form of the fuzzing, and every crash that the long one has found."""
 import gzip
+import json
 import os
 import random
 import subprocess
@@ -13,6 +14,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE)]
 import fuzz_bases  # noqa: E402
 import fuzz_model  # noqa: E402
+import fuzz_namelist  # noqa: E402
 import fuzz_result  # noqa: E402
 from project import PROGRAM  # noqa: E402
 
@@ -20,6 +22,12 @@ from project import PROGRAM  # noqa: E402
 def check(folder, *options):
     return subprocess.run([PROGRAM, *options, "case.nml"], cwd=folder, text=True,
                           capture_output=True, timeout=60, check=False)
+
+
+def test_every_key_of_the_program_is_among_the_inputs():
+    shown = subprocess.run([PROGRAM, "--keys=json"], text=True, capture_output=True, check=True)
+    declared = {group: list(content["keys"]) for group, content in json.loads(shown.stdout).items()}
+    assert declared == fuzz_namelist.KEYS
 
 
 def test_three_hundred_inputs():
