@@ -135,6 +135,11 @@ compare: build ## numbers and work of OTHER (another fw_run) and of this build, 
 paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) -m bench.paper.gallery
 
+BEFORE ?=
+peaks: build ## reported peaks of random sweeps, also of a program BEFORE, written to docs/robustness.md
+	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/peaks.py \
+	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
+
 faults: build ## kills, signals, full disks, two runs at a time, written to docs/robustness.md
 	$(OVERVIEW) PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \
 	   -o docs/robustness.md

@@ -343,7 +343,8 @@ contains
       load_norm = norm2(self%load)
       if (self%fourier%has_constant()) then
          load_norm = norm2(self%load(:, 2:))
-         static = norm2(self%load(:, 1))
+         ! What a fit presses together acts like a static load, even where no load moves the joint.
+         static = norm2(self%load(:, 1)) + press_of(self)
       end if
       load_norm = max(load_norm, static_share*static)
       if (load_norm <= 0.0_wp) then
@@ -353,6 +354,17 @@ contains
       end if
       if (load_norm <= 0.0_wp) load_norm = 1.0_wp
    end function load_norm
+
+   !> Forces that interferences would have where nothing gave way.
+   real(wp) function press_of(self)
+      type(hbm_system), intent(in) :: self
+
+      press_of = 0.0_wp
+      if (size(self%depth) == 0) return
+      associate (p => self%forces%entry(self%forces%pairs)%law%prediction)
+         press_of = norm2(p%stiffness(:, 3)*min(p%gap, 0.0_wp))
+      end associate
+   end function press_of
 
    !> R(x); see the module header.
    subroutine residual(self, x, r)

@@ -10,7 +10,7 @@ module fw_diagnosis
    implicit none (type, external)
    private
 
-   public :: explain_failure, finer
+   public :: explain_failure, finer, takes_scale
 
    !> Halvings of the interval in which the largest share of the load is looked for that converges.
    integer, parameter :: n_halvings = 6
@@ -68,7 +68,10 @@ contains
       if (.not. held_without_friction(system)) then
          reason = 'the joint cannot carry its static load while it slides, for only '// &
                   'friction holds it: '//reason//'; it needs more preload, friction or support'
-      else if (system%forces%entry(system%forces%pairs)%law%prediction%takes_balance) then
+      else if (size(system%depth) == 0) then
+         reason = reason//'; try '//trim(finer(system))//', or a sweep that starts where the '// &
+                  'response is small; an undamped resonance needs damping'
+      else if (takes_scale(system)) then
          reason = reason//'; try another penalty_scale (0.3 or 3), '//trim(finer(system))// &
                   ', or a sweep that starts where the response is small; an undamped resonance '// &
                   'needs damping'
@@ -78,6 +81,14 @@ contains
                   'response is small; an undamped resonance needs damping'
       end if
    end subroutine explain_vibration
+
+   !> Whether the case accepts a penalty_scale: its pairs have a rigid law.
+   pure logical function takes_scale(system)
+      type(hbm_system), intent(in) :: system
+
+      takes_scale = size(system%depth) > 0 .and. &
+                    system%forces%entry(system%forces%pairs)%law%prediction%takes_balance
+   end function takes_scale
 
    !> What resolves the contact better: located events do not depend on the instants.
    pure function finer(system) result(advice)

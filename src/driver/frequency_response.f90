@@ -13,6 +13,8 @@ module fw_frequency_response
    use fw_one_level, only: one_level
    use fw_peak, only: peak_type
    use fw_peak_finder, only: peak_finder
+   use fw_remarks, only: remark_peaks
+   use fw_remarks, only: remark_range
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
    use fw_sinks, only: observer_sink
@@ -67,6 +69,7 @@ contains
          if (case%analysis == analysis_frf .and. size(source%omega) > 1) then
             call finder%start(case, source%omega, source, strategy)
             call sinks%add(finder)
+            call remark_range(case, finder%modes, summary%remarks)
          end if
       end select
       call run_sweep(case, source, sinks, observer, state, error)
@@ -92,6 +95,7 @@ contains
       if (allocated(error)) return
       call finder%peaks(peaks)
       call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
+      call remark_peaks(peaks, case%model%observe_name, summary%remarks)
       call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, error)
    end subroutine find_peaks
 

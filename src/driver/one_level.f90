@@ -3,6 +3,7 @@ module fw_one_level
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
    use fw_diagnosis, only: finer
+   use fw_diagnosis, only: takes_scale
    use fw_error, only: error_type
    use fw_level, only: level_type
    use fw_point, only: point_type
@@ -67,8 +68,9 @@ contains
                                     state%all_converged())
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
          if (state%was_stopped .or. state%all_converged()) return
-         message = 'try a finer sweep, the other direction, another penalty_scale (0.3 or 3) '// &
-                   'or '//trim(finer(system))//' for the points above'
+         message = 'try a finer sweep, the other direction'
+         if (takes_scale(system)) message = message//', another penalty_scale (0.3 or 3)'
+         message = message//' or '//trim(finer(system))//' for the points above'
          if (state%n_converged == 0) call explain_failure(system, solver%method, message)
          message = 'not converged: '//message
       end associate

@@ -252,7 +252,8 @@ contains
       if (.not. allocated(error)) call climb(self, case, budget, error)
    end subroutine search
 
-   !> Where an end of the range seems to hold the highest amplitude, the maximum may lie just inside.
+   !> Where an end of the range seems to hold the highest amplitude, the maximum may lie just
+   !> inside.
    subroutine look_inside(self, case, budget, error)
       type(peak_finder), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -503,7 +504,7 @@ contains
       integer, intent(in) :: k, i
       integer :: inside
 
-      is_bound = k == 1 .or. k == samples%n
+      is_bound = (k == 1 .or. k == samples%n) .and. samples%item(k)%at%amplitude(i) > 0.0_wp
       if (.not. is_bound .or. samples%n == 1) return
       inside = merge(2, samples%n - 1, k == 1)
       is_bound = samples%item(k)%at%amplitude(i) >= samples%item(inside)%at%amplitude(i)

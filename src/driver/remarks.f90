@@ -2,7 +2,10 @@
 !> run.
 module fw_remarks
    use fw_case, only: case_type
+   use fw_joint_modes, only: held_stiffness
    use fw_joint_modes, only: joint_mode_type
+   use fw_joint_modes, only: most_dofs
+   use fw_joint_modes, only: state_sliding
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dpotrf
@@ -54,11 +57,14 @@ contains
    subroutine remark_input(case, remarks)
       type(case_type), intent(in) :: case
       type(remark_list), intent(inout) :: remarks
+      real(wp), allocatable :: stiffness(:, :)
       logical :: acts
 
-      if (is_negative(case%model%stiffness)) call remarks%add('negative stiffness', &
-         'the stiffness matrix is not positive: some deformation gives off energy, and without '// &
-         'contact the structure does not stay where it is')
+      ! A part that its contact holds may well be softened by rotation.
+      call held_stiffness(case, state_sliding, stiffness)
+      if (is_negative(stiffness)) call remarks%add('negative stiffness', &
+         'the stiffness matrix is not positive: some deformation gives off energy, and nothing '// &
+         'holds the structure where it is')
       if (is_negative(case%model%damping)) call remarks%add('negative damping', &
          'the damping matrix is not positive: some motion gains energy (flutter, where it is '// &
          'meant); a periodic response need not be the one that is seen')
@@ -69,8 +75,8 @@ contains
       end if
       acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
              any(abs(case%model%load_sine) > 0.0_wp)
-      if (.not. acts) call remarks%add('no load', 'no vibratory load acts: the response is that '// &
-         'at rest; set load%cosine or load%sine (with a model file, load%harmonic_scale)')
+      if (.not. acts) call remarks%add('no load', 'no vibratory load acts: the response is '// &
+         'that at rest; set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       call remark_harmonics(case, remarks)
    end subroutine remark_input
 
@@ -98,7 +104,7 @@ contains
       character(:), allocatable :: text
       real(wp) :: range(2)
 
-      if (size(modes) > 0) return
+      if (size(modes) > 0 .or. case%model%n_dof > most_dofs) return
       range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
       text = 'no natural frequency of the free or the stuck structure lies in the sweep, '// &
              number_text(rounded(range(1)/(2.0_wp*pi)))//' to '// &
@@ -129,7 +135,7 @@ contains
          if (n_bound == 1) first = names(i)%text
       end do
       if (n_bound > 0) call remarks%add('peak at the end', 'the largest amplitude of '//first// &
-         others(n_bound - 1)//' is at an end of the sweep: it may rise further outside')
+         trim(others(n_bound - 1))//' is at an end of the sweep: it may rise further outside')
       n_open = count(peaks%found_by == found_unresolved)
       if (n_open > 0) call remarks%add('peak not resolved', to_text(n_open)// &
          ' of '//to_text(size(peaks))//' maxima are not resolved: take more points around them '// &
@@ -138,12 +144,10 @@ contains
 
    pure function others(n) result(words)
       integer, intent(in) :: n
-      character(32) :: padded
-      character(:), allocatable :: words
+      character(20) :: words
 
-      padded = ''
-      if (n > 0) write (padded, '(a, i0, a)') ' and of ', n, ' more'
-      words = trim(padded)
+      words = ''
+      if (n > 0) write (words, '(a, i0, a)') ' and of ', n, ' more'
    end function others
 
    !> Whether a symmetric matrix has negative directions beyond round-off, its rows being scaled.

@@ -12,6 +12,7 @@ module fw_run
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
    use fw_problem, only: build_system
+   use fw_remarks, only: remark_input
    use fw_restart_file, only: read_restart
    use fw_restart_file, only: restart_type
    use fw_result, only: result_writer
@@ -80,6 +81,7 @@ contains
       if (allocated(error)) return
       call threads%enter(case%threads)
       summary = new_summary(case)
+      call remark_input(case, summary%remarks)
       if (case%analysis == analysis_wear) then
          call run_wear(case, restart, observer, writer, summary, state, error)
       else
@@ -97,6 +99,10 @@ contains
             if (present(image)) call move_alloc(writer%image, image)
          end if
          return
+      end if
+      if (summary%remarks%count() > 0) then
+         call writer%add_remarks(summary%remarks%name, summary%remarks%text, error)
+         if (allocated(error)) return
       end if
       call writer%close(trim(state%words()), elapsed, error, summary%skipped, summary%sampling)
       if (present(image)) call move_alloc(writer%image, image)

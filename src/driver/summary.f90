@@ -13,6 +13,7 @@ module fw_summary
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
    use fw_point, only: point_type
+   use fw_remarks, only: remark_list
    use fw_run_state, only: run_state
    use fw_solver_options, only: solver_newton
    use fw_text, only: string_type
@@ -37,6 +38,8 @@ module fw_summary
       real(wp), allocatable :: peak(:), peak_omega(:)
       !> What else there is to say of the peak of each; not allocated where nothing is.
       type(string_type), allocatable :: peak_note(:)
+      !> What is allowed and seldom meant.
+      type(remark_list) :: remarks
       type(string_type), allocatable :: work(:)
       !> What the case did not need, in words.
       type(string_type), allocatable :: skipped(:)
@@ -308,6 +311,9 @@ contains
       end if
       do i = 1, size(self%work)
          call append(table, self%work(i)%text)
+      end do
+      do i = 1, self%remarks%count()
+         call add_line(table, 'remark', self%remarks%text(i)%text)
       end do
       write (text, '(f20.3, a)') seconds, ' s'
       call add_line(table, 'time', trim(adjustl(text)))

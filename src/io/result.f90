@@ -55,6 +55,7 @@ module fw_result
       procedure :: add_point
       procedure :: copy_points
       procedure :: add_peaks
+      procedure :: add_remarks
       procedure :: flush
       procedure :: close
       procedure :: discard
@@ -142,6 +143,20 @@ contains
       call write_peaks(self%file, peaks, n_harmonics, unit_system, error)
       !$omp end critical (fretwear_io)
    end subroutine add_peaks
+
+   !> What is allowed in the case and seldom meant.
+   subroutine add_remarks(self, name, text, error)
+      class(result_writer), intent(inout) :: self
+      !> Names by which programs know them, and the words (n_remarks).
+      type(string_type), intent(in) :: name(:), text(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call write_text(self%file, '/remarks/name', name, error)
+      if (.not. allocated(error)) call write_text(self%file, '/remarks/text', text, error)
+      !$omp end critical (fretwear_io)
+   end subroutine add_remarks
 
    subroutine append_point(self, point, error)
       class(result_writer), intent(inout) :: self

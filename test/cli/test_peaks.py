@@ -1,0 +1,98 @@
+"""The peak that a sweep of few points reports is the true one, or it says that it may not be."""
+import subprocess
+
+import h5py
+import numpy as np
+import peak_family
+import pytest
+from cases import merged, run, write_namelist
+from limits import limit
+from project import PROGRAM
+
+#: Sliders, friction, a stop and a cubic spring, down and up.
+FEW = range(12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_linear_chain_has_its_highest_resonance_found(tmp_path, seed):
+    groups, true = peak_family.linear(seed)
+    run(tmp_path, groups)
+    peak, remark = peak_family.reported(tmp_path / "case.h5")
+    assert peak == pytest.approx(true, rel=peak_family.RIGHT) and not remark
+
+
+@pytest.mark.parametrize("seed", FEW)
+def test_a_nonlinear_peak_is_that_of_a_fine_sweep_or_has_a_remark(tmp_path, seed):
+    groups, _, ratio = peak_family.nonlinear(seed)
+    run(tmp_path, groups, status=(0, 4))
+    peak, remark = peak_family.reported(tmp_path / "case.h5")
+    true = peak_family.fine_peak(tmp_path, groups, ratio)
+    assert remark or true is None or peak == pytest.approx(true, rel=peak_family.RIGHT)
+
+
+def test_rows_stay_those_that_were_asked_for(tmp_path):
+    groups, _ = peak_family.linear(1)
+    sweep = groups["sweep"]
+    run(tmp_path, groups)
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert np.allclose(file["omega"][:], np.linspace(sweep["start"], sweep["end"],
+                                                         sweep["n_points"]), rtol=1e-15)
+        width, omega = file["peak/bandwidth"][:], file["peak/omega"][:]
+        coefficients, amplitude = file["peak/coefficients"][:], file["peak/amplitude"][:]
+        best = amplitude.argmax()
+    # Half-power width of a mode of its damping: 2 zeta omega, but for the tails of the others.
+    expected = 2.0 * groups["model"]["modal_damping"] * omega[best]
+    assert width[best] == pytest.approx(expected, rel=0.02)
+    assert np.hypot(*coefficients[best, 1:3]) == pytest.approx(amplitude[best], rel=1e-6)
+
+
+def test_a_peak_at_the_end_of_the_sweep_is_said(tmp_path):
+    groups, _ = peak_family.linear(0)
+    groups["sweep"]["end"] = groups["sweep"]["start"] * 1.05
+    run(tmp_path, groups)
+    assert peak_family.reported(tmp_path / "case.h5")[1]
+
+
+#: A slider that nothing is wrong with, and a change to it with the remark that it draws.
+PLAIN = {"case": {"analysis": "frf"},
+         "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.05},
+         "contact": {"n_pairs": 1, "side_1": [1, 0, 0], "mu": 0.3, "normal_load": 1.0},
+         "load": {"cosine": 1.0}, "harmonics": {"n_harmonics": 3},
+         "sweep": {"start": 0.5, "end": 1.5, "n_points": 11}}
+REMARKS = {"negative stiffness": {"model": {"stiffness": -1.0}},
+           "negative damping": {"model": {"damping": -0.05}},
+           "high friction": {"contact": {"mu": 30.0}},
+           "no load": {"load": {"cosine": 0.0}},
+           "one harmonic": {"harmonics": {"n_harmonics": 1}},
+           "no mode": {"sweep": {"start": 3.0, "end": 4.0}},
+           "peak at the end": {"sweep": {"start": 0.2, "end": 0.5}}}
+
+
+def remarks(path):
+    with h5py.File(path) as file:
+        return [name.decode() for name in file["remarks/name"][:]] if "remarks" in file else []
+
+
+@pytest.mark.parametrize("name", [None, *REMARKS])
+def test_what_is_seldom_meant_is_said_and_ends_nothing(tmp_path, name):
+    write_namelist(tmp_path / "case.nml", merged(PLAIN, REMARKS.get(name, {})))
+    done = subprocess.run([PROGRAM, "case.nml"], cwd=tmp_path, text=True, capture_output=True,
+                          check=False, timeout=limit(60))
+    assert done.returncode == 0, done.stderr
+    found = remarks(tmp_path / "case.h5")
+    assert name in found if name else found == []
+    assert done.stdout.count("\nremark ") == len(found)
+
+
+def test_a_load_that_moves_no_joint_converges(tmp_path):
+    """Two bodies pressed together and driven alike: the load on the joint is round-off."""
+    case = {"case": {"analysis": "point"},
+            "model": {"n_dof": 4, "mass": np.diag([1.0, 0.3, 1.0, 0.3]).ravel().tolist(),
+                      "stiffness": np.kron(np.eye(2), [[3.0, -1.0], [-1.0, 1.7]]).ravel().tolist(),
+                      "rayleigh_stiffness": 0.01},
+            "contact": {"n_pairs": 1, "side_1": [1, 0, 2], "side_2": [3, 0, 4], "mu": 0.3,
+                        "gap": -0.05},
+            "load": {"cosine": [0.3, 1.0, 0.3, 1.0]},
+            "harmonics": {"n_harmonics": 5, "n_time": 192, "sampling": "uniform"},
+            "sweep": {"start": 0.5965}}
+    run(tmp_path, case)

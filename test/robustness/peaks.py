@@ -1,0 +1,76 @@
+"""Counts of reported peaks: right, with a remark, wrong without a word; docs/robustness.md.
+
+    python test/robustness/peaks.py --before OTHER/fw_run -o docs/robustness.md
+"""
+import argparse
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+
+import peak_family  # noqa: E402
+from cases import run  # noqa: E402
+from project import PROGRAM  # noqa: E402
+from sections import write_section  # noqa: E402
+
+WORDS = ("right", "remark", "wrong without a word")
+
+
+def verdict(folder, groups, true, program):
+    """What a program makes of a case whose highest amplitude is known."""
+    run(folder, groups, status=(0, 4), program=program)
+    peak, remark = peak_family.reported(folder / "case.h5")
+    if abs(peak / true - 1.0) <= peak_family.RIGHT:
+        return WORDS[0]
+    return WORDS[1] if remark else WORDS[2]
+
+
+def count(number, programs):
+    """Verdicts by family and program; families of which no fine sweep converges are left out."""
+    counts = Counter()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for seed in range(number):
+            if seed % 2 == 0:
+                groups, true = peak_family.linear(seed)
+                family = "linear chain"
+            else:
+                groups, family, ratio = peak_family.nonlinear(seed)
+                true = peak_family.fine_peak(folder, groups, ratio)
+            if true is None:
+                counts[family, "left out"] += 1
+                continue
+            for label, program in programs.items():
+                counts[family, label, verdict(folder, groups, true, program)] += 1
+    return counts
+
+
+def table(counts, programs):
+    """Rows of the document."""
+    lines = ["", "| family | left out | " + " | ".join(
+        f"{label}: {word}" for label in programs for word in WORDS) + " |",
+        "|---|" + "---|" * (1 + len(WORDS) * len(programs))]
+    for family in sorted({key[0] for key in counts}):
+        cells = [counts[family, "left out"]] + [counts[family, label, word]
+                                                for label in programs for word in WORDS]
+        lines.append(f"| {family} | " + " | ".join(map(str, cells)) + " |")
+    return [*lines, ""]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=500)
+    parser.add_argument("--before", help="program to compare with")
+    parser.add_argument("-o", "--output", type=Path, help="document with the section `peaks`")
+    options = parser.parse_args()
+    programs = {"now": PROGRAM} | ({"before": options.before} if options.before else {})
+    lines = table(count(options.count, programs), programs)
+    print("\n".join(lines))
+    if options.output:
+        write_section("peaks", lines, options.output)
+
+
+if __name__ == "__main__":
+    main()
