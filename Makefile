@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare paper
-.PHONY: stress long faults verify
+.PHONY: stress long faults peaks verify
 
 BUILD := build/release
 RUN := build/run
