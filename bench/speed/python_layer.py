@@ -41,10 +41,10 @@ class TimedSession(Session):
         super().read(*arguments, **named)
         TimedSession.seconds += now() - start
 
-    def run(self, control):
+    def run(self, *arguments, **named):
         """Run the case."""
         start = now()
-        status = super().run(control)
+        status = super().run(*arguments, **named)
         TimedSession.seconds += now() - start
         return status
 

@@ -101,9 +101,9 @@ contains
 
    !> The quantities of a point: a line each, with the name and the shape of its array, where -1 is
    !> a size that only the numbers tell.
-   function quantity_lines(case) result(text)
+   subroutine quantity_lines(case, text)
       type(case_type), intent(in) :: case
-      character(:), allocatable :: text
+      character(:), allocatable, intent(out) :: text
       type(quantity_type), allocatable :: list(:)
       integer, allocatable :: sizes(:)
       integer :: i, k
@@ -118,7 +118,7 @@ contains
          end do
          text = text//new_line('a')
       end do
-   end function quantity_lines
+   end subroutine quantity_lines
 
    pure function flat(array) result(values)
       real(wp), intent(in) :: array(:, :)

@@ -349,7 +349,7 @@ contains
          case ('inputs')
             if (allocated(case%inputs)) text = join(case%inputs, new_line('a'))
          case ('quantities')
-            text = quantity_lines(case)
+            call quantity_lines(case, text)
          case ('image')
             if (allocated(handle%image)) bytes = handle%image
          case default

@@ -39,8 +39,8 @@ module fw_session
 
    public :: session_type
 
-   !> What messages call the input of a session without a namelist file, and its keys.
-   character(*), parameter :: default_name = 'case', key_origin = 'set'
+   !> What messages call the input of a session without a namelist file.
+   character(*), parameter :: default_name = 'case'
 
    type :: session_type
       !> The case as it was last read; see `prepare`.
@@ -50,7 +50,7 @@ module fw_session
       !> The points of the last run, or of the steps since `start`.
       type(point_list) :: points
       !> What messages call a key that was set.
-      character(:), allocatable :: origin
+      character(16) :: origin = 'set'
       !> Namelist text, its path or name, and `group%key=value` on top of it.
       character(:), allocatable, private :: text, path
       type(string_type), allocatable, private :: keys(:)
@@ -122,7 +122,7 @@ contains
       assignment = trim(adjustl(key))//'='
       ! The texts of the reader serve one thread at a time.
       !$omp critical (fretwear_io)
-      call parse_override(assignment//trim(value), entry, error, origin_of(self))
+      call parse_override(assignment//trim(value), entry, error, trim(self%origin))
       !$omp end critical (fretwear_io)
       if (allocated(error)) return
       allocate (kept(0))
@@ -229,7 +229,7 @@ contains
       input%path = self%path
       input%overrides = self%keys
       input%text = self%text
-      input%origin = origin_of(self)
+      input%origin = trim(self%origin)
       ! Damping and checks of a model must not depend on the threads of the BLAS.
       call threads%enter(0)
       if (allocated(self%model)) then
@@ -388,14 +388,6 @@ contains
          call get_point_values(self%points%item(k)%point, name, self%case, values, error)
       end if
    end subroutine get
-
-   pure function origin_of(self) result(origin)
-      class(session_type), intent(in) :: self
-      character(:), allocatable :: origin
-
-      origin = key_origin
-      if (allocated(self%origin)) origin = self%origin
-   end function origin_of
 
    subroutine require_model(self, error)
       class(session_type), intent(in) :: self
