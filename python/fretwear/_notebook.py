@@ -82,9 +82,9 @@ def result_html(result: Result) -> str:
         if "amplitude" in result and "observed/name" in result and converged:
             units = result.units("amplitude")
             for name in result.observed:
-                peak = result.peak(name)
-                value = f"{result.amplitude_of(name)[peak]:.6g} {units}".strip()
-                rows.append((f"largest {name}", f"{value} at {result.frequency[peak]:.6g} Hz"))
+                omega, height = result.maximum(name)
+                value = f"{height:.6g} {units}".strip()
+                rows.append((f"largest {name}", f"{value} at {omega / (2.0 * np.pi):.6g} Hz"))
     if "wear/depth" in result and len(result.depth):
         depth = f"{result.depth[-1].max():.4g} {result.units('wear/depth')}".strip()
         rows.append(("wear", f"{depth} deep after {result.cycles[-1]:.4g} cycles"))

@@ -179,12 +179,12 @@ def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
     for name in result.observed if result.n_points else ():
         try:
             peak = result.peak(name)
+            omega, height = result.maximum(name)
         except InputError:  # not one point converged: said at the top of the page
             break
-        rows += [(f"peak of {name}", float(result.amplitude[peak, result.index(name)]),
+        rows += [(f"peak of {name}", height,
                   units_of(result, "amplitude")),
-                 (f"frequency of this peak, point {peak + 1}", float(result.frequency[peak]),
-                  "Hz")]
+                 (f"frequency of this peak, near point {peak + 1}", omega / (2.0 * np.pi), "Hz")]
         if name == result.observed[0] and "contact/fraction" in result:
             shares = result.fraction[peak].mean(axis=0)
             rows += [(f"pairs and period in {state}, at this peak", float(share), "")

@@ -562,6 +562,21 @@ class Result:
             raise AbsentError(f"{self.name}: has no peak: no point has converged")
         return int(np.nanargmax(values))
 
+    def maximum(self, observe: str | int | None = None) -> tuple[float, float]:
+        """Where the curve is highest [rad/s], and how high.
+
+        The highest of the maxima that the run has looked for between its points (`/peak`) and of
+        the points themselves; the latter alone where the file holds no maxima.
+        """
+        column, point = self.index(observe), self.peak(observe)
+        found = [(float(self.amplitude[point, column]), float(self.omega[point]))]
+        if "peak/omega" in self:
+            of_it = self["peak/observed"] == column
+            found += zip(self["peak/amplitude"][of_it].tolist(),
+                         self["peak/omega"][of_it].tolist())
+        height, omega = max(found)
+        return omega, height
+
     # ------------------------------------------------------------------ notebooks
 
     def to_xarray(self) -> xarray.Dataset:

@@ -17,7 +17,7 @@ PROPERTIES = sorted(name for name, value in vars(fw.Result).items()
                     if isinstance(value, property) and not name.startswith("_"))
 #: Methods, with arguments that fit any result.
 METHODS: dict[str, tuple[Any, ...]] = {
-    "index": (), "amplitude_of": (), "harmonic": (1,), "peak": (), "cycle": (0,),
+    "index": (), "amplitude_of": (), "harmonic": (1,), "peak": (), "maximum": (), "cycle": (0,),
     "declared": ("omega",), "units": ("omega",), "to_xarray": ()}
 #: Neither is asked for data.
 OTHERS = {"open", "save", "from_bytes"}

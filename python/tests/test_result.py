@@ -110,10 +110,26 @@ def test_a_dataset_is_what_its_file_declares(result: Result) -> None:
     assert result.declared("omega").units == "rad/s"
 
 
+def test_the_maximum_is_that_of_the_curve_not_of_its_points(tmp_path: Path, result: Result) -> None:
+    """Between five points the peak is higher than at any of them."""
+    assert result.maximum()[1] >= result.amplitude.max()
+    path = result.save(tmp_path / "a.h5").path
+    with h5py.File(path, "r+") as file:
+        if "peak" in file:
+            del file["peak"]
+    point = result.peak()
+    assert Result(path).maximum() == (result.omega[point], result.amplitude[point, 0])
+    with h5py.File(path, "r+") as file:
+        file["peak/omega"], file["peak/amplitude"] = [1.1, 1.2, 1.3], [2e3, 1e3, 9e9]
+        file["peak/observed"] = [0, 0, 1]
+    assert Result(path).maximum("u1") == (1.1, 2e3)
+
+
 def test_a_notebook_shows_a_table(result: Result) -> None:
     page = result._repr_html_()
     assert page.startswith("<table>") and "complete" in page and "5, 5 converged" in page
-    peak = f"{result.amplitude.max():.6g} at {result.frequency[result.peak()]:.6g} Hz"
+    omega, height = result.maximum()
+    peak = f"{height:.6g} at {omega / (2.0 * np.pi):.6g} Hz"
     assert "largest u1" in page and peak in page
     assert "<script" not in page
 

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..result import STATES
+from ..errors import AbsentError, InputError
+from ..result import STATES, Result
 from .style import (
     CURVE,
     FAILED,
@@ -53,6 +53,8 @@ class Response:
         1 stable, 0 unstable, -1 not known.
     units : str
         Of the amplitude; "" where they are not known.
+    maximum : (float, float) or None
+        Where the curve is highest [Hz], and how high, between the points too.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Response:
     dissipation: Floats | None = None
     stable: NDArray[np.int_] | None = None
     units: str = ""
+    maximum: tuple[float, float] | None = None
 
     @property
     def is_branch(self) -> bool:
@@ -101,7 +104,16 @@ def read_response(source: Source, observe: str | None = None) -> Response:
         result.observed[column], result.frequency, result.amplitude[:, column], result.converged,
         None if fraction is None else fraction.mean(axis=1),
         None if loss is None else loss.sum(axis=1),
-        result.stable if "floquet/stable" in result else None, units_of(result, "amplitude"))
+        result.stable if "floquet/stable" in result else None, units_of(result, "amplitude"),
+        _maximum(result, column))
+
+
+def _maximum(result: Result, column: int) -> tuple[float, float] | None:
+    try:
+        omega, height = result.maximum(column)
+    except AbsentError:  # nothing has converged
+        return None
+    return omega / (2.0 * np.pi), height
 
 
 def half_power_damping(response: Response) -> float:
@@ -217,7 +229,7 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
     if unstable.any():
         _draw_unstable(axes, response, good, unstable)
     bad = ~response.converged
-    largest = float(np.nanmax(good, initial=0.0))
+    largest = float(np.nanmax(good, initial=response.maximum[1] if response.maximum else 0.0))
     if stuck is not None:
         largest = max(largest, float(np.nanmax(stuck.amplitude[stuck.converged], initial=0.0)))
     if bad.any():
@@ -251,7 +263,7 @@ def _annotate_peak(axes: Axes, response: Response, stuck: Response | None,
                    modal_mass: float | None, largest: float) -> None:
     """What the peak is, in the unit of an axis that shows values up to `largest`."""
     peak = response.peak
-    f, a = response.frequency[peak], response.amplitude[peak]
+    f, a = response.maximum or (response.frequency[peak], response.amplitude[peak])
     factor, units = scale(largest, response.units)
     height = f"{factor * a:.4g} {units}".strip()
     lines = [f"peak {height} at {f:.{_digits(response.frequency)}f} Hz"]

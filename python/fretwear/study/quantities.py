@@ -24,7 +24,7 @@ _FORM = re.compile(r"(\w+)(?:\[([^\]]+)\])?$")
 
 
 def _peak_omega(result: Result, observed: str | None) -> float:
-    return float(result.omega[result.peak(observed)])
+    return result.maximum(observed)[0]
 
 
 def _slipping(result: Result, observed: str | None) -> float:
@@ -45,8 +45,8 @@ def _steady_state(result: Result, _: str | None) -> str:
 
 #: Quantity: function, whether it is of an observed quantity, dataset that it needs, meaning.
 QUANTITIES: dict[str, tuple[_Quantity, bool, str, str]] = {
-    "max_amplitude": (lambda r, o: float(r.amplitude_of(o)[r.peak(o)]), True, "omega",
-                      "largest amplitude among the converged points [L]"),
+    "max_amplitude": (lambda r, o: r.maximum(o)[1], True, "omega",
+                      "largest amplitude, of the maxima between the points too [L]"),
     "omega_at_peak": (_peak_omega, True, "omega", "where it is [rad/s]"),
     "frequency_at_peak": (lambda r, o: _peak_omega(r, o) / (2.0 * np.pi), True, "omega",
                           "where it is [Hz]"),
