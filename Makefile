@@ -67,6 +67,7 @@ test: build ## every test; the last line counts the cases
 
 lint: build/deps.stamp ## linters of the Fortran and the Python code, type checker
 	@$(PYTHON) -m fortitude check --quiet
+	@$(PYTHON) tools/comment_share.py
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench tools docs \
 	   test/builds test/robustness test/stress test/verify
