@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from bench.common.layout import table
+from bench.common.layout import table, wrapped
 
 __all__ = ["COMMON", "ORDER", "anchor", "targets", "update_document", "with_origin"]
 
@@ -44,7 +44,7 @@ def update_document(path: Path, part: str, text: str, machine: dict[str, str],
     for name in order:
         if name in parts:
             lines += ["", begin(name), "", parts[name], "", end(name)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text(wrapped("\n".join(lines)) + "\n", encoding="utf-8")
 
 
 def targets(parts: Iterable[str]) -> list[str]:

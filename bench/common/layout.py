@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -10,7 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 __all__ = ["COLOURS", "finish", "microseconds", "milliseconds", "new_figure", "sentence",
-           "table"]
+           "table", "unwrapped", "wrapped"]
+
+#: Widest line of text; tables and pictures are as wide as they are.
+WIDTH = 120
 
 #: Lines of a picture, in this order; apart in brightness too.
 COLOURS = ("#1f4e79", "#c0392b", "#54a24b", "#f58518", "#7f4fa3", "#4c9aa8")
@@ -50,3 +55,21 @@ def milliseconds(seconds: float) -> str:
 def microseconds(seconds: str) -> str:
     """The same for a text in seconds."""
     return f"{1e6 * float(seconds):.3g}"
+
+
+def unwrapped(text: str) -> str:
+    """Text with each of its paragraphs in one line."""
+    return re.sub(r"(?<=[^\n|])\n(?=[^\n|#!*<-])", " ", text)
+
+
+def wrapped(text: str) -> str:
+    """Text with its paragraphs in lines of `WIDTH`; tables, headings and pictures as they are."""
+    lines = []
+    for line in text.split("\n"):
+        if len(line) <= WIDTH or line.startswith(("|", "#", "!", "    ", "<!--")):
+            lines.append(line)
+            continue
+        indent = "  " if line.startswith(("* ", "- ")) else ""
+        lines += textwrap.wrap(line, WIDTH, subsequent_indent=indent, break_long_words=False,
+                               break_on_hyphens=False)
+    return "\n".join(lines)

@@ -6,18 +6,15 @@ A measurement replaces the page of its part; the first page is made anew from al
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 
 from bench.common.document import COMMON, ORDER, anchor, targets, with_origin
 from bench.common.headlines import rows
-from bench.common.layout import table
+from bench.common.layout import table, unwrapped, wrapped
 
-__all__ = ["read_pages", "unwrapped", "update_page", "wrapped", "write_overview"]
+__all__ = ["read_pages", "update_page", "write_overview"]
 
-#: Widest line of text; tables and pictures are as wide as they are.
-WIDTH = 120
 HEAD = (
     "# Benchmarks\n\n"
     "Written by `python -m bench.run`: do not edit. Times are medians of repeated runs in one "
@@ -105,21 +102,3 @@ def relinked(part: str, pages: Mapping[str, str]) -> str:
         return found[0] if home == part else f"]({home}.md#{found[1]})"
 
     return re.sub(r"\]\(#([^)]+)\)", link, pages[part])
-
-
-def unwrapped(text: str) -> str:
-    """Text with each of its paragraphs in one line."""
-    return re.sub(r"(?<=[^\n|])\n(?=[^\n|#!*<-])", " ", text)
-
-
-def wrapped(text: str) -> str:
-    """Text with its paragraphs in lines of `WIDTH`; tables, headings and pictures as they are."""
-    lines = []
-    for line in text.split("\n"):
-        if len(line) <= WIDTH or line.startswith(("|", "#", "!", "    ", "<!--")):
-            lines.append(line)
-            continue
-        indent = "  " if line.startswith(("* ", "- ")) else ""
-        lines += textwrap.wrap(line, WIDTH, subsequent_indent=indent, break_long_words=False,
-                               break_on_hyphens=False)
-    return "\n".join(lines)

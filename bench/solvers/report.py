@@ -45,10 +45,10 @@ def introduction() -> str:
         "relative L2 error of the coefficients among them, against the nearest known solution. "
         "It is the error of the balance wherever solvers share it. Newton's method has a line "
         "search, and ends each pseudo-time path (see the user guide). Every run ends: "
-        "`max_iterations = 60`, `max_steps = 500`. *The flow runs away from its start* "
-        "stands for: it has no stable steady state there, or the steps are too long for the scheme. Above a resonance, "
-        "where the identity flow grows, it ends so or runs out of steps, unless Newton's method "
-        "converges on the way.")
+        "`max_iterations = 60`, `max_steps = 500`. *The flow runs away from its start* stands "
+        "for: it has no stable steady state there, or the steps are too long for the scheme. "
+        "Above a resonance, where the identity flow grows, it ends so or runs out of steps, "
+        "unless Newton's method converges on the way.")
 
 
 def duffing_part(outcomes: list[Outcome], names: list[str]) -> str:

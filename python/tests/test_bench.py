@@ -57,7 +57,8 @@ def test_a_measurement_replaces_its_page_and_the_first_one(tmp_path: Path) -> No
 
 def test_the_first_page_finds_its_answers_and_is_that_of_the_pages(tmp_path: Path) -> None:
     from bench.common.headlines import HEADLINES, rows
-    from bench.common.pages import read_pages, unwrapped, write_overview
+    from bench.common.layout import unwrapped
+    from bench.common.pages import read_pages, write_overview
 
     docs = BENCH.parent / "docs"
     pages = {part: unwrapped(text) for part, text in read_pages(docs / "benchmarks").items()}
@@ -71,7 +72,7 @@ def test_the_first_page_finds_its_answers_and_is_that_of_the_pages(tmp_path: Pat
 
 
 def test_prose_is_wrapped_and_tables_are_not() -> None:
-    from bench.common.pages import unwrapped, wrapped
+    from bench.common.layout import unwrapped, wrapped
 
     text = "# " + "h " * 90 + "\n\n" + "word " * 60 + "end\n\n| " + "cell " * 60 + "|"
     lines = wrapped(text).split("\n")
