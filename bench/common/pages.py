@@ -47,7 +47,8 @@ def update_page(folder: Path, part: str, text: str, machine: Mapping[str, str]) 
     pages = read_pages(target)
     body = with_origin(text, dict(machine))
     body = re.sub(r"^#(#+ )", r"\1", body, flags=re.MULTILINE)
-    body = re.sub(r"\]\(images/", "](../images/", body)
+    # Written as a part of the first page, from where other documents are beside it.
+    body = re.sub(r"\]\((?=images/|[\w-]+\.md)", "](../", body)
     facts = "; ".join(f"{key} {machine[key]}" for key in COMMON if key in machine)
     body = body.replace("*Measured: ", f"*Measured: {facts}; " if facts else "*Measured: ", 1)
     pages[part] = body

@@ -44,7 +44,7 @@ def test_the_tables_and_the_settings_of_the_package_are_what_the_program_declare
 
 
 def test_links_within_the_documents_lead_somewhere() -> None:
-    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")),
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")),
              *sorted((ROOT / "example").glob("*/README.md"))]
     broken = []
     for page in pages:

@@ -9,7 +9,7 @@ from sections import DOCUMENT, write_section
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verify"))
 from verify import PARTS
 
-NAMES = ["overview", "stress suite", "faults", "long runs", *PARTS]
+NAMES = ["overview", "stress suite", "faults", "long runs", "branches", *PARTS]
 
 
 @pytest.mark.parametrize("name", NAMES)
