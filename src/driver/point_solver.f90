@@ -23,6 +23,7 @@ module fw_point_solver
    use fw_point, only: served_by_smaller_steps
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
+   use fw_tail, only: recover_tail
    use fw_solution, only: find_stability
    use fw_solution, only: solution_method
    use fw_strategy, only: point_request
@@ -112,6 +113,7 @@ contains
       point%converged = report%converged
       point%residual = report%residual
       call recover_point(system, self%x, self%method%harmonics%n_harmonics, request%contact, point)
+      call recover_tail(system, case%model, case%contact, point%omega, case%output%tail, point)
       if (request%histories) then
          call recover_histories(system, size(system%balance, 1), self%x, &
             self%method%harmonics%n_harmonics, point)

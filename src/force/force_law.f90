@@ -70,6 +70,8 @@ module fw_force_law
       logical :: needs_projection = .false.
       !> Sliding under pressure, with its derivative: what wear takes.
       logical :: measures_slip = .false.
+      !> Its forces are known in every harmonic (`tail`), where a pair has one tangential direction.
+      logical :: has_tail = .false.
       !> A perturbation can be followed through the period: Floquet multipliers.
       logical :: has_multipliers = .false.
       !> The integration in time knows the law.
@@ -147,6 +149,7 @@ module fw_force_law
       procedure(linearize_interface), deferred :: linearize
       procedure :: sample
       procedure :: coefficients
+      procedure :: tail
       procedure :: fractions
       procedure :: slope_at_rest
       procedure :: slope_at
@@ -287,6 +290,19 @@ contains
       end associate
       call fourier%to_coefficients(self%n_elements*self%n_components, work%force_time, force)
    end subroutine coefficients
+
+   !> Coefficients of the forces of the harmonics 0..highest at the last evaluation, whatever
+   !> harmonics it had (n_elements, n_components, 2 highest + 1); left alone where facts know of none.
+   subroutine tail(self, work, highest, force)
+      class(force_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      integer, intent(in) :: highest
+      real(wp), intent(inout) :: force(:, :, :)
+
+      associate (unused => self, unused_work => work, unused_highest => highest, &
+                 unused_force => force)
+      end associate
+   end subroutine tail
 
    !> Share of the period that each element spends in stick, slip and open (3, n_elements): without
    !> a law's own say it slips where it bears, the last component being the pressure.

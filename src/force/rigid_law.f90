@@ -36,6 +36,7 @@ module fw_rigid_law
       procedure :: linearize
       procedure :: sample
       procedure :: coefficients
+      procedure :: tail
       procedure :: fractions
       procedure :: located
    end type rigid_law
@@ -59,7 +60,7 @@ contains
       law%prediction = prediction_type(takes_balance=.true., has_inertia=.true.)
       law%facts = law_facts(remembers=.true., can_stick=.true., can_open=.true., &
                             needs_independent=.true., has_events=.true., follows_events=.true., &
-                            needs_projection=.true., is_integrated=.true.)
+                            needs_projection=.true., has_tail=.true., is_integrated=.true.)
    end function friction_of_high_order
 
    !> Room; the masses are known.
@@ -329,6 +330,25 @@ contains
          end do
       end select
    end subroutine coefficients
+
+   subroutine tail(self, work, highest, force)
+      class(rigid_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      integer, intent(in) :: highest
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp) :: out(2*highest + 1, 2)
+      integer :: j
+
+      if (self%n_elements == 0) return
+      select type (room => work%room)
+      type is (rigid_room)
+         call room%paths%tail(highest, force)
+         do j = 1, room%n_massive
+            call room%massive(j)%force_to(highest, out(:, 1), out(:, 2))
+            force(room%pair(j), room%direction(j), :) = out(:, 1)
+         end do
+      end select
+   end subroutine tail
 
    pure subroutine fractions(self, work, share)
       class(rigid_law), intent(in) :: self

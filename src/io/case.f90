@@ -30,6 +30,8 @@ module fw_case
       logical :: histories = .false.
       !> Write the contact forces, states and dissipation.
       logical :: contact = .true.
+      !> Highest harmonic of the answer that is given back, where it is above those of the balance.
+      integer :: tail = 0
    contains
       procedure :: bind_keys => bind_output_keys
    end type output_options
@@ -87,6 +89,9 @@ contains
       call keys%bind(key('histories', 'write one period of every quantity at every point; '// &
                          'large'), self%histories)
       call keys%bind(key('contact', 'write contact forces, states and dissipation'), self%contact)
+      call keys%bind(key('tail', 'highest harmonic of the answer that is given back, above those '// &
+                         'of the balance; 0: theirs', from_to(0, 10000), &
+                         only="law = 'rigid'"), self%tail)
    end subroutine bind_output_keys
 
 end module fw_case

@@ -1,6 +1,7 @@
 !> Combinations of sound keys that cannot be run, each with what to use instead.
 module fw_combinations
    use fw_case, only: case_type, analysis_frf, analysis_point, analysis_wear
+   use fw_contact_data, only: contact_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
    use fw_force_law, only: law_facts
@@ -59,11 +60,31 @@ contains
       else if (facts%needs_projection .and. case%harmonics%sampling == sampling_uniform) then
          call fatal_error(error, law//" follows events: leave harmonics%sampling out, or take "// &
                           "'events'", status_input)
+      else if (case%output%tail > 0 .and. .not. facts%has_tail) then
+         call fatal_error(error, "output%tail needs contact%law = 'rigid', whose forces are known "// &
+                          'in every harmonic', status_input)
+      else if (case%output%tail > 0 .and. any(both_tangents(case%contact))) then
+         call fatal_error(error, 'output%tail needs pairs with one tangential direction', &
+                          status_input)
+      else if (case%output%tail > 0 .and. &
+               (case%harmonics%adaptive .or. case%harmonics%accuracy > 0.0_wp .or. &
+                case%sweep%continuation == continuation_arclength .or. &
+                .not. any(case%analysis == [analysis_frf, analysis_point]))) then
+         call fatal_error(error, 'output%tail goes with natural sweeps and points of given '// &
+                          'n_harmonics: leave it out', status_input)
       else if (case%analysis == analysis_wear .and. .not. facts%measures_slip) then
          call fatal_error(error, law//" does not wear yet: use 'dlft' (nodes without mass), "// &
                           "'dlft_velocity' or 'penalty' for analysis = 'wear'", status_input)
       end if
    end subroutine check_law
+
+   !> Which pairs have two tangential directions (n_pairs).
+   pure function both_tangents(contact) result(both)
+      type(contact_type), intent(in) :: contact
+      logical :: both(contact%n_pairs)
+
+      both = all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1)
+   end function both_tangents
 
    !> What wear needs, and which schemes step it.
    subroutine check_wear(case, error)

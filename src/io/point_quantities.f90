@@ -164,7 +164,7 @@ contains
          n = 0
          if (allocated(case%model%observe_matrix)) n = size(case%model%observe_matrix, 1)
       case ('coefficient')
-         n = 2*case%harmonics%n_harmonics + 1
+         n = 2*max(case%harmonics%n_harmonics, case%output%tail) + 1
       case ('pair')
          n = case%contact%n_pairs
       case ('patch')

@@ -43,6 +43,7 @@ module fw_event_contact
       procedure :: evaluate
       procedure :: linearize
       procedure :: coefficients
+      procedure :: tail
       procedure :: values
       procedure :: friction_path
       procedure :: fractions
@@ -346,6 +347,23 @@ contains
          force(i, 3, :) = out(:, 2)
       end do
    end subroutine coefficients
+
+   !> Coefficients of the contact forces of the harmonics 0..highest (n_pairs, 3, 2 highest + 1), of
+   !> pairs with at most one tangential direction.
+   subroutine tail(self, highest, force)
+      class(event_contact_type), intent(in) :: self
+      integer, intent(in) :: highest
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp) :: out(2*highest + 1, 2)
+      integer :: i
+
+      do i = 1, self%n_pairs
+         if (self%is_planar(i)) cycle
+         call self%pair(i)%force_to(highest, out(:, 1), out(:, 2))
+         if (self%direction(i) > 0) force(i, self%direction(i), :) = out(:, 1)
+         force(i, 3, :) = out(:, 2)
+      end do
+   end subroutine tail
 
    !> Contact forces at uniform instants (n_pairs, 3, n_time).
    subroutine values(self, force)

@@ -45,6 +45,7 @@ module fw_event_pair
       procedure :: follow
       procedure :: fill_moments
       procedure :: force
+      procedure :: force_to
       procedure :: derivative
       procedure :: values_at
       procedure :: rows_at
@@ -159,6 +160,28 @@ contains
          call add_means(self%held, -1.0_wp, n_retained, harmonic, column, tangential)
       end associate
    end subroutine force
+
+   !> Coefficients of the contact forces of the harmonics 0..highest, above those of the curves: the
+   !> path has all of them.
+   pure subroutine force_to(self, highest, tangential, normal)
+      class(event_pair_type), intent(in) :: self
+      integer, intent(in) :: highest
+      !> (2 highest + 1).
+      real(wp), intent(out) :: tangential(:), normal(:)
+      type(event_pair_type) :: wide
+      integer :: harmonic(highest + 1), n
+
+      harmonic = [(n, n=0, highest)]
+      n = self%curves%degree
+      call wide%reserve(max(highest, n), 1, 2*highest + 1)
+      wide%rubs = self%rubs
+      wide%curves%mu = self%curves%mu
+      wide%curves%tangential(0:n, :) = self%curves%tangential
+      wide%curves%normal(0:n, :) = self%curves%normal
+      wide%path = self%path
+      call wide%fill_moments()
+      call wide%force(highest + 1, harmonic, max(1, 2*harmonic), tangential, normal)
+   end subroutine force_to
 
    !> Add factor times the coefficients of the weight of `moments` itself.
    pure subroutine add_means(moments, factor, n_retained, harmonic, column, coefficient)

@@ -230,6 +230,9 @@ contains
 
       low = left%angle
       high = right%angle
+      angle = low
+      ! f is round-off there already.
+      if (side*left%value <= 0.0_wp) return
       angle = low + (high - low)*(left%value/(left%value - right%value))
       do k = 1, newton_steps
          call look(wave, motion, angle, knot)
