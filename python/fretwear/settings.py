@@ -269,6 +269,9 @@ class Output(TypedDict, total=False):
     histories: bool
     #: write contact forces, states and dissipation (default: .true.)
     contact: bool
+    #: highest harmonic of the answer that is given back, above those of the balance; 0: theirs;
+    #: only: law = 'rigid' (default: 0)
+    tail: int
     #: which displacements are written; a dof number k is called uk (default: all that the model
     #: file names, else every dof)
     observe: str | int | Sequence[str | int]

@@ -24,7 +24,7 @@ KEYS = {
     "wear": ["scheme", "law", "order", "coefficient", "n_cycles", "max_depth_step",
              "error_tolerance", "steady_tolerance", "max_steps", "check_steps", "follow_resonance"],
     "time": ["n_periods", "steps_per_period"],
-    "output": ["file", "histories", "contact", "observe"],
+    "output": ["file", "histories", "contact", "tail", "observe"],
 }
 
 NUMBERS = ["0", "-1", "1", "2", "3", "7", "1e-300", "1e300", "1e308", "4.9e-324", "1e400", "-1e400",
