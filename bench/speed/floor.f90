@@ -23,6 +23,7 @@ module floor_system
    use fw_lapack, only: zgemm
    use fw_lapack, only: zgemv
    use fw_linalg, only: complex_lu_type
+   use fw_plain_structure, only: plain_structure
    use fw_preconditioner_lu, only: preconditioner_lu_type
    implicit none (type, external)
    private
@@ -69,6 +70,10 @@ module floor_system
       real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :), jacobian(:, :)
       real(wp), allocatable :: basis(:, :), vector(:), weights(:)
       complex(wp), allocatable :: input(:), output(:), coupling(:, :), solved(:, :), square(:, :)
+      complex(wp), allocatable :: stiffness(:, :, :)
+      !> Internal modes of the condensation, and whether damping couples them.
+      integer :: n_internal = 0
+      logical :: coupled = .false.
       type(preconditioner_lu_type) :: lu
       type(complex_lu_type) :: internal
    contains
@@ -115,7 +120,13 @@ contains
       allocate (self%basis(m*nc, longest_basis), source=1.0e-3_wp)
       allocate (self%vector(m*nc), self%weights(longest_basis), source=1.0e-3_wp)
       allocate (self%input(m), self%output(m), source=one)
-      associate (n_internal => self%structure%basis%n_internal)
+      select type (structure => self%structure)
+      type is (plain_structure)
+         self%n_internal = structure%basis%n_internal
+         self%coupled = allocated(structure%basis%c_ii)
+      end select
+      allocate (self%stiffness(m, m, self%fourier%n_retained), source=one)
+      associate (n_internal => self%n_internal)
          allocate (self%coupling(m, n_internal), self%solved(n_internal, m), source=one)
          allocate (self%square(m, m), source=one)
       end associate
@@ -155,7 +166,7 @@ contains
       n = size(self%coupling, 2)
       if (n > 0) then
          do h = 1, self%fourier%n_retained
-            if (allocated(self%structure%basis%c_ii)) call solve_internal(self, m, n)
+            if (self%coupled) call solve_internal(self, m, n)
             call zgemm('N', 'N', m, (m + 1)/2, n, -one, self%coupling, m, self%solved, n, one, &
                        self%square, m)
          end do
@@ -193,7 +204,7 @@ contains
       m = self%structure%n_coordinates
       n = 3*self%n_pairs
       do h = 1, self%fourier%n_retained
-         call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, self%input, 1, zero, &
+         call zgemv('N', m, m, one, self%stiffness(1, 1, h), m, self%input, 1, zero, &
                     self%output, 1)
       end do
       call self%fourier%to_time(n, self%work(self%forces%pairs)%prediction, self%values)
@@ -276,7 +287,7 @@ contains
          call self%lu%reserve(self%n_active, 1.0_wp)
          do j = 1, self%n_active
             self%lu%matrix(:self%n_active, j) = cmplx(self%preconditioner(h)%scale* &
-               self%active_stiffness(:self%n_active, j, h), kind=sp)
+               self%stiffness(:self%n_active, j, h), kind=sp)
          end do
          call self%lu%factor()
       end do
@@ -297,7 +308,7 @@ contains
       middle = processor_time()
       m = self%structure%n_coordinates
       do h = 1, self%fourier%n_retained
-         call zgemv('N', self%n_used, self%n_active, one, self%active_stiffness(1, 1, h), m, &
+         call zgemv('N', self%n_used, self%n_active, one, self%stiffness(1, 1, h), m, &
                     self%input, 1, zero, self%output, 1)
       end do
       n = 3*self%fourier%n_coefficients

@@ -1,7 +1,5 @@
 !> Core operators for post-processing, with plain arrays: what the wrapper for Python calls.
 module fw_python_operators
-   use fw_condensation, only: condensation_type
-   use fw_condensation, only: new_condensation
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -10,8 +8,11 @@ module fw_python_operators
    use fw_force_law, only: pair_stuck
    use fw_kinds, only: wp
    use fw_model, only: model_type
+   use fw_plain_structure, only: new_plain_structure
+   use fw_plain_structure, only: plain_structure
    use fw_relative, only: relative_type
    use fw_relative, only: new_relative
+   use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
    implicit none (type, external)
    private
@@ -21,7 +22,7 @@ module fw_python_operators
 contains
 
    !> Condense a structure to the relative displacements u(side_1) - u(side_2) at one frequency.
-   subroutine build_condensation(model, side_1, side_2, harmonic, omega, structure, error)
+   subroutine build_condensation(model, side_1, side_2, harmonic, omega, structure, state, error)
       type(model_type), intent(in) :: model
       !> Signed dof numbers, 0 for ground (n_rows).
       integer, intent(in) :: side_1(:), side_2(:)
@@ -29,7 +30,9 @@ contains
       integer, intent(in) :: harmonic(:)
       !> [rad/s]
       real(wp), intent(in) :: omega
-      type(condensation_type), intent(out) :: structure
+      type(plain_structure), intent(out) :: structure
+      !> At that frequency.
+      class(structure_state), allocatable, intent(out) :: state
       !> Raised where the rows depend on each other, and at a pole of the condensed stiffness.
       type(error_type), allocatable, intent(out) :: error
       type(relative_type) :: relative
@@ -42,7 +45,7 @@ contains
                           'from the rows before it: remove it', status_input)
          return
       end if
-      call new_condensation(model, relative, harmonic, [omega, omega], structure, error)
+      call new_plain_structure(model, relative, harmonic, [omega, omega], structure, error)
       if (allocated(error)) return
       if (structure%n_coordinates > size(side_1)) then
          call fatal_error(error, 'omega = '//to_text(omega)//' rad/s: one of the harmonics is '// &
@@ -51,7 +54,8 @@ contains
                           'omega', status_input)
          return
       end if
-      call structure%update(omega, error)
+      call structure%new_state(state)
+      call structure%at(state, omega, 0.0_wp, error)
    end subroutine build_condensation
 
    !> Derivative of the force coefficients by those of the prediction, pair by pair, with nothing

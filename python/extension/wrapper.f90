@@ -2,7 +2,6 @@
 !> Fortran-ordered arrays, the interpreter lock released. python/fretwear/ checks arguments; texts
 !> are arrays of bytes, lists of texts have null bytes between them.
 module fw_python
-   use fw_condensation, only: condensation_type
    use fw_error, only: error_type
    use fw_error, only: status_ok
    use fw_force_law, only: force_workspace
@@ -14,6 +13,7 @@ module fw_python
    use fw_kinds, only: i8
    use fw_kinds, only: wp
    use fw_model, only: model_type
+   use fw_plain_structure, only: plain_structure
    use fw_python_operators, only: build_condensation
    use fw_python_operators, only: unpack_jacobian
    use fw_python_parts, only: case_part
@@ -23,6 +23,7 @@ module fw_python
    use fw_python_session, only: handle_type
    use fw_python_session, only: new_handle
    use fw_recovery, only: largest_magnitude
+   use fw_structure_operator, only: structure_state
    use fw_text, only: join
    use fw_text, only: string_type
    use fw_version, only: version
@@ -500,16 +501,20 @@ contains
       complex(wp), intent(inout) :: z(n_rows, n_rows, n_harmonics), f(n_rows, n_harmonics)
       integer, intent(out) :: status
       character(512), intent(out) :: message
-      type(condensation_type) :: structure
+      type(plain_structure) :: structure
+      class(structure_state), allocatable :: state
       type(error_type), allocatable :: error
+      integer :: h
       !f2py threadsafe
 
       call build_condensation(model_of(n, mass, damping, stiffness, load), side_1, side_2, &
-                              harmonic, omega, structure, error)
+                              harmonic, omega, structure, state, error)
       call pass_on(error, status, message)
       if (status /= status_ok) return
-      z = structure%stiffness
-      f = structure%load
+      do h = 1, n_harmonics
+         call structure%block(state, h, z(:, :, h))
+      end do
+      f = state%load
    end subroutine condense
 
    !> All displacements from the relative ones.
@@ -523,14 +528,15 @@ contains
       complex(wp), intent(inout) :: u(n, n_harmonics)
       integer, intent(out) :: status
       character(512), intent(out) :: message
-      type(condensation_type) :: structure
+      type(plain_structure) :: structure
+      class(structure_state), allocatable :: state
       type(error_type), allocatable :: error
       !f2py threadsafe
 
       call build_condensation(model_of(n, mass, damping, stiffness, load), side_1, side_2, &
-                              harmonic, omega, structure, error)
+                              harmonic, omega, structure, state, error)
       call pass_on(error, status, message)
-      if (status == status_ok) call structure%recover(q, u)
+      if (status == status_ok) call structure%recover(state, q, u)
    end subroutine recover
 
    !> A structure of which every displacement is observed.

@@ -83,28 +83,27 @@ contains
    subroutine fill_flow(balance, flow, h, p)
       type(hbm_system), intent(in) :: balance
       integer, intent(in) :: flow, h
-      complex(wp), intent(out) :: p(:, :)
-      real(wp) :: omega, mean_mass
+      complex(wp), intent(out), contiguous :: p(:, :)
+      real(wp) :: omega, mean_mass, mass(size(p, 1), size(p, 2))
       integer :: i, n
 
-      omega = balance%structure%omega
+      omega = balance%frequency()
       n = balance%fourier%harmonic(h)
-      associate (b => balance%structure%basis)
-         select case (flow)
-         case (flow_identity)
-            mean_mass = sum([(abs(b%m_qq(i, i)), i=1, size(p, 1))])/real(size(p, 1), wp)
-            p = (0.0_wp, 0.0_wp)
-            do i = 1, size(p, 1)
-               p(i, i) = omega**2*mean_mass
-            end do
-         case (flow_preconditioned)
-            p = balance%structure%stiffness(:, :, h)
-            call add_closed_joint(balance, h, p)
-         case default
-            p = omega**2*b%m_qq
-            if (n > 0) p = cmplx(0.0_wp, 2.0_wp*n, wp)*p
-         end select
-      end associate
+      call balance%structure%mass(mass)
+      select case (flow)
+      case (flow_identity)
+         mean_mass = sum([(abs(mass(i, i)), i=1, size(p, 1))])/real(size(p, 1), wp)
+         p = (0.0_wp, 0.0_wp)
+         do i = 1, size(p, 1)
+            p(i, i) = omega**2*mean_mass
+         end do
+      case (flow_preconditioned)
+         call balance%structure%block(balance%structure_state, h, p)
+         call add_closed_joint(balance, h, p)
+      case default
+         p = omega**2*mass
+         if (n > 0) p = cmplx(0.0_wp, 2.0_wp*n, wp)*p
+      end select
    end subroutine fill_flow
 
    !> Prediction stiffness of every component of every pair, where that is one.
@@ -141,8 +140,8 @@ contains
       smallest = minval([(abs(self%factors(h)%matrix(i, i)), i=1, m)])
       if (.not. singular .and. smallest > 1.0e-12_wp*maxval(abs(self%p(:, :, h)))) return
       do i = 1, m
-         self%p(i, i, h) = self%p(i, i, h) + &
-            massless_share*abs(self%balance%structure%stiffness(i, i, h))
+         self%p(i, i, h) = self%p(i, i, h) + massless_share* &
+            abs(self%balance%structure%diagonal(self%balance%structure_state, h, i))
       end do
       self%factors(h)%matrix = self%p(:, :, h)
       call self%factors(h)%factor(singular)

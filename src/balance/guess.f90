@@ -48,10 +48,13 @@ contains
    !> there is no static position to lose.)
    logical function held_without_contact(system) result(held)
       type(hbm_system), intent(in) :: system
+      complex(wp), allocatable :: stiffness(:, :)
 
       held = .true.
       if (.not. system%fourier%has_constant()) return
-      held = is_positive_definite(real(system%structure%stiffness(:, :, 1), wp))
+      allocate (stiffness(system%structure%n_coordinates, system%structure%n_coordinates))
+      call system%structure%block(system%structure_state, 1, stiffness)
+      held = is_positive_definite(real(stiffness, wp))
    end function held_without_contact
 
    !> Whether the structure holds a static load with its pairs closed but free of friction.
@@ -65,7 +68,8 @@ contains
       held = .true.
       if (.not. system%fourier%has_constant()) return
       free = .true.
-      stiffness = system%structure%stiffness(:, :, 1)
+      allocate (stiffness(size(free), size(free)))
+      call system%structure%block(system%structure_state, 1, stiffness)
       associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
          do i = 1, system%n_pairs
             row = system%joint%row(3, i)
@@ -95,15 +99,17 @@ contains
 
       m = system%structure%n_coordinates
       allocate (q(m, system%fourier%n_retained), source=(0.0_wp, 0.0_wp))
+      allocate (stiffness(m, m))
       tension = 0.0_wp
       do h = 1, system%fourier%n_retained
-         stiffness = system%structure%stiffness(:, :, h)
-         force = system%structure%load(:, h)
+         call system%structure%block(system%structure_state, h, stiffness)
+         force = system%structure_state%load(:, h)
          if (system%fourier%harmonic(h) > 0) force = system%load_share*force
          held = .false.
          call close_pairs(system, closed, h, stiffness, force, held, q(:, h))
          call solve_free(stiffness, force, held, q(:, h))
-         if (system%fourier%harmonic(h) == 0) call mean_tension(system, q(:, h), tension)
+         if (system%fourier%harmonic(h) == 0) call mean_tension(system, stiffness, q(:, h), &
+                                                                  tension)
       end do
       call to_real_vector(system, q, x)
    end subroutine linear_solution
@@ -181,8 +187,10 @@ contains
    end subroutine solve_free
 
    !> Mean normal force of every pair at a static position.
-   subroutine mean_tension(system, q, tension)
+   subroutine mean_tension(system, stiffness, q, tension)
       type(hbm_system), intent(in) :: system
+      !> Of the structure, where the pairs take the balance.
+      complex(wp), intent(in) :: stiffness(:, :)
       complex(wp), intent(in) :: q(:)
       real(wp), intent(out) :: tension(:)
       real(wp) :: opening(size(tension))
@@ -197,7 +205,7 @@ contains
             if (p%takes_balance) then
                j = system%incidence%coordinate_of(row)
                tension(i) = system%load(j, 1) - &
-                            real(sum(system%structure%stiffness(j, :, 1)*q), wp)
+                            real(sum(stiffness(j, :)*q), wp)
             else
                tension(i) = p%stiffness(i, 3)*(opening(i) + p%gap(i) + system%depth(i))
             end if

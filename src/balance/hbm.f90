@@ -10,21 +10,23 @@
 !> Unknowns are (coordinate, coefficient), coordinates innermost.
 module fw_hbm
    use fw_kinds, only: wp
-   use fw_condensation, only: condensation_type
    use fw_error, only: error_type
    use fw_force_law, only: force_workspace
    use fw_force_law, only: pair_stuck
    use fw_force_law, only: prediction_type
    use fw_force_list, only: force_entry
    use fw_force_list, only: force_list
+   use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
    use fw_fourier, only: fourier_type
    use fw_incidence, only: incidence_type
    use fw_incidence, only: new_incidence
    use fw_joint, only: joint_type
-   use fw_lapack, only: zgemv
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_split, only: split_coordinate
+   use fw_structure_operator, only: structure_operator
+   use fw_structure_operator, only: structure_state
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
@@ -35,7 +37,9 @@ module fw_hbm
       type(joint_type) :: joint
       !> B, from the coordinates to the rows of the joint.
       type(incidence_type) :: incidence
-      type(condensation_type) :: structure
+      !> The structure, and where it stands.
+      class(structure_operator), allocatable :: structure
+      class(structure_state), allocatable :: structure_state
       type(fourier_type) :: fourier
       !> The laws of the forces, which are not written after construction, and what their
       !> evaluations leave (n_laws).
@@ -46,6 +50,8 @@ module fw_hbm
       real(wp), allocatable :: depth(:)
       !> F - Z q less the forces that do not take the balance, and the loads (n_coordinates, n_coefficients).
       real(wp), allocatable :: balance(:, :), load(:, :)
+      !> Scratch (n_coordinates, n_coefficients).
+      real(wp), allocatable :: product(:, :)
       !> What a step of pseudo-time adds to the derivative, P/h, outside of the contact laws
       !> (n_coordinates, n_coordinates, n_retained); only allocated during such a step.
       complex(wp), allocatable :: shift(:, :, :)
@@ -60,12 +66,6 @@ module fw_hbm
       integer :: n_active = 0
       integer :: n_used = 0
       integer, allocatable :: used(:), place(:)
-      !> Frequency and coordinates (first n_gathered entries, as `used`) of `active_stiffness`.
-      real(wp) :: gathered_omega = -1.0_wp
-      integer :: n_gathered = 0
-      integer :: n_gathered_active = 0
-      integer, allocatable :: gathered(:)
-      complex(wp), allocatable :: active_stiffness(:, :, :)
       real(wp), allocatable :: active_out(:, :)
       type(preconditioner_lu_type), allocatable :: preconditioner(:)
       !> Coordinates for which the preconditioner was built (first n_preconditioned entries).
@@ -80,6 +80,7 @@ module fw_hbm
    contains
       procedure :: set_parameter => set_frequency
       procedure :: set_frequency
+      procedure :: frequency
       procedure :: parameter_derivative
       procedure :: coordinate_of
       procedure :: rate_unit
@@ -161,11 +162,12 @@ module fw_hbm
 
 contains
 
-   !> Build the system of a joint. The structure must stand at a frequency already (its stiffness
-   !> sets eps); call set_frequency before the first residual.
-   subroutine new_hbm(joint, structure, fourier, forces, depth, self)
+   !> Build the system of a joint; call set_frequency before the first residual.
+   subroutine new_hbm(joint, structure, state, fourier, forces, depth, self)
       type(joint_type), intent(in) :: joint
-      type(condensation_type), intent(in) :: structure
+      class(structure_operator), intent(in) :: structure
+      !> At a frequency (its stiffness sets eps); moved into the system.
+      class(structure_state), allocatable, intent(inout) :: state
       type(fourier_type), intent(in) :: fourier
       type(force_list), intent(in) :: forces
       !> Wear depth of the pairs (n_pairs) [length]; zero where it is not allocated.
@@ -176,6 +178,7 @@ contains
       self%joint = joint
       call new_incidence(joint%relative, structure%n_coordinates, self%incidence)
       self%structure = structure
+      call move_alloc(state, self%structure_state)
       self%fourier = fourier
       m = structure%n_coordinates
       nc = fourier%n_coefficients
@@ -191,10 +194,10 @@ contains
          end associate
       end do
       call self%forces%reserve(fourier, self%work)
-      allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
+      allocate (self%balance(m, nc), self%load(m, nc), self%product(m, nc), source=0.0_wp)
       allocate (self%complex_in(m, nh), self%complex_out(m, nh), source=(0.0_wp, 0.0_wp))
       allocate (self%active_out(m, nc), self%used(m), self%place(m), self%preconditioned(m))
-      allocate (self%gathered(m), self%kept_place(m), self%unknown_stiffness(m))
+      allocate (self%kept_place(m), self%unknown_stiffness(m))
       allocate (self%preconditioner(nh))
    end subroutine new_hbm
 
@@ -302,7 +305,7 @@ contains
 
       stiffness = abs(self%structure%static_stiffness(coordinate))
       h = findloc(self%structure%harmonic, 1, dim=1)
-      dynamic = abs(self%structure%stiffness(coordinate, coordinate, h))
+      dynamic = abs(self%structure%diagonal(self%structure_state, h, coordinate))
       if (stiffness <= unheld*dynamic) stiffness = dynamic
    end function local_stiffness
 
@@ -321,9 +324,10 @@ contains
       real(wp), intent(in) :: parameter
       type(error_type), allocatable, intent(out) :: error
 
-      call self%structure%update(parameter, error)
+      call self%structure%at(self%structure_state, parameter, 0.0_wp, error)
       if (allocated(error)) return
-      call to_real(self%fourier, self%structure%n_coordinates, self%structure%load, self%load)
+      call to_real(self%fourier, self%structure%n_coordinates, self%structure_state%load, &
+                   self%load)
       self%reference = load_norm(self)
       if (self%fourier%has_constant()) then
          self%load(:, 2:) = self%load_share*self%load(:, 2:)
@@ -331,6 +335,13 @@ contains
          self%load = self%load_share*self%load
       end if
    end subroutine set_frequency
+
+   !> Present angular frequency [rad/s].
+   pure real(wp) function frequency(self)
+      class(hbm_system), intent(in) :: self
+
+      frequency = self%structure_state%omega
+   end function frequency
 
    !> The norm to which residuals are compared: that of the vibratory load. A large static load
    !> must not hide the vibration, but its round-off must not forbid convergence either.
@@ -398,18 +409,8 @@ contains
       class(hbm_system), intent(inout) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
-      integer :: h
-      complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
-      call to_complex(self%fourier, m, q, self%complex_in)
-      !$omp parallel do default(none) shared(self, m) private(h) &
-      !$omp if(m >= coordinates_for_threads)
-      do h = 1, self%fourier%n_retained
-         call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, &
-                    self%complex_in(1, h), 1, zero, self%complex_out(1, h), 1)
-      end do
-      !$omp end parallel do
-      call to_real(self%fourier, m, self%complex_out, self%balance)
+      call self%structure%multiply(self%structure_state, q, self%balance)
       self%balance = self%load - self%balance
    end subroutine multiply_stiffness
 
@@ -438,7 +439,7 @@ contains
       class(hbm_system), intent(in) :: self
       type(prediction_type), intent(in) :: prediction
 
-      rate_unit = merge(self%structure%omega, 1.0_wp, prediction%by_time)
+      rate_unit = merge(self%frequency(), 1.0_wp, prediction%by_time)
    end function rate_unit
 
    !> Replace inputs from displacements by inputs from velocities, where the law takes these.
@@ -554,16 +555,8 @@ contains
       integer, intent(in) :: n_rows
       real(wp), intent(in) :: coefficients(n_rows, *)
       complex(wp), intent(inout) :: harmonics(n_rows, *)
-      integer :: h, k
 
-      do h = 1, fourier%n_retained
-         k = fourier%column(h)
-         if (fourier%harmonic(h) == 0) then
-            harmonics(:, h) = cmplx(coefficients(:, k), kind=wp)
-         else
-            harmonics(:, h) = cmplx(coefficients(:, k), -coefficients(:, k + 1), wp)
-         end if
-      end do
+      call amplitudes_of(fourier%harmonic, fourier%column, n_rows, coefficients, n_rows, harmonics)
    end subroutine to_complex
 
    !> The inverse of to_complex.
@@ -572,13 +565,8 @@ contains
       integer, intent(in) :: n_rows
       complex(wp), intent(in) :: harmonics(n_rows, *)
       real(wp), intent(inout) :: coefficients(n_rows, *)
-      integer :: h, k
 
-      do h = 1, fourier%n_retained
-         k = fourier%column(h)
-         coefficients(:, k) = real(harmonics(:, h), wp)
-         if (fourier%harmonic(h) > 0) coefficients(:, k + 1) = -aimag(harmonics(:, h))
-      end do
+      call coefficients_of(fourier%harmonic, fourier%column, n_rows, n_rows, harmonics, coefficients)
    end subroutine to_real
 
 end module fw_hbm

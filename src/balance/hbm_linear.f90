@@ -11,6 +11,8 @@ submodule(fw_hbm) fw_hbm_linear
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_open
    use fw_lapack, only: dgemv
+   use fw_lapack, only: zgemv
+   use fw_structure_operator, only: by_frequency
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
 
@@ -28,7 +30,7 @@ contains
          call self%forces%entry(k)%law%linearize(self%fourier, self%work(k))
       end do
       call choose_active(self)
-      call gather_stiffness(self)
+      call self%structure%restrict(self%structure_state, self%n_active, self%n_used, self%used)
       n_linear = self%n_active*self%fourier%n_coefficients
       self%n_linear = n_linear
    end procedure linearize
@@ -88,40 +90,6 @@ contains
       end do
    end subroutine find_held
 
-   !> Copy the rows and columns in use, so that products run over contiguous memory.
-   subroutine gather_stiffness(self)
-      type(hbm_system), intent(inout) :: self
-      integer :: h, j, m
-
-      m = self%structure%n_coordinates
-      if (.not. allocated(self%active_stiffness)) then
-         allocate (self%active_stiffness(m, m, self%fourier%n_retained))
-      end if
-      if (is_gathered(self)) return
-      !$omp parallel do default(none) shared(self) private(h, j) &
-      !$omp if(m >= coordinates_for_threads)
-      do h = 1, self%fourier%n_retained
-         do j = 1, self%n_active
-            self%active_stiffness(:self%n_used, j, h) = &
-               self%structure%stiffness(self%used(:self%n_used), self%used(j), h)
-         end do
-      end do
-      !$omp end parallel do
-      self%gathered_omega = self%structure%omega
-      self%n_gathered_active = self%n_active
-      self%n_gathered = self%n_used
-      self%gathered(:self%n_used) = self%used(:self%n_used)
-   end subroutine gather_stiffness
-
-   !> Whether the copies of this frequency and these coordinates are there from the last step.
-   pure logical function is_gathered(self)
-      type(hbm_system), intent(in) :: self
-
-      is_gathered = self%n_gathered == self%n_used .and. self%n_gathered_active == self%n_active &
-                    .and. abs(self%gathered_omega - self%structure%omega) <= 0.0_wp
-      if (is_gathered) is_gathered = all(self%gathered(:self%n_used) == self%used(:self%n_used))
-   end function is_gathered
-
    module procedure reduce
       integer :: m, nc
 
@@ -164,21 +132,17 @@ contains
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: r(m, nc)
       real(wp), intent(out) :: rhs(self%n_active, nc)
-      integer :: h, k
+      integer :: k
 
       do k = 1, nc
          rhs(:, k) = -r(self%used(:self%n_active), k)
       end do
       if (self%n_active == m .or. self%n_active == 0) return
       if (pinned_are_solved(self, m, nc, r)) return
-      call to_complex(self%fourier, m, self%balance, self%complex_in)
-      do h = 1, self%fourier%n_retained
-         call zgemv('N', m, m, one, self%structure%stiffness(1, 1, h), m, self%complex_in(1, h), &
-            1, &
-                    zero, self%complex_out(1, h), 1)
-         self%complex_out(:self%n_used, h) = self%complex_out(self%used(:self%n_used), h)
+      call self%structure%multiply(self%structure_state, self%balance, self%product)
+      do k = 1, nc
+         self%active_out(:self%n_used, k) = self%product(self%used(:self%n_used), k)
       end do
-      call outputs_to_real(self)
       call add_forces(self, self%incidence%identity, m, self%balance)
       rhs = rhs - self%active_out(:self%n_active, :)
    end subroutine reduce_shaped
@@ -226,24 +190,21 @@ contains
 
    !> dR/d omega = Z' q - F', with what the forces add to it.
    module procedure parameter_derivative
-      integer :: m
 
-      m = self%structure%n_coordinates
-      call to_complex(self%fourier, m, x, self%complex_in)
-      call self%structure%frequency_derivative(self%complex_in, self%complex_out)
-      call derivative_with_forces(self, m, self%fourier%n_coefficients, x, dr)
+      call self%structure%derivative(self%structure_state, by_frequency, x, dr)
+      call derivative_with_forces(self, self%structure%n_coordinates, &
+                                  self%fourier%n_coefficients, x, dr)
    end procedure parameter_derivative
 
-   !> dr from the slopes of all coordinates in complex_out: the inputs of a law change by the
+   !> dr from the slopes of all coordinates: the inputs of a law change by the
    !> balance that it takes, and by the unit of time of its rates.
    subroutine derivative_with_forces(self, m, nc, q, dr)
       type(hbm_system), intent(inout) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
-      real(wp), intent(out) :: dr(m, nc)
+      real(wp), intent(inout) :: dr(m, nc)
       integer :: k
 
-      call to_real(self%fourier, m, self%complex_out, dr)
       do k = 1, self%forces%n_laws
          associate (p => self%forces%entry(k)%law%prediction)
             if (.not. (p%takes_balance .or. p%by_time)) cycle
@@ -336,33 +297,25 @@ contains
    end subroutine add_inertia_by_frequency
 
    module procedure apply
-      integer :: h, k, na, nu, ld
+      integer :: k, na
 
       na = self%n_active
-      nu = self%n_used
-      ld = self%structure%n_coordinates
-      call active_to_complex(self, na, vector)
-      !$omp parallel do default(none) shared(self, na, nu, ld) private(h) &
-      !$omp if(ld >= coordinates_for_threads)
-      do h = 1, self%fourier%n_retained
-         call zgemv('N', nu, na, one, self%active_stiffness(1, 1, h), ld, &
-                    self%complex_in(1, h), 1, zero, self%complex_out(1, h), 1)
-      end do
-      !$omp end parallel do
-      call outputs_to_real(self)
+      call self%structure%multiply_active(self%structure_state, vector, self%active_out)
       call add_forces(self, self%place, na, vector)
-      if (allocated(self%shift)) call add_shift(self)
+      if (allocated(self%shift)) call add_shift(self, na, vector)
       do k = 1, self%fourier%n_coefficients
          product((k - 1)*na + 1:k*na) = self%active_out(:na, k)
       end do
    end procedure apply
 
-   !> active_out = active_out + P/h v, all coordinates being active and v in complex_in.
-   subroutine add_shift(self)
+   !> active_out = active_out + P/h v, all coordinates being active.
+   subroutine add_shift(self, m, vector)
       class(hbm_system), intent(inout) :: self
-      integer :: h, k, m
+      integer, intent(in) :: m
+      real(wp), intent(in) :: vector(m, *)
+      integer :: h, k
 
-      m = self%n_active
+      call active_to_complex(self, m, vector)
       do h = 1, self%fourier%n_retained
          call zgemv('N', m, m, one, self%shift(1, 1, h), m, self%complex_in(1, h), 1, zero, &
                     self%complex_out(1, h), 1)
@@ -374,31 +327,10 @@ contains
    end subroutine add_shift
 
    module procedure active_to_complex
-      integer :: h, k
 
-      do h = 1, self%fourier%n_retained
-         k = self%fourier%column(h)
-         if (self%fourier%harmonic(h) == 0) then
-            self%complex_in(:na, h) = cmplx(vector(:, k), kind=wp)
-         else
-            self%complex_in(:na, h) = cmplx(vector(:, k), -vector(:, k + 1), wp)
-         end if
-      end do
+      call amplitudes_of(self%fourier%harmonic, self%fourier%column, na, vector, &
+                         size(self%complex_in, 1), self%complex_in)
    end procedure active_to_complex
-
-   !> active_out = real form of complex_out, rows in use.
-   subroutine outputs_to_real(self)
-      type(hbm_system), intent(inout) :: self
-      integer :: h, k, nu
-
-      nu = self%n_used
-      do h = 1, self%fourier%n_retained
-         k = self%fourier%column(h)
-         self%active_out(:nu, k) = real(self%complex_out(:nu, h), wp)
-         if (self%fourier%harmonic(h) > 0) self%active_out(:nu, k + 1) &
-            = -aimag(self%complex_out(:nu, h))
-      end do
-   end subroutine outputs_to_real
 
    !> active_out = active_out + what the forces add to the product, Z_r v being in active_out. Laws
    !> that take the balance take that of the others, but not of one another.

@@ -14,23 +14,12 @@ contains
 
    !> Per harmonic, the matrix with each G replaced by its mean over cosine and sine.
    module procedure build_preconditioner
-      integer :: h, k
+      integer :: h
 
-      !$omp parallel do default(none) shared(self) private(h, k) schedule(dynamic) &
+      !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
       !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%fourier%n_retained
-         call self%preconditioner(h)%reserve(self%n_active, largest_diagonal(self, h))
-         associate (m => self%preconditioner(h)%matrix, na => self%n_active, &
-                    scale => self%preconditioner(h)%scale)
-            m(:na, :na) = cmplx(scale*self%active_stiffness(:na, :na, h), kind=sp)
-            do k = 1, self%forces%n_laws
-               call add_mean_forces(self, self%forces%entry(k), self%work(k), h, scale, m)
-            end do
-            if (allocated(self%shift)) then
-               m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
-            end if
-         end associate
-         call self%preconditioner(h)%factor()
+         call build_harmonic(self, h)
       end do
       !$omp end parallel do
       self%n_preconditioned = self%n_active
@@ -39,15 +28,37 @@ contains
       self%preconditioned_shift = allocated(self%shift)
    end procedure build_preconditioner
 
-   !> Largest diagonal entry of the stiffness in absolute value.
-   pure real(wp) function largest_diagonal(self, h)
-      type(hbm_system), intent(in) :: self
+   subroutine build_harmonic(self, h)
+      type(hbm_system), intent(inout) :: self
       integer, intent(in) :: h
+      !> Z_n of rows and columns in use; of one harmonic at a time, so that memory holds no more.
+      complex(wp), allocatable :: stiffness(:, :)
+      integer :: k
+
+      allocate (stiffness(self%n_used, self%n_active))
+      call self%structure%active_block(self%structure_state, h, stiffness)
+      call self%preconditioner(h)%reserve(self%n_active, largest_diagonal(stiffness))
+      associate (m => self%preconditioner(h)%matrix, na => self%n_active, &
+                 scale => self%preconditioner(h)%scale)
+         m(:na, :na) = cmplx(scale*stiffness(:na, :), kind=sp)
+         do k = 1, self%forces%n_laws
+            call add_mean_forces(self, self%forces%entry(k), self%work(k), h, scale, stiffness, m)
+         end do
+         if (allocated(self%shift)) then
+            m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
+         end if
+      end associate
+      call self%preconditioner(h)%factor()
+   end subroutine build_harmonic
+
+   !> Largest diagonal entry of the stiffness in absolute value.
+   pure real(wp) function largest_diagonal(stiffness)
+      complex(wp), intent(in) :: stiffness(:, :)
       integer :: j
 
       largest_diagonal = 0.0_wp
-      do j = 1, self%n_active
-         largest_diagonal = max(largest_diagonal, abs(self%active_stiffness(j, j, h)))
+      do j = 1, size(stiffness, 2)
+         largest_diagonal = max(largest_diagonal, abs(stiffness(j, j)))
       end do
    end function largest_diagonal
 
@@ -102,12 +113,13 @@ contains
       end if
    end function mean_block
 
-   subroutine add_mean_forces(self, entry, work, h, scale, m)
+   subroutine add_mean_forces(self, entry, work, h, scale, stiffness, m)
       type(hbm_system), intent(in) :: self
       type(force_entry), intent(in) :: entry
       type(force_workspace), intent(in) :: work
       integer, intent(in) :: h
       real(wp), intent(in) :: scale
+      complex(wp), intent(in) :: stiffness(:, :)
       complex(sp), intent(inout) :: m(:, :)
       integer :: i, c_out, c_in, k, nc
       complex(wp) :: mean
@@ -127,19 +139,20 @@ contains
                   mean = merge(one, zero, c_in == c_out)
                end if
                call add_rows(self, entry, h, i, c_out, c_in, work%linear_state(i) == pair_stuck, &
-                             scale*mean, m)
+                             scale*mean, stiffness, m)
             end do
          end do
       end do
    end subroutine add_mean_forces
 
    !> m(out, :) = m(out, :) + mean (k d e_in - A(in, :)), without A where the balance is not taken.
-   subroutine add_rows(self, entry, h, element, c_out, c_in, is_stuck, mean, m)
+   subroutine add_rows(self, entry, h, element, c_out, c_in, is_stuck, mean, stiffness, m)
       type(hbm_system), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: h, element, c_out, c_in
       logical, intent(in) :: is_stuck
       complex(wp), intent(in) :: mean
+      complex(wp), intent(in) :: stiffness(:, :)
       complex(sp), intent(inout) :: m(:, :)
       integer :: p_out, p_in, n
       complex(wp) :: factor
@@ -157,7 +170,7 @@ contains
             p_out = self%place(self%incidence%coordinate_of(row(c_out)))
             p_in = self%place(self%incidence%coordinate_of(row(c_in)))
             if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then
-               call subtract_row(na, mean, self%active_stiffness(p_in, :, h), m(p_out, :))
+               call subtract_row(na, mean, stiffness(p_in, :), m(p_out, :))
             end if
          end if
          call self%incidence%add_mapped_block(row(c_out), row(c_in), h, self%place, na, &

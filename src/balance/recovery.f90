@@ -29,10 +29,10 @@ contains
       integer :: m, h, n, n_observed, i
 
       m = system%structure%n_coordinates
-      n_observed = size(system%structure%basis%observe_q, 1)
+      n_observed = system%structure%n_observed
       allocate (q(m, system%fourier%n_retained), observed(n_observed, system%fourier%n_retained))
       call to_complex(system%fourier, m, x, q)
-      call system%structure%recover(q, observed)
+      call system%structure%recover(system%structure_state, q, observed)
       allocate (point%coefficients(2*n_harmonics + 1, n_observed), source=0.0_wp)
       do h = 1, system%fourier%n_retained
          n = system%fourier%harmonic(h)
@@ -76,12 +76,12 @@ contains
       real(wp), intent(inout) :: y(:)
       integer :: i, j, first_x, first_y, n_relative
 
-      n_relative = source%joint%relative%n_coordinates
+      n_relative = source%structure%n_relative
       first_x = (from - 1)*source%structure%n_coordinates
       first_y = (to - 1)*target%structure%n_coordinates
       y(first_y + 1:first_y + n_relative) = x(first_x + 1:first_x + n_relative)
-      do i = 1, size(source%structure%basis%kept)
-         j = findloc(target%structure%basis%kept, source%structure%basis%kept(i), dim=1)
+      do i = 1, size(source%structure%kept)
+         j = findloc(target%structure%kept, source%structure%kept(i), dim=1)
          if (j > 0) y(first_y + n_relative + j) = x(first_x + n_relative + i)
       end do
    end subroutine carry_coefficient

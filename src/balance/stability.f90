@@ -82,9 +82,9 @@ contains
          if (allocated(error)) return
       else
          call new_tangent(system, x, history%forces%state, n_harmonics, tangent)
-         call hill_exponents(basis, tangent, system%structure%omega, exponents, error)
+         call hill_exponents(basis, tangent, system%frequency(), exponents, error)
          if (allocated(error)) return
-         multipliers = exp(exponents*(2.0_wp*pi/system%structure%omega))
+         multipliers = exp(exponents*(2.0_wp*pi/system%frequency()))
       end if
       call pair_conjugates(multipliers)
       call sort_descending(multipliers)

@@ -93,7 +93,7 @@ contains
       nd = nb + basis%n_damped
       nr = size(basis%direction, 2)
       n_columns = nd + nb + size(memory)
-      self%step = 2.0_wp*pi/(system%structure%omega*history%n_time)
+      self%step = 2.0_wp*pi/(system%frequency()*history%n_time)
       allocate (self%y(n, n_columns), self%v(nb, n_columns), self%a(nb, n_columns), source=0.0_wp)
       allocate (self%x(nr, n_columns), self%by_u(nr, nr), self%by_x(nr, nr), source=0.0_wp)
       allocate (self%keeps(nr))

@@ -28,28 +28,20 @@ contains
       do h = 1, system%fourier%n_retained
          if (system%fourier%harmonic(h) == 0) cycle
          k = (system%fourier%column(h) - 1)*m
-         square = square + cancelling(system, system%fourier%harmonic(h), x(k + 1:k + m), &
-                                      x(k + m + 1:k + 2*m))
+         square = square + cancelling(system, h, x(k + 1:k + m), x(k + m + 1:k + 2*m))
       end do
       lost = .not. epsilon(1.0_wp)*sqrt(square) <= limit*system%reference
    end function is_lost_in_round_off
 
    !> Square of the norm of (|K| + (n omega)^2 |M|) |q| for one harmonic.
-   pure real(wp) function cancelling(system, n, cosine, sine) result(square)
+   pure real(wp) function cancelling(system, h, cosine, sine) result(square)
       type(hbm_system), intent(in) :: system
-      integer, intent(in) :: n
+      integer, intent(in) :: h
       real(wp), intent(in) :: cosine(:), sine(:)
-      real(wp) :: amplitude(size(cosine)), sums(size(cosine)), s
-      integer :: j
+      real(wp) :: amplitude(size(cosine)), sums(size(cosine))
 
-      s = real(n, wp)*system%structure%omega
       amplitude = hypot(cosine, sine)
-      sums = 0.0_wp
-      associate (b => system%structure%basis)
-         do j = 1, size(amplitude)
-            sums = sums + (abs(b%k_qq(:, j)) + s**2*abs(b%m_qq(:, j)))*amplitude(j)
-         end do
-      end associate
+      call system%structure%magnitudes(system%structure_state, h, amplitude, sums)
       square = sum(sums**2)
    end function cancelling
 

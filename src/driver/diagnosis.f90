@@ -138,7 +138,7 @@ contains
       real(wp) :: trial(size(x))
 
       system%load_share = share
-      call system%set_frequency(system%structure%omega, error)
+      call system%set_frequency(system%frequency(), error)
       done = .not. allocated(error)
       if (.not. done .or. present(only_set)) return
       trial = x

@@ -381,7 +381,7 @@ contains
 
       call self%method%solve(system, self%x, report)
       if (report%converged .or. system%load_share < 1.0_wp) return
-      if (abs(system%structure%omega - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
+      if (abs(system%frequency() - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
    end subroutine attempt
 
    subroutine note_best(self, report)

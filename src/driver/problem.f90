@@ -5,8 +5,6 @@ module fw_problem
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_point
    use fw_case, only: analysis_wear
-   use fw_condensation, only: condensation_type
-   use fw_condensation, only: new_condensation
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -29,8 +27,11 @@ module fw_problem
    use fw_joint, only: joint_type
    use fw_joint, only: new_joint
    use fw_memory, only: require_memory
+   use fw_plain_structure, only: new_plain_structure
+   use fw_plain_structure, only: plain_structure
    use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_powell
+   use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
    use fw_wear_options, only: follow_range
    implicit none (type, external)
@@ -58,7 +59,8 @@ contains
       logical :: skip_idle
       type(joint_type) :: joint
       type(fourier_type) :: fourier
-      type(condensation_type) :: structure
+      type(plain_structure) :: structure
+      class(structure_state), allocatable :: state
       type(force_list) :: forces
       real(wp) :: range(2)
 
@@ -77,12 +79,13 @@ contains
       if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
          range = follow_range*range
       end if
-      call new_condensation(case%model, joint%relative, fourier%harmonic, range, structure, &
-         error, keep_all)
+      call new_plain_structure(case%model, joint%relative, fourier%harmonic, range, structure, &
+                               error, keep_all)
       if (allocated(error)) return
-      call structure%update(case%sweep%start, error)
+      call structure%new_state(state)
+      call structure%at(state, case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
-      call new_hbm(joint, structure, fourier, forces, case%contact%depth, system)
+      call new_hbm(joint, structure, state, fourier, forces, case%contact%depth, system)
       system%reduced = case%solver%skips
       if (case%contact%n_pairs > 0 .and. fft_pays(fourier%n_coefficients)) then
          call system%fourier%prepare_fft(3*case%contact%n_pairs)

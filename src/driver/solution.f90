@@ -184,7 +184,7 @@ contains
          call build_system(case, self%whole, error, keep_all=.true., of_level=self%harmonics)
          if (allocated(error)) return
       end if
-      call self%whole%set_frequency(system%structure%omega, error)
+      call self%whole%set_frequency(system%frequency(), error)
       if (allocated(error)) return
       ! One and the same law: prediction stiffness, memory and reference of the condensed system.
       self%whole%forces = system%forces

@@ -163,7 +163,7 @@ contains
          end if
       end associate
       run%first = run%state
-      run%first_omega = run%system%structure%omega
+      run%first_omega = run%system%frequency()
    end subroutine start_march
 
    !> The march to its end, and why it ended.
@@ -397,7 +397,7 @@ contains
 
       go_on = .false.
       n = system%n_vibration()
-      point%omega = system%structure%omega
+      point%omega = system%frequency()
       point%cycles = state%cycles
       point%depth = state%x(n + 1:)
       point%wear_rate = state%rate

@@ -19,10 +19,14 @@ module fw_reduction
       integer :: n_internal = 0
       !> Internal modes kept as coordinates, behind the relative ones: their numbers.
       integer, allocatable :: kept(:)
-      !> Blocks of the coordinates (n_coordinates, n_coordinates).
-      real(wp), allocatable :: k_qq(:, :), m_qq(:, :), c_qq(:, :)
-      !> Coupling blocks (n_internal, n_coordinates).
-      real(wp), allocatable :: k_iq(:, :), m_iq(:, :), c_iq(:, :)
+      !> K, M and C, the last only where there is damping: rows of the coordinates, then of the
+      !> internal modes (n_coordinates + n_internal, n_coordinates, n_blocks). One array, so that
+      !> products with all of them are one product.
+      integer :: n_blocks = 0
+      real(wp), allocatable :: blocks(:, :, :)
+      !> The rows of the internal modes again, for products with the transpose
+      !> (n_internal, n_blocks, n_coordinates).
+      real(wp), allocatable :: coupling(:, :, :)
       !> Diagonals of the internal modes (n_internal).
       real(wp), allocatable :: k_i(:), m_i(:), c_i(:)
       !> Internal damping, only where it is not diagonal (n_internal, n_internal).
@@ -134,12 +138,13 @@ contains
 
       self%n_coordinates = size(t_q, 2)
       self%n_internal = size(t_i, 2)
-      self%k_qq = congruence(t_q, model%stiffness, t_q)
-      self%m_qq = congruence(t_q, model%mass, t_q)
-      self%c_qq = congruence(t_q, model%damping, t_q)
-      self%k_iq = congruence(t_i, model%stiffness, t_q)
-      self%m_iq = congruence(t_i, model%mass, t_q)
-      self%c_iq = congruence(t_i, model%damping, t_q)
+      self%n_blocks = merge(3, 2, any(abs(model%damping) > 0.0_wp))
+      if (allocated(self%blocks)) deallocate (self%blocks, self%coupling)
+      allocate (self%blocks(self%n_coordinates + self%n_internal, self%n_coordinates, self%n_blocks))
+      allocate (self%coupling(self%n_internal, self%n_blocks, self%n_coordinates))
+      call fill_blocks(model%stiffness, t_q, t_i, 1, self)
+      call fill_blocks(model%mass, t_q, t_i, 2, self)
+      if (self%n_blocks == 3) call fill_blocks(model%damping, t_q, t_i, 3, self)
       damping = congruence(t_i, model%damping, t_i)
       self%c_i = [(damping(j, j), j=1, self%n_internal)]
       do j = 1, self%n_internal
@@ -158,6 +163,18 @@ contains
       self%observe_q = product_of(model%observe_matrix, t_q)
       self%observe_i = product_of(model%observe_matrix, t_i)
    end subroutine transform
+
+   subroutine fill_blocks(matrix, t_q, t_i, block, self)
+      real(wp), intent(in) :: matrix(:, :), t_q(:, :), t_i(:, :)
+      integer, intent(in) :: block
+      type(reduction_type), intent(inout) :: self
+      integer :: m
+
+      m = self%n_coordinates
+      self%blocks(:m, :, block) = congruence(t_q, matrix, t_q)
+      self%coupling(:, block, :) = congruence(t_i, matrix, t_q)
+      self%blocks(m + 1:, :, block) = self%coupling(:, block, :)
+   end subroutine fill_blocks
 
    !> Internal modes that have no damping and whose frequency a harmonic may hit.
    pure function undamped_resonances(self, harmonic, omega_range) result(keep)

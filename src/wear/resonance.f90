@@ -68,7 +68,7 @@ contains
       type(trial_type) :: low, best, high
       type(solver_report) :: report
 
-      best%omega = system%structure%omega
+      best%omega = system%frequency()
       best%state = state
       best%amplitude = amplitude_of(self, system, state)
       if (self%first <= 0.0_wp) self%first = best%omega

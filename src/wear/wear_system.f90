@@ -15,6 +15,7 @@ module fw_wear_system
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_stuck
    use fw_hbm, only: hbm_system
+   use fw_hbm, only: to_complex
    use fw_lapack, only: zgemm
    use fw_linalg, only: lu_type
    implicit none (type, external)
@@ -42,7 +43,7 @@ module fw_wear_system
       !> Unknowns of the balance in the linear problem.
       integer, private :: n_balance = 0
       !> Preconditioner: M^-1 B and the rows of C M^-1 per harmonic, factors of the complement.
-      complex(wp), allocatable, private :: columns(:, :, :), product(:, :)
+      complex(wp), allocatable, private :: columns(:, :, :), stiff(:, :)
       type(lu_type), private :: complement
       real(wp), allocatable, private :: adjusted(:), solved(:)
    contains
@@ -341,6 +342,7 @@ contains
             do j = 1, self%n_wearing
                call self%preconditioner(h)%solve(self%columns(:na, j, h))
             end do
+            if (takes_balance(self)) call multiply_columns(self, h)
             call subtract_rows(self, h, self%n_wearing, self%columns(:, :, h), s)
          end do
       end associate
@@ -363,9 +365,9 @@ contains
       n = self%n_wearing
       if (allocated(self%columns)) then
          if (size(self%columns, 2) == n) return
-         deallocate (self%columns, self%product)
+         deallocate (self%columns, self%stiff)
       end if
-      allocate (self%columns(m, n, self%fourier%n_retained), self%product(m, max(n, 1)))
+      allocate (self%columns(m, n, self%fourier%n_retained), self%stiff(m, max(n, 1)))
    end subroutine reserve
 
    !> Harmonics of active coordinates as complex rows.
@@ -386,7 +388,28 @@ contains
       end do
    end subroutine harmonics_of
 
-   !> rows = rows - C z for displacements z of one harmonic (active coordinates, right-hand side).
+   !> Whether the pairs take the balance: their predictions need Z_n z.
+   pure logical function takes_balance(self)
+      type(wear_system), intent(in) :: self
+
+      takes_balance = self%forces%entry(self%forces%pairs)%law%prediction%takes_balance
+   end function takes_balance
+
+   !> stiff = Z_n columns of one harmonic, rows in use.
+   subroutine multiply_columns(self, h)
+      type(wear_system), intent(inout) :: self
+      integer, intent(in) :: h
+      complex(wp), allocatable :: stiffness(:, :)
+
+      allocate (stiffness(self%n_used, self%n_active))
+      call self%structure%active_block(self%structure_state, h, stiffness)
+      call zgemm('N', 'N', self%n_used, self%n_wearing, self%n_active, one, stiffness, &
+                 self%n_used, self%columns(1, 1, h), size(self%columns, 1), zero, self%stiff, &
+                 size(self%stiff, 1))
+   end subroutine multiply_columns
+
+   !> rows = rows - C z for displacements z of one harmonic (active coordinates, right-hand side);
+   !> where the pairs take the balance, Z_n z is in `stiff`.
    subroutine subtract_rows(self, h, n_right, z, rows)
       type(wear_system), intent(inout) :: self
       integer, intent(in) :: h, n_right
@@ -399,9 +422,6 @@ contains
       n = self%fourier%harmonic(h)
       associate (p => self%forces%entry(self%forces%pairs)%law%prediction, &
                  work => self%work(self%forces%pairs))
-         if (p%takes_balance) call zgemm('N', 'N', self%n_used, n_right, self%n_active, one, &
-            self%active_stiffness(1, 1, h), size(self%active_stiffness, 1), z, size(z, 1), zero, &
-            self%product, size(self%product, 1))
          do j = 1, self%n_wearing
             i = self%wearing(j)
             do c = 1, 3
@@ -413,7 +433,7 @@ contains
                call self%incidence%gather_harmonic(row, h, self%place, self%n_active, &
                                                    turn*p%stiffness(i, c), z, input)
                place = self%place(self%incidence%coordinate_of(row))
-               if (p%takes_balance .and. place > 0) input = input - self%product(place, :n_right)
+               if (p%takes_balance .and. place > 0) input = input - self%stiff(place, :n_right)
                k = (c - 1)*nc + self%fourier%column(h)
                associate (g => work%slip_derivative(:, i), &
                           scale => self%weight(i)*self%cycles*self%factor(i))
@@ -439,7 +459,12 @@ contains
       allocate (z(self%structure%n_coordinates, 1, self%fourier%n_retained))
       call harmonics_of(self, na, vector, z(:, 1, :))
       depth(:, 1) = vector(n + 1:)
+      if (takes_balance(self)) then
+         call self%structure%multiply_active(self%structure_state, vector, self%active_out)
+         call to_complex(self%fourier, size(self%active_out, 1), self%active_out, self%complex_out)
+      end if
       do h = 1, self%fourier%n_retained
+         self%stiff(:, 1) = self%complex_out(:, h)
          call subtract_rows(self, h, 1, z(:, :, h), depth)
       end do
       call self%complement%solve(depth(:, 1))

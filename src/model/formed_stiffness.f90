@@ -1,0 +1,255 @@
+!> The condensed stiffness as complex matrices, one a harmonic: formed at a frequency, products by
+!> zgemv. For few coordinates, whose matrices stay in the cache, and for many internal modes.
+module fw_formed_stiffness
+   use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
+   use fw_internal_block, only: internal_block
+   use fw_kinds, only: wp
+   use fw_lapack, only: zgemm
+   use fw_lapack, only: zgemv
+   use fw_reduction, only: reduction_type
+   use fw_threads, only: coordinates_for_threads
+   implicit none (type, external)
+   private
+
+   public :: formed_stiffness, form_block, harmonic_load
+
+   type :: formed_stiffness
+      !> Z_r (n_coordinates, n_coordinates, n_retained) [force/length].
+      complex(wp), allocatable :: matrix(:, :, :)
+      !> Its rows and columns in use, where these are not all, one harmonic behind the other; and
+      !> scratch.
+      complex(wp), allocatable, private :: active(:)
+      complex(wp), allocatable, private :: input(:, :), output(:, :)
+   contains
+      procedure :: reserve
+      procedure :: form
+      procedure :: multiply
+      procedure :: gather
+      procedure :: multiply_active
+   end type formed_stiffness
+
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+
+contains
+
+   pure subroutine reserve(self, m, n_harmonics)
+      class(formed_stiffness), intent(inout) :: self
+      integer, intent(in) :: m, n_harmonics
+
+      allocate (self%matrix(m, m, n_harmonics), source=zero)
+      allocate (self%input(m, n_harmonics), self%output(m, n_harmonics), source=zero)
+   end subroutine reserve
+
+   !> All harmonics at a frequency, and their loads.
+   subroutine form(self, basis, harmonic, theta, s, load, n_failed)
+      class(formed_stiffness), intent(inout) :: self
+      type(reduction_type), intent(in) :: basis
+      integer, intent(in) :: harmonic(:)
+      complex(wp), intent(in) :: theta(:)
+      real(wp), intent(in) :: s(:)
+      complex(wp), intent(inout) :: load(:, :)
+      !> Harmonics that hit a mode without damping.
+      integer, intent(out) :: n_failed
+      integer :: h
+
+      n_failed = 0
+      !$omp parallel do default(none) shared(self, basis, harmonic, theta, s, load) private(h) &
+      !$omp reduction(+:n_failed) schedule(dynamic) &
+      !$omp if(basis%n_coordinates >= coordinates_for_threads)
+      do h = 1, size(harmonic)
+         call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), load(:, h), &
+                            n_failed)
+      end do
+      !$omp end parallel do
+   end subroutine form
+
+   subroutine form_harmonic(basis, n, theta, s, matrix, load, n_failed)
+      type(reduction_type), intent(in) :: basis
+      integer, intent(in) :: n
+      complex(wp), intent(in) :: theta
+      real(wp), intent(in) :: s
+      complex(wp), intent(inout), contiguous :: matrix(:, :)
+      complex(wp), intent(inout) :: load(:)
+      integer, intent(inout) :: n_failed
+      type(internal_block) :: internal
+      logical :: failed
+      integer :: j
+
+      call internal%factor(basis, theta, s, failed)
+      if (failed) n_failed = n_failed + 1
+      load = harmonic_load(basis%load_q, n)
+      call form_block(basis, theta, s, internal, basis%n_coordinates, &
+                      [(j, j=1, basis%n_coordinates)], matrix, harmonic_load(basis%load_i, n), load)
+   end subroutine form_harmonic
+
+   !> Z_r of one harmonic, rows in use and the first of them as columns, Z_qq - Z_qi D^-1 Z_iq;
+   !> where an internal load is given, load - Z_qi D^-1 F_i along with it.
+   subroutine form_block(basis, theta, s, internal, n_active, used, matrix, internal_load, load)
+      type(reduction_type), intent(in) :: basis
+      complex(wp), intent(in) :: theta
+      !> n omega.
+      real(wp), intent(in) :: s
+      !> D at this harmonic.
+      type(internal_block), intent(in) :: internal
+      integer, intent(in) :: n_active
+      !> Coordinates in use.
+      integer, intent(in) :: used(:)
+      !> (size(used), n_active)
+      complex(wp), intent(inout), contiguous :: matrix(:, :)
+      complex(wp), intent(in), optional :: internal_load(:)
+      complex(wp), intent(inout), optional :: load(:)
+      complex(wp), allocatable :: z_iq(:, :), solved(:, :), part(:)
+      integer :: j, n_i, n_right, n_used
+
+      n_i = basis%n_internal
+      n_used = size(used)
+      n_right = n_active
+      if (present(load)) n_right = n_active + 1
+      do j = 1, n_active
+         call combine(n_used, basis%n_blocks, theta, s, basis%blocks(used, used(j), :), &
+                      matrix(:, j))
+      end do
+      if (n_i == 0) return
+      allocate (z_iq(n_i, n_used), solved(n_i, n_right), part(n_used))
+      do j = 1, n_used
+         call combine(n_i, basis%n_blocks, theta, s, basis%coupling(:, :, used(j)), z_iq(:, j))
+      end do
+      solved(:, :n_active) = z_iq(:, :n_active)
+      if (present(load)) solved(:, n_right) = internal_load
+      call internal%solve(n_right, solved)
+      call subtract_product(n_used, n_active, n_i, z_iq, solved, matrix)
+      if (.not. present(load)) return
+      call zgemm('T', 'N', n_used, 1, n_i, -one, z_iq, n_i, solved(1, n_right), n_i, zero, part, &
+                 n_used)
+      load = load + part
+   end subroutine form_block
+
+   !> K - theta M + i s C.
+   pure subroutine combine(n, n_blocks, theta, s, blocks, z)
+      integer, intent(in) :: n, n_blocks
+      complex(wp), intent(in) :: theta
+      real(wp), intent(in) :: s
+      real(wp), intent(in) :: blocks(:, :)
+      complex(wp), intent(out) :: z(n)
+
+      if (n_blocks == 3) then
+         z = cmplx(blocks(:, 1) - real(theta, wp)*blocks(:, 2), &
+                   s*blocks(:, 3) - aimag(theta)*blocks(:, 2), wp)
+      else
+         z = cmplx(blocks(:, 1) - real(theta, wp)*blocks(:, 2), -aimag(theta)*blocks(:, 2), wp)
+      end if
+   end subroutine combine
+
+   !> z = z - z_iq^T solved, symmetric in its first rows: by blocks of columns down to the diagonal
+   !> and below the last column, the rest by its symmetry.
+   subroutine subtract_product(n_used, n_active, n_i, z_iq, solved, z)
+      integer, intent(in) :: n_used, n_active, n_i
+      complex(wp), intent(in) :: z_iq(n_i, n_used), solved(n_i, *)
+      complex(wp), intent(inout) :: z(n_used, n_active)
+      !> Columns of a block: fewer leave the product no speed.
+      integer, parameter :: width = 48
+      integer :: first, last, j
+
+      do first = 1, n_active, width
+         last = min(first + width - 1, n_active)
+         call zgemm('T', 'N', last, last - first + 1, n_i, -one, z_iq, n_i, &
+                    solved(1, first), n_i, one, z(1, first), n_used)
+      end do
+      do first = 1, n_active - width, width
+         last = first + width - 1
+         do j = first, last
+            z(last + 1:n_active, j) = z(j, last + 1:n_active)
+         end do
+      end do
+      if (n_used == n_active) return
+      call zgemm('T', 'N', n_used - n_active, n_active, n_i, -one, z_iq(1, n_active + 1), n_i, &
+                 solved, n_i, one, z(n_active + 1, 1), n_used)
+   end subroutine subtract_product
+
+   !> Complex load of a harmonic from the static, cosine and sine parts in columns.
+   pure function harmonic_load(parts, n) result(load)
+      real(wp), intent(in) :: parts(:, :)
+      integer, intent(in) :: n
+      complex(wp) :: load(size(parts, 1))
+
+      select case (n)
+      case (0)
+         load = cmplx(parts(:, 1), kind=wp)
+      case (1)
+         load = cmplx(parts(:, 2), -parts(:, 3), wp)
+      case default
+         load = zero
+      end select
+   end function harmonic_load
+
+   !> product = Z q.
+   subroutine multiply(self, harmonic, column, m, q, product)
+      class(formed_stiffness), intent(inout) :: self
+      integer, intent(in) :: harmonic(:), column(:)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: q(m, *)
+      real(wp), intent(inout) :: product(m, *)
+      integer :: h
+
+      call amplitudes_of(harmonic, column, m, q, m, self%input)
+      !$omp parallel do default(none) shared(self, m, harmonic) private(h) &
+      !$omp if(m >= coordinates_for_threads)
+      do h = 1, size(harmonic)
+         call zgemv('N', m, m, one, self%matrix(1, 1, h), m, self%input(1, h), 1, zero, &
+                    self%output(1, h), 1)
+      end do
+      !$omp end parallel do
+      call coefficients_of(harmonic, column, m, m, self%output, product)
+   end subroutine multiply
+
+   !> Copy the rows and columns in use, so that products run over contiguous memory.
+   subroutine gather(self, n_active, n_used, used)
+      class(formed_stiffness), intent(inout) :: self
+      integer, intent(in) :: n_active, n_used
+      integer, intent(in) :: used(:)
+      integer :: h, j, m, n, place
+
+      m = size(self%matrix, 1)
+      if (n_active == m) return
+      n = n_used*n_active*size(self%matrix, 3)
+      if (allocated(self%active)) then
+         if (size(self%active) < n) deallocate (self%active)
+      end if
+      if (.not. allocated(self%active)) allocate (self%active(n))
+      !$omp parallel do default(none) shared(self, n_active, n_used, used) private(h, j, place) &
+      !$omp if(m >= coordinates_for_threads)
+      do h = 1, size(self%matrix, 3)
+         do j = 1, n_active
+            place = ((h - 1)*n_active + j - 1)*n_used
+            self%active(place + 1:place + n_used) = self%matrix(used(:n_used), used(j), h)
+         end do
+      end do
+      !$omp end parallel do
+   end subroutine gather
+
+   !> product = Z(used, active) v, the first n_used rows of product.
+   subroutine multiply_active(self, harmonic, column, n_active, n_used, v, m, product)
+      class(formed_stiffness), intent(inout) :: self
+      integer, intent(in) :: harmonic(:), column(:)
+      integer, intent(in) :: n_active, n_used, m
+      real(wp), intent(in) :: v(n_active, *)
+      real(wp), intent(inout) :: product(m, *)
+      integer :: h
+
+      if (n_active == m) then
+         call self%multiply(harmonic, column, m, v, product)
+         return
+      end if
+      call amplitudes_of(harmonic, column, n_active, v, m, self%input)
+      !$omp parallel do default(none) shared(self, m, harmonic, n_used, n_active) private(h) &
+      !$omp if(m >= coordinates_for_threads)
+      do h = 1, size(harmonic)
+         call zgemv('N', n_used, n_active, one, self%active((h - 1)*n_used*n_active + 1), n_used, &
+                    self%input(1, h), 1, zero, self%output(1, h), 1)
+      end do
+      !$omp end parallel do
+      call coefficients_of(harmonic, column, n_used, m, self%output, product)
+   end subroutine multiply_active
+
+end module fw_formed_stiffness

@@ -1,0 +1,514 @@
+!> One structure, condensed to its relative coordinates. u = T_q q + T_i x: the relative coordinates
+!> q with their static constraint modes, and modes x of the structure with q held, so that the
+!> internal block is diagonal (but for damping that is not proportional). Then, with s = n omega,
+!>
+!>   D_j = k_j - theta_n m_j + i s c_j,   Z_qi = K_qi - theta_n M_qi + i s C_qi,
+!>   Z_r = Z_qq - Z_qi D^-1 Z_qi^T,   F_r = F_q - Z_qi D^-1 F_i,   x = D^-1 (F_i - Z_qi^T q).
+!>
+!> This is (B Z^-1 B^T)^-1 in exact arithmetic, and needs neither a regular mass nor a stiffness that
+!> holds the structure without its contact. At an undamped mode of the held structure Z_r has
+!> a pole; internal modes that a harmonic of the given range of frequencies may hit so are kept as
+!> coordinates.
+!>
+!> Of many coordinates no matrix Z_r is formed: K, M and C are real and the same for all harmonics
+!> and frequencies, so that one real product serves all harmonics (fw_real_products). Complex
+!> matrices of few coordinates stay in the cache, and need fewer operations: there Z_r is formed once
+!> at each frequency (fw_formed_stiffness).
+module fw_plain_structure
+   use fw_kinds, only: wp
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
+   use fw_formed_stiffness, only: form_block
+   use fw_formed_stiffness, only: formed_stiffness
+   use fw_formed_stiffness, only: harmonic_load
+   use fw_internal_block, only: internal_block
+   use fw_model, only: model_type
+   use fw_real_products, only: harmonic_factors
+   use fw_real_products, only: packed_blocks
+   use fw_real_products, only: real_products
+   use fw_reduction, only: reduction_type
+   use fw_reduction, only: new_reduction
+   use fw_relative, only: relative_type
+   use fw_structure_operator, only: by_frequency
+   use fw_structure_operator, only: lay_out_coefficients
+   use fw_structure_operator, only: structure_operator
+   use fw_structure_operator, only: structure_state
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: plain_structure, new_plain_structure
+
+   type, extends(structure_operator) :: plain_structure
+      type(reduction_type) :: basis
+      !> Whether Z_r is formed at each frequency.
+      logical :: forms_blocks = .true.
+      !> All rows and columns for real products, where it is not.
+      type(packed_blocks) :: packed
+   contains
+      procedure :: new_state
+      procedure :: at
+      procedure :: multiply
+      procedure :: restrict
+      procedure :: multiply_active
+      procedure :: block => block_of_all
+      procedure :: active_block => block_in_use
+      procedure :: diagonal
+      procedure :: derivative
+      procedure :: recover
+      procedure :: static_stiffness
+      procedure :: mass
+      procedure :: magnitudes
+   end type plain_structure
+
+   type, extends(structure_state) :: plain_state
+      type(harmonic_factors) :: factors
+      !> The one or the other.
+      type(formed_stiffness) :: formed
+      type(real_products) :: products
+      !> Whether rows in use are those of the present frequency.
+      logical :: restricted = .false.
+   end type plain_state
+
+   !> Entries of all complex matrices from which real products pay (8 MB, more than caches near
+   !> a processor hold), and internal modes for each coordinate up to which they do. Measured by
+   !> bench/speed/products.f90, and on sweeps of 48 and 96 pairs.
+   real(wp), parameter :: most_entries = 5.0e5_wp, most_internal = 0.5_wp
+
+contains
+
+   !> Prepare the condensation of a model to its relative coordinates.
+   subroutine new_plain_structure(model, relative, harmonic, omega_range, self, error, keep_all, &
+                                  forms_blocks)
+      type(model_type), intent(in) :: model
+      type(relative_type), intent(in) :: relative
+      !> Harmonics in use.
+      integer, intent(in) :: harmonic(:)
+      !> Lowest and highest frequency that will be asked for [rad/s].
+      real(wp), intent(in) :: omega_range(2)
+      type(plain_structure), intent(out) :: self
+      type(error_type), allocatable, intent(out) :: error
+      !> Condense nothing: every internal mode becomes a coordinate.
+      logical, intent(in), optional :: keep_all
+      !> Form Z_r at each frequency, or never; chosen by size where it is not given.
+      logical, intent(in), optional :: forms_blocks
+      integer :: j
+
+      call new_reduction(model, relative, harmonic, omega_range, self%basis, error, keep_all)
+      if (allocated(error)) return
+      self%n_coordinates = self%basis%n_coordinates
+      self%n_relative = relative%n_coordinates
+      self%kept = self%basis%kept
+      self%n_observed = size(self%basis%observe_q, 1)
+      call lay_out_coefficients(self, harmonic)
+      self%forms_blocks = real(self%n_coordinates, wp)**2*size(harmonic) < most_entries .or. &
+                          self%basis%n_internal > most_internal*self%n_coordinates
+      if (present(forms_blocks)) self%forms_blocks = forms_blocks
+      if (.not. self%forms_blocks) call self%packed%pack_blocks(self%basis, self%n_coordinates, &
+                                           self%n_coordinates, [(j, j=1, self%n_coordinates)])
+   end subroutine new_plain_structure
+
+   subroutine new_state(self, state)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), allocatable, intent(out) :: state
+      type(plain_state), allocatable :: plain
+      integer :: m, nh
+
+      m = self%n_coordinates
+      nh = size(self%harmonic)
+      allocate (plain)
+      plain%factors%harmonic = self%harmonic
+      plain%factors%column = self%column
+      allocate (plain%factors%theta(nh), source=(0.0_wp, 0.0_wp))
+      allocate (plain%factors%s(nh), source=0.0_wp)
+      allocate (plain%load(m, nh), source=(0.0_wp, 0.0_wp))
+      allocate (plain%used(m), source=0)
+      if (self%forms_blocks) then
+         call plain%formed%reserve(m, nh)
+      else
+         call plain%products%reserve(self%basis, nh, self%n_coefficients)
+      end if
+      call move_alloc(plain, state)
+   end subroutine new_state
+
+   subroutine at(self, state, omega, self_excitation, error)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: omega, self_excitation
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n_failed
+
+      if (abs(omega - state%omega) <= 0.0_wp .and. &
+          abs(self_excitation - state%self_excitation) <= 0.0_wp) return
+      n_failed = 0
+      select type (state)
+      type is (plain_state)
+         call go_to(self, state, omega, self_excitation, n_failed)
+      end select
+      if (n_failed > 0) then
+         call fatal_error(error, 'the structure resonates without damping at omega = '// &
+                          to_text(omega)//' rad/s in a mode that no contact pair touches; '// &
+                          'give it damping or shift the frequency', status_input)
+         return
+      end if
+      state%omega = omega
+      state%self_excitation = self_excitation
+   end subroutine at
+
+   subroutine go_to(self, state, omega, self_excitation, n_failed)
+      type(plain_structure), intent(in) :: self
+      type(plain_state), intent(inout) :: state
+      real(wp), intent(in) :: omega, self_excitation
+      integer, intent(out) :: n_failed
+
+      n_failed = 0
+      associate (f => state%factors)
+         f%s = self%harmonic*omega
+         f%theta = cmplx(f%s**2, f%s*self_excitation, wp)
+         if (self%n_coordinates == 0) return
+         if (self%forms_blocks) then
+            call state%formed%form(self%basis, f%harmonic, f%theta, f%s, state%load, n_failed)
+            state%restricted = .false.
+         else
+            call state%products%factor(self%basis, f, n_failed)
+            call condense_load(self, f, state%products, state%load)
+         end if
+      end associate
+   end subroutine go_to
+
+   !> F_q - Z_qi D^-1 F_i of all harmonics.
+   subroutine condense_load(self, factors, products, load)
+      type(plain_structure), intent(in) :: self
+      type(harmonic_factors), intent(in) :: factors
+      type(real_products), intent(inout) :: products
+      complex(wp), intent(inout) :: load(:, :)
+      real(wp) :: coefficients(self%n_coordinates, self%n_coefficients)
+      integer :: h, m, n_i
+
+      m = self%n_coordinates
+      n_i = self%basis%n_internal
+      do h = 1, size(factors%harmonic)
+         load(:, h) = harmonic_load(self%basis%load_q, factors%harmonic(h))
+         products%amplitudes(:, h) = harmonic_load(self%basis%load_i, factors%harmonic(h))
+      end do
+      if (n_i == 0) return
+      call coefficients_of(factors%harmonic, factors%column, m, m, load, coefficients)
+      call coefficients_of(factors%harmonic, factors%column, n_i, n_i, products%amplitudes, &
+                           products%modes)
+      call products%solve_internal(factors)
+      call products%subtract_modes(self%basis, factors, coefficients)
+      call amplitudes_of(factors%harmonic, factors%column, m, coefficients, m, load)
+   end subroutine condense_load
+
+   subroutine multiply(self, state, q, product)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: product(*)
+
+      associate (m => self%n_coordinates, b => self%basis)
+         select type (state)
+         type is (plain_state)
+            if (self%forms_blocks) then
+               call state%formed%multiply(self%harmonic, self%column, m, q, product)
+            else
+               call state%products%multiply(b, state%factors, self%packed, q, m, product)
+            end if
+         end select
+      end associate
+   end subroutine multiply
+
+   subroutine restrict(self, state, n_active, n_used, used)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      integer, intent(in) :: n_active, n_used
+      integer, intent(in) :: used(:)
+
+      select type (state)
+      type is (plain_state)
+         if (state%restricted .and. state%n_active == n_active .and. state%n_used == n_used) then
+            if (all(state%used(:n_used) == used(:n_used))) return
+         end if
+         state%n_active = n_active
+         state%n_used = n_used
+         state%used(:n_used) = used(:n_used)
+         state%restricted = .true.
+         if (self%forms_blocks) then
+            call state%formed%gather(n_active, n_used, used)
+         else
+            if (n_active == self%n_coordinates) return
+            call state%products%active%pack_blocks(self%basis, n_active, n_used, used)
+         end if
+      end select
+   end subroutine restrict
+
+   subroutine multiply_active(self, state, v, product)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: v(*)
+      real(wp), intent(inout) :: product(*)
+
+      associate (m => self%n_coordinates, b => self%basis)
+         select type (state)
+         type is (plain_state)
+            if (self%forms_blocks) then
+               call state%formed%multiply_active(self%harmonic, self%column, state%n_active, &
+                                                 state%n_used, v, m, product)
+            else if (state%n_active == m) then
+               call state%products%multiply(b, state%factors, self%packed, v, m, product)
+            else
+               call state%products%multiply_active(b, state%factors, v, m, product)
+            end if
+         end select
+      end associate
+   end subroutine multiply_active
+
+   subroutine block_of_all(self, state, h, matrix)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+      integer :: j
+
+      associate (m => self%n_coordinates, b => self%basis)
+         select type (state)
+         type is (plain_state)
+            if (self%forms_blocks) then
+               matrix = state%formed%matrix(:, :, h)
+            else
+               call form_block(b, state%factors%theta(h), state%factors%s(h), &
+                               state%products%internal(h), m, [(j, j=1, m)], matrix)
+            end if
+         end select
+      end associate
+   end subroutine block_of_all
+
+   subroutine block_in_use(self, state, h, matrix)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+      integer :: j
+
+      if (state%n_active == self%n_coordinates) then
+         call self%block(state, h, matrix)
+         return
+      end if
+      select type (state)
+      type is (plain_state)
+         if (self%forms_blocks) then
+            do j = 1, state%n_active
+               matrix(:, j) = state%formed%matrix(state%used(:state%n_used), state%used(j), h)
+            end do
+         else
+            call form_block(self%basis, state%factors%theta(h), state%factors%s(h), &
+                            state%products%internal(h), state%n_active, &
+                            state%used(:state%n_used), matrix)
+         end if
+      end select
+   end subroutine block_in_use
+
+   complex(wp) function diagonal(self, state, h, coordinate)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h, coordinate
+      complex(wp) :: matrix(1, 1)
+
+      diagonal = (0.0_wp, 0.0_wp)
+      select type (state)
+      type is (plain_state)
+         if (self%forms_blocks) then
+            diagonal = state%formed%matrix(coordinate, coordinate, h)
+         else
+            call form_block(self%basis, state%factors%theta(h), state%factors%s(h), &
+                            state%products%internal(h), 1, [coordinate], matrix)
+            diagonal = matrix(1, 1)
+         end if
+      end select
+   end function diagonal
+
+   !> With ' = d/dp and x recovered:  Z'_qq q + Z'_qi x - Z_qi D^-1 (Z'_iq q + D' x).
+   subroutine derivative(self, state, parameter, q, slope)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      integer, intent(in) :: parameter
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: slope(*)
+
+      select type (state)
+      type is (plain_state)
+         call derive(self, state%factors, slopes_of(state, parameter), q, slope)
+      end select
+   end subroutine derivative
+
+   !> d/dp of the factors of K, M and C.
+   pure function slopes_of(state, parameter) result(slopes)
+      type(plain_state), intent(in) :: state
+      integer, intent(in) :: parameter
+      type(harmonic_factors) :: slopes
+
+      slopes = state%factors
+      slopes%k = 0.0_wp
+      if (parameter == by_frequency) then
+         slopes%theta = slopes%harmonic*cmplx(2.0_wp*slopes%s, state%self_excitation, wp)
+         slopes%s = real(slopes%harmonic, wp)
+      else
+         slopes%theta = cmplx(0.0_wp, slopes%s, wp)
+         slopes%s = 0.0_wp
+      end if
+   end function slopes_of
+
+   !> All harmonics at once.
+   subroutine derive(self, f, slopes, q, slope)
+      class(plain_structure), intent(in) :: self
+      type(harmonic_factors), intent(in) :: f, slopes
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: slope(*)
+      type(real_products) :: work
+      complex(wp), allocatable :: x(:, :)
+      integer :: h, m, n_i, n_failed
+
+      m = self%n_coordinates
+      n_i = self%basis%n_internal
+      call work%reserve(self%basis, size(self%harmonic), self%n_coefficients)
+      associate (b => self%basis)
+         call work%factor(b, f, n_failed)
+         call recover_modes(self, f, work, q, x)
+         call work%multiply_blocks(b, slopes, q)
+         call take_rows(m, n_i, self%n_coefficients, work%products, slope, work%modes)
+         if (n_i > 0) then
+            ! D^-1 (Z'_iq q + D' x)
+            call amplitudes_of(f%harmonic, f%column, n_i, work%modes, n_i, work%amplitudes)
+            do h = 1, size(f%harmonic)
+               work%amplitudes(:, h) = work%amplitudes(:, h) + &
+                                       internal_slope(b, slopes%theta(h), slopes%s(h), x(:, h))
+            end do
+            call coefficients_of(f%harmonic, f%column, n_i, n_i, work%amplitudes, work%modes)
+            call work%solve_internal(f)
+            call work%subtract_modes(b, f, slope)
+            ! - Z'_qi (-x)
+            call coefficients_of(f%harmonic, f%column, n_i, n_i, -x, work%modes)
+            call work%subtract_modes(b, slopes, slope)
+         end if
+      end associate
+   end subroutine derive
+
+   !> Rows of the coordinates and of the internal modes of a product with the blocks.
+   pure subroutine take_rows(m, n_i, n_columns, products, rows, modes)
+      integer, intent(in) :: m, n_i, n_columns
+      real(wp), intent(in) :: products(m + n_i, n_columns)
+      real(wp), intent(inout) :: rows(m, n_columns), modes(n_i, n_columns)
+
+      rows = products(:m, :)
+      modes = products(m + 1:, :)
+   end subroutine take_rows
+
+   !> D' times a vector.
+   pure function internal_slope(basis, theta, s, vector) result(product)
+      type(reduction_type), intent(in) :: basis
+      !> d theta/dp and ds/dp.
+      complex(wp), intent(in) :: theta
+      real(wp), intent(in) :: s
+      complex(wp), intent(in) :: vector(:)
+      complex(wp) :: product(size(vector))
+
+      product = -theta*basis%m_i*vector
+      if (allocated(basis%c_ii)) then
+         product = product + cmplx(0.0_wp, s, wp)*matmul(basis%c_ii, vector)
+      else
+         product = product + cmplx(0.0_wp, s, wp)*basis%c_i*vector
+      end if
+   end function internal_slope
+
+   !> x = D^-1 (F_i - Z_iq q), complex amplitudes (n_internal, n_retained); D factored in `work`.
+   subroutine recover_modes(self, factors, work, q, x)
+      class(plain_structure), intent(in) :: self
+      type(harmonic_factors), intent(in) :: factors
+      type(real_products), intent(inout) :: work
+      real(wp), intent(in) :: q(*)
+      complex(wp), allocatable, intent(out) :: x(:, :)
+      real(wp) :: unused(self%n_coordinates*self%n_coefficients)
+      integer :: h, m
+
+      m = self%n_coordinates
+      associate (b => self%basis)
+         call work%multiply_blocks(b, factors, q)
+         call take_rows(m, b%n_internal, self%n_coefficients, work%products, unused, work%modes)
+         allocate (x(b%n_internal, size(factors%harmonic)))
+         call amplitudes_of(factors%harmonic, factors%column, b%n_internal, work%modes, &
+                            b%n_internal, x)
+         do h = 1, size(factors%harmonic)
+            x(:, h) = harmonic_load(b%load_i, factors%harmonic(h)) - x(:, h)
+            call work%internal(h)%solve(1, x(:, h:h))
+         end do
+      end associate
+   end subroutine recover_modes
+
+   subroutine recover(self, state, q, observed)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      complex(wp), intent(in), contiguous :: q(:, :)
+      complex(wp), intent(out), contiguous :: observed(:, :)
+      type(real_products) :: work
+      real(wp) :: coefficients(self%n_coordinates, self%n_coefficients)
+      complex(wp), allocatable :: x(:, :)
+      integer :: h, m, n_failed
+
+      m = self%n_coordinates
+      call work%reserve(self%basis, size(self%harmonic), self%n_coefficients)
+      call coefficients_of(self%harmonic, self%column, m, m, q, coefficients)
+      select type (state)
+      type is (plain_state)
+         call work%factor(self%basis, state%factors, n_failed)
+         call recover_modes(self, state%factors, work, coefficients, x)
+      end select
+      do h = 1, size(self%harmonic)
+         observed(:, h) = matmul(self%basis%observe_q, q(:, h))
+         if (self%basis%n_internal == 0) cycle
+         observed(:, h) = observed(:, h) + matmul(self%basis%observe_i, x(:, h))
+      end do
+   end subroutine recover
+
+   pure real(wp) function static_stiffness(self, coordinate)
+      class(plain_structure), intent(in) :: self
+      integer, intent(in) :: coordinate
+
+      associate (b => self%basis)
+         static_stiffness = b%blocks(coordinate, coordinate, 1)
+         if (b%n_internal > 0) then
+            static_stiffness = static_stiffness - sum(b%coupling(:, 1, coordinate)**2/b%k_i, &
+                                                      mask=abs(b%k_i) > 0)
+         end if
+      end associate
+   end function static_stiffness
+
+   pure subroutine mass(self, matrix)
+      class(plain_structure), intent(in) :: self
+      real(wp), intent(out) :: matrix(:, :)
+
+      matrix = self%basis%blocks(:self%n_coordinates, :, 2)
+   end subroutine mass
+
+   pure subroutine magnitudes(self, state, h, amplitude, sums)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      real(wp), intent(in) :: amplitude(:)
+      real(wp), intent(out) :: sums(:)
+      real(wp) :: theta
+      integer :: j, m
+
+      m = self%n_coordinates
+      theta = self%harmonic(h)*abs(cmplx(self%harmonic(h)*state%omega**2, &
+                                         state%omega*state%self_excitation, wp))
+      sums = 0.0_wp
+      do j = 1, m
+         sums = sums + (abs(self%basis%blocks(:m, j, 1)) + &
+                        theta*abs(self%basis%blocks(:m, j, 2)))*amplitude(j)
+      end do
+   end subroutine magnitudes
+
+end module fw_plain_structure

@@ -1,0 +1,191 @@
+!> A linear structure as the balance sees it: per harmonic n a dynamic stiffness and a load,
+!>
+!>   Z_n q_n - F_n,   Z_n = K - theta_n M + i n omega C,   theta_n = (n omega)^2 + i n omega xi,
+!>
+!> on coordinates of which the first are relative displacements. xi is a self-excitation in
+!> proportion to mass, 0 in a response to a load. The structure knows no forces of contact.
+!>
+!> The operator is built once and only read then, so that threads may share it. Where it stands
+!> (frequency, what depends on it, the rows in use, scratch) is in a `structure_state`, one for each
+!> thread. Vectors are real coefficients (coordinate, coefficient), ordered as those of
+!> fourier_type. Products are exact; a matrix Z_n is formed only where one is asked for.
+module fw_structure_operator
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: structure_operator, structure_state, lay_out_coefficients
+   public :: by_frequency, by_self_excitation
+
+   !> What a derivative is taken by.
+   integer, parameter :: by_frequency = 1, by_self_excitation = 2
+
+   !> Where a structure stands.
+   type, abstract :: structure_state
+      !> Angular frequency and self-excitation [rad/s]; below 0 before the first.
+      real(wp) :: omega = -1.0_wp
+      real(wp) :: self_excitation = 0.0_wp
+      !> F_n (n_coordinates, n_retained) [force].
+      complex(wp), allocatable :: load(:, :)
+      !> Coordinates in use (first n_used entries), of which the first n_active are multiplied.
+      integer :: n_active = 0
+      integer :: n_used = 0
+      integer, allocatable :: used(:)
+   end type structure_state
+
+   type, abstract :: structure_operator
+      integer :: n_coordinates = 0
+      !> The first coordinates, relative displacements; behind them internal modes `kept`.
+      integer :: n_relative = 0
+      integer, allocatable :: kept(:)
+      integer :: n_observed = 0
+      !> Harmonics in use and the columns of their coefficients (n_retained).
+      integer, allocatable :: harmonic(:), column(:)
+      integer :: n_coefficients = 0
+   contains
+      procedure(make_state), deferred :: new_state
+      procedure(stand_at), deferred :: at
+      procedure(multiply_all), deferred :: multiply
+      procedure(choose_rows), deferred :: restrict
+      procedure(multiply_restricted), deferred :: multiply_active
+      procedure(form_block), deferred :: block
+      procedure(form_block), deferred :: active_block
+      procedure(read_diagonal), deferred :: diagonal
+      procedure(derive), deferred :: derivative
+      procedure(recover_observed), deferred :: recover
+      procedure(read_static), deferred :: static_stiffness
+      procedure(read_mass), deferred :: mass
+      procedure(sum_magnitudes), deferred :: magnitudes
+   end type structure_operator
+
+   abstract interface
+      subroutine make_state(self, state)
+         import :: structure_operator, structure_state
+         class(structure_operator), intent(in) :: self
+         class(structure_state), allocatable, intent(out) :: state
+      end subroutine make_state
+
+      !> Go to a frequency; nothing is done if the state stands there already.
+      subroutine stand_at(self, state, omega, self_excitation, error)
+         import :: structure_operator, structure_state, wp, error_type
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         !> [rad/s]
+         real(wp), intent(in) :: omega, self_excitation
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine stand_at
+
+      !> product = Z q, all harmonics (n_coordinates * n_coefficients).
+      subroutine multiply_all(self, state, q, product)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         real(wp), intent(in) :: q(*)
+         real(wp), intent(inout) :: product(*)
+      end subroutine multiply_all
+
+      !> From now on, `multiply_active` and `active_block` take rows `used`, and its first n_active
+      !> as columns. At every frequency anew.
+      subroutine choose_rows(self, state, n_active, n_used, used)
+         import :: structure_operator, structure_state
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         integer, intent(in) :: n_active, n_used
+         integer, intent(in) :: used(:)
+      end subroutine choose_rows
+
+      !> product = Z(used, active) v: v (n_active, n_coefficients), product (n_coordinates,
+      !> n_coefficients), of which the first n_used rows are set.
+      subroutine multiply_restricted(self, state, v, product)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         real(wp), intent(in) :: v(*)
+         real(wp), intent(inout) :: product(*)
+      end subroutine multiply_restricted
+
+      !> Z_n of the h-th harmonic: of all coordinates (n_coordinates, n_coordinates), or of those
+      !> in use (n_used, n_active). Threads may ask for different harmonics at the same time.
+      subroutine form_block(self, state, h, matrix)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         integer, intent(in) :: h
+         complex(wp), intent(out), contiguous :: matrix(:, :)
+      end subroutine form_block
+
+      !> An entry on the diagonal of Z_n of the h-th harmonic [force/length].
+      complex(wp) function read_diagonal(self, state, h, coordinate)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         integer, intent(in) :: h, coordinate
+      end function read_diagonal
+
+      !> slope = d(Z q - F)/dp at fixed q (n_coordinates * n_coefficients).
+      subroutine derive(self, state, parameter, q, slope)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         !> by_frequency or by_self_excitation.
+         integer, intent(in) :: parameter
+         real(wp), intent(in) :: q(*)
+         real(wp), intent(inout) :: slope(*)
+      end subroutine derive
+
+      !> Observed quantities from the coordinates, all harmonics, complex amplitudes.
+      subroutine recover_observed(self, state, q, observed)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         !> (n_coordinates, n_retained)
+         complex(wp), intent(in), contiguous :: q(:, :)
+         !> (n_observed, n_retained)
+         complex(wp), intent(out), contiguous :: observed(:, :)
+      end subroutine recover_observed
+
+      !> Static stiffness of a coordinate, the scale of its penalty [force/length].
+      pure real(wp) function read_static(self, coordinate)
+         import :: structure_operator, wp
+         class(structure_operator), intent(in) :: self
+         integer, intent(in) :: coordinate
+      end function read_static
+
+      !> Mass of the coordinates, without what is condensed (n_coordinates, n_coordinates).
+      pure subroutine read_mass(self, matrix)
+         import :: structure_operator, wp
+         class(structure_operator), intent(in) :: self
+         real(wp), intent(out) :: matrix(:, :)
+      end subroutine read_mass
+
+      !> (|K| + |theta_n| |M|) times amplitudes, without what is condensed: elastic and inertial
+      !> forces before they cancel (n_coordinates).
+      pure subroutine sum_magnitudes(self, state, h, amplitude, sums)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         integer, intent(in) :: h
+         real(wp), intent(in) :: amplitude(:)
+         real(wp), intent(out) :: sums(:)
+      end subroutine sum_magnitudes
+   end interface
+
+contains
+
+   !> Columns of the harmonics: constant or cosine, then sine.
+   pure subroutine lay_out_coefficients(self, harmonic)
+      class(structure_operator), intent(inout) :: self
+      integer, intent(in) :: harmonic(:)
+      integer :: h
+
+      self%harmonic = harmonic
+      allocate (self%column(size(harmonic)))
+      self%n_coefficients = 0
+      do h = 1, size(harmonic)
+         self%column(h) = self%n_coefficients + 1
+         self%n_coefficients = self%n_coefficients + merge(1, 2, harmonic(h) == 0)
+      end do
+   end subroutine lay_out_coefficients
+
+end module fw_structure_operator
