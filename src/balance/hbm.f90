@@ -24,7 +24,6 @@ module fw_hbm
    use fw_joint, only: joint_type
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
-   use fw_split, only: split_coordinate
    use fw_structure_operator, only: structure_operator
    use fw_structure_operator, only: structure_state
    use fw_threads, only: coordinates_for_threads
@@ -48,7 +47,8 @@ module fw_hbm
       integer :: n_pairs = 0
       !> Wear depth of the pairs (n_pairs) [length].
       real(wp), allocatable :: depth(:)
-      !> F - Z q less the forces that do not take the balance, and the loads (n_coordinates, n_coefficients).
+      !> F - Z q less the forces that do not take the balance, and the loads (n_coordinates,
+      !> n_coefficients).
       real(wp), allocatable :: balance(:, :), load(:, :)
       !> Scratch (n_coordinates, n_coefficients).
       real(wp), allocatable :: product(:, :)
@@ -245,8 +245,8 @@ contains
          k = 0.0_wp
          do j = 1, 3
             if (.not. counts(j)) cycle
-            call split_coordinate(self%structure%basis, self%coordinate_of(j, i), &
-                                  (n + 1)*self%structure%omega, m(j), c(j), k(j))
+            call self%structure%split(self%coordinate_of(j, i), (n + 1)*self%frequency(), m(j), &
+                                      c(j), k(j))
             if (k(j) > 0.0_wp) prediction%stiffness(i, j) = prediction%scale*k(j)
          end do
          if (count(counts(1:2)) == 2) then
@@ -260,7 +260,7 @@ contains
          if (j == 0) cycle
          if (all(self%joint%row(1:2, i) > 0)) cycle
          if (.not. k(j) > 0.0_wp) cycle
-         call take_inertia(4*n*self%structure%omega, m(j), c(j), k(j))
+         call take_inertia(4*n*self%frequency(), m(j), c(j), k(j))
          prediction%inertia(i, j) = prediction%scale*m(j)
          prediction%damping(i, j) = prediction%scale*c(j)
       end do
@@ -390,7 +390,7 @@ contains
       call multiply_stiffness(self, m, nc, x)
       do k = 1, self%forces%n_laws
          associate (entry => self%forces%entry(k), work => self%work(k))
-            work%rate = self%structure%omega
+            work%rate = self%frequency()
             call predict(self, entry, m, nc, x, work)
             if (k == self%forces%pairs) call entry%law%set_offset(self%depth, work)
             call entry%law%evaluate(self%fourier, work)
@@ -429,7 +429,7 @@ contains
             y(:, :, j) = p%stiffness*y(:, :, j)
          end do
          if (any(p%order > 0)) call take_rates(self%fourier, self%rate_unit(p), p%order, y)
-         if (p%has_inertia) call take_inertias(self%fourier, self%structure%omega, p, y)
+         if (p%has_inertia) call take_inertias(self%fourier, self%frequency(), p, y)
          if (p%takes_balance) call add_balance(self, entry%row, y)
       end associate
    end subroutine predict
@@ -566,7 +566,8 @@ contains
       complex(wp), intent(in) :: harmonics(n_rows, *)
       real(wp), intent(inout) :: coefficients(n_rows, *)
 
-      call coefficients_of(fourier%harmonic, fourier%column, n_rows, n_rows, harmonics, coefficients)
+      call coefficients_of(fourier%harmonic, fourier%column, n_rows, n_rows, harmonics, &
+                           coefficients)
    end subroutine to_real
 
 end module fw_hbm

@@ -231,13 +231,13 @@ contains
       real(wp) :: step
       integer :: side
 
-      step = relative_step*self%structure%omega
+      step = relative_step*self%frequency()
       do side = -1, 1, 2
-         work%rate = self%structure%omega + side*step
+         work%rate = self%frequency() + side*step
          call entry%law%evaluate(self%fourier, work)
          call self%incidence%scatter(entry%rows, m, nc, 0.5_wp*side/step, work%force, dr)
       end do
-      work%rate = self%structure%omega
+      work%rate = self%frequency()
       call entry%law%evaluate(self%fourier, work)
    end subroutine add_law_by_frequency
 
@@ -288,7 +288,7 @@ contains
          n = self%fourier%harmonic(h)
          if (n == 0) cycle
          k = self%fourier%column(h)
-         slope = cmplx(-2.0_wp*n**2*self%structure%omega*prediction%inertia(element, component), &
+         slope = cmplx(-2.0_wp*n**2*self%frequency()*prediction%inertia(element, component), &
                        n*prediction%damping(element, component), wp)* &
                  cmplx(u(k), -u(k + 1), wp)
          y(k) = y(k) + real(slope, wp)
@@ -446,7 +446,7 @@ contains
          if (self%fourier%harmonic(h) == 0) cycle
          k = self%fourier%column(h)
          ratio = prediction%impedance_ratio(element, component, self%fourier%harmonic(h), &
-                                            self%structure%omega)
+                                            self%frequency())
          if (divides) ratio = one/ratio
          turned = ratio*cmplx(row(k), -row(k + 1), wp)
          row(k) = real(turned, wp)

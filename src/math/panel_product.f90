@@ -1,6 +1,6 @@
 !> Products of one real matrix with few columns, many times over. The matrix is packed once into
-!> panels of rows, so that it is read in the order in which it lies; BLAS packs it at every call, which
-!> takes longer than a product with a dozen columns.
+!> panels of rows, so that it is read in the order in which it lies; BLAS packs it at every call,
+!> which takes longer than a product with a dozen columns.
 !>
 !> Panels are (row of the panel, column of the matrix, panel), right-hand sides (column of a group,
 !> row, group). Both are filled up with zeros. Panels are independent of each other: threads share
@@ -30,7 +30,8 @@ contains
    end function group_count
 
    !> product = matrix right, n_rows of its n_stored rows.
-   subroutine multiply_panels(n_rows, n_inner, n_columns, panels, right, threaded, n_stored, product)
+   subroutine multiply_panels(n_rows, n_inner, n_columns, panels, right, threaded, n_stored, &
+                              product)
       integer, intent(in) :: n_rows, n_inner, n_columns, n_stored
       real(wp), intent(in) :: panels(panel_height, n_inner, *)
       real(wp), intent(in) :: right(group_width, n_inner, *)
@@ -47,7 +48,8 @@ contains
       !$omp end parallel do
    end subroutine multiply_panels
 
-   pure subroutine multiply_panel(n_rows, n_inner, n_columns, panel, right, first, n_stored, product)
+   pure subroutine multiply_panel(n_rows, n_inner, n_columns, panel, right, first, n_stored, &
+                                  product)
       integer, intent(in) :: n_rows, n_inner, n_columns, first, n_stored
       real(wp), intent(in) :: panel(panel_height, n_inner)
       real(wp), intent(in) :: right(group_width, n_inner, *)

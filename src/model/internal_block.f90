@@ -1,5 +1,5 @@
-!> The internal block of a condensation at one harmonic, D_j = k_j - theta m_j + i s c_j: a diagonal,
-!> or factors where the damping couples the internal modes.
+!> The internal block of a condensation at one harmonic, D_j = k_j - theta m_j + i s c_j: a
+!> diagonal, or factors where the damping couples the internal modes.
 module fw_internal_block
    use fw_kinds, only: wp
    use fw_linalg, only: complex_lu_type

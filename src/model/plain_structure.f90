@@ -5,15 +5,15 @@
 !>   D_j = k_j - theta_n m_j + i s c_j,   Z_qi = K_qi - theta_n M_qi + i s C_qi,
 !>   Z_r = Z_qq - Z_qi D^-1 Z_qi^T,   F_r = F_q - Z_qi D^-1 F_i,   x = D^-1 (F_i - Z_qi^T q).
 !>
-!> This is (B Z^-1 B^T)^-1 in exact arithmetic, and needs neither a regular mass nor a stiffness that
-!> holds the structure without its contact. At an undamped mode of the held structure Z_r has
+!> This is (B Z^-1 B^T)^-1 in exact arithmetic, and needs neither a regular mass nor a stiffness
+!> that holds the structure without its contact. At an undamped mode of the held structure Z_r has
 !> a pole; internal modes that a harmonic of the given range of frequencies may hit so are kept as
 !> coordinates.
 !>
 !> Of many coordinates no matrix Z_r is formed: K, M and C are real and the same for all harmonics
 !> and frequencies, so that one real product serves all harmonics (fw_real_products). Complex
-!> matrices of few coordinates stay in the cache, and need fewer operations: there Z_r is formed once
-!> at each frequency (fw_formed_stiffness).
+!> matrices of few coordinates stay in the cache, and need fewer operations: there Z_r is formed
+!> once at each frequency (fw_formed_stiffness).
 module fw_plain_structure
    use fw_kinds, only: wp
    use fw_error, only: error_type
@@ -32,6 +32,7 @@ module fw_plain_structure
    use fw_reduction, only: reduction_type
    use fw_reduction, only: new_reduction
    use fw_relative, only: relative_type
+   use fw_split, only: split_coordinate
    use fw_structure_operator, only: by_frequency
    use fw_structure_operator, only: lay_out_coefficients
    use fw_structure_operator, only: structure_operator
@@ -60,6 +61,7 @@ module fw_plain_structure
       procedure :: derivative
       procedure :: recover
       procedure :: static_stiffness
+      procedure :: split
       procedure :: mass
       procedure :: magnitudes
    end type plain_structure
@@ -340,9 +342,70 @@ contains
 
       select type (state)
       type is (plain_state)
-         call derive(self, state%factors, slopes_of(state, parameter), q, slope)
+         if (self%forms_blocks .and. parameter == by_frequency .and. &
+             abs(state%self_excitation) <= 0.0_wp) then
+            call derive_formed(self, state, q, slope)
+         else
+            call derive(self, state%factors, slopes_of(state, parameter), q, slope)
+         end if
       end select
    end subroutine derivative
+
+   !> By frequency, harmonic by harmonic, from complex matrices that round as Z_r does: near the
+   !> sharp turns of a branch the last digits decide where it goes on.
+   subroutine derive_formed(self, state, q, slope)
+      class(plain_structure), intent(in) :: self
+      type(plain_state), intent(in) :: state
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: slope(*)
+      complex(wp) :: amplitude(self%n_coordinates, size(self%harmonic))
+      complex(wp) :: derivative(self%n_coordinates, size(self%harmonic))
+      integer :: h, m
+
+      m = self%n_coordinates
+      call amplitudes_of(self%harmonic, self%column, m, q, m, amplitude)
+      do h = 1, size(self%harmonic)
+         call derive_harmonic(self%basis, self%harmonic(h), state%factors%s(h), amplitude(:, h), &
+                              derivative(:, h))
+      end do
+      call coefficients_of(self%harmonic, self%column, m, m, derivative, slope)
+   end subroutine derive_formed
+
+   subroutine derive_harmonic(b, harmonic, s, q, derivative)
+      type(reduction_type), intent(in) :: b
+      integer, intent(in) :: harmonic
+      !> n omega.
+      real(wp), intent(in) :: s
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: derivative(:)
+      type(internal_block) :: internal
+      complex(wp), allocatable :: coupling(:, :), slope(:, :), xi(:, :)
+      real(wp), allocatable :: damping(:, :)
+      logical :: failed
+      real(wp) :: n
+      integer :: m
+
+      m = b%n_coordinates
+      n = real(harmonic, wp)
+      allocate (damping(m + b%n_internal, m), xi(b%n_internal, 1))
+      damping = 0.0_wp
+      if (b%n_blocks == 3) damping = b%blocks(:, :, 3)
+      associate (m_qq => b%blocks(:m, :, 2), c_qq => damping(:m, :), &
+                 k_iq => b%blocks(m + 1:, :, 1), m_iq => b%blocks(m + 1:, :, 2), &
+                 c_iq => damping(m + 1:, :))
+         derivative = n*matmul(cmplx(-2.0_wp*s*m_qq, c_qq, wp), q)
+         if (b%n_internal == 0) return
+         coupling = cmplx(k_iq - s**2*m_iq, s*c_iq, wp)
+         slope = n*cmplx(-2.0_wp*s*m_iq, c_iq, wp)
+      end associate
+      call internal%factor(b, cmplx(s**2, kind=wp), s, failed)
+      xi(:, 1) = harmonic_load(b%load_i, harmonic) - matmul(coupling, q)
+      call internal%solve(1, xi)
+      derivative = derivative + matmul(xi(:, 1), slope)
+      xi(:, 1) = matmul(slope, q) + n*internal_slope(b, cmplx(2.0_wp*s, kind=wp), 1.0_wp, xi(:, 1))
+      call internal%solve(1, xi)
+      derivative = derivative - matmul(xi(:, 1), coupling)
+   end subroutine derive_harmonic
 
    !> d/dp of the factors of K, M and C.
    pure function slopes_of(state, parameter) result(slopes)
@@ -484,6 +547,15 @@ contains
          end if
       end associate
    end function static_stiffness
+
+   pure subroutine split(self, coordinate, limit, m, c, k)
+      class(plain_structure), intent(in) :: self
+      integer, intent(in) :: coordinate
+      real(wp), intent(in) :: limit
+      real(wp), intent(out) :: m, c, k
+
+      call split_coordinate(self%basis, coordinate, limit, m, c, k)
+   end subroutine split
 
    pure subroutine mass(self, matrix)
       class(plain_structure), intent(in) :: self

@@ -1,5 +1,5 @@
-!> Products with the condensed stiffness without any complex matrix. K, M and C are real and the same
-!> for all harmonics: with all coefficients side by side
+!> Products with the condensed stiffness without any complex matrix. K, M and C are real and the
+!> same for all harmonics: with all coefficients side by side
 !>
 !>   [a]   [K_qq M_qq C_qq] [    q    ]
 !>   [b] = [K_iq M_iq C_iq] [-theta q ],   Z_r q = a - [K_qi M_qi C_qi] [y; -theta y; i s y],
@@ -271,7 +271,8 @@ contains
    end subroutine group_multiples
 
    !> One column of the groups: k a, re a + im b and s b.
-   pure subroutine fill_column(n, n_blocks, sign, a, b, k, re, im, s, first, n_inner, column, groups)
+   pure subroutine fill_column(n, n_blocks, sign, a, b, k, re, im, s, first, n_inner, column, &
+                               groups)
       integer, intent(in) :: n, n_blocks
       real(wp), intent(in) :: sign
       real(wp), intent(in) :: a(n), b(n), k, re, im, s

@@ -140,7 +140,8 @@ contains
       self%n_internal = size(t_i, 2)
       self%n_blocks = merge(3, 2, any(abs(model%damping) > 0.0_wp))
       if (allocated(self%blocks)) deallocate (self%blocks, self%coupling)
-      allocate (self%blocks(self%n_coordinates + self%n_internal, self%n_coordinates, self%n_blocks))
+      allocate (self%blocks(self%n_coordinates + self%n_internal, self%n_coordinates, &
+                            self%n_blocks))
       allocate (self%coupling(self%n_internal, self%n_blocks, self%n_coordinates))
       call fill_blocks(model%stiffness, t_q, t_i, 1, self)
       call fill_blocks(model%mass, t_q, t_i, 2, self)

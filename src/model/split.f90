@@ -26,23 +26,33 @@ contains
       real(wp), intent(in) :: limit
       real(wp), intent(out) :: m, c, k
       real(wp) :: damping
-      integer :: i, j
+      !> K, M and C of an entry; without damping the last stays 0.
+      real(wp) :: own(3), mode(3), coupling(3)
+      integer :: i, j, nb
 
       i = coordinate
+      own = 0.0_wp
+      mode = 0.0_wp
+      coupling = 0.0_wp
       associate (b => basis)
-         m = b%m_qq(i, i)
-         c = b%c_qq(i, i)
-         k = b%k_qq(i, i)
+         nb = b%n_blocks
+         own(:nb) = b%blocks(i, i, :)
+         k = own(1)
+         m = own(2)
+         c = own(3)
          ! Modes that were kept as coordinates stand behind the others.
          do j = b%n_coordinates - size(b%kept) + 1, b%n_coordinates
             if (j == i) cycle
-            call take_mode(b%m_qq(j, j), b%c_qq(j, j), b%k_qq(j, j), b%m_qq(j, i), b%c_qq(j, i), &
-                           b%k_qq(j, i), limit, m, c, k)
+            mode(:nb) = b%blocks(j, j, :)
+            coupling(:nb) = b%blocks(j, i, :)
+            call take_mode(mode(2), mode(3), mode(1), coupling(2), coupling(3), coupling(1), limit, &
+                           m, c, k)
          end do
          do j = 1, b%n_internal
             damping = b%c_i(j)
             if (allocated(b%c_ii)) damping = b%c_ii(j, j)
-            call take_mode(b%m_i(j), damping, b%k_i(j), b%m_iq(j, i), b%c_iq(j, i), b%k_iq(j, i), &
+            coupling(:nb) = b%coupling(j, :, i)
+            call take_mode(b%m_i(j), damping, b%k_i(j), coupling(2), coupling(3), coupling(1), &
                            limit, m, c, k)
          end do
       end associate

@@ -55,6 +55,7 @@ module fw_structure_operator
       procedure(derive), deferred :: derivative
       procedure(recover_observed), deferred :: recover
       procedure(read_static), deferred :: static_stiffness
+      procedure(split_one), deferred :: split
       procedure(read_mass), deferred :: mass
       procedure(sum_magnitudes), deferred :: magnitudes
    end type structure_operator
@@ -151,6 +152,16 @@ module fw_structure_operator
          class(structure_operator), intent(in) :: self
          integer, intent(in) :: coordinate
       end function read_static
+
+      !> What a coordinate is to motion above the harmonics, see fw_split: mass, dashpot, spring.
+      pure subroutine split_one(self, coordinate, limit, m, c, k)
+         import :: structure_operator, wp
+         class(structure_operator), intent(in) :: self
+         integer, intent(in) :: coordinate
+         !> Angular frequency below which modes follow by their inertia [rad/s].
+         real(wp), intent(in) :: limit
+         real(wp), intent(out) :: m, c, k
+      end subroutine split_one
 
       !> Mass of the coordinates, without what is condensed (n_coordinates, n_coordinates).
       pure subroutine read_mass(self, matrix)
