@@ -164,7 +164,7 @@ contains
          if (p%order(c_in) > 0) factor = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
          if (n == 0 .and. is_stuck) factor = one
          if (p%has_inertia) then
-            factor = factor*p%impedance_ratio(element, c_in, n, self%structure%omega)
+            factor = factor*p%impedance_ratio(element, c_in, n, self%frequency())
          end if
          if (p%takes_balance) then
             p_out = self%place(self%incidence%coordinate_of(row(c_out)))
