@@ -14,7 +14,7 @@ module fw_harmonics_options
    public :: harmonics_options
    public :: method_words, method_hbm, method_tcm, method_tcm_least_squares, method_hdhb
    public :: sampling_words, sampling_uniform, sampling_events, sampling_auto
-   public :: instants_per_event_wave, most_for_accuracy
+   public :: instants_per_event_wave, most_for_accuracy, usual_accuracy
    public :: parity_words, parity_auto, parity_all, parity_odd
 
    character(*), parameter :: method_words(*) = &
@@ -29,6 +29,8 @@ module fw_harmonics_options
    integer, parameter :: instants_per_event_wave = 4
    !> Harmonics at most where an accuracy is asked for and no number is given.
    integer, parameter :: most_for_accuracy = 53
+   !> The accuracy where neither is given.
+   real(wp), parameter :: usual_accuracy = 1.0e-2_wp
 
    character(*), parameter :: parity_words(*) = [character(4) :: 'auto', 'all', 'odd']
    integer, parameter :: parity_auto = 1, parity_all = 2, parity_odd = 3
@@ -51,6 +53,8 @@ module fw_harmonics_options
       real(wp) :: adaptive_tolerance = 1.0e-3_wp
       !> Relative error that the response is to keep within (0: harmonics as given).
       real(wp) :: accuracy = 0.0_wp
+      !> Neither harmonics nor an accuracy was given, and the program took one; no input.
+      logical :: is_chosen = .false.
       !> Doublings of an automatic n_time, below 0 halvings; no input, but set where accuracy asks.
       integer :: doublings = 0
    contains

@@ -85,6 +85,9 @@ contains
       type(case_type), intent(in) :: case
       type(remark_list), intent(inout) :: remarks
 
+      if (case%harmonics%is_chosen) call remarks%add('accuracy chosen', 'nothing was said of '// &
+         'the harmonics: they are chosen for harmonics%accuracy = '// &
+         number_text(case%harmonics%accuracy)//'; give one of both')
       if (case%harmonics%n_harmonics > 1) return
       if (case%contact%n_pairs + case%springs%n_springs == 0) return
       if (case%springs%n_springs > 0 .and. case%contact%n_pairs == 0) then

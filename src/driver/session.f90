@@ -11,6 +11,7 @@ module fw_session
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_usage
+   use fw_harmonics_options, only: harmonics_options
    use fw_kinds, only: wp
    use fw_memory_model, only: memory_model_type
    use fw_namelist, only: parse_override
@@ -262,9 +263,16 @@ contains
       class(session_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(thread_scope) :: threads
+      type(harmonics_options) :: plain
 
       call self%prepare(error)
       if (allocated(error)) return
+      ! What was left to the program is no obstacle to steps, which take the plain defaults.
+      if (self%case%harmonics%is_chosen) then
+         self%case%harmonics%n_harmonics = plain%n_harmonics
+         self%case%harmonics%accuracy = plain%accuracy
+         self%case%harmonics%is_chosen = .false.
+      end if
       if (all(self%case%analysis /= [analysis_frf, analysis_point]) .or. &
           self%case%sweep%continuation /= continuation_natural .or. &
           self%case%harmonics%adaptive .or. self%case%harmonics%accuracy > 0.0_wp) then

@@ -1,8 +1,11 @@
 !> From a namelist file to a validated case.
 module fw_read_case
    use fw_combinations, only: check_combinations
-   use fw_case, only: case_type, analysis_wear
+   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_wear
+   use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
+   use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
+   use fw_kinds, only: wp
    use fw_model_file, only: file_model_type
    use fw_model_keys, only: model_options
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
@@ -14,9 +17,10 @@ module fw_read_case
    use fw_reader, only: reader_type, new_reader
    use fw_reader_text, only: printable
    use fw_records, only: record_list
-   use fw_text, only: string_type
+   use fw_solver_options, only: continuation_natural
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
-   use fw_values, only: quoted_text
+   use fw_values, only: number_text, quoted_text
    implicit none (type, external)
    private
 
@@ -104,11 +108,50 @@ contains
       reader%tries_files = input%tries_files
       call read_keys(reader, input%path, case, error, memory_model)
       if (allocated(error)) return
+      call choose_harmonics(reader, case)
       call reader%finish(error)
       if (allocated(error)) return
       case%namelist = reader%effective()
       call check_combinations(case, error)
    end subroutine read_groups
+
+   !> Where nothing is said of the harmonics, an accuracy chooses them, if the rest of the case goes
+   !> with one: a single harmonic says little of friction and gaps.
+   subroutine choose_harmonics(reader, case)
+      type(reader_type), intent(inout) :: reader
+      type(case_type), intent(inout) :: case
+
+      if (reader%given('harmonics', 'n_harmonics') .or. reader%given('harmonics', 'accuracy')) return
+      if (.not. has_nonlinear(case) .or. .not. goes_with_accuracy(case)) return
+      case%harmonics%accuracy = usual_accuracy
+      case%harmonics%n_harmonics = most_for_accuracy
+      case%harmonics%is_chosen = .true.
+      call reader%amend('harmonics', 'accuracy', number_text(usual_accuracy))
+      call reader%amend('harmonics', 'n_harmonics', to_text(most_for_accuracy))
+   end subroutine choose_harmonics
+
+   pure logical function has_nonlinear(case)
+      type(case_type), intent(in) :: case
+
+      has_nonlinear = case%contact%n_pairs > 0
+      if (case%springs%n_springs > 0) then
+         has_nonlinear = has_nonlinear .or. any(case%springs%power > 1)
+      end if
+   end function has_nonlinear
+
+   !> Whether an accuracy could have been asked for; see fw_combinations.
+   pure logical function goes_with_accuracy(case)
+      type(case_type), intent(in) :: case
+
+      associate (harmonics => case%harmonics)
+         goes_with_accuracy = any(case%analysis == [analysis_frf, analysis_point]) .and. &
+                              case%sweep%continuation == continuation_natural .and. &
+                              harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &
+                              .not. harmonics%adaptive .and. .not. case%output%histories .and. &
+                              case%contact%memory /= memory_carried .and. &
+                              100.0_wp*case%solver%tolerance <= usual_accuracy
+      end associate
+   end function goes_with_accuracy
 
    !> Every key, in the order of the effective input.
    subroutine read_keys(reader, path, case, error, memory_model)

@@ -64,6 +64,8 @@ REMARKS = {"negative stiffness": {"model": {"stiffness": -1.0}},
            "high friction": {"contact": {"mu": 30.0}},
            "no load": {"load": {"cosine": 0.0}},
            "one harmonic": {"harmonics": {"n_harmonics": 1}},
+           "accuracy chosen": {"harmonics": {"n_harmonics": None},
+                               "contact": {"law": "penalty", "tangential_stiffness": 1.0}},
            "no mode": {"sweep": {"start": 3.0, "end": 4.0}},
            "peak at the end": {"sweep": {"start": 0.2, "end": 0.5}}}
 

@@ -28,7 +28,8 @@ def verdict(folder, groups, true, program):
 
 
 def count(number, programs):
-    """Verdicts by family and program; families of which no fine sweep converges are left out."""
+    """Verdicts by family and program. Cases whose fine sweep fails, or that never move, are left
+    out."""
     counts = Counter()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -39,7 +40,7 @@ def count(number, programs):
             else:
                 groups, family, ratio = peak_family.nonlinear(seed)
                 true = peak_family.fine_peak(folder, groups, ratio)
-            if true is None:
+            if not true:
                 counts[family, "left out"] += 1
                 continue
             for label, program in programs.items():
