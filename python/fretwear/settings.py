@@ -179,6 +179,9 @@ class Sweep(TypedDict, total=False):
     #: compute the Floquet multipliers of every point; only: springs and law = 'penalty' (default:
     #: .false.)
     stability: bool
+    #: points that are solved to find maxima become rows, in order; only: analysis = 'frf',
+    #: continuation = 'natural' (default: .false.)
+    refine: bool
 
 
 class Solver(TypedDict, total=False):

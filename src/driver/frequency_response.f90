@@ -78,9 +78,28 @@ contains
       if (len(message) > 0 .and. .not. allocated(error)) call observer%on_message(message)
       if (.not. (allocated(error) .or. state%was_stopped)) then
          call find_peaks(case, finder, writer, summary, error)
+         if (.not. allocated(error)) call add_rows(case, finder, sinks, writer, state, error)
       end if
       call finder%clear()
    end subroutine run_frequency_response
+
+   !> Points of the search become rows, in the order of the sweep, where the case wants it.
+   subroutine add_rows(case, finder, sinks, writer, state, error)
+      type(case_type), intent(in) :: case
+      type(peak_finder), intent(in) :: finder
+      type(sink_list), intent(inout) :: sinks
+      type(result_writer), intent(inout) :: writer
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 1, finder%added%n
+         call sinks%take(finder%added%item(k)%point, error)
+         if (allocated(error)) return
+         call state%note(finder%added%item(k)%point)
+      end do
+      if (finder%added%n > 0) call writer%sort_points(case%sweep%end < case%sweep%start, error)
+   end subroutine add_rows
 
    !> The maxima between the rows go to the result and the summary.
    subroutine find_peaks(case, finder, writer, summary, error)

@@ -32,7 +32,9 @@ module fw_peak_finder
    use fw_samples, only: phase_step
    use fw_samples, only: sample_list
    use fw_samples, only: sample_type
+   use fw_session_points, only: point_list
    use fw_sinks, only: point_sink
+   use fw_strategy, only: new_request
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
    use fw_sweep, only: point_source
@@ -72,6 +74,8 @@ module fw_peak_finder
       type(joint_mode_type), allocatable :: modes(:)
       !> Solutions of the search, and their iterations.
       integer :: n_solved = 0, iterations = 0
+      !> The points of these solutions, where they are to become rows.
+      type(point_list) :: added
       type(sample_list), private :: samples
       type(interval_type), allocatable, private :: suspects(:)
       !> Frequencies at which rows failed [rad/s].
@@ -117,8 +121,8 @@ contains
       type(sample_type) :: sample
       integer :: place
 
-      self%n_rows = self%n_rows + 1
       if (.not. self%is_active) return
+      self%n_rows = self%n_rows + 1
       if (.not. point%converged) then
          self%failed = [self%failed, point%omega]
          self%n_following = 0
@@ -250,6 +254,8 @@ contains
       end do
       call look_inside(self, case, budget, error)
       if (.not. allocated(error)) call climb(self, case, budget, error)
+      ! What becomes a row now is known here already.
+      self%is_active = .false.
    end subroutine search
 
    !> Where an end of the range seems to hold the highest amplitude, the maximum may lie just
@@ -426,6 +432,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer, intent(in), optional :: from
       type(sample_type) :: sample
+      type(point_request) :: request
       type(point_type) :: point
       integer :: start, place
 
@@ -436,7 +443,10 @@ contains
       end if
       if (start == 0) return
       call self%strategy%recall(self%samples%item(start)%at%memory)
-      call self%strategy%solve(case, point_request(omega=omega, fallback=.false.), point, error)
+      request = point_request(omega=omega, fallback=.false.)
+      if (case%sweep%refine) request = new_request(case, omega)
+      request%fallback = .false.
+      call self%strategy%solve(case, request, point, error)
       if (allocated(error)) return
       self%n_solved = self%n_solved + 1
       self%iterations = self%iterations + point%iterations
@@ -446,6 +456,7 @@ contains
          end if
          return
       end if
+      if (case%sweep%refine) call self%added%add(point)
       sample = new_sample(point)
       sample%is_needed = .true.
       sample%fraction = self%samples%item(start)%at%fraction

@@ -70,6 +70,7 @@ module fw_hdf5_append
       procedure :: is_created
       procedure :: skip
       procedure :: copy_rows
+      procedure :: permute
       procedure :: close
       !> `call dataset%append(file, values, error)`: one row, of exactly the shape created.
       generic :: append => append_real_0, append_real_1, append_real_2, append_real_3, &
@@ -216,6 +217,36 @@ contains
       end if
       call self%append_raw(file, int(self%row(:rank - 1)), self%type_id, c_loc(buffer), error)
    end subroutine copy_row
+
+   !> Put row order(k) in the place of row k, bit by bit; nothing where this was never created.
+   subroutine permute(self, file, order, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: order(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int8_t), allocatable, target :: buffer(:), sorted(:)
+      type(c_ptr) :: address
+      integer(size_t) :: bytes
+      integer :: status, k, n
+
+      if (self%id < 0) return
+      if (self%n_rows == 0 .or. product(self%row) == 0) return
+      if (size(order) /= self%n_rows) then
+         call dataset_failure(file, self%name, 'has another number of rows', error)
+         return
+      end if
+      call h5tget_size_f(self%type_id, bytes, status)
+      n = int(bytes)*int(product(self%row))
+      allocate (buffer(n*self%n_rows), sorted(n*self%n_rows))
+      address = c_loc(buffer)
+      call h5dread_f(self%id, self%type_id, address, status)
+      do k = 1, self%n_rows
+         sorted((k - 1)*n + 1:k*n) = buffer((order(k) - 1)*n + 1:order(k)*n)
+      end do
+      address = c_loc(sorted)
+      if (status >= 0) call h5dwrite_f(self%id, self%type_id, address, status)
+      if (status < 0) call dataset_failure(file, self%name, 'cannot be sorted (disk full?)', error)
+   end subroutine permute
 
    !> Release the handles; harmless where nothing was created.
    subroutine close(self)

@@ -29,10 +29,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: coefficients(:, :), width(:)
       type(string_type) :: words(size(found_words))
-      integer :: k
+      integer :: k, n
 
       if (size(peaks) == 0) return
-      allocate (coefficients(2*n_harmonics + 1, size(peaks)), source=0.0_wp)
+      n = 2*n_harmonics + 1
+      do k = 1, size(peaks)
+         n = max(n, size(peaks(k)%coefficients))
+      end do
+      allocate (coefficients(n, size(peaks)), source=0.0_wp)
       do k = 1, size(peaks)
          coefficients(:size(peaks(k)%coefficients), k) = peaks(k)%coefficients
       end do

@@ -121,7 +121,8 @@ contains
       type(reader_type), intent(inout) :: reader
       type(case_type), intent(inout) :: case
 
-      if (reader%given('harmonics', 'n_harmonics') .or. reader%given('harmonics', 'accuracy')) return
+      if (reader%given('harmonics', 'n_harmonics')) return
+      if (reader%given('harmonics', 'accuracy')) return
       if (.not. has_nonlinear(case) .or. .not. goes_with_accuracy(case)) return
       case%harmonics%accuracy = usual_accuracy
       case%harmonics%n_harmonics = most_for_accuracy

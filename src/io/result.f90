@@ -56,6 +56,7 @@ module fw_result
       procedure :: copy_points
       procedure :: add_peaks
       procedure :: add_remarks
+      procedure :: sort_points
       procedure :: flush
       procedure :: close
       procedure :: discard
@@ -143,6 +144,18 @@ contains
       call write_peaks(self%file, peaks, n_harmonics, unit_system, error)
       !$omp end critical (fretwear_io)
    end subroutine add_peaks
+
+   !> Bring the rows into the order of their frequencies.
+   subroutine sort_points(self, descending, error)
+      class(result_writer), intent(inout) :: self
+      logical, intent(in) :: descending
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call self%rows%sort(self%file, descending, error)
+      !$omp end critical (fretwear_io)
+   end subroutine sort_points
 
    !> What is allowed in the case and seldom meant.
    subroutine add_remarks(self, name, text, error)

@@ -10,6 +10,7 @@ module fw_result_rows
    use fw_hdf5, only: growing_integer
    use fw_hdf5, only: growing_logical
    use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: read_dataset
    use fw_hdf5, only: write_attribute
    use fw_kinds, only: wp
    use fw_point, only: point_type
@@ -51,6 +52,7 @@ module fw_result_rows
       procedure :: create
       procedure :: append
       procedure :: copy
+      procedure :: sort
       procedure :: close
    end type row_set
 
@@ -167,6 +169,33 @@ contains
       end do
       self%n_rows = n
    end subroutine copy
+
+   !> Bring all rows into the order of their frequencies.
+   subroutine sort(self, file, descending, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      logical, intent(in) :: descending
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: omega(:)
+      integer, allocatable :: order(:)
+      integer :: i, k
+
+      call read_dataset(file, '/omega', omega, error)
+      if (allocated(error)) return
+      if (descending) omega = -omega
+      ! By insertion: few rows are out of place.
+      order = [(i, i=1, size(omega))]
+      do i = 2, size(order)
+         do k = i, 2, -1
+            if (omega(order(k - 1)) <= omega(order(k))) exit
+            order(k - 1:k) = order([k, k - 1])
+         end do
+      end do
+      do i = 1, size(self%columns)
+         call self%columns(i)%dataset%permute(file, order, error)
+         if (allocated(error)) return
+      end do
+   end subroutine sort
 
    subroutine close(self)
       class(row_set), intent(inout) :: self

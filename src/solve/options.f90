@@ -88,6 +88,8 @@ module fw_solver_options
       integer :: max_points = 1000
       !> Compute the Floquet multipliers of every point.
       logical :: stability = .false.
+      !> Points that are solved to find maxima become rows of the result.
+      logical :: refine = .false.
    contains
       procedure :: bind_keys => bind_sweep_keys
       procedure :: range => sweep_range
@@ -167,6 +169,8 @@ contains
                          only="continuation = 'arclength'"), self%max_points)
       call keys%bind(key('stability', 'compute the Floquet multipliers of every point', &
                          only="springs and law = 'penalty'"), self%stability)
+      call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
+                         only="analysis = 'frf', continuation = 'natural'"), self%refine)
    end subroutine bind_sweep_keys
 
    !> The lowest and the highest frequency.

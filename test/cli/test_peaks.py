@@ -46,6 +46,23 @@ def test_rows_stay_those_that_were_asked_for(tmp_path):
     assert np.hypot(*coefficients[best, 1:3]) == pytest.approx(amplitude[best], rel=1e-6)
 
 
+@pytest.mark.parametrize("down", [False, True])
+def test_refined_rows_hold_the_peak_in_the_order_of_the_sweep(tmp_path, down):
+    groups, true = peak_family.linear(3)
+    sweep = {**groups["sweep"], "refine": True}
+    if down:
+        sweep["start"], sweep["end"] = sweep["end"], sweep["start"]
+    run(tmp_path, {**groups, "sweep": sweep})
+    with h5py.File(tmp_path / "case.h5") as file:
+        steps = np.diff(file["omega"][:])
+        assert (steps < 0.0).all() if down else (steps > 0.0).all()
+        assert len(steps) >= sweep["n_points"]
+        amplitude, rows = file["amplitude"][:, 0], file["coefficients"][:, :, 0]
+        assert np.allclose(np.hypot(rows[:, 1], rows[:, 2]), amplitude, rtol=1e-6)
+        assert amplitude.max() == file["peak/amplitude"][:].max()
+    assert amplitude.max() == pytest.approx(true, rel=peak_family.RIGHT)
+
+
 def test_a_peak_at_the_end_of_the_sweep_is_said(tmp_path):
     groups, _ = peak_family.linear(0)
     groups["sweep"]["end"] = groups["sweep"]["start"] * 1.05

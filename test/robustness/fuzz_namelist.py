@@ -17,7 +17,7 @@ KEYS = {
     "harmonics": ["method", "n_harmonics", "n_time", "n_collocation", "filter_harmonics",
                   "sampling", "parity", "adaptive", "adaptive_tolerance", "accuracy"],
     "sweep": ["frequencies", "start", "end", "unit", "continuation", "n_points", "max_points",
-              "stability"],
+              "stability", "refine"],
     "solver": ["kind", "linear", "jacobian", "tolerance", "max_iterations", "fallback",
                "skips"],
     "pseudo_time": ["flow", "scheme", "step", "cfl", "max_steps"],
