@@ -250,13 +250,19 @@ contains
    !> makes of the stiffness of the joint.
    pure real(wp) function displacement_scale(system) result(scale)
       type(hbm_system), intent(in) :: system
+      real(wp) :: stiffness
+      integer :: c
 
-      scale = 0.0_wp
-      associate (stiffness => system%forces%entry(system%forces%pairs)%law%prediction%stiffness)
-         if (any(stiffness > 0.0_wp)) then
-            scale = system%reference/maxval(stiffness)
-         end if
+      stiffness = 0.0_wp
+      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+         do c = 1, size(p%stiffness, 2)
+            ! A velocity in time is no displacement.
+            if (p%by_time .and. p%order(c) > 0) cycle
+            if (size(p%stiffness, 1) > 0) stiffness = max(stiffness, maxval(p%stiffness(:, c)))
+         end do
       end associate
+      scale = 0.0_wp
+      if (stiffness > 0.0_wp) scale = system%reference/stiffness
    end function displacement_scale
 
    !> What is known of a point of the curve.

@@ -5,6 +5,7 @@
 !> of motion; lambda_n <= 0 is compression.
 module fw_contact_data
    use fw_kinds, only: wp
+   use fw_law_constants, only: law_constants
    use fw_text, only: string_type
    implicit none (type, external)
    private
@@ -33,8 +34,10 @@ module fw_contact_data
       real(wp), allocatable :: area(:)
       !> Constant compressive force of pairs without a normal dof [force] (n_pairs).
       real(wp), allocatable :: normal_load(:)
-      !> Stiffnesses of the penalty law [force/length] (n_pairs).
+      !> Stiffnesses of elastic pairs [force/length] (n_pairs).
       real(wp), allocatable :: tangential_stiffness(:), normal_stiffness(:)
+      !> What else a law takes of the pairs.
+      type(law_constants) :: constants
       !> Multiplies the automatic penalty of the DLFT laws.
       real(wp) :: penalty_scale = 1.0_wp
       !> Where the march through the period starts.

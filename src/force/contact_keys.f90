@@ -9,11 +9,13 @@ module fw_contact_keys
    use fw_key_range, only: from_to
    use fw_kinds, only: wp
    use fw_laws, only: law_words
+   use fw_laws, only: new_law
+   use fw_pair_law, only: pair_law
    implicit none (type, external)
    private
 
    public :: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, bind_normal_load, &
-             bind_stiffnesses, bind_march, bind_worn, bind_springs
+             bind_laws, bind_march, bind_worn, bind_springs
 
    !> More pairs or springs are taken for a mistake.
    integer, parameter :: most = 1000000
@@ -36,8 +38,9 @@ contains
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
 
-      call keys%bind_word(key('law', 'rigid, rigid at velocity level, elastic, or rigid of '// &
-                              'high order (friction on dofs with mass)'), contact%law, law_words)
+      call keys%bind_word(key('law', 'rigid, rigid at velocity level, elastic, rigid of high '// &
+                              'order (friction on dofs with mass), or smooth in the velocity'), &
+                          contact%law, law_words)
    end subroutine bind_law
 
    subroutine bind_sides(keys, contact, needed)
@@ -86,23 +89,26 @@ contains
                          only='pairs without a normal dof'), contact%normal_load, needed)
    end subroutine bind_normal_load
 
-   !> Each left unallocated where it is not given.
-   subroutine bind_stiffnesses(keys, contact, slides, closes)
+   !> The keys that belong to one law or some, those of the law of the case first: keys that laws
+   !> share are needed as it says.
+   subroutine bind_laws(keys, contact, slides, closes)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
       !> Whether there are tangential dofs, normal dofs.
       logical, intent(in) :: slides, closes
-      character(*), parameter :: only = "law = 'penalty'"
+      class(pair_law), allocatable :: law
+      integer :: k
 
-      call keys%bind(key('tangential_stiffness', 'contact stiffness; 0 with a parallel pair '// &
-                         'that has one, or without a tangential dof', at_least(0.0_wp), 'F/L', &
-                         'n_pairs', absent='required with tangential dofs', only=only), &
-                     contact%tangential_stiffness, slides)
-      call keys%bind(key('normal_stiffness', 'contact stiffness; 0 without a normal dof', &
-                         at_least(0.0_wp), 'F/L', &
-                         'n_pairs', absent='required with normal dofs', only=only), &
-                     contact%normal_stiffness, closes)
-   end subroutine bind_stiffnesses
+      contact%constants%law = contact%law
+      call new_law(contact%law, law)
+      call law%bind_keys(keys, contact, slides, closes)
+      do k = 1, size(law_words)
+         if (k == contact%law) cycle
+         contact%constants%law = k
+         call new_law(k, law)
+         call law%bind_keys(keys, contact, .false., .false.)
+      end do
+   end subroutine bind_laws
 
    subroutine bind_march(keys, contact)
       class(key_visitor), intent(inout) :: keys

@@ -14,9 +14,14 @@ module fw_friction
    use fw_force_law, only: pair_open
    use fw_force_law, only: pair_stuck
    use fw_force_law, only: prediction_type
+   use fw_contact_data, only: contact_type
    use fw_fourier, only: fourier_type
    use fw_friction_events, only: follow_events
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: at_least
    use fw_kinds, only: wp
+   use fw_pair_law, only: normal_stiffness_key
    use fw_pair_law, only: pair_law
    use fw_sampled_turn, only: settle_samples
    use fw_settling, only: periodic_tolerance
@@ -37,6 +42,8 @@ module fw_friction
 
    type, extends(pair_law) :: friction_law
    contains
+      procedure :: bind_keys
+      procedure :: take_constants
       procedure :: reserve
       procedure :: evaluate
       procedure :: linearize
@@ -86,6 +93,33 @@ contains
       law%facts%needs_independent = .false.
       law%facts%has_multipliers = .true.
    end function elastic_friction
+
+   !> Stiffnesses belong to elastic pairs, which cannot do without them.
+   subroutine bind_keys(self, keys, contact, slides, closes)
+      class(friction_law), intent(in) :: self
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      logical, intent(in) :: slides, closes
+
+      if (self%prediction%takes_balance) return
+      call contact%constants%bind(keys, key('tangential_stiffness', 'contact stiffness; '// &
+         '0 with a parallel pair that has one, or without a tangential dof', at_least(0.0_wp), &
+         'F/L', 'n_pairs', absent='required with tangential dofs', only="law = 'penalty'"), slides)
+      call contact%constants%bind(keys, normal_stiffness_key(), closes)
+   end subroutine bind_keys
+
+   subroutine take_constants(self, contact)
+      class(friction_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+      integer :: i
+
+      if (self%prediction%takes_balance) return
+      do i = 1, self%n_elements
+         if (any(self%present(1:2, i))) self%prediction%stiffness(i, 1:2) = &
+            contact%tangential_stiffness(i)
+         if (self%present(3, i)) self%prediction%stiffness(i, 3) = contact%normal_stiffness(i)
+      end do
+   end subroutine take_constants
 
    subroutine reserve(self, fourier, work)
       class(friction_law), intent(in) :: self

@@ -6,6 +6,7 @@ module fw_laws
    use fw_friction, only: rigid_friction
    use fw_friction, only: rigid_friction_of_rates
    use fw_pair_law, only: pair_law
+   use fw_regularised, only: regularised_friction
    use fw_rigid_law, only: friction_of_high_order
    implicit none (type, external)
    private
@@ -13,7 +14,7 @@ module fw_laws
    public :: law_words, law_number, new_law, facts_of, is_rigid
 
    character(*), parameter :: law_words(*) = &
-      [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid']
+      [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
 
 contains
 
@@ -26,6 +27,7 @@ contains
       case ('dlft_velocity'); allocate (law, source=rigid_friction_of_rates())
       case ('penalty'); allocate (law, source=elastic_friction())
       case ('rigid'); allocate (law, source=friction_of_high_order())
+      case ('regularised'); allocate (law, source=regularised_friction())
       case default; allocate (law, source=rigid_friction())
       end select
    end subroutine new_law

@@ -3,11 +3,15 @@
 module fw_pair_law
    use fw_contact_data, only: contact_type
    use fw_force_law, only: force_law
+   use fw_key, only: key
+   use fw_key, only: key_type
+   use fw_key, only: key_visitor
+   use fw_key_range, only: at_least
    use fw_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: pair_law
+   public :: pair_law, normal_stiffness_key
 
    type, abstract, extends(force_law) :: pair_law
       !> Friction coefficient (n_elements).
@@ -16,6 +20,8 @@ module fw_pair_law
       logical :: two_directions = .false.
    contains
       procedure :: build
+      procedure :: bind_keys
+      procedure :: take_constants
       procedure :: take_pairs
       procedure :: slope_at_rest
       procedure :: located
@@ -40,14 +46,39 @@ contains
          p%gap = contact%gap
          p%load = merge(contact%normal_load, 0.0_wp, contact%side_1(3, :) == 0 .and. &
                         contact%side_2(3, :) == 0)
-         if (p%takes_balance) return
-         where (any(present(1:2, :), dim=1))
-            p%stiffness(:, 1) = contact%tangential_stiffness
-            p%stiffness(:, 2) = contact%tangential_stiffness
-         end where
-         where (present(3, :)) p%stiffness(:, 3) = contact%normal_stiffness
       end associate
+      call self%take_constants(contact)
    end subroutine build
+
+   !> Keys that belong to this law, for the pairs of a case: without a law's own say it has none.
+   subroutine bind_keys(self, keys, contact, slides, closes)
+      class(pair_law), intent(in) :: self
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      !> Whether constants of tangential and of normal dofs are needed.
+      logical, intent(in) :: slides, closes
+
+      associate (unused => self, unused_keys => keys, unused_contact => contact, &
+                 unused_slides => slides, unused_closes => closes)
+      end associate
+   end subroutine bind_keys
+
+   !> The key of what presses elastic pairs together, which several laws have.
+   pure type(key_type) function normal_stiffness_key()
+      normal_stiffness_key = key('normal_stiffness', 'contact stiffness; 0 without a normal '// &
+                                 'dof', at_least(0.0_wp), 'F/L', 'n_pairs', &
+                                 absent='required with normal dofs', &
+                                 only="law = 'penalty', 'regularised'")
+   end function normal_stiffness_key
+
+   !> Take what `bind_keys` declared, once the pairs are there.
+   subroutine take_constants(self, contact)
+      class(pair_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+
+      associate (unused => self, unused_contact => contact)
+      end associate
+   end subroutine take_constants
 
    !> Pairs that touch, without a load.
    pure subroutine take_pairs(self, mu, present)

@@ -1,12 +1,13 @@
 !> Combinations of sound keys that cannot be run, each with what to use instead.
 module fw_combinations
-   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_wear
+   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_time, analysis_wear
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
    use fw_force_law, only: law_facts
    use fw_kinds, only: wp
    use fw_harmonics_options, only: method_hbm
+   use fw_harmonics_options, only: sampling_events
    use fw_harmonics_options, only: sampling_uniform
    use fw_laws, only: facts_of
    use fw_laws, only: law_words
@@ -72,6 +73,12 @@ contains
                 .not. any(case%analysis == [analysis_frf, analysis_point]))) then
          call fatal_error(error, 'output%tail goes with natural sweeps and points of given '// &
                           'n_harmonics: leave it out', status_input)
+      else if (case%harmonics%sampling == sampling_events .and. .not. facts%has_events) then
+         call fatal_error(error, law//" does not go with harmonics%sampling = 'events': its "// &
+                          "force is smooth; leave it to 'auto'", status_input)
+      else if (case%analysis == analysis_time .and. .not. facts%is_integrated) then
+         call fatal_error(error, law//" does not go with case%analysis = 'time', which does not "// &
+                          'know the law', status_input)
       else if (case%analysis == analysis_wear .and. .not. facts%measures_slip) then
          call fatal_error(error, law//" does not wear yet: use 'dlft' (nodes without mass), "// &
                           "'dlft_velocity' or 'penalty' for analysis = 'wear'", status_input)
@@ -146,7 +153,7 @@ contains
       facts = facts_of(case%contact%law)
       if (facts%has_multipliers) return
       call fatal_error(error, "sweep%stability = .true. needs contact%law = 'penalty' (or "// &
-                       "no contact pairs): rigid contact has no Floquet multipliers", status_input)
+                       "no contact pairs): the law has no Floquet multipliers", status_input)
    end subroutine check_stability
 
    !> Differences serve the solution of a point at given depths; the rest takes the derivative

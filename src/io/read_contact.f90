@@ -2,7 +2,7 @@
 module fw_read_contact
    use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
-                              bind_normal_load, bind_stiffnesses, bind_march, bind_springs
+                              bind_normal_load, bind_laws, bind_march, bind_springs
    use fw_kinds, only: wp
    use fw_laws, only: law_words, is_rigid
    use fw_model_file, only: file_model_type
@@ -31,13 +31,13 @@ contains
       call bind_law(reader, contact)
       call read_sides(reader, contact)
       call read_constants(reader, needs_area, contact)
-      call read_stiffnesses(reader, contact)
+      call read_law(reader, contact)
       call bind_march(reader, contact)
       scale = contact%penalty_scale
       if (.not. is_rigid(contact%law) .and. abs(scale - 1.0_wp) > 0.0_wp) then
          call reader%refuse('contact', 'penalty_scale', "has no meaning with law = '"// &
                             trim(law_words(contact%law))//"': "// &
-                            'scale tangential_stiffness and normal_stiffness')
+                            'scale the stiffnesses themselves')
       end if
    end subroutine read_contact
 
@@ -149,47 +149,46 @@ contains
       where (closes) contact%normal_load = 0.0_wp
    end subroutine read_constants
 
-   !> Stiffnesses belong to the penalty law, which cannot do without them.
-   subroutine read_stiffnesses(reader, contact)
+   !> Constants that belong to some laws, and to no others.
+   subroutine read_law(reader, contact)
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(inout) :: contact
-      logical :: is_penalty
+      character(24) :: name
+      integer :: other
 
-      is_penalty = .not. is_rigid(contact%law)
-      call bind_stiffnesses(reader, contact, is_penalty .and. any(has_tangent(contact)), &
-                            is_penalty .and. any(has_normal(contact)))
-      call finish_one('tangential_stiffness', contact%tangential_stiffness)
-      call finish_one('normal_stiffness', contact%normal_stiffness)
-      if (is_penalty .and. .not. reader%failed()) call check_zeros(reader, contact)
+      call bind_laws(reader, contact, any(has_tangent(contact)), any(has_normal(contact)))
+      call contact%constants%first_of_others(contact%law, name, other)
+      if (other > 0) then
+         call reader%refuse('contact', trim(name), "belongs to law = '"//trim(law_words(other))// &
+                            "', but law = '"//trim(law_words(contact%law))// &
+                            "': remove it or change the law")
+      end if
+      contact%tangential_stiffness = contact%constants%get('tangential_stiffness', contact%n_pairs)
+      contact%normal_stiffness = contact%constants%get('normal_stiffness', contact%n_pairs)
+      if (reader%failed()) return
+      if (contact%constants%has('normal_stiffness')) call check_normal_zeros(reader, contact)
+      if (contact%constants%has('tangential_stiffness')) call check_zeros(reader, contact)
+   end subroutine read_law
 
-   contains
+   !> A stiffness of 0 is none.
+   subroutine check_normal_zeros(reader, contact)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(in) :: contact
+      integer :: i
 
-      subroutine finish_one(key, values)
-         character(*), intent(in) :: key
-         real(wp), allocatable, intent(inout) :: values(:)
+      i = findloc(has_normal(contact) .and. contact%normal_stiffness <= 0.0_wp, .true., 1)
+      if (i > 0) call reader%refuse('contact', 'normal_stiffness', '= 0 for pair '// &
+                                    to_text(i)//': must be above 0 where there is a normal dof')
+   end subroutine check_normal_zeros
 
-         if (.not. allocated(values)) then
-            allocate (values(contact%n_pairs), source=0.0_wp)
-         else if (.not. is_penalty) then
-            call reader%refuse('contact', key, "belongs to law = 'penalty', but law = '"// &
-                               trim(law_words(contact%law))//"': remove it or change the law")
-         end if
-      end subroutine finish_one
-
-   end subroutine read_stiffnesses
-
-   !> A stiffness of 0 is none: the pair has no such dof, or is one of several sliders between the
-   !> same dofs of which others have one.
+   !> Without a tangential stiffness the pair has no such dof, or is one of several sliders between
+   !> the same dofs of which others have one.
    subroutine check_zeros(reader, contact)
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(in) :: contact
       logical :: is_idle(contact%n_pairs)
       integer :: i
 
-      is_idle = has_normal(contact) .and. contact%normal_stiffness <= 0.0_wp
-      i = findloc(is_idle, .true., 1)
-      if (i > 0) call reader%refuse('contact', 'normal_stiffness', '= 0 for pair '// &
-                                    to_text(i)//': must be above 0 where there is a normal dof')
       do i = 1, contact%n_pairs
          is_idle = .false.
          is_idle(i) = contact%tangential_stiffness(i) <= 0.0_wp

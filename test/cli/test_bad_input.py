@@ -75,6 +75,10 @@ def with_model(fw_run):
     ("mu = 0.3", "mu = 0.3 law = 'penalty'", ["&contact tangential_stiffness is missing"]),
     ("mu = 0.3", "mu = 0.3 tangential_stiffness = 1",
      ["tangential_stiffness belongs to law = 'penalty'"]),
+    ("mu = 0.3", "mu = 0.3 law = 'regularised'", ["&contact slip_speed is missing", "above 0"]),
+    ("mu = 0.3", "mu = 0.3 slip_speed = 1", ["slip_speed belongs to law = 'regularised'"]),
+    ("mu = 0.3", "mu = 0.3 law = 'regularised' slip_speed = 1 penalty_scale = 2",
+     ["penalty_scale has no meaning with law = 'regularised'"]),
     ("mu = 0.3", "mu = 0.3 0.4 0.5", ["&contact mu has 3 values", "must be 1"]),
 ])
 def test_wrong_namelist(fw_run, old, new, expected):
@@ -82,6 +86,18 @@ def test_wrong_namelist(fw_run, old, new, expected):
     message = fw_run.refused()
     for part in expected:
         assert part in message, message
+
+
+@pytest.mark.parametrize(("setting", "expected"), [
+    ("harmonics%sampling=events", "does not go with harmonics%sampling = 'events'"),
+    ("case%analysis=time", "does not go with case%analysis = 'time'"),
+    ("case%analysis=wear", "does not wear yet"),
+    ("sweep%stability=.true.", "sweep%stability = .true. needs contact%law"),
+])
+def test_a_law_says_what_it_does_not_offer(fw_run, setting, expected):
+    fw_run.edit("mu = 0.3", "mu = 0.3 area = 1 law = 'regularised' slip_speed = 1")
+    message = fw_run.refused("--set", setting, "--set", "wear%coefficient=1e-9", "case.nml")
+    assert expected in message, message
 
 
 def test_all_problems_at_once(fw_run):

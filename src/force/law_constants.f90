@@ -1,0 +1,127 @@
+!> Constants of pairs that only some laws have, by the names of their keys: a law declares its own
+!> in `bind_keys` and takes their values when it is built, and nobody else knows them.
+module fw_law_constants
+   use fw_key, only: key_type
+   use fw_key, only: key_visitor
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: law_constants
+
+   type :: constant_type
+      character(24) :: name = ''
+      !> Number of the law that declared it.
+      integer :: law = 0
+      !> One for each pair; not allocated where none was given.
+      real(wp), allocatable :: values(:)
+   end type constant_type
+
+   type :: law_constants
+      !> Number of the law that declares keys now.
+      integer :: law = 0
+      type(constant_type), allocatable, private :: constant(:)
+   contains
+      procedure :: bind
+      procedure :: set
+      procedure :: get
+      procedure :: has
+      procedure :: first_of_others
+   end type law_constants
+
+contains
+
+   !> Declare a constant for each pair. What laws share is declared by each, and read once.
+   subroutine bind(self, keys, key, needed)
+      class(law_constants), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+      type(key_type), intent(in) :: key
+      logical, intent(in) :: needed
+      type(constant_type) :: new
+
+      if (.not. allocated(self%constant)) allocate (self%constant(0))
+      if (place_of(self, key%name) > 0) return
+      new%name = key%name
+      new%law = self%law
+      call keys%bind(key, new%values, needed)
+      self%constant = [self%constant, new]
+   end subroutine bind
+
+   !> Give a constant its values, without a reader.
+   subroutine set(self, name, values)
+      class(law_constants), intent(inout) :: self
+      character(*), intent(in) :: name
+      !> (n_pairs).
+      real(wp), intent(in) :: values(:)
+      type(constant_type) :: new
+      integer :: k
+
+      if (.not. allocated(self%constant)) allocate (self%constant(0))
+      k = place_of(self, name)
+      if (k == 0) then
+         new%name = name
+         new%law = self%law
+         self%constant = [self%constant, new]
+         k = size(self%constant)
+      end if
+      self%constant(k)%values = values
+   end subroutine set
+
+   !> Values of a constant (n_pairs); zero where none were given.
+   pure function get(self, name, n_pairs) result(values)
+      class(law_constants), intent(in) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: n_pairs
+      real(wp) :: values(n_pairs)
+      integer :: k
+
+      values = 0.0_wp
+      k = place_of(self, name)
+      if (k == 0) return
+      if (.not. allocated(self%constant(k)%values)) return
+      if (size(self%constant(k)%values) == n_pairs) values = self%constant(k)%values
+   end function get
+
+   !> Whether values of a constant were given.
+   pure logical function has(self, name)
+      class(law_constants), intent(in) :: self
+      character(*), intent(in) :: name
+      integer :: k
+
+      k = place_of(self, name)
+      has = .false.
+      if (k > 0) has = allocated(self%constant(k)%values)
+   end function has
+
+   !> A constant that was given but that only other laws than `law` declare, and the first of
+   !> these; law 0 where there is none.
+   subroutine first_of_others(self, law, name, other)
+      class(law_constants), intent(in) :: self
+      integer, intent(in) :: law
+      character(*), intent(out) :: name
+      integer, intent(out) :: other
+      integer :: k
+
+      name = ''
+      other = 0
+      if (.not. allocated(self%constant)) return
+      do k = 1, size(self%constant)
+         if (self%constant(k)%law == law .or. .not. allocated(self%constant(k)%values)) cycle
+         name = self%constant(k)%name
+         other = self%constant(k)%law
+         return
+      end do
+   end subroutine first_of_others
+
+   pure integer function place_of(self, name) result(place)
+      type(law_constants), intent(in) :: self
+      character(*), intent(in) :: name
+
+      place = 0
+      if (.not. allocated(self%constant)) return
+      do place = size(self%constant), 1, -1
+         if (self%constant(place)%name == name) return
+      end do
+   end function place_of
+
+end module fw_law_constants
