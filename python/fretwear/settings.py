@@ -58,9 +58,9 @@ class Contact(TypedDict, total=False):
 
     #: required with side_1; 0 switches the contact of a file off (default: of the file, else 0)
     n_pairs: int
-    #: rigid, rigid at velocity level (friction on dofs with mass), elastic, or smooth in the
-    #: sliding velocity (default: 'dlft')
-    law: Literal["dlft", "dlft_velocity", "penalty", "regularised"]
+    #: rigid, rigid at velocity level, elastic, rigid of high order (friction on dofs with mass), or
+    #: smooth in the velocity (default: 'dlft')
+    law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised"]
     #: dofs of t1, t2, n on one side; 0: none, negative: with its sign turned (default: of the file,
     #: else required)
     side_1: ArrayLike
@@ -85,8 +85,8 @@ class Contact(TypedDict, total=False):
     #: [L/s] sliding velocity du/dt at which tanh(1) = 76 % of the friction acts; only: law =
     #: 'regularised' (required with tangential dofs)
     slip_speed: ArrayLike
-    #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity' (default:
-    #: 1)
+    #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity', 'rigid'
+    #: (default: 1)
     penalty_scale: float
     #: where pairs that never slip start: unstrained, or as the last point ended (default:
     #: 'assembly')

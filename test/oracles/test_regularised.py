@@ -41,7 +41,8 @@ def reference(sides, slip_speed, n_harmonics):
     n = 512
     times = (PERIODS - 1) * period + np.arange(n + 1) * period / n
     start = np.zeros(7)
-    run = solve_ivp(slope, (0.0, times[-1]), start, method="DOP853", rtol=1e-10, atol=1e-12, t_eval=times)
+    run = solve_ivp(slope, (0.0, times[-1]), start, method="DOP853", rtol=1e-10, atol=1e-12,
+                    t_eval=times)
     u = run.y[:3, :n]
     spectrum = np.fft.rfft(u, axis=1) / n
     coefficients = np.zeros((2 * n_harmonics + 1, 3))
