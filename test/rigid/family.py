@@ -2,6 +2,7 @@
 """Errors of rigid friction over 500 random structures, into docs/robustness.md.
 
     family.py [-n CASES] [--with OTHER_PROGRAM] [--print]
+    family.py --orders [--print]     error against H of four structures, into docs/theory.md
 
 Judge: motions from event to event (event_motion.py). Laws: rigid with its tail, dlft_velocity and
 dlft of this build, and dlft_velocity of another program if one is given. A false solution counts as
@@ -17,8 +18,17 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 import numpy as np  # noqa: E402
 from project import PROGRAM  # noqa: E402
-from rigid_cases import answer, error, random_structure, reference_of  # noqa: E402
-from sections import write_section  # noqa: E402
+from rigid_cases import (  # noqa: E402
+    BOTH,
+    ONE,
+    THREE,
+    TWO,
+    answer,
+    error,
+    random_structure,
+    reference_of,
+)
+from sections import DOCUMENT, write_section  # noqa: E402
 
 N_HARMONICS = 9
 TAIL = 255
@@ -67,23 +77,50 @@ def table(rows, skipped, n_cases):
     return lines
 
 
+def orders(laws, harmonics=(1, 3, 7, 15, 31)):
+    """Lines of the table of errors against H."""
+    names = {"one mass": ONE, "two masses, the second rubs": TWO, "two masses, both rub": BOTH,
+             "three masses, the second rubs": THREE}
+    lines = ["| structure | law | " + " | ".join(f"H = {n}" for n in harmonics) + " |",
+             "|---|---|" + "---|" * len(harmonics)]
+    with tempfile.TemporaryDirectory() as folder:
+        for title, structure in names.items():
+            reference = reference_of(structure)
+            for name, (law, tail, program) in laws.items():
+                cells = []
+                for n in harmonics:
+                    coefficients, converged, _ = answer(Path(folder), structure, law, n, tail,
+                                                        program)
+                    cells.append(f"{error(coefficients, reference):.1e}" if converged else "-")
+                lines.append(f"| {title} | {name} | " + " | ".join(cells) + " |")
+    return lines
+
+
 def main():
     """Measure and write, or print."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-n", type=int, default=500, metavar="CASES")
     parser.add_argument("--with", dest="other", metavar="PROGRAM")
+    parser.add_argument("--orders", action="store_true")
     parser.add_argument("--print", action="store_true", help="do not write the document")
     options = parser.parse_args()
     laws = {"`rigid`": ("rigid", TAIL, PROGRAM),
             "`dlft_velocity`": ("dlft_velocity", 0, PROGRAM), "`dlft`": ("dlft", 0, PROGRAM)}
     if options.other:
         laws["`dlft_velocity`, the program before"] = ("dlft_velocity", 0, options.other)
+    if options.orders:
+        lines = orders(laws)
+        if not options.print:
+            write_section("rigid-orders", ["", *lines, ""], DOCUMENT.with_name("theory.md"))
+            return
+        print("\n".join(lines))
+        return
     lines = table(*measure(options.n, laws), options.n)
     if options.print:
         print("\n".join(lines))
     else:
-        write_section("rigid", lines)
+        write_section("rigid", ["", *lines, ""])
 
 
 if __name__ == "__main__":

@@ -94,6 +94,14 @@ def chain(masses, springs, dampers, cosine, static, omega, limit):
                      limit)
 
 
+#: One mass; two, the second or both of which rub; three, the second of which does.
+ONE = chain([1.0], [1.0], [0.1], [1.0], [0.0], 0.3, {0: 0.5})
+TWO = chain([1.0, 0.5], [1.0, 1.0], [0.02, 0.02], [1.0, 0.0], [0.0, 0.0], 0.6, {1: 0.35})
+BOTH = chain([1.0, 0.5], [1.0, 1.0], [0.02, 0.02], [1.0, 0.3], [0.0, 0.1], 0.6, {0: 0.3, 1: 0.25})
+THREE = chain([1.0, 0.5, 0.7], [1.0, 1.0, 1.0], [0.02, 0.02, 0.02], [1.0, 0.3, 0.0],
+              [0.0, 0.1, 0.0], 0.4, {1: 0.3})
+
+
 def random_structure(seed):
     """One to three masses, one or two of which rub, near and off resonance, some with a static
     load; friction from 15 to 85 % of what would hold the masses."""

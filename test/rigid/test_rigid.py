@@ -6,7 +6,7 @@ import cases
 import numpy as np
 import pytest
 from project import ROOT
-from rigid_cases import answer, chain, error, random_structure, reference_of
+from rigid_cases import BOTH, THREE, TWO, answer, error, random_structure, reference_of
 
 sys.path.insert(0, str(ROOT / "test" / "oracles"))
 from oracle_cases import coefficients_of, coulomb  # noqa: E402
@@ -18,12 +18,6 @@ ONE_MASS = 1e-9
 TAIL = 255
 HARMONICS = (1, 3, 7, 15)
 N_RANDOM = 30
-
-TWO = chain([1.0, 0.5], [1.0, 1.0], [0.02, 0.02], [1.0, 0.0], [0.0, 0.0], 0.6, {1: 0.35})
-BOTH = chain([1.0, 0.5], [1.0, 1.0], [0.02, 0.02], [1.0, 0.3], [0.0, 0.1], 0.6, {0: 0.3, 1: 0.25})
-THREE = chain([1.0, 0.5, 0.7], [1.0, 1.0, 1.0], [0.02, 0.02, 0.02], [1.0, 0.3, 0.0],
-              [0.0, 0.1, 0.0], 0.4, {1: 0.3})
-
 
 @pytest.mark.parametrize("n_harmonics", HARMONICS)
 @pytest.mark.parametrize("name", ORACLE)
