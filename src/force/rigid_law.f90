@@ -60,7 +60,8 @@ contains
       law%prediction = prediction_type(takes_balance=.true., has_inertia=.true.)
       law%facts = law_facts(remembers=.true., can_stick=.true., can_open=.true., &
                             needs_independent=.true., has_events=.true., follows_events=.true., &
-                            needs_projection=.true., has_tail=.true., is_integrated=.true.)
+                            needs_projection=.true., has_tail=.true., measures_slip=.true., &
+                            is_integrated=.true.)
    end function friction_of_high_order
 
    !> Room; the masses are known.
@@ -120,8 +121,21 @@ contains
          call work%measure_scale()
          call classify(room, work)
          if (room%n_massive > 0) call evaluate_massive(self, fourier, work, room)
+         if (work%measures_slip) call measure_paths(room, work%slip)
       end select
    end subroutine evaluate
+
+   !> int N |dx| of every pair, x in units of force.
+   subroutine measure_paths(room, slip)
+      type(rigid_room), intent(inout) :: room
+      real(wp), intent(inout) :: slip(:)
+      integer :: j
+
+      call room%paths%friction_path(slip)
+      do j = 1, room%n_massive
+         slip(room%pair(j)) = room%massive(j)%friction_path()
+      end do
+   end subroutine measure_paths
 
    !> Of the pressure, only whether it ever vanishes is known.
    pure subroutine classify(room, work)
@@ -262,7 +276,9 @@ contains
       integer :: j, nc
 
       nc = fourier%n_coefficients
-      call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, work%jacobian)
+      ! Where slip is not measured, the derivative of it is not allocated: not present.
+      call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, work%jacobian, &
+                                work%slip_derivative)
       !$omp parallel do default(none) shared(self, fourier, work, room, nc) private(j) &
       !$omp schedule(dynamic) if(room%n_massive >= pairs_for_threads)
       do j = 1, room%n_massive
@@ -270,6 +286,10 @@ contains
          call linearize_pair(fourier, nc, (room%direction(j) - 1)*nc, &
                              self%present(3, room%pair(j)), room%massive(j), &
                              work%jacobian(:, :, room%pair(j)))
+         if (.not. work%measures_slip) cycle
+         call differentiate_path(fourier, nc, (room%direction(j) - 1)*nc, &
+                                 self%present(3, room%pair(j)), room%massive(j), &
+                                 work%slip_derivative(:, room%pair(j)))
       end do
       !$omp end parallel do
    end subroutine linearize_pairs
@@ -290,6 +310,22 @@ contains
       jacobian(t + 1:t + nc, t + 1:t + nc) = by_tangential
       if (has_normal) jacobian(2*nc + 1:, t + 1:t + nc) = by_normal
    end subroutine linearize_pair
+
+   !> What the sliding of a pair with mass depends on.
+   subroutine differentiate_path(fourier, nc, t, has_normal, pair, slope)
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: nc, t
+      logical, intent(in) :: has_normal
+      type(oscillator_pair_type), intent(inout) :: pair
+      real(wp), intent(inout) :: slope(:)
+      real(wp) :: by_tangential(nc), by_normal(nc)
+
+      call pair%path_derivative(fourier%n_retained, fourier%harmonic, fourier%column, &
+                                by_tangential, by_normal)
+      slope = 0.0_wp
+      slope(t + 1:t + nc) = by_tangential
+      if (has_normal) slope(2*nc + 1:) = by_normal
+   end subroutine differentiate_path
 
    subroutine sample(self, work)
       class(rigid_law), intent(in) :: self

@@ -13,7 +13,7 @@ submodule(fw_oscillator_pair) fw_oscillator_derivative
 contains
 
    module procedure derivative_of_oscillator
-      real(wp) :: start(2, size(by_tangential, 1), 2)
+      real(wp) :: start(2, size(by_tangential, 1), 2), unused(0, 2)
 
       if (.not. self%swings) then
          call self%event_pair_type%derivative(n_retained, harmonic, column, by_tangential, &
@@ -24,13 +24,96 @@ contains
       by_normal = 0.0_wp
       normal = 0.0_wp
       start = 0.0_wp
-      call carry(self, n_retained, harmonic, column, .false., start, by_tangential, by_normal)
+      call carry(self, n_retained, harmonic, column, .false., start, by_tangential, by_normal, unused)
       call repeat(self%turn%monodromy, start)
       call self%contact%add_gram(1.0_wp, n_retained, harmonic, column, normal)
       call self%stick%add_gram(1.0_wp, n_retained, harmonic, column, by_tangential)
       call self%slip%add_gram(-self%curves%mu, n_retained, harmonic, column, by_normal)
-      call carry(self, n_retained, harmonic, column, .true., start, by_tangential, by_normal)
+      call carry(self, n_retained, harmonic, column, .true., start, by_tangential, by_normal, unused)
    end procedure derivative_of_oscillator
+
+   !> With W = k int N |x'|, dW/k = int dN |x'| + int N s dx', s the side of slip: stops add nothing,
+   !> for x' = 0 there.
+   module procedure path_of_oscillator
+      real(wp) :: start(2, size(by_normal), 2), none(0, 0), slope(size(by_normal), 2)
+      integer :: j
+
+      if (.not. self%swings) then
+         call self%event_pair_type%path_derivative(n_retained, harmonic, column, by_tangential, &
+                                                   by_normal)
+         return
+      end if
+      slope = 0.0_wp
+      start = 0.0_wp
+      call carry(self, n_retained, harmonic, column, .false., start, none, none, none)
+      call repeat(self%turn%monodromy, start)
+      call carry(self, n_retained, harmonic, column, .false., start, none, none, slope)
+      call add_driven_slip(self, n_retained, harmonic, column, slope)
+      do j = 1, self%turn%n_segments
+         if (side_of(self%turn%phase(j)) == 0) cycle
+         call add_free_slip(self, j, n_retained, harmonic, column, slope(:, 2))
+      end do
+      by_tangential = self%waves%oscillator%k*slope(:, 1)
+      by_normal = self%waves%oscillator%k*slope(:, 2)
+   end procedure path_of_oscillator
+
+   !> The driven velocity under dN, and the variation of the driven velocity under N.
+   pure subroutine add_driven_slip(self, n_retained, harmonic, column, slope)
+      type(oscillator_pair_type), intent(inout) :: self
+      integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      real(wp), intent(inout) :: slope(:, :)
+      real(wp) :: raw(size(slope, 1), 3)
+      complex(wp) :: answer
+      integer :: c, h, k, n
+
+      self%one%cosine = self%contact%cosine - self%stick%cosine
+      self%one%sine = self%contact%sine - self%stick%sine
+      raw = 0.0_wp
+      associate (w => self%waves, normal => self%curves%normal, nr => n_retained)
+         self%answer = 0.5_wp*(w%rate(1)%p + w%rate(-1)%p)
+         call self%slip%project(-pi, self%answer, nr, harmonic, column, raw(:, 3))
+         self%answer = 0.5_wp*(w%rate(1)%p - w%rate(-1)%p)
+         call self%one%project(-pi, self%answer, nr, harmonic, column, raw(:, 3))
+         call self%slip%project(pi, normal, nr, harmonic, column, raw(:, 1))
+         call self%one%project(pi*self%curves%mu, normal, nr, harmonic, column, raw(:, 2))
+      end associate
+      ! Projections halve the constant.
+      if (harmonic(1) == 0) raw(column(1), :) = 2.0_wp*raw(column(1), :)
+      slope(:, 2) = slope(:, 2) + raw(:, 3)
+      do h = 1, n_retained
+         n = harmonic(h)
+         if (n == 0) cycle
+         k = column(h)
+         do c = 1, 2
+            answer = cmplx(0.0_wp, n, wp)*cmplx(raw(k, c), raw(k + 1, c), wp) &
+                     /self%waves%oscillator%impedance(n)
+            slope(k, c) = slope(k, c) + real(answer, wp)
+            slope(k + 1, c) = slope(k + 1, c) + aimag(answer)
+         end do
+      end do
+   end subroutine add_driven_slip
+
+   !> The free velocity of a segment under dN = -dy_n.
+   pure subroutine add_free_slip(self, j, n_retained, harmonic, column, slope)
+      type(oscillator_pair_type), intent(in) :: self
+      integer, intent(in) :: j, n_retained, harmonic(n_retained), column(n_retained)
+      real(wp), intent(inout) :: slope(:)
+      real(wp) :: phi(2, 2)
+      complex(wp) :: row(2), integral
+      integer :: h, k, side
+
+      side = side_of(self%turn%phase(j))
+      associate (a => self%turn%angle(j), b => self%turn%angle(j + 1), o => self%waves%oscillator)
+         call o%propagate(b - a, phi)
+         do h = 1, n_retained
+            k = column(h)
+            call integrate_wave(o, harmonic(h), a, b, phi, row)
+            integral = row(1)*self%turn%free(1, j) + row(2)*self%turn%free(2, j)
+            slope(k) = slope(k) - side*real(integral, wp)
+            if (harmonic(h) > 0) slope(k + 1) = slope(k + 1) - side*aimag(integral)
+         end do
+      end associate
+   end subroutine add_free_slip
 
    !> dX_0 of the period from dX at the end of a turn that starts with none.
    pure subroutine repeat(monodromy, d)
@@ -49,14 +132,16 @@ contains
    end subroutine repeat
 
    !> Carry dX by P and y_n (2, coefficient, which) through the turn; with `adds`, add what the
-   !> motion does to the derivatives of the force.
-   pure subroutine carry(self, n_retained, harmonic, column, adds, d, by_tangential, by_normal)
+   !> motion does to the derivatives of the force, and where by_slip has rows, what the free motion
+   !> does to int N s dx'.
+   pure subroutine carry(self, n_retained, harmonic, column, adds, d, by_tangential, by_normal, &
+                         by_slip)
       type(oscillator_pair_type), intent(in) :: self
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
       logical, intent(in) :: adds
       real(wp), intent(inout) :: d(:, :, :)
-      real(wp), intent(inout) :: by_tangential(:, :), by_normal(:, :)
-      real(wp) :: phi(2, 2), output(size(d, 2)), driven(2, size(d, 2)), x(2), friction
+      real(wp), intent(inout) :: by_tangential(:, :), by_normal(:, :), by_slip(:, :)
+      real(wp) :: phi(2, 2), output(size(d, 2)), driven(2, size(d, 2)), x(2), friction, weight(2)
       integer :: j, k, i, side
 
       associate (turn => self%turn, o => self%waves%oscillator)
@@ -83,6 +168,10 @@ contains
             call driven_waves(o, n_retained, harmonic, column, turn%angle(j), driven)
             d(:, :, 1) = d(:, :, 1) - driven
             d(:, :, 2) = d(:, :, 2) - friction*driven
+            if (size(by_slip, 1) > 0 .and. side /= 0) then
+               call integrate_free(o, self%curves, turn%angle(j), turn%angle(j + 1), weight)
+               by_slip = by_slip + side*(weight(1)*d(1, :, :) + weight(2)*d(2, :, :))
+            end if
             call driven_waves(o, n_retained, harmonic, column, turn%angle(j + 1), driven)
             do i = 1, 2
                do k = 1, size(d, 2)
@@ -171,5 +260,35 @@ contains
          end if
       end do
    end subroutine integrals_out
+
+   !> With X' = A X, the second row of (A + i n)^-1 (e^(i n b) Phi(b - a) - e^(i n a)).
+   module procedure integrate_wave
+      complex(wp) :: difference(2, 2), inverse(2), wave
+
+      difference = cmplx(cos(n*b), sin(n*b), wp)*phi
+      wave = cmplx(cos(n*a), sin(n*a), wp)
+      difference(1, 1) = difference(1, 1) - wave
+      difference(2, 2) = difference(2, 2) - wave
+      ! Second row of (A + i n)^-1, times m: (k, i n m) over k - n**2 m - i n c.
+      inverse = [cmplx(oscillator%k, kind=wp), cmplx(0.0_wp, n*oscillator%m, wp)] &
+                /conjg(oscillator%impedance(n))
+      row = inverse(1)*difference(1, :) + inverse(2)*difference(2, :)
+   end procedure integrate_wave
+
+   !> The integral of N times the velocity of a free motion X, over X at its start.
+   module procedure integrate_free
+      real(wp) :: phi(2, 2)
+      complex(wp) :: row(2), amplitude
+      integer :: n
+
+      weight = 0.0_wp
+      call oscillator%propagate(b - a, phi)
+      do n = 0, curves%degree
+         amplitude = cmplx(curves%normal(n, 1), -curves%normal(n, 2), wp)
+         if (.not. abs(amplitude) > 0.0_wp) cycle
+         call integrate_wave(oscillator, n, a, b, phi, row)
+         weight = weight + real(amplitude*row, wp)
+      end do
+   end procedure integrate_free
 
 end submodule fw_oscillator_derivative

@@ -45,6 +45,7 @@ module fw_oscillator_pair
       procedure :: follow => follow_oscillator
       procedure :: derivative => derivative_of_oscillator
       procedure :: friction_path
+      procedure :: path_derivative => path_of_oscillator
    end type oscillator_pair_type
 
    interface
@@ -55,6 +56,29 @@ module fw_oscillator_pair
          integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
          real(wp), intent(inout) :: by_tangential(:, :), by_normal(:, :), normal(:, :)
       end subroutine derivative_of_oscillator
+
+      pure module subroutine path_of_oscillator(self, n_retained, harmonic, column, &
+                                                by_tangential, by_normal)
+         class(oscillator_pair_type), intent(inout) :: self
+         integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+         real(wp), intent(inout) :: by_tangential(:), by_normal(:)
+      end subroutine path_of_oscillator
+
+      !> The integral of e^(i n tau) times the velocity of a free motion, over X at its start.
+      pure module subroutine integrate_wave(oscillator, n, a, b, phi, row)
+         type(oscillator_type), intent(in) :: oscillator
+         integer, intent(in) :: n
+         !> From a to b, and Phi(b - a).
+         real(wp), intent(in) :: a, b, phi(2, 2)
+         complex(wp), intent(out) :: row(2)
+      end subroutine integrate_wave
+
+      pure module subroutine integrate_free(oscillator, curves, a, b, weight)
+         type(oscillator_type), intent(in) :: oscillator
+         type(curves_type), intent(in) :: curves
+         real(wp), intent(in) :: a, b
+         real(wp), intent(out) :: weight(2)
+      end subroutine integrate_free
    end interface
 
    !> Angles of the grid for each wave of the highest harmonic, and at least.
@@ -275,35 +299,5 @@ contains
       end associate
       path = path*self%waves%oscillator%k
    end function friction_path
-
-   !> The integral of N times the velocity of a free motion X, over X at its start. With
-   !> X' = A X it is the second row of
-   !>
-   !>   (A + i n)^-1 (e^(i n b) Phi(b - a) - e^(i n a)),   summed over the waves of N.
-   pure subroutine integrate_free(oscillator, curves, a, b, weight)
-      type(oscillator_type), intent(in) :: oscillator
-      type(curves_type), intent(in) :: curves
-      real(wp), intent(in) :: a, b
-      real(wp), intent(out) :: weight(2)
-      real(wp) :: phi(2, 2)
-      complex(wp) :: wave, difference(2, 2), row(2), amplitude
-      integer :: n
-
-      weight = 0.0_wp
-      call oscillator%propagate(b - a, phi)
-      do n = 0, curves%degree
-         amplitude = cmplx(curves%normal(n, 1), -curves%normal(n, 2), wp)
-         if (.not. abs(amplitude) > 0.0_wp) cycle
-         wave = cmplx(cos(n*b), sin(n*b), wp)
-         difference = wave*phi
-         wave = cmplx(cos(n*a), sin(n*a), wp)
-         difference(1, 1) = difference(1, 1) - wave
-         difference(2, 2) = difference(2, 2) - wave
-         ! Second row of (A + i n)^-1, times m: (k, i n m) over k - n**2 m - i n c.
-         row = [cmplx(oscillator%k, kind=wp), cmplx(0.0_wp, n*oscillator%m, wp)] &
-               /conjg(oscillator%impedance(n))
-         weight = weight + real(amplitude*(row(1)*difference(1, :) + row(2)*difference(2, :)), wp)
-      end do
-   end subroutine integrate_free
 
 end module fw_oscillator_pair
