@@ -113,6 +113,24 @@ def test_truncation_of_the_velocity_law(tmp_path):
     assert np.all((slopes > 0.6) & (slopes < 1.2)), (errors, slopes)
 
 
+@pytest.mark.parametrize("n_harmonics", [1, 15])
+def test_a_mass_wears_exactly(tmp_path, n_harmonics):
+    """W3 with the rigid law: the first rate to round-off, whatever H, and the depths at all cycles.
+
+    10 times the iteration's tolerance for the rate; for the depths the error asked for.
+    """
+    p = REFERENCE["W3"]["params"]
+    exact = p["kwA"] * p["N0"] * 4.0 * REFERENCE["W3"]["table"][0]["xmax"]
+    for row in REFERENCE["W3"]["table"][1:]:
+        case = oscillator(n_harmonics, "rigid", error_tolerance=ERROR_TOLERANCE,
+                          n_cycles=float(row["n"]))
+        del case["harmonics"]["n_time"]
+        found = result(tmp_path, case)
+        assert found["wear/rate"][0, 0] == pytest.approx(exact, rel=1e-9)
+        n = np.searchsorted(found["wear/cycles"], row["n"] - 1e-9)
+        assert found["wear/depth"][n, 0] == pytest.approx(row["W"], rel=ERROR_TOLERANCE)
+
+
 def test_oscillator_wears_free(tmp_path):
     """W3: most of its error is that of the first rates; the end is exact."""
     found = result(tmp_path, oscillator(25, error_tolerance=ERROR_TOLERANCE, n_cycles=200.0))
