@@ -430,7 +430,7 @@ contains
                ! d/dtau is a factor i n of the complex coefficient.
                turn = one
                if (p%order(c) > 0) turn = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
-               turn = turn*p%impedance_ratio(i, c, n, self%structure%omega)
+               turn = turn*p%impedance_ratio(i, c, n, self%frequency())
                call self%incidence%gather_harmonic(row, h, self%place, self%n_active, &
                                                    turn*p%stiffness(i, c), z, input)
                place = self%place(self%incidence%coordinate_of(row))

@@ -17,6 +17,8 @@ N_TIME = 4096
 #: A reference that drifts more over a period is none.
 GOOD_DRIFT = 1e-9
 TOLERANCE = 1e-11
+#: Vibration, as a part of the largest, that is none.
+AT_REST = 1e-6
 
 
 def groups(structure, law, n_harmonics, tail=0, **contact):
@@ -76,7 +78,10 @@ def reference_of(structure):
         return None
     motion, pieces = history(structure, state, N_TIME)
     slips = {i for _, _, piece in pieces for i, s in piece.direction.items() if s != 0}
-    return motion if slips == set(structure.limit) else None
+    moved = np.ptp(motion, axis=1)
+    # Having come to rest, a pair may still slip by round-off.
+    rests = any(moved[i] < AT_REST * moved.max() for i in structure.limit)
+    return None if slips != set(structure.limit) or rests or moved.max() < AT_REST else motion
 
 
 def chain(masses, springs, dampers, cosine, static, omega, limit):
