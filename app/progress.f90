@@ -16,6 +16,9 @@ module fw_progress
    integer, parameter :: bar_width = 30
    !> About as many lines stand in a log for a long sweep.
    integer, parameter :: log_lines = 20
+   !> Where nobody knows how many points there will be, each line comes this much later than the
+   !> last: about as many again for some hundred points.
+   real, parameter :: later = 1.35
 
    type, extends(observer_type) :: progress_type
       private
@@ -24,6 +27,8 @@ module fw_progress
       logical :: draws_bar = .false.
       !> Whether the line of the terminal is occupied by the bar.
       logical :: bar_is_shown = .false.
+      !> Point of the next line, where it is not known how many there will be.
+      integer :: next_line = 1
    contains
       procedure :: on_start
       procedure :: on_point
@@ -60,6 +65,7 @@ contains
       integer, intent(in) :: n_points
       character(:), allocatable :: count
 
+      self%next_line = 1
       if (self%quiet) return
       count = ''
       if (n_points == 1) count = ': 1 point'
@@ -78,8 +84,15 @@ contains
       if (self%quiet) return
       ! A point that failed is worth a line wherever it is shown.
       is_due = self%verbose .or. .not. point%converged
-      if (.not. self%draws_bar) is_due = is_due .or. index == n_points &
-                                         .or. mod(index - 1, max(1, n_points/log_lines)) == 0
+      if (.not. self%draws_bar) then
+         if (n_points > 0) then
+            is_due = is_due .or. index == n_points .or. &
+                     mod(index - 1, max(1, n_points/log_lines)) == 0
+         else if (index >= self%next_line) then
+            is_due = .true.
+            self%next_line = max(index + 1, ceiling(later*index))
+         end if
+      end if
       if (is_due) then
          call self%clear_bar()
          write (error_unit, '(a)') point_line(index, n_points, point, self%verbose)

@@ -72,6 +72,9 @@ module fw_continuation
    real(wp), parameter :: halved = 0.5_wp
    !> Steps aim at this part of the error that is allowed.
    real(wp), parameter :: aim = 0.4_wp
+   !> What the model of the resonances may say of a step that has been taken, of the error that is
+   !> allowed.
+   real(wp), parameter :: passed = 0.6_wp
    !> Longest step: of p over the interval, and of x over its size.
    real(wp), parameter :: longest_p = 0.0625_wp, longest_x = 0.5_wp
    !> What is left of the size of x from one point to the next where x itself gets smaller.
@@ -311,7 +314,7 @@ contains
          if (turns_between(self%corrector%metric, self%here, ahead)) return
          shortening = shortening_for_error(self, ahead)
          if (shortening < 1.0_wp .or. self%here%t_p*ahead%t_p <= 0.0_wp) return
-         if (self%near%misses(ahead%p - self%here%p) > allowed_error) shortening = 0.7_wp
+         if (self%near%misses(ahead%p - self%here%p) > passed*allowed_error) shortening = 0.7_wp
       end if
    end subroutine attempt
 

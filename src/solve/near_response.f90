@@ -41,8 +41,9 @@ module fw_near_response
    integer, parameter :: directions_lu = 16, directions_krylov = 4
    !> A direction that is nothing but round-off of the one before.
    real(wp), parameter :: dependent = 1.0e-10_wp
-   !> What the cubic may miss of the model, of the size of x.
-   real(wp), parameter :: allowed = 3.0e-3_wp
+   !> What the cubic may miss of the model, of the size of x: the model is linear in the change of
+   !> p, and takes a resonance ahead to be a little further than it is.
+   real(wp), parameter :: allowed = 2.0e-3_wp
    !> Places of a step where it is looked at.
    integer, parameter :: n_places = 12
    !> How much further than along the tangent p is followed.

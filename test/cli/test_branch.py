@@ -128,6 +128,7 @@ def test_resonances_are_followed_in_few_points(fw_run, k, c, d, load, start, n, 
     assert highest == pytest.approx(tops, rel=0.04)
     # Progress of a branch of unknown length is some lines, and says why it ended.
     assert "followed to the end of the sweep" in done.stderr
+    assert len(done.stderr.splitlines()) < 30 < len(omega)
 
 
 SECTOR = Path(__file__).parents[2] / "example" / "blade_sector" / "frf.nml"
