@@ -148,6 +148,7 @@ contains
          curve%finish = case%sweep%end
          curve%max_points = case%sweep%max_points
          curve%x_scale = displacement_scale(self%system)
+         if (.not. associated(self%whole)) call find_poles(system, curve)
          curve%step = 1.0_wp/real(default_steps, wp)
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       end associate
@@ -199,6 +200,22 @@ contains
          whole_x = x
       end if
    end subroutine build_whole
+
+   !> While all of the contact sticks, the structure vibrates with its relative coordinates held.
+   pure subroutine find_poles(system, curve)
+      type(hbm_system), intent(in) :: system
+      type(arclength_type), intent(inout) :: curve
+      !> Half width of a mode without damping, over its frequency.
+      real(wp), parameter :: least = 1.0e-4_wp
+      logical, allocatable :: vibrates(:)
+
+      associate (b => system%structure%basis)
+         vibrates = b%k_i > 0.0_wp .and. b%m_i > 0.0_wp
+         curve%pole = sqrt(pack(b%k_i, vibrates)/pack(b%m_i, vibrates))
+         curve%pole_width = max(0.5_wp*pack(b%c_i, vibrates)/pack(b%m_i, vibrates), &
+                                least*curve%pole)
+      end associate
+   end subroutine find_poles
 
    subroutine release(self)
       type(branch_type), intent(inout) :: self

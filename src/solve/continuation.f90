@@ -43,6 +43,9 @@ module fw_continuation
       integer :: max_points = 1000
       !> The least size of x that matters.
       real(wp) :: x_scale = 0.0_wp
+      !> Resonances of what x does not show, heeded where x does not move at all: where they are in
+      !> p, and half their half-power widths.
+      real(wp), allocatable :: pole(:), pole_width(:)
       !> Why the branch ended.
       character(:), allocatable :: ending
       logical :: ended = .false.
@@ -77,6 +80,8 @@ module fw_continuation
    real(wp), parameter :: passed = 0.6_wp
    !> Longest step: of p over the interval, and of x over its size.
    real(wp), parameter :: longest_p = 0.0625_wp, longest_x = 0.5_wp
+   !> Step over the distance of a simple pole at which a cubic misses (0.45)^4/16 of it, 0.3 %.
+   real(wp), parameter :: beside_pole = 0.45_wp
    !> What is left of the size of x from one point to the next where x itself gets smaller.
    real(wp), parameter :: fading = 0.4_wp
    !> Angles of a step (rad): between its tangents, between a tangent and its chord, and what
@@ -405,13 +410,17 @@ contains
    !> No step beyond what p and x may change, nor over a resonance.
    subroutine limit_step(self)
       class(arclength_type), intent(inout) :: self
-      real(wp) :: change
+      real(wp) :: change, reach
 
       associate (metric => self%corrector%metric, here => self%here)
          change = abs(here%t_p)/metric%p_scale
          if (change*self%ds > longest_p) self%ds = longest_p/change
          change = norm2(here%t)/metric%x_scale
          if (change*self%ds > longest_x) self%ds = longest_x/change
+         if (self%near%n == 0 .and. allocated(self%pole)) then
+            reach = beside_pole*minval(hypot(here%p - self%pole, self%pole_width))
+            if (self%ds*abs(here%t_p) > reach) self%ds = reach/abs(here%t_p)
+         end if
          self%ds = self%near%bound(self%ds, here%t_p/metric%p_scale, metric%p_scale)
       end associate
    end subroutine limit_step

@@ -96,7 +96,7 @@ contains
       real(wp), intent(in) :: scale, at_point(:)
       real(wp), intent(inout), contiguous :: v(:, :)
       integer, intent(in) :: j
-      real(wp), parameter :: forcing = 1.0e-4_wp
+      real(wp), parameter :: forcing = 1.0e-2_wp
       real(wp), allocatable :: w(:), image(:)
       real(wp) :: part, size
       integer :: i, turn
@@ -174,6 +174,7 @@ contains
       integer :: k
 
       misses = 0.0_wp
+      if (self%n == 0) return
       slope_start = 0.0_wp
       slope_start(1) = self%slope
       call evaluate(self, change, at_end, slope_end)

@@ -190,3 +190,16 @@ def test_the_lock_carries_the_branch_on(fw_run, harmonics, load, n_points, peak)
         amplitude = file["amplitude"][:, 0]
     assert hertz[-1] == pytest.approx(1012, rel=1e-12)
     assert amplitude.max() == pytest.approx(peak, abs=2e-4)
+
+
+def test_the_resonance_of_a_stuck_joint_is_not_passed_over(fw_run) -> None:
+    """No unknown moves there: the modes with the contact held say how long a step may be."""
+    done = fw_run("-o", "stuck.h5", "--set", "load%harmonic_scale=0.02",
+                  "--set", "sweep%continuation='arclength'", "--set", "sweep%n_points=5", SECTOR)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(fw_run.directory / "stuck.h5") as file:
+        amplitude = file["amplitude"][:, 0]
+        assert np.diff(file["omega"][:]).min() > 0
+    # The top of a natural sweep of 1201 points; rows stand within a fifth of the width.
+    assert amplitude.max() == pytest.approx(0.06774, rel=0.02)
+    assert len(amplitude) < 120
