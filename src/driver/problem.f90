@@ -105,7 +105,7 @@ contains
       integer :: n_time
 
       n_time = harmonics%n_time
-      if (n_time == 0) n_time = automatic_n_time(case, harmonics, joint, forces)
+      if (n_time == 0) n_time = automatic_n_time(harmonics, joint, forces)
       ! Only the projection keeps the symmetry of the instants; collocation at an odd number of
       ! them does not.
       odd_only = joint%half_wave_symmetric .and. modulo(n_time, 2) == 0 .and. &
@@ -140,7 +140,7 @@ contains
       case (method_tcm)
          call fourier%collocate(fourier%n_coefficients)
       case (method_tcm_least_squares)
-         call fourier%collocate(least_squares_points(case, harmonics, fourier))
+         call fourier%collocate(least_squares_points(harmonics, fourier))
       case default ! the equations are those of the harmonics
       end select
    end subroutine choose_harmonics
@@ -172,8 +172,7 @@ contains
 
    !> Instants of the equations in the least-squares variant: twice the unknowns, where the user
    !> leaves the choice.
-   pure integer function least_squares_points(case, harmonics, fourier) result(n_points)
-      type(case_type), intent(in) :: case
+   pure integer function least_squares_points(harmonics, fourier) result(n_points)
       type(harmonics_options), intent(in) :: harmonics
       type(fourier_type), intent(in) :: fourier
 
@@ -183,8 +182,7 @@ contains
    end function least_squares_points
 
    !> Instants per period where the input leaves the choice: what the laws need.
-   pure integer function automatic_n_time(case, harmonics, joint, forces) result(n_time)
-      type(case_type), intent(in) :: case
+   pure integer function automatic_n_time(harmonics, joint, forces) result(n_time)
       type(harmonics_options), intent(in) :: harmonics
       type(joint_type), intent(in) :: joint
       type(force_list), intent(in) :: forces
@@ -195,7 +193,7 @@ contains
       if (harmonics%method == method_hdhb) return
       n_time = max(2*h + 2, forces%least_instants(h, separates=any(joint%row(3, :) > 0)))
       if (forces%entry(forces%pairs)%law%facts%follows_events) then
-         n_time = max(n_time, least_events(case, harmonics, is_planar(joint)))
+         n_time = max(n_time, least_events(harmonics, is_planar(joint)))
       end if
       n_time = nint(n_time*2.0_wp**harmonics%doublings)
       n_time = n_time + modulo(n_time, 2)
@@ -231,8 +229,7 @@ contains
 
    !> Instants that isolate the events, twice the 2H+1 of a collocation, which then lie evenly; or
    !> cells of the quadrature over slip in two directions, four times as many.
-   pure integer function least_events(case, harmonics, planar) result(n_time)
-      type(case_type), intent(in) :: case
+   pure integer function least_events(harmonics, planar) result(n_time)
       type(harmonics_options), intent(in) :: harmonics
       !> Whether a pair has two tangential directions.
       logical, intent(in) :: planar

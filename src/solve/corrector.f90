@@ -124,7 +124,7 @@ contains
             if (.not. done) exit
             report%iterations = report%iterations + 1
          end associate
-         if (self%careful) call cut_short(self, system, next, r, step, dp, error)
+         if (self%careful) call cut_short(system, next, r, step, dp, error)
          if (allocated(error)) return
          next%x = next%x + step
          next%p = next%p + dp
@@ -140,8 +140,7 @@ contains
    end subroutine correct
 
    !> Halve a correction until the residual decreases; where it never does, what leaves the least.
-   subroutine cut_short(self, system, from, r, step, dp, error)
-      type(corrector_type), intent(inout) :: self
+   subroutine cut_short(system, from, r, step, dp, error)
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: from
       real(wp), intent(inout), contiguous :: r(:), step(:)

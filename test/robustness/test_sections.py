@@ -4,12 +4,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from project import ROOT
 from sections import DOCUMENT, write_section
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verify"))
 from verify import PARTS
 
-NAMES = ["overview", "stress suite", "faults", "long runs", "branches", *PARTS]
+#: Of the scripts that write a section, and of the parts of `make verify`.
+NAMES = [*sorted({name for path in (ROOT / "test").rglob("*.py")
+                  for name in re.findall(r'write_section\("([^"]+)"', path.read_text())}), *PARTS]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -19,8 +22,8 @@ def test_a_section_replaces_itself_and_nothing_else(tmp_path, name):
     page.write_text(before, encoding="utf-8")
     write_section(name, ["new", "lines"], page)
     after = page.read_text(encoding="utf-8")
-    section = re.compile(rf"(<!-- {name}: begin -->\n)(.*?)(\n<!-- {name}: end -->)", re.DOTALL)
-    assert section.search(after)[2] == "new\nlines"
+    section = re.compile(rf"(<!-- {name}: begin -->)(.*?)(<!-- {name}: end -->)", re.DOTALL)
+    assert section.search(after)[2] == "\nnew\nlines\n"
     assert section.sub(r"\1\3", after) == section.sub(r"\1\3", before)
 
 

@@ -15,8 +15,9 @@ def test_no_line_of_prose_needs_scrolling():
 
 def test_what_is_wrapped_stays_the_same_text(tmp_path):
     """Words stay in their order; code, tables and the items of a list stay apart."""
-    text = ("# " + "title " * 30 + "\n\n* first " + "word " * 40 + "`a b c`\n* second\n\n"
-            + "like\n\n    " + "code " * 30 + "\n\n| " + "cell " * 40 + "|\n\n" + "prose " * 50 + "end\n")
+    text = "\n\n".join([
+        "# " + "title " * 30, "* first " + "word " * 40 + "`a b c`\n* second", "like",
+        "    " + "code " * 30, "| " + "cell " * 40 + "|", "prose " * 50 + "end\n"])
     path = tmp_path / "page.md"
     path.write_text(text)
     subprocess.run([sys.executable, TOOL, path], check=True)

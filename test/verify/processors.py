@@ -14,7 +14,8 @@ from common import build, run_tests
 
 #: Tests whose numbers come from the program.
 NUMBERS = ("test/cli", "test/oracles")
-HEAD = ["| build | kernels | tests | passed | failed | skipped |", "|---|---|---|---|---|---|"]
+HEAD = ["| build | warnings | kernels | tests | passed | failed | skipped |",
+        "|---|---|---|---|---|---|---|"]
 #: Kernels of OpenBLAS on x86-64 and what a processor needs for them, as /proc/cpuinfo names it.
 #: Prescott is what it falls back to on a processor that it does not know.
 KERNELS = {"Prescott": (), "Nehalem": ("sse4_2",), "Sandybridge": ("avx",),
@@ -33,27 +34,31 @@ def march(setting):
                                 ("unoptimised", "-O0 -g -march=native", None)):
         directory, warnings = build(setting, name, f"-DCMAKE_Fortran_FLAGS={flags}",
                                     "-DFRETWEAR_PYTHON=OFF", "-DFRETWEAR_SHARED=OFF")
-        clean = row(setting, rows, directory, flags, kernel, NUMBERS) and not warnings and clean
+        clean = row(setting, rows, (directory, warnings), flags, kernel, NUMBERS) and clean
     return rows, clean
 
 
 def kernels(setting):
     """The optimised build with every kernel that this processor can run."""
-    directory, _ = build(setting, "native", "-DCMAKE_Fortran_FLAGS=-O3 -g", "-DFRETWEAR_NATIVE=ON")
+    built = build(setting, "native", "-DCMAKE_Fortran_FLAGS=-O3 -g", "-DFRETWEAR_NATIVE=ON")
     rows, clean = list(HEAD), True
     for kernel in usable():
         tests = NUMBERS if kernel == "Prescott" else ()
-        clean = row(setting, rows, directory, "-O3 -g -march=native", kernel, tests) and clean
+        clean = row(setting, rows, built, "-O3 -g -march=native", kernel, tests) and clean
     return rows, clean
 
 
-def row(setting, rows, directory, flags, kernel, tests):
-    """Run the unit tests and these of pytest, add a row; whether it is clean."""
+def row(setting, rows, built, flags, kernel, tests):
+    """Run the unit tests and these of pytest, add a row; whether it is clean.
+
+    `built` is the directory of the build, and how often the compiler warned where it compiled.
+    """
+    directory, warnings = built
     environment = {"OPENBLAS_CORETYPE": kernel} if kernel else {}
     counts = run_tests(setting, directory, *(tests or ["--unit-only"]), environment=environment)
     names = ", ".join(("unit tests", *(f"`{name}`" for name in tests)))
-    rows.append(f"| `{flags}` | {taken(environment)} | {names} | {counts.row()} |")
-    return counts.good
+    rows.append(f"| `{flags}` | {warnings} | {taken(environment)} | {names} | {counts.row()} |")
+    return counts.good and not warnings
 
 
 def usable():
