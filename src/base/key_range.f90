@@ -1,4 +1,8 @@
 !> What the number of a key may be: `above(0.0_wp) .and. below(1.0_wp)`, `from_to(1, 99)`.
+!>
+!> A range is a value that declarations of keys put together and that one procedure tests, so that
+!> the reader, the list of keys and the documents tell the same. NaN and infinities hold in no
+!> range.
 module fw_key_range
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
@@ -13,8 +17,10 @@ module fw_key_range
    type :: range_type
       !> Strict bounds.
       real(wp) :: above = -huge(1.0_wp), below = huge(1.0_wp)
+      !> Bounds that the number may take.
       real(wp) :: least = -huge(1.0_wp), most = huge(1.0_wp)
       !> Name of the size that bounds the number on either side of 0, or blank.
+      !> The bound itself is known only with the model, so the reader tests it, not `holds`.
       character(12) :: within = ''
    contains
       procedure :: holds
@@ -37,36 +43,42 @@ module fw_key_range
 
 contains
 
+   !> Any number larger than this one.
    pure type(range_type) function above(number) result(range)
       real(wp), intent(in) :: number
 
       range%above = number
    end function above
 
+   !> Any number smaller than this one.
    pure type(range_type) function below(number) result(range)
       real(wp), intent(in) :: number
 
       range%below = number
    end function below
 
+   !> This number or larger.
    pure type(range_type) function at_least_real(number) result(range)
       real(wp), intent(in) :: number
 
       range%least = number
    end function at_least_real
 
+   !> Ranges are of reals throughout: whole numbers in use are exact in them.
    pure type(range_type) function at_least_integer(number) result(range)
       integer, intent(in) :: number
 
       range%least = real(number, wp)
    end function at_least_integer
 
+   !> This number or smaller.
    pure type(range_type) function at_most(number) result(range)
       real(wp), intent(in) :: number
 
       range%most = number
    end function at_most
 
+   !> Both ends included.
    pure type(range_type) function from_to_real(least, most) result(range)
       real(wp), intent(in) :: least, most
 
@@ -81,10 +93,12 @@ contains
    end function from_to_integer
 
    !> Numbers of dofs, negative for those whose sign is turned.
+   !> 0 stands for the ground; what counts as a dof is known with the model only.
    pure type(range_type) function dof_numbers() result(range)
       range%within = 'n_dof'
    end function dof_numbers
 
+   !> The narrower of each bound; the name of a size is the first one's.
    pure type(range_type) function both(first, second) result(range)
       type(range_type), intent(in) :: first, second
 
@@ -95,12 +109,14 @@ contains
       range%within = first%within
    end function both
 
+   !> Whether a number is in the range, `within` aside.
    pure logical function holds(self, number)
       class(range_type), intent(in) :: self
       real(wp), intent(in) :: number
 
       holds = ieee_is_finite(number) .and. number > self%above .and. number >= self%least &
               .and. number <= self%most
+      ! Tested only where it binds: huge(1.0) itself is a number below no bound.
       if (self%below < huge(1.0_wp)) holds = holds .and. number < self%below
    end function holds
 

@@ -26,6 +26,7 @@ module fw_text
 
 contains
 
+   !> Two passes: the first for the length. Numbers are rare and short, allocation is not safe here.
    pure function integer_to_text(number) result(text)
       integer, intent(in) :: number
       character(len_trim(integer_field(number))) :: text
@@ -43,11 +44,13 @@ contains
 
    pure function logical_to_text(flag) result(text)
       logical, intent(in) :: flag
+      ! 7 letters for false, 6 for true: what a function of fixed length can declare.
       character(7 - count([flag])) :: text
 
       text = merge('.true. ', '.false.', flag)
    end function logical_to_text
 
+   !> ASCII letters only: keys and words of the input have no others.
    pure function lower_case(text) result(lower)
       character(*), intent(in) :: text
       character(len(text)) :: lower
@@ -62,12 +65,15 @@ contains
 
    !> The word of a list with the smallest edit distance, or '' where none is near.
    pure function nearest_word(word, words) result(nearest)
+      !> Compared letter by letter: lower case is up to the caller.
       character(*), intent(in) :: word
+      !> First of the nearest counts where several are as near.
       type(string_type), intent(in) :: words(:)
       character(:), allocatable :: nearest
       integer :: i, distance, best
 
       nearest = ''
+      ! A third of the letters may be wrong, at least two: farther words would be mere guesses.
       best = max(2, len(word)/3) + 1
       do i = 1, size(words)
          distance = edit_distance(word, words(i)%text)
@@ -78,12 +84,14 @@ contains
    end function nearest_word
 
    !> Levenshtein distance, one row at a time.
+   !> Least number of letters to insert, delete or replace that turns one word into the other.
    pure integer function edit_distance(a, b) result(distance)
       character(*), intent(in) :: a, b
       integer :: row(0:len(b)), i, j, diagonal, above
 
       row = [(j, j=0, len(b))]
       do i = 1, len(a)
+         ! `diagonal` saves the entry of the row above before it is overwritten.
          diagonal = row(0)
          row(0) = i
          do j = 1, len(b)

@@ -1,5 +1,10 @@
 !> The functions of fretwear.h. Each turns its arguments into those of Fortran and hands over to
 !> fw_calls; what they mean stands in the header.
+!>
+!> A handle is a number in the guise of a pointer, never an address: a stale or invented one is
+!> refused by its number instead of being followed. Null pointers are refused with a message before
+!> anything is touched; texts end in a null and are copied at once; arrays are read in place for the
+!> time of the call. No function returns through an exception or ends the program.
 module fw_c_interface
    use, intrinsic :: iso_c_binding, only: c_associated
    use, intrinsic :: iso_c_binding, only: c_char
@@ -50,20 +55,25 @@ module fw_c_interface
    !> Changes when a program that was built with an older header can no longer be linked.
    integer(c_int), parameter :: interface_version = 1_c_int
 
+   ! With its null, in static memory: the pointer stays valid as long as the library is loaded.
    character(kind=c_char, len=len(version) + 1), target :: version_text = &
       version//c_null_char
 
 contains
 
+   !> Static text, not to be freed.
    type(c_ptr) function c_get_version() bind(c, name='fw_get_version') result(text)
       text = c_loc(version_text)
    end function c_get_version
 
+   !> For a program that loads the library at run time, to compare with the header it was built
+   !> with.
    integer(c_int) function c_get_interface_version() bind(c, name='fw_get_interface_version') &
       result(number)
       number = interface_version
    end function c_get_interface_version
 
+   !> Puts a new handle to *handle, or null where none is left (status as in fw_handles).
    integer(c_int) function c_create(handle) bind(c, name='fw_create') result(status)
       type(c_ptr), value :: handle
       type(c_ptr), pointer :: created
@@ -73,15 +83,19 @@ contains
       if (.not. c_associated(handle)) return
       call c_f_pointer(handle, created)
       status = int(new_handle(id), c_int)
+      ! The number itself in the bits of the pointer.
       created = transfer(int(id, c_intptr_t), c_null_ptr)
    end function c_create
 
+   !> status_usage for a handle that is at work in another call: a callback cannot destroy its own.
    integer(c_int) function c_destroy(handle) bind(c, name='fw_destroy') result(status)
       type(c_ptr), value :: handle
 
       status = int(delete_handle(id_of(handle)), c_int)
    end function c_destroy
 
+   !> The length of the whole message without the null, as snprintf has it: a length of buffer_size
+   !> or more says that the buffer holds only its beginning.
    integer(c_size_t) function c_get_message(handle, buffer, buffer_size) &
       bind(c, name='fw_get_message') result(length)
       type(c_ptr), value :: handle, buffer
@@ -93,6 +107,7 @@ contains
       length = len(text, c_size_t)
    end function c_get_message
 
+   !> Names of files in the namelist count from the folder of the file.
    integer(c_int) function c_load_file(handle, path) bind(c, name='fw_load_file') result(status)
       type(c_ptr), value :: handle, path
       character(:), allocatable :: path_text
@@ -105,6 +120,8 @@ contains
       end if
    end function c_load_file
 
+   !> As fw_load_file with the text in memory; `name` stands for its path in messages and for the
+   !> folder from which names of files count.
    integer(c_int) function c_load_text(handle, text, name) bind(c, name='fw_load_text') &
       result(status)
       type(c_ptr), value :: handle, text, name
@@ -119,6 +136,7 @@ contains
       end if
    end function c_load_text
 
+   !> The value is text of a namelist: words need no quotes.
    integer(c_int) function c_set(handle, key, value) bind(c, name='fw_set') result(status)
       type(c_ptr), value :: handle, key, value
       character(:), allocatable :: key_text, value_text
@@ -132,6 +150,7 @@ contains
       end if
    end function c_set
 
+   !> Through a text that reads back to the same bits.
    integer(c_int) function c_set_real(handle, key, value) bind(c, name='fw_set_real') result(status)
       type(c_ptr), value :: handle, key
       real(c_double), value :: value
@@ -145,6 +164,7 @@ contains
       end if
    end function c_set_real
 
+   !> As fw_set_real for a whole number.
    integer(c_int) function c_set_integer(handle, key, value) bind(c, name='fw_set_integer') &
       result(status)
       type(c_ptr), value :: handle, key
@@ -159,6 +179,7 @@ contains
       end if
    end function c_set_integer
 
+   !> The sizes are needed first: they decide the shapes that fw_put_reals accepts.
    integer(c_int) function c_new_model(handle, n_dof, n_pairs) bind(c, name='fw_new_model') &
       result(status)
       type(c_ptr), value :: handle
@@ -167,6 +188,7 @@ contains
       status = int(call_new_model(id_of(handle), int(n_dof), int(n_pairs)), c_int)
    end function c_new_model
 
+   !> n is the number of values, whatever the rank of the part; a matrix stands by columns.
    integer(c_int) function c_put_reals(handle, name, n, values) bind(c, name='fw_put_reals') &
       result(status)
       type(c_ptr), value :: handle, name, values
@@ -175,6 +197,7 @@ contains
       real(c_double), pointer :: array(:)
 
       call take_text(name, name_text)
+      ! n = 0 with a null pointer is refused too: there is no part of a model that is empty.
       if (allocated(name_text) .and. c_associated(values) .and. n >= 0_c_size_t) then
          call c_f_pointer(values, array, [n])
          status = int(call_put_reals(id_of(handle), name_text, array), c_int)
@@ -183,6 +206,7 @@ contains
       end if
    end function c_put_reals
 
+   !> As fw_put_reals for dof numbers, which count from 1, 0 for the ground.
    integer(c_int) function c_put_integers(handle, name, n, values) bind(c, name='fw_put_integers') &
       result(status)
       type(c_ptr), value :: handle, name, values
@@ -199,6 +223,7 @@ contains
       end if
    end function c_put_integers
 
+   !> A row of n = n_dof factors, by which the displacements of the dofs are added up.
    integer(c_int) function c_observe(handle, name, n, row) bind(c, name='fw_observe') result(status)
       type(c_ptr), value :: handle, name, row
       integer(c_size_t), value :: n
@@ -214,6 +239,7 @@ contains
       end if
    end function c_observe
 
+   !> A null function takes the callback off. `user` is handed back untouched.
    integer(c_int) function c_on_progress(handle, callback, user) bind(c, name='fw_on_progress') &
       result(status)
       type(c_ptr), value :: handle, user
@@ -223,12 +249,14 @@ contains
 
       status = int(status_usage, c_int)
       call enter(id_of(handle), handle_data)
+      ! Set while no run is under way only: `enter` gives no handle that is at work.
       if (.not. associated(handle_data)) return
       handle_data%observer%progress = callback
       handle_data%observer%progress_user = user
       status = int(leave(handle_data, error), c_int)
    end function c_on_progress
 
+   !> As fw_on_progress, for lines of text.
    integer(c_int) function c_on_message(handle, callback, user) bind(c, name='fw_on_message') &
       result(status)
       type(c_ptr), value :: handle, user
@@ -244,24 +272,28 @@ contains
       status = int(leave(handle_data, error), c_int)
    end function c_on_message
 
+   !> Reads and checks everything, computes nothing.
    integer(c_int) function c_check(handle) bind(c, name='fw_check') result(status)
       type(c_ptr), value :: handle
 
       status = int(call_check(id_of(handle)), c_int)
    end function c_check
 
+   !> Makes fw_solve possible; points of an earlier start are forgotten.
    integer(c_int) function c_start(handle) bind(c, name='fw_start') result(status)
       type(c_ptr), value :: handle
 
       status = int(call_start(id_of(handle)), c_int)
    end function c_start
 
+   !> status_not_converged where points failed: the others are there to be read.
    integer(c_int) function c_run_case(handle) bind(c, name='fw_run_case') result(status)
       type(c_ptr), value :: handle
 
       status = int(call_run(id_of(handle)), c_int)
    end function c_run_case
 
+   !> omega in rad/s, in any order; the last converged point is the first guess.
    integer(c_int) function c_solve(handle, omega) bind(c, name='fw_solve') result(status)
       type(c_ptr), value :: handle
       real(c_double), value :: omega
@@ -269,6 +301,7 @@ contains
       status = int(call_solve(id_of(handle), omega), c_int)
    end function c_solve
 
+   !> k counts from 0; there is no -1 for the last one here.
    integer(c_int) function c_get_frequency(handle, k, omega) bind(c, name='fw_get_frequency') &
       result(status)
       type(c_ptr), value :: handle, omega
@@ -283,6 +316,7 @@ contains
       end if
    end function c_get_frequency
 
+   !> What may be counted stands at call_count.
    integer(c_int) function c_count(handle, what, n) bind(c, name='fw_count') result(status)
       type(c_ptr), value :: handle, what, n
       character(:), allocatable :: what_text
@@ -293,12 +327,14 @@ contains
       if (allocated(what_text) .and. c_associated(n)) then
          call c_f_pointer(n, found)
          status = int(call_count(id_of(handle), what_text, number), c_int)
+         ! Also with an error, when it is 0: the caller's variable is never left undefined.
          found = int(number, c_int)
       else
          status = int(call_refuse(id_of(handle), 'fw_count: null pointer'), c_int)
       end if
    end function c_count
 
+   !> The length to allocate for fw_get.
    integer(c_int) function c_size(handle, name, point, n) bind(c, name='fw_size') result(status)
       type(c_ptr), value :: handle, name, n
       integer(c_int), value :: point
@@ -316,6 +352,7 @@ contains
       end if
    end function c_size
 
+   !> Writes nothing where n is too small; `n` may be larger than needed.
    integer(c_int) function c_get(handle, name, point, n, values) bind(c, name='fw_get') &
       result(status)
       type(c_ptr), value :: handle, name, values
@@ -333,6 +370,7 @@ contains
       end if
    end function c_get
 
+   !> As fw_get_message: cut to the buffer, and the whole length in *length, which may be null.
    integer(c_int) function c_get_text(handle, what, k, buffer, buffer_size, length) &
       bind(c, name='fw_get_text') result(status)
       type(c_ptr), value :: handle, what, buffer, length
@@ -354,6 +392,8 @@ contains
       needed = len(text, c_size_t)
    end function c_get_text
 
+   !> A pointer of a newer or a wrong library has no small number as its bits, and is no handle
+   !> then.
    !> The number behind a handle; 0, which is none, for a pointer that cannot be one.
    pure integer function id_of(handle) result(id)
       type(c_ptr), intent(in) :: handle
@@ -369,6 +409,7 @@ contains
       integer(c_int), intent(in) :: point
 
       k = int(point)
+      ! The largest number stays as it is: adding 1 would overflow; there is no such point anyway.
       if (point < huge(point)) k = k + 1
    end function point_of
 

@@ -1,4 +1,6 @@
 !> Texts between C and Fortran.
+!>
+!> Letters are copied one by one: a Fortran text has no null at its end and a length of its own.
 module fw_c_text
    use, intrinsic :: iso_c_binding, only: c_associated
    use, intrinsic :: iso_c_binding, only: c_char
@@ -39,8 +41,11 @@ contains
 
    !> Copy a text to a buffer of C as far as it fits, always with a null at the end.
    subroutine give_text(text, buffer, buffer_size)
+      !> Text of any length; it may hold nulls, which C will take for its end.
       character(*), intent(in) :: text
+      !> Null, or a size of 0: only the length is of interest, and nothing is written.
       type(c_ptr), intent(in) :: buffer
+      !> Letters of the buffer, the null included.
       integer(c_size_t), intent(in) :: buffer_size
       character(kind=c_char), pointer :: letters(:)
       integer(c_size_t) :: i, n

@@ -1,4 +1,7 @@
 !> An observer that calls back into a program written in C or in Fortran 77.
+!>
+!> Callbacks run on the thread that runs the case, between two points: they may read the points that
+!> there are, and ask for the end by their return value; a function that is not set is passed over.
 module fw_callbacks
    use, intrinsic :: iso_c_binding, only: c_associated
    use, intrinsic :: iso_c_binding, only: c_char
@@ -18,18 +21,25 @@ module fw_callbacks
 
    public :: callback_observer, fortran77_progress
 
+   !> The order and the kinds of the components are part of the binary interface.
    !> struct fw_progress of fretwear.h.
    type, bind(c) :: c_progress
+      !> From 0, of n_points; n_points is 0 where their number is not known (a branch).
       integer(c_int) :: point = 0_c_int
       integer(c_int) :: n_points = 0_c_int
+      !> [rad/s].
       real(c_double) :: omega = 0.0_c_double
+      !> 1 or 0.
       integer(c_int) :: converged = 0_c_int
       integer(c_int) :: iterations = 0_c_int
+      !> norm(R) over the reference of the loads, and the largest amplitude of the
+      !> observed quantities [length].
       real(c_double) :: residual = 0.0_c_double
       real(c_double) :: amplitude = 0.0_c_double
    end type c_progress
 
    abstract interface
+      !> Any value but 0 ends the run behind this point.
       integer(c_int) function c_progress_callback(user, progress) bind(c)
          import :: c_int, c_progress, c_ptr
          implicit none (type, external)
@@ -37,6 +47,7 @@ module fw_callbacks
          type(c_progress), intent(in) :: progress
       end function c_progress_callback
 
+      !> The text ends in a null and belongs to the library: it lives for the time of the call.
       subroutine c_message_callback(user, text) bind(c)
          import :: c_char, c_ptr
          implicit none (type, external)
@@ -54,9 +65,11 @@ module fw_callbacks
       end subroutine fortran77_progress
    end interface
 
+   !> One object serves both languages: whichever functions are set are called.
    type, extends(observer_type) :: callback_observer
       !> Number of the handle, for programs in Fortran 77.
       integer :: handle = 0
+      !> Function pointers and the data that go back to them, of fw_on_progress and fw_on_message.
       type(c_funptr) :: progress = c_null_funptr
       type(c_ptr) :: progress_user = c_null_ptr
       type(c_funptr) :: message = c_null_funptr
@@ -81,6 +94,7 @@ contains
       end associate
    end subroutine on_start
 
+   !> The request to stop is only noted here: the sweep looks at it when the point is written.
    subroutine on_point(self, index, n_points, point)
       class(callback_observer), intent(inout) :: self
       integer, intent(in) :: index, n_points
@@ -111,6 +125,7 @@ contains
       call message(self%message_user, text//c_null_char)
    end subroutine on_message
 
+   !> The end of the run is the return of the call that started it.
    subroutine on_end(self)
       class(callback_observer), intent(inout) :: self
 
@@ -131,6 +146,7 @@ contains
       progress%iterations = int(point%iterations, c_int)
       progress%residual = point%residual
       if (.not. allocated(point%amplitude)) return
+      ! An observer without observed quantities reports an amplitude of 0.
       if (size(point%amplitude) > 0) progress%amplitude = maxval(point%amplitude)
    end function described
 

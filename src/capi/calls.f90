@@ -3,6 +3,10 @@
 !>
 !> Statuses are those of fw_error; the words that go with one are kept with the session. Points
 !> and frequencies count from 1 here, and 0 is the last point.
+!>
+!> A call that changes the session takes it with `enter`, which fails while another call is at work
+!> on it (another thread, or a callback of the run itself), and gives it back with `leave`. Calls
+!> that only read use `find_handle`, so that a callback may ask for the points there are so far.
 module fw_calls
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -31,6 +35,7 @@ module fw_calls
 
 contains
 
+   !> Read a namelist file; the keys that were set before stay on top of it.
    integer function call_load_file(id, path) result(status)
       integer, intent(in) :: id
       character(*), intent(in) :: path
@@ -44,6 +49,8 @@ contains
       status = leave(handle, error)
    end function call_load_file
 
+   !> As call_load_file with the namelist in memory; `path` is its name in messages and the folder
+   !> of its files. Nothing is parsed before the case is checked or started.
    integer function call_load_text(id, text, path) result(status)
       integer, intent(in) :: id
       character(*), intent(in) :: text, path
@@ -57,6 +64,7 @@ contains
       status = leave(handle, error)
    end function call_load_text
 
+   !> Set 'group%key'; the value is checked with the rest of the case, not here.
    integer function call_set(id, key, value) result(status)
       integer, intent(in) :: id
       character(*), intent(in) :: key, value
@@ -70,6 +78,7 @@ contains
       status = leave(handle, error)
    end function call_set
 
+   !> Begin a model of n_dof dofs and n_pairs contact pairs in place of one of a file.
    integer function call_new_model(id, n_dof, n_pairs) result(status)
       integer, intent(in) :: id
       integer, intent(in) :: n_dof, n_pairs
@@ -83,6 +92,7 @@ contains
       status = leave(handle, error)
    end function call_new_model
 
+   !> Give a real part of the model (any rank, by columns); the names are those of model files.
    integer function call_put_reals(id, name, values) result(status)
       integer, intent(in) :: id
       character(*), intent(in) :: name
@@ -97,6 +107,7 @@ contains
       status = leave(handle, error)
    end function call_put_reals
 
+   !> As call_put_reals for whole numbers.
    integer function call_put_integers(id, name, values) result(status)
       integer, intent(in) :: id
       character(*), intent(in) :: name
@@ -111,6 +122,7 @@ contains
       status = leave(handle, error)
    end function call_put_integers
 
+   !> Observe sum_i row(i) u(i) under a name (n_dof).
    integer function call_observe(id, name, row) result(status)
       integer, intent(in) :: id
       character(*), intent(in) :: name
@@ -125,6 +137,7 @@ contains
       status = leave(handle, error)
    end function call_observe
 
+   !> Build everything of the case short of a solution: whatever refuses it, refuses it here.
    integer function call_check(id) result(status)
       integer, intent(in) :: id
       type(handle_type), pointer :: handle
@@ -137,6 +150,7 @@ contains
       status = leave(handle, error)
    end function call_check
 
+   !> Begin to go through frequencies: what call_solve continues from.
    integer function call_start(id) result(status)
       integer, intent(in) :: id
       type(handle_type), pointer :: handle
@@ -149,12 +163,14 @@ contains
       status = leave(handle, error)
    end function call_start
 
+   !> Frequency k of the sweep [rad/s], from 1; there is no 0 for the last one here.
    integer function call_frequency(id, k, omega) result(status)
       integer, intent(in) :: id, k
       real(wp), intent(out) :: omega
       type(handle_type), pointer :: handle
       type(error_type), allocatable :: error
 
+      ! Defined on every way out: a caller who ignores the status reads no garbage.
       omega = 0.0_wp
       status = status_usage
       call find_handle(id, handle)
@@ -163,6 +179,8 @@ contains
       status = outcome_of(handle, error)
    end function call_frequency
 
+   !> Solve at omega [rad/s] from the last converged point. A point that does not converge is kept,
+   !> with the smallest residual that was found, and status_not_converged says so.
    !> status_stopped where the callback asks for it, also of a point that did not converge.
    integer function call_solve(id, omega) result(status)
       integer, intent(in) :: id
@@ -196,6 +214,8 @@ contains
       end associate
    end subroutine judge_point
 
+   !> The whole case with its output files. A failure at single points is no error of the run: what
+   !> there is of results is kept, and the status tells.
    integer function call_run(id) result(status)
       integer, intent(in) :: id
       type(handle_type), pointer :: handle
@@ -213,6 +233,7 @@ contains
          case (status_not_converged)
             call fatal_error(error, 'not every point converged, or the branch ended early: see '// &
                              'the summary', status_not_converged)
+         ! `complete`: nothing to say.
          case default ! complete
          end select
       end if
@@ -252,6 +273,8 @@ contains
             call fatal_error(error, "there is no number of '"//what//"': must be points, "// &
                              'frequencies, dofs, pairs, observed or coefficients', status_usage)
          end select
+         ! Defaults and files decide these numbers: before the case is read they would be of the
+         ! case before it.
          if (.not. allocated(error) .and. what /= 'points' .and. .not. session%is_ready()) then
             n = 0
             call fatal_error(error, "the number of '"//what//"' is known once the case was "// &
@@ -262,6 +285,8 @@ contains
    end function call_count
 
    !> Number of values that a point holds of a result.
+   !> The values themselves are formed for it: some results exist only as a function of the point.
+   !> Count in 64 bits: fields of all dofs and instants may pass 2**31 values.
    integer function call_size(id, name, k, n) result(status)
       integer, intent(in) :: id, k
       character(*), intent(in) :: name
@@ -280,6 +305,7 @@ contains
    end function call_size
 
    !> Copy the values of a result; a buffer that is too small stays as it is.
+   !> `values` of a smaller result fill the beginning only.
    integer function call_get(id, name, k, buffer) result(status)
       integer, intent(in) :: id, k
       character(*), intent(in) :: name
@@ -305,6 +331,7 @@ contains
 
    !> A text: 'title', 'namelist' (the effective input), 'summary' (of a run, line by line), or
    !> 'observed', the name of observed quantity k.
+   !> Blank where the case has none; only a name or a number that cannot be is an error.
    integer function call_get_text(id, what, k, text) result(status)
       integer, intent(in) :: id, k
       character(*), intent(in) :: what
@@ -349,6 +376,7 @@ contains
    end function call_get_text
 
    !> What the last call that failed had to say.
+   !> A call that may change the session clears it at its start; one that only reads does not.
    subroutine call_message(id, text)
       integer, intent(in) :: id
       character(:), allocatable, intent(out) :: text
@@ -360,6 +388,7 @@ contains
    end subroutine call_message
 
    !> Keep the words for arguments that an interface cannot pass on.
+   !> Always status_usage, with or without a handle to keep the words.
    integer function call_refuse(id, message) result(status)
       integer, intent(in) :: id
       character(*), intent(in) :: message
@@ -371,6 +400,7 @@ contains
    end function call_refuse
 
    !> Of a call that only reads, which may come from a callback in the middle of another one.
+   !> It must not give the handle back: the call that it interrupts still has it.
    integer function outcome_of(handle, error) result(status)
       type(handle_type), pointer, intent(in) :: handle
       type(error_type), allocatable, intent(in) :: error

@@ -1,9 +1,13 @@
 ! The layer for Fortran 77: external subroutines with names of up to six letters, default INTEGER
 ! and DOUBLE PRECISION arguments, and texts of any length, of which blanks at the end do not count.
 ! A handle is an INTEGER. ISTAT is 0 or one of the statuses of fw_error; FWMSG has the words.
+! Texts are trimmed on the way in and filled with blanks on the way out: blanks at the end cannot be
+! part of a name here. Arrays are of assumed size with N beside them, of which a negative one counts
+! as none.
 ! Points and frequencies count from 1, and 0 is the last point. docs/library.md lists the routines.
 
 !> Create a handle.
+!> HANDLE is 0 where none is left.
 subroutine fwnew(handle, istat)
    use fw_handles, only: new_handle
    implicit none (type, external)
@@ -20,6 +24,7 @@ subroutine fwfree(handle, istat)
    integer, intent(out) :: istat
 
    istat = delete_handle(handle)
+   ! So that a second FWFREE is refused instead of hitting the next owner of the number.
    handle = 0
 end subroutine fwfree
 
@@ -45,6 +50,7 @@ subroutine fwvers(text)
 end subroutine fwvers
 
 !> Take the namelist of a file.
+!> Names of files in it count from its folder; the keys set before stay on top of it.
 subroutine fwload(handle, path, istat)
    use fw_calls, only: call_load_file
    implicit none (type, external)
@@ -92,6 +98,7 @@ subroutine fwseti(handle, key, value, istat)
 end subroutine fwseti
 
 !> Begin a model in memory.
+!> Its sizes come first, for the shapes of the parts.
 subroutine fwmodl(handle, n_dof, n_pairs, istat)
    use fw_calls, only: call_new_model
    implicit none (type, external)
@@ -102,6 +109,7 @@ subroutine fwmodl(handle, n_dof, n_pairs, istat)
 end subroutine fwmodl
 
 !> Give a real part of the model.
+!> VALUES by columns, N of them.
 subroutine fwputd(handle, name, n, values, istat)
    use fw_calls, only: call_put_reals
    implicit none (type, external)
@@ -114,6 +122,7 @@ subroutine fwputd(handle, name, n, values, istat)
 end subroutine fwputd
 
 !> Give an integer part of the model.
+!> Dof numbers count from 1, 0 for the ground.
 subroutine fwputi(handle, name, n, values, istat)
    use fw_calls, only: call_put_integers
    implicit none (type, external)
@@ -126,6 +135,7 @@ subroutine fwputi(handle, name, n, values, istat)
 end subroutine fwputi
 
 !> Observe a linear combination of the dofs.
+!> VALUES has a factor for each dof.
 subroutine fwobs(handle, name, n, values, istat)
    use fw_calls, only: call_observe
    implicit none (type, external)
@@ -138,6 +148,7 @@ subroutine fwobs(handle, name, n, values, istat)
 end subroutine fwobs
 
 !> Have SUBROUTINE PROGRESS(HANDLE, K, N, OMEGA, ICONV, ISTOP) called after every point.
+!> ISTOP /= 0 on return ends the run; PROGRESS may read points but change nothing.
 subroutine fwprog(handle, progress, istat)
    use fw_callbacks, only: fortran77_progress
    use fw_error, only: error_type
@@ -160,6 +171,7 @@ subroutine fwprog(handle, progress, istat)
 end subroutine fwprog
 
 !> Everything that would refuse the case before it is computed.
+!> Nothing is computed.
 subroutine fwchk(handle, istat)
    use fw_calls, only: call_check
    implicit none (type, external)
@@ -170,6 +182,7 @@ subroutine fwchk(handle, istat)
 end subroutine fwchk
 
 !> Begin to go through frequencies.
+!> Afterwards FWSOLV solves at any frequency, each from the last converged point.
 subroutine fwstrt(handle, istat)
    use fw_calls, only: call_start
    implicit none (type, external)
@@ -180,6 +193,7 @@ subroutine fwstrt(handle, istat)
 end subroutine fwstrt
 
 !> Run the whole case.
+!> ISTAT tells of points that failed; the others can be read.
 subroutine fwrun(handle, istat)
    use fw_calls, only: call_run
    implicit none (type, external)
@@ -190,6 +204,7 @@ subroutine fwrun(handle, istat)
 end subroutine fwrun
 
 !> Frequency k of the sweep [rad/s].
+!> Defined, as 0, also with an error.
 subroutine fwfreq(handle, k, omega, istat)
    use fw_calls, only: call_frequency
    implicit none (type, external)
@@ -201,6 +216,7 @@ subroutine fwfreq(handle, k, omega, istat)
 end subroutine fwfreq
 
 !> Solve at a frequency [rad/s].
+!> ISTAT is status_not_converged where it failed; the point is kept and marked.
 subroutine fwsolv(handle, omega, istat)
    use fw_calls, only: call_solve
    implicit none (type, external)
@@ -212,6 +228,7 @@ subroutine fwsolv(handle, omega, istat)
 end subroutine fwsolv
 
 !> How many there are of something.
+!> WHAT may be 'points', 'frequencies', 'dofs', 'pairs', 'observed', 'coefficients'.
 subroutine fwcnt(handle, what, n, istat)
    use fw_calls, only: call_count
    implicit none (type, external)
@@ -223,6 +240,7 @@ subroutine fwcnt(handle, what, n, istat)
 end subroutine fwcnt
 
 !> Number of values that point k holds of a result.
+!> Counts beyond the range of INTEGER are cut to its largest value.
 subroutine fwsize(handle, name, k, n, istat)
    use fw_calls, only: call_size
    use fw_kinds, only: i8
@@ -237,6 +255,7 @@ subroutine fwsize(handle, name, k, n, istat)
 end subroutine fwsize
 
 !> Copy a result of point k; VALUES has room for N.
+!> VALUES stays as it is where N is too small.
 subroutine fwget(handle, name, k, n, values, istat)
    use fw_calls, only: call_get
    implicit none (type, external)
@@ -249,6 +268,7 @@ subroutine fwget(handle, name, k, n, values, istat)
 end subroutine fwget
 
 !> Copy a text, cut or filled with blanks.
+!> K matters for 'observed' alone: the number of the quantity.
 subroutine fwtext(handle, what, k, text, istat)
    use fw_calls, only: call_get_text
    implicit none (type, external)
@@ -259,5 +279,6 @@ subroutine fwtext(handle, what, k, text, istat)
    character(:), allocatable :: found
 
    istat = call_get_text(handle, trim(what), k, found)
+   ! With an error TEXT keeps what it had.
    if (istat == 0) text = found
 end subroutine fwtext

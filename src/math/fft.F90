@@ -1,4 +1,8 @@
 !> Batched real transforms through FFTW along the second index of (row, instant) arrays.
+!>
+!> A transform of length n_time costs O(n_time log n_time) a row where the matrix product costs
+!> n_time (2H+1); it pays above a number of coefficients that fw_fourier knows (`fft_pays`). The row
+!> is the first index, so that all rows of an instant are neighbours and FFTW vectorises over them.
 module fw_fft
    ! allow(C121): all that fftw3.f03 takes from there
    use, intrinsic :: iso_c_binding
@@ -12,8 +16,12 @@ module fw_fft
 
    !> A pair of plans with their own buffers; belongs to one thread.
    type :: fft_type
+      !> Number of rows (pairs times components), and of instants in a period.
       integer :: n_rows = 0
       integer :: n_time = 0
+      !> Values at the instants (n_rows, n_time) and half spectrum (n_rows, n_time/2 + 1): the
+      !> buffers of the plans, whose alignment FFTW has assumed; other arrays are copied through
+      !> them.
       real(c_double), allocatable :: values(:, :)
       complex(c_double_complex), allocatable :: spectrum(:, :)
       type(c_ptr) :: forward = c_null_ptr
@@ -30,6 +38,8 @@ contains
 
    !> Plan transforms of n_rows rows with n_time instants. The planner of FFTW serves one thread
    !> at a time; transforms with plans of their own may run side by side.
+   !> Plans are estimated, not measured: measuring would choose by the clock, and the sums, hence
+   !> the last digits of a result, would change from run to run.
    subroutine plan(self, n_rows, n_time)
       class(fft_type), intent(inout) :: self
       integer, intent(in) :: n_rows, n_time
@@ -51,6 +61,7 @@ contains
    end subroutine plan
 
    !> Give a copy plans of its own: those that came with it stay with the original.
+   !> Without this both would destroy the same plan, and two threads would share its buffers.
    subroutine renew(self)
       class(fft_type), intent(inout) :: self
 
@@ -64,16 +75,22 @@ contains
    !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.
    subroutine synthesise(self, harmonic, column, coefficients, values)
       class(fft_type), intent(inout) :: self
+      !> Harmonic numbers, increasing, and the column at which the coefficients of each begin (n).
       integer, intent(in) :: harmonic(:), column(:)
+      !> Coefficients (n_rows, n_coefficients): one column for harmonic 0, cosine and sine for
+      !> others.
       real(wp), intent(in) :: coefficients(self%n_rows, *)
+      !> Values at tau_k = 2 pi k/n_time (n_rows, n_time).
       real(wp), intent(inout) :: values(self%n_rows, *)
       integer :: i
 
+      ! The backward transform of FFTW overwrites its input: it is filled anew every time.
       self%spectrum = (0.0_wp, 0.0_wp)
       do i = 1, size(harmonic)
          if (harmonic(i) == 0) then
             self%spectrum(:, 1) = cmplx(coefficients(:self%n_rows, column(i)), kind=wp)
          else
+            ! The other half of a real wave is the conjugate at -n, which the transform implies.
             self%spectrum(:, harmonic(i) + 1) = 0.5_wp* &
                cmplx(coefficients(:self%n_rows, column(i)), &
                      -coefficients(:self%n_rows, column(i) + 1), wp)
@@ -84,7 +101,9 @@ contains
    end subroutine synthesise
 
    !> Coefficients of the retained harmonics from values at the instants.
+   !> Harmonics above n_time/2 alias: the caller keeps n_time > 2H.
    subroutine analyse(self, harmonic, column, values, coefficients)
+      !> As in synthesise.
       class(fft_type), intent(inout) :: self
       integer, intent(in) :: harmonic(:), column(:)
       real(wp), intent(in) :: values(self%n_rows, *)
@@ -94,6 +113,7 @@ contains
 
       self%values = values(:, :self%n_time)
       call fftw_execute_dft_r2c(self%forward, self%values, self%spectrum)
+      ! FFTW does not normalise.
       weight = 1.0_wp/real(self%n_time, wp)
       do i = 1, size(harmonic)
          if (harmonic(i) == 0) then
@@ -105,6 +125,7 @@ contains
       end do
    end subroutine analyse
 
+   !> Plans are of FFTW's own storage, which deallocation of the object alone would leak.
    subroutine destroy(self)
       type(fft_type), intent(inout) :: self
 

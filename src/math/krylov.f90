@@ -1,5 +1,9 @@
 !> Restarted GMRES with right preconditioning (Saad and Schultz 1986): the norm that it watches is
 !> that of the true residual. The operator knows nothing of the solver, nor the reverse.
+!>
+!> It solves A P^-1 (P x) = b. From x = 0 only: a restart passes the remaining residual to a new
+!> cycle instead of a guess. Both vectors and their products may hold physical units; the only norm
+!> taken is the Euclidean one of the right-hand side's space, so the caller scales where it matters.
 module fw_krylov
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
@@ -21,11 +25,14 @@ module fw_krylov
       subroutine apply_operator(self, vector, product)
          import :: linear_operator, wp
          class(linear_operator), intent(inout) :: self
+         ! Both of the order of the system; apply must not change what `precondition` works with.
          real(wp), intent(in), contiguous :: vector(:)
          real(wp), intent(out), contiguous :: product(:)
       end subroutine apply_operator
 
       !> Replace a vector by an approximation of A^-1 vector.
+      ! P is linear and the same for all vectors of a solution: a method that varies would need
+      ! flexible GMRES, which keeps a second basis.
       subroutine apply_preconditioner(self, vector)
          import :: linear_operator, wp
          class(linear_operator), intent(inout) :: self
@@ -38,11 +45,17 @@ module fw_krylov
 
    !> Workspace of GMRES for vectors of one length; belongs to one thread.
    type :: gmres_type
+      !> Directions in a cycle: its cost grows with the square of it, its memory is n times as many.
       integer :: restart = 60
+      !> Over all cycles of a solution.
       integer :: max_iterations = 300
       !> Iterations of the last solution.
       integer :: iterations = 0
+      !> Orthonormal directions (n, restart + 1); Hessenberg matrix, made triangular column by
+      !> column (restart + 1, restart); P^-1 v and A P^-1 v of the direction at work, both (n).
       real(wp), allocatable :: basis(:, :), hessenberg(:, :), direction(:), product(:)
+      !> Rotations (restart); norm of the residual in their coordinates and the small unknowns
+      !> (restart + 1).
       real(wp), allocatable :: cosine(:), sine(:), rhs(:), coefficients(:)
    contains
       procedure :: reserve
@@ -69,11 +82,17 @@ contains
 
    !> Solve A x = b to norm(b - A x) <= tolerance * norm(b), from x = 0.
    subroutine solve(self, operator, b, x, tolerance, converged)
+      !> Workspace, with the counts of this solution on return.
       class(gmres_type), intent(inout) :: self
+      !> The operator may keep caches of its own, hence inout.
       class(linear_operator), intent(inout) :: operator
+      !> Right-hand side (n), and the solution (n): the best of the cycles where not converged.
       real(wp), intent(in), contiguous :: b(:)
       real(wp), intent(out), contiguous :: x(:)
+      !> Relative to the norm of b.
       real(wp), intent(in) :: tolerance
+      !> False where max_iterations were used up or a cycle did not reduce the residual: what x
+      !> holds then still has a smaller residual than x = 0.
       logical, intent(out) :: converged
       real(wp) :: target, norm, before
       integer :: used
@@ -96,7 +115,10 @@ contains
          norm = norm2(self%basis(:, 1))
          converged = norm <= rounding_allowance*target
          if (converged) exit
+         ! Less than nothing gained in a whole cycle: another one from here would repeat it.
          if (norm < before) cycle
+         ! Infinite corrections come of a singular small matrix; with them the earlier cycles are
+         ! lost, because infinity cannot be subtracted again.
          where (ieee_is_finite(self%direction))
             x = x - self%direction
          else where
@@ -108,9 +130,12 @@ contains
 
    !> Arnoldi's process with Givens rotations, until the target or the restart length.
    subroutine build_cycle(self, operator, norm, target, used)
+      !> basis(:, 1) holds the residual on entry, not yet normalised.
       type(gmres_type), intent(inout) :: self
       class(linear_operator), intent(inout) :: operator
+      !> Norm of that residual, and the norm at which the cycle may end.
       real(wp), intent(in) :: norm, target
+      !> Number of directions that were built; at least one.
       integer, intent(out) :: used
       integer :: j
 
@@ -126,6 +151,8 @@ contains
          call rotate(self, j)
          self%iterations = self%iterations + 1
          used = j
+         ! abs(rhs(j + 1)) is the norm of the residual by the least-squares theory: no product is
+         ! spent on watching it.
          if (abs(self%rhs(j + 1)) <= target .or. self%iterations >= self%max_iterations) exit
       end do
    end subroutine build_cycle
@@ -133,11 +160,14 @@ contains
    !> Classical Gram-Schmidt, twice: two products with the whole basis instead of j dot products.
    subroutine orthogonalize(self, j)
       type(gmres_type), intent(inout) :: self
+      !> Column of the Hessenberg matrix that is made; direction j + 1 comes of it.
       integer, intent(in) :: j
       integer :: n, pass
 
       n = size(self%product)
       self%hessenberg(:, j) = 0.0_wp
+      ! One pass loses orthogonality where the product lies almost in the basis; after the second it
+      ! is orthogonal to working precision ("twice is enough").
       do pass = 1, 2
          call dgemv('T', n, j, 1.0_wp, self%basis, n, self%product, 1, 0.0_wp, self%coefficients, 1)
          call dgemv('N', n, j, -1.0_wp, self%basis, n, self%coefficients, 1, 1.0_wp, &
@@ -145,22 +175,28 @@ contains
          self%hessenberg(:j, j) = self%hessenberg(:j, j) + self%coefficients(:j)
       end do
       self%hessenberg(j + 1, j) = norm2(self%product)
+      ! A product within the span of the basis leaves nothing: x is then exact, and the division
+      ! must only not fail.
       self%basis(:, j + 1) = self%product/max(self%hessenberg(j + 1, j), tiny(1.0_wp))
    end subroutine orthogonalize
 
    !> Bring column j of the Hessenberg matrix to triangular form.
    subroutine rotate(self, j)
       type(gmres_type), intent(inout) :: self
+      !> Column at work; the rotations 1 to j - 1 are known.
       integer, intent(in) :: j
       integer :: i
       real(wp) :: upper, length
 
       associate (h => self%hessenberg, c => self%cosine, s => self%sine)
+         ! First the rotations of earlier columns, in the order in which they were found ...
          do i = 1, j - 1
             upper = c(i)*h(i, j) + s(i)*h(i + 1, j)
             h(i + 1, j) = -s(i)*h(i, j) + c(i)*h(i + 1, j)
             h(i, j) = upper
          end do
+         ! ... then a new one, which removes the entry below the diagonal. For a zero column it is
+         ! the null rotation c = s = 0; the true residual at the end of the cycle notices.
          length = max(hypot(h(j, j), h(j + 1, j)), tiny(1.0_wp))
          c(j) = h(j, j)/length
          s(j) = h(j + 1, j)/length
@@ -174,12 +210,15 @@ contains
    !> x = x + P^-1 V y with the minimising y of a cycle.
    subroutine add_correction(self, operator, used, x)
       type(gmres_type), intent(inout) :: self
+      !> Directions that the cycle built.
       class(linear_operator), intent(inout) :: operator
       integer, intent(in) :: used
+      !> Solution so far (n).
       real(wp), intent(inout), contiguous :: x(:)
       integer :: i, n
 
       n = size(x)
+      ! Back substitution in the triangular matrix that the rotations left.
       do i = used, 1, -1
          self%coefficients(i) = (self%rhs(i) - dot_product(self%hessenberg(i, i + 1:used), &
                                                           self%coefficients(i + 1:used)))/ &
@@ -187,6 +226,7 @@ contains
       end do
       call dgemv('N', n, used, 1.0_wp, self%basis, n, self%coefficients, 1, 0.0_wp, &
                  self%direction, 1)
+      ! Once for the sum of all directions instead of once for each of them: P is linear.
       call operator%precondition(self%direction)
       x = x + self%direction
    end subroutine add_correction

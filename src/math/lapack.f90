@@ -1,4 +1,8 @@
 !> Explicit interfaces to the BLAS and LAPACK routines in use, so that every call is checked.
+!> The routines keep their names, argument orders and conventions of the reference BLAS and LAPACK:
+!> matrices by columns, `info` = 0 for success, < 0 for a bad argument, > 0 for a numerical failure.
+!> Arrays are of assumed size, so that a leading block or a column can be passed without a copy; the
+!> shapes are the caller's business, since the routines do not check them.
 module fw_lapack
    use fw_kinds, only: sp
    use fw_kinds, only: wp
@@ -9,6 +13,7 @@ module fw_lapack
    public :: dgeev, dpotrf, ztrsv, cgetrf, claswp, ctrsv
 
    interface
+      !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
       subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
          import :: wp
          character, intent(in) :: transa, transb
@@ -17,6 +22,7 @@ module fw_lapack
          real(wp), intent(inout) :: c(ldc, *)
       end subroutine dgemm
 
+      !> y = alpha op(a) x + beta y; with beta = 0 the old y is never read, and may be undefined.
       subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
          import :: wp
          character, intent(in) :: trans
@@ -25,6 +31,7 @@ module fw_lapack
          real(wp), intent(inout) :: y(*)
       end subroutine dgemv
 
+      !> As dgemm for complex matrices; 'C' is the conjugate transpose.
       subroutine zgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
          import :: wp
          character, intent(in) :: transa, transb
@@ -33,6 +40,7 @@ module fw_lapack
          complex(wp), intent(inout) :: c(ldc, *)
       end subroutine zgemm
 
+      !> As dgemv for complex matrices.
       subroutine zgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
          import :: wp
          character, intent(in) :: trans
@@ -41,6 +49,8 @@ module fw_lapack
          complex(wp), intent(inout) :: y(*)
       end subroutine zgemv
 
+      !> LU factors with row pivots, in place; info = k > 0: pivot k is exactly zero, the factors
+      !> are complete but cannot solve. A nearly singular matrix is not noticed.
       subroutine dgetrf(m, n, a, lda, ipiv, info)
          import :: wp
          integer, intent(in) :: m, n, lda
@@ -48,6 +58,7 @@ module fw_lapack
          integer, intent(out) :: ipiv(*), info
       end subroutine dgetrf
 
+      !> Solutions by the factors of dgetrf, in place of the right-hand sides.
       subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
          import :: wp
          character, intent(in) :: trans
@@ -57,6 +68,7 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dgetrs
 
+      !> Triangular solution in place: half of zgetrs for one right-hand side, without its blocking.
       subroutine ztrsv(uplo, trans, diag, n, a, lda, x, incx)
          import :: wp
          character(1), intent(in) :: uplo, trans, diag
@@ -65,6 +77,7 @@ module fw_lapack
          complex(wp), intent(inout) :: x(*)
       end subroutine ztrsv
 
+      !> As dgetrf for complex matrices.
       subroutine zgetrf(m, n, a, lda, ipiv, info)
          import :: wp
          integer, intent(in) :: m, n, lda
@@ -72,6 +85,8 @@ module fw_lapack
          integer, intent(out) :: ipiv(*), info
       end subroutine zgetrf
 
+      !> In single precision: the preconditioner, of which few digits serve, is factored and applied
+      !> at half the memory traffic.
       subroutine cgetrf(m, n, a, lda, ipiv, info)
          import :: sp
          integer, intent(in) :: m, n, lda
@@ -79,12 +94,14 @@ module fw_lapack
          integer, intent(out) :: ipiv(*), info
       end subroutine cgetrf
 
+      !> Swap the rows k1 to k2 as the pivots say, forwards for incx = 1.
       subroutine claswp(n, a, lda, k1, k2, ipiv, incx)
          import :: sp
          integer, intent(in) :: n, lda, k1, k2, ipiv(*), incx
          complex(sp), intent(inout) :: a(lda, *)
       end subroutine claswp
 
+      !> As ztrsv in single precision.
       subroutine ctrsv(uplo, trans, diag, n, a, lda, x, incx)
          import :: sp
          character, intent(in) :: uplo, trans, diag
@@ -93,6 +110,7 @@ module fw_lapack
          complex(sp), intent(inout) :: x(*)
       end subroutine ctrsv
 
+      !> Solutions by the factors of zgetrf, in place of the right-hand sides.
       subroutine zgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
          import :: wp
          character, intent(in) :: trans
@@ -102,6 +120,7 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine zgetrs
 
+      !> Cholesky factor, in place; info > 0: the matrix is not positive definite.
       subroutine dpotrf(uplo, n, a, lda, info)
          import :: wp
          implicit none (type, external)
@@ -111,6 +130,8 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dpotrf
 
+      !> Eigenpairs of a symmetric matrix in ascending order, by divide and conquer; vectors in
+      !> place of a. It needs workspace of order 2 n**2 in return for its speed.
       subroutine dsyevd(jobz, uplo, n, a, lda, w, work, lwork, iwork, liwork, info)
          import :: wp
          character, intent(in) :: jobz, uplo
@@ -122,6 +143,7 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dsyevd
 
+      !> As dsyevd for a x = value b x (itype = 1), b positive definite; info > n: b is not.
       subroutine dsygvd(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, iwork, liwork, info)
          import :: wp
          integer, intent(in) :: itype, n, lda, ldb, lwork, liwork
@@ -133,6 +155,8 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dsygvd
 
+      !> Eigenvalues and, on request, eigenvectors of a general matrix; a complex pair stands in two
+      !> following entries of wr and wi.
       subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
          import :: wp
          character, intent(in) :: jobvl, jobvr

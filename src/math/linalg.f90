@@ -20,8 +20,11 @@ module fw_linalg
 
    !> LU factors of a real matrix. The storage only grows, so that refactoring does not allocate.
    type :: lu_type
+      !> Order of the matrix in use, at most the order of the storage.
       integer :: n = 0
+      !> The matrix, then its factors: L below the diagonal (unit diagonal), U on and above it.
       real(wp), allocatable :: matrix(:, :)
+      !> Row that was swapped with row i at step i.
       integer, allocatable :: pivot(:)
    contains
       procedure :: reserve => reserve_real
@@ -32,6 +35,7 @@ module fw_linalg
 
    !> LU factors of a complex matrix; as lu_type.
    type :: complex_lu_type
+      !> Components as those of lu_type.
       integer :: n = 0
       complex(wp), allocatable :: matrix(:, :)
       integer, allocatable :: pivot(:)
@@ -50,6 +54,7 @@ contains
 
       self%n = n
       if (allocated(self%matrix)) then
+         ! Larger storage serves as well: the leading dimension goes to LAPACK with every call.
          if (size(self%matrix, 1) >= n) return
          deallocate (self%matrix, self%pivot)
       end if
@@ -82,7 +87,10 @@ contains
 
       determinant_sign = 1
       do i = 1, self%n
+         ! Counted by signs only: the product of the pivots would leave the range of the numbers for
+         ! the orders that occur (hundreds of unknowns in physical units).
          if (abs(self%matrix(i, i)) <= 0.0_wp) determinant_sign = 0
+         ! A swap of two rows turns the sign once, as a negative pivot does.
          if ((self%matrix(i, i) < 0.0_wp) .neqv. (self%pivot(i) /= i)) then
             determinant_sign = -determinant_sign
          end if
@@ -146,6 +154,8 @@ contains
 
    !> Eigenpairs of a x = value b x with b positive definite, ascending; x^T b x = 1.
    !> `done` is false where b is not positive definite (to working precision).
+   !> The test of b is that of Cholesky's method, so a semidefinite b may pass by round-off: where
+   !> this matters, ask is_positive_definite first.
    subroutine solve_symmetric_eigen(a, b, values, vectors, done)
       !> Symmetric matrices (n, n).
       real(wp), intent(in) :: a(:, :), b(:, :)
@@ -163,6 +173,7 @@ contains
       factor = b
       done = .true.
       if (n == 0) return
+      ! The first call only asks for the workspace.
       call dsygvd(1, 'V', 'U', n, vectors, n, factor, n, values, room, -1, iroom, -1, info)
       allocate (work(int(room(1))), iwork(iroom(1)))
       call dsygvd(1, 'V', 'U', n, vectors, n, factor, n, values, work, size(work), &
@@ -174,6 +185,7 @@ contains
    subroutine diagonalize(matrix, values, purpose, error)
       real(wp), contiguous, intent(inout) :: matrix(:, :)
       real(wp), allocatable, intent(out) :: values(:)
+      ! The matrix has to be symmetric; its upper triangle alone is read.
       !> What the eigenvalues are for, for the message.
       character(*), intent(in) :: purpose
       type(error_type), allocatable, intent(out) :: error
@@ -182,6 +194,7 @@ contains
       integer :: n, info
 
       n = size(matrix, 1)
+      ! Workspace as the manual of dsyevd asks for with vectors: no call is needed to ask.
       allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
       call dsyevd('V', 'U', n, matrix, n, values, work, size(work), iwork, size(iwork), info)
       if (info == 0) return
@@ -192,7 +205,11 @@ contains
    !> Whether a symmetric matrix is positive definite, beyond the round-off of its eigenvalues,
    !> after its rows and columns are scaled to a unit diagonal.
    logical function is_positive_definite(a) result(positive)
+      !> Symmetric matrix (n, n).
       real(wp), intent(in) :: a(:, :)
+      ! Relative to the diagonal of the scaled matrix, which is 1: some 1e6 times the round-off of
+      ! an eigenvalue, so that a rigid-body mode, 0 up to round-off of assembly and condensation, is
+      ! never taken for a stiffness.
       real(wp), parameter :: round_off = 1.0e-10_wp
       real(wp), allocatable :: scaled(:, :), values(:)
       type(error_type), allocatable :: error
@@ -202,6 +219,8 @@ contains
       positive = all([(a(i, i) > 0.0_wp, i=1, n)])
       if (.not. positive .or. n == 0) return
       allocate (scaled(n, n))
+      ! Scaling makes the verdict independent of units: displacements beside rotations or amplitudes
+      ! of modes would hide a zero eigenvalue below the spread of their sizes.
       do j = 1, n
          do i = 1, n
             scaled(i, j) = a(i, j)/sqrt(a(i, i)*a(j, j))
