@@ -92,7 +92,7 @@ contains
       !> Relative to the norm of b.
       real(wp), intent(in) :: tolerance
       !> False where max_iterations were used up or a cycle did not reduce the residual: what x
-      !> holds then still has a smaller residual than x = 0.
+      !> holds then has no larger residual than x = 0.
       logical, intent(out) :: converged
       real(wp) :: target, norm, before
       integer :: used

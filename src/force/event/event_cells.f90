@@ -13,6 +13,8 @@ module fw_event_cells
    public :: cells_type, new_cells, waves_at
 
    type :: cells_type
+      !> Highest harmonic, cells in the period, and waves that are retained (parity may leave some
+      !> out).
       integer :: degree = 0, n_cells = 0, n_coefficients = 0
       !> Width of half a cell.
       real(wp) :: half = 0.0_wp
@@ -33,6 +35,7 @@ module fw_event_cells
 
 contains
 
+   !> The object holds some 10 n_coefficients n_cells numbers, once for all pairs.
    pure type(cells_type) function new_cells(fourier) result(self)
       !> Its instants are the ends of the cells.
       type(fourier_type), intent(in) :: fourier
@@ -51,16 +54,20 @@ contains
       allocate (self%node(self%n_coefficients, n))
       allocate (self%gauss(self%n_coefficients, 2, n), self%gauss_slope(self%n_coefficients, 2, n))
       allocate (self%cosine(0:2*self%degree, n), self%sine(0:2*self%degree, n))
+      ! A coefficient is 1/pi times the integral against its wave, that of the constant 1/(2 pi).
       self%weight = 1.0_wp/pi
       if (fourier%has_constant()) self%weight(1) = 0.5_wp/pi
       do j = 1, n
          call waves_at(self, self%node_angle(j), self%node(:, j), unused)
+         ! Up to twice the degree: products of two waves are integrated.
          call fill_waves(2*self%degree, self%node_angle(j), self%cosine(:, j), self%sine(:, j))
          do i = 1, 2
             call waves_at(self, self%node_angle(j) + gauss_point(i)*self%half, &
                           self%gauss(:, i, j), self%gauss_slope(:, i, j))
          end do
       end do
+      ! At the starts of cells to the last bit what the transform takes, so that a force sampled
+      ! there is that of the balance.
       self%node(:, ::2) = fourier%synthesis
    end function new_cells
 
@@ -81,6 +88,8 @@ contains
       real(wp) :: c, s, c_1, s_1, c_next, n
       integer :: h, k, m
 
+      ! By rotation from harmonic to harmonic: one sine and cosine a call. Harmonics that are not
+      ! retained are passed through, since the recurrence needs them.
       c_1 = cos(angle)
       s_1 = sin(angle)
       c = 1.0_wp

@@ -52,6 +52,7 @@ module fw_event_contact
 contains
 
    !> Room for the events of pairs.
+   !> Memory of the derivatives is not among it: `linearize` has a block for each thread.
    pure subroutine new_event_contact(mu, present, remembers, fourier, self)
       !> Friction coefficient (n_pairs).
       real(wp), intent(in) :: mu(:)
@@ -90,6 +91,7 @@ contains
 
    !> Contact forces and the position at the end of the period.
    subroutine evaluate(self, fourier, prediction, offset, x_start, force, x)
+      !> Also keeps the paths of the pairs, which all other procedures read: evaluate first.
       class(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(inout) :: fourier
       !> Coefficients of the predicted forces (n_pairs, 3, n_coefficients), and what the normal ones
@@ -103,12 +105,16 @@ contains
       real(wp) :: start(2)
       integer :: c, i
 
+      ! Values and slopes of all pairs at the instants in one product; planar pairs, which look at
+      ! nodes and Gauss points of their own instead, take part for the sake of one call.
       if (.not. all(self%is_planar)) then
          call fill_batch(self, fourier, prediction)
          call dgemm('T', 'N', fourier%n_time, 6*self%n_pairs, fourier%n_coefficients, 1.0_wp, &
                     fourier%synthesis, fourier%n_coefficients, self%batch, &
                     fourier%n_coefficients, 0.0_wp, self%samples, fourier%n_time)
       end if
+      ! Pairs differ widely in the number of their events, hence dynamic; each is summed by one
+      ! thread, so that the number of threads changes no bit.
       !$omp parallel do default(none) private(c, i, start) schedule(dynamic) &
       !$omp shared(self, fourier, prediction, offset, x_start, force, x) &
       !$omp if(self%n_pairs >= pairs_for_threads)
@@ -129,6 +135,7 @@ contains
          self%moved(i) = self%pair(i)%path%moved
          call collect(self%pair(i), fourier, self%out(:, :, i))
          force(i, :, :) = 0.0_wp
+         ! Where nothing rubs there is no position to move.
          x(i, :) = x_start(i, :)
          force(i, 3, :) = self%out(:, 2, i)
          if (self%direction(i) == 0) cycle
@@ -142,6 +149,7 @@ contains
    pure subroutine fill_batch(self, fourier, prediction)
       type(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
+      !> (n_pairs, 3, n_coefficients); the normal one is turned, N = -y_n being a pressure.
       real(wp), intent(in) :: prediction(:, :, :)
       integer :: d, i, k
 
@@ -154,6 +162,7 @@ contains
          end do
       end do
       do i = 1, self%n_pairs
+         ! 1 to 3 are P and its derivatives, 4 to 6 those of N.
          do d = 1, 4, 3
             call differentiate(fourier, self%batch(:, d, i), self%batch(:, d + 1, i))
             call differentiate(fourier, self%batch(:, d + 1, i), self%batch(:, d + 2, i))
@@ -172,6 +181,8 @@ contains
    pure subroutine evaluate_pair(pair, fourier, coefficients, samples, offset, x_start)
       type(event_pair_type), intent(inout) :: pair
       type(fourier_type), intent(in) :: fourier
+      !> Coefficients and samples as in `batch`, without the offset (of y_n, hence taken off N); the
+      !> position at tau = 0 in units of force.
       real(wp), intent(in) :: coefficients(:, :), samples(:, :), offset, x_start
       integer :: h, k, n
 
@@ -185,6 +196,7 @@ contains
             c%tangential(n, 2) = coefficients(k + 1, 1)
             c%normal(n, 2) = coefficients(k + 1, 4)
          end do
+         ! Parity leaves the constant out of the unknowns, but not out of what was left from before.
          if (.not. fourier%has_constant()) c%normal(0, 1) = 0.0_wp
          c%normal(0, 1) = c%normal(0, 1) - offset
          c%samples = samples
@@ -237,6 +249,8 @@ contains
 
    !> Transposed derivatives of pairs at the last evaluation: (coefficient, component) of the input,
    !> then of the output, pair.
+   !> The path of the last evaluation is differentiated, so nothing may have been evaluated since.
+   !> At a switch that just begins to appear (grazing) the derivative is continuous but not smooth.
    subroutine linearize(self, fourier, wanted, x_start, jacobian, by_path)
       class(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
@@ -257,6 +271,7 @@ contains
       !$omp shared(nc, n) private(block, path, start, i, t) if(self%n_pairs >= pairs_for_threads)
       allocate (block(nc, nc, 3), path(3*nc))
       !$omp do schedule(dynamic)
+      ! Sections by component: rows 1.., nc + 1.., 2 nc + 1.. of the input, likewise of the output.
       do i = 1, self%n_pairs
          if (.not. wanted(i)) cycle
          if (self%is_planar(i)) then
@@ -302,6 +317,7 @@ contains
 
    !> The derivatives of forces that are fitted at instants.
    subroutine collocate(pair, fourier, block)
+      !> The last evaluation has to be that of the same harmonics.
       type(event_pair_type), intent(inout) :: pair
       type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: block(fourier%n_coefficients, fourier%n_coefficients, 3)
@@ -312,6 +328,7 @@ contains
       nc = fourier%n_coefficients
       call pair%rows_at(fourier%n_retained, fourier%harmonic, fourier%column, fourier%synthesis, &
                         rows(:, :, 1), rows(:, :, 2), bears)
+      ! Normal forces take the normal prediction itself wherever the pair bears.
       do k = 1, fourier%n_time
          rows(:, k, 3) = merge(fourier%synthesis(:, k), 0.0_wp, bears(k))
       end do
@@ -322,6 +339,8 @@ contains
    end subroutine collocate
 
    !> Coefficients of the contact forces on any set of harmonics (n_pairs, 3, n_coefficients).
+   !> More harmonics than those of the balance may be asked for: the forces are functions of the
+   !> angle, not only of the retained coefficients.
    subroutine coefficients(self, fourier, computed, force)
       class(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
@@ -387,6 +406,8 @@ contains
 
    !> int |lambda_n| |dx| over a period [force**2] (n_pairs), x in units of force.
    subroutine friction_path(self, path)
+      !> Its derivative goes with that of the forces (linearize), because both need the same
+      !> tangents.
       class(event_contact_type), intent(inout) :: self
       real(wp), intent(out) :: path(:)
       integer :: i
@@ -401,6 +422,7 @@ contains
    end subroutine friction_path
 
    !> Share of the period that each pair spends in stick, slip and open (3, n_pairs).
+   !> By durations, not by counts: they add up to one to round-off.
    pure subroutine fractions(self, share)
       class(event_contact_type), intent(in) :: self
       real(wp), intent(out) :: share(:, :)

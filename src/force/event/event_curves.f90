@@ -46,6 +46,7 @@ contains
    end subroutine reserve
 
    !> Fill the bounds from P and N.
+   !> Called once the coefficients of P and N are filled; `samples` are not touched.
    pure subroutine combine(self, mu)
       class(curves_type), intent(inout) :: self
       real(wp), intent(in) :: mu
@@ -61,6 +62,8 @@ contains
          self%lower_slope(m, 2) = -real(m, wp)*self%lower(m, 1)
          self%upper_slope(m, 1) = real(m, wp)*self%upper(m, 2)
          self%upper_slope(m, 2) = -real(m, wp)*self%upper(m, 1)
+         ! Not the size of the bounds themselves: where P and Q cancel, the round-off of the terms
+         ! stays.
          self%scale = self%scale + abs(self%tangential(m, 1)) + abs(self%tangential(m, 2)) + &
                       mu*(abs(self%normal(m, 1)) + abs(self%normal(m, 2)))
          if (m > 0) self%steady = self%steady .and. all(abs(self%normal(m, :)) <= 0.0_wp)
@@ -68,6 +71,7 @@ contains
    end subroutine combine
 
    !> Values and slopes on the grid of P + side Q, or of its derivative.
+   !> The slope of a derivative is the second one: hence the six samples.
    pure subroutine sample_bound(self, side, of_derivative)
       class(curves_type), intent(inout) :: self
       !> -1 for the lower bound, +1 for the upper one.
@@ -75,6 +79,7 @@ contains
       logical, intent(in) :: of_derivative
       integer :: first, k
 
+      ! P or P' as the values, of which the next sample is the slope; N stands three further on.
       first = merge(2, 1, of_derivative)
       do k = 1, self%n_grid
          self%values(k) = self%samples(k, first) + side*self%mu*self%samples(k, first + 3)

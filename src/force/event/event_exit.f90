@@ -15,12 +15,16 @@ module fw_event_exit
    public :: is_pushed, sticks_on, find_exit
 
    !> Trials for the angle where slip begins, and its accuracy.
+   !> Halvings alone take a cell to round-off in some fifty. The rough tolerance is that on the
+   !> quintic, whose own error is larger.
    integer, parameter :: max_trials = 80
    real(wp), parameter :: angle_tolerance = 1.0e-15_wp, rough_tolerance = 1.0e-9_wp
 
 contains
 
    !> Whether a pair at a position slips: outside of the cone, or pushed where it is on it.
+   !> On the cone to round-off the slope decides: a position that a stop of slip left there must not
+   !> slip again at once.
    pure logical function is_pushed(motion, at, z)
       type(motion_type), intent(in) :: motion
       type(instant_type), intent(in) :: at
@@ -35,6 +39,7 @@ contains
    !> Whether a pair that sticks keeps within the cone from one node to another (fw_event_motion):
    !> inside at the end, and no summit between.
    pure logical function sticks_on(motion, z, from, to)
+      ! Entries as `node` of motion_type: P, P', P'', N, N', N''.
       type(motion_type), intent(in) :: motion
       real(wp), intent(in) :: z(2), from(9), to(9)
       real(wp) :: d(2), slope
@@ -42,6 +47,8 @@ contains
       d = to(1:2) - z
       sticks_on = d(1)**2 + d(2)**2 - (motion%mu*to(7))**2 <= noise_of(motion)
       if (.not. sticks_on) return
+      ! Half the slope of the excess. Inside at both ends, it can only pass the cone in between if
+      ! it rises at the start and falls at the end.
       slope = d(1)*to(3) + d(2)*to(4) - motion%mu**2*to(7)*to(8)
       if (slope >= 0.0_wp) return
       d = from(1:2) - z
@@ -50,6 +57,8 @@ contains
    end function sticks_on
 
    !> First angle after which the pair leaves the cone, if it does before `to`.
+   !> Two exits within one stretch that both return inside before `to` are seen as none: the cubic
+   !> has one summit.
    pure subroutine find_exit(motion, z, to, at, found)
       type(motion_type), intent(in) :: motion
       real(wp), intent(in) :: z(2)
@@ -93,6 +102,7 @@ contains
               first_guess([excess(at, z), excess(last, z)], &
                           (high - low)*[excess_slope(at, z), excess_slope(last, z)])
       segment = new_segment(motion, at, last)
+      ! Most steps on the quintic, which is cheaper than the series; the last ones where it counts.
       call refine(motion, segment, .false., z, low, high, rough_tolerance, trial, at)
       call refine(motion, segment, .true., z, low, high, angle_tolerance*(1.0_wp + high), trial, at)
    end subroutine find_crossing
@@ -125,6 +135,8 @@ contains
          else
             low = trial
          end if
+         ! Halving is the fallback that is always there; Newton's step only where it stays in the
+         ! bracket.
          step = 0.5_wp*(low + high) - trial
          if (abs(slope) > 0.0_wp) then
             if (trial - value/slope > low .and. trial - value/slope < high) step = -value/slope
@@ -135,6 +147,7 @@ contains
    end subroutine refine
 
    pure real(wp) function noise_of(motion)
+      !> The excess is a square: its round-off goes with the square of the size of P.
       type(motion_type), intent(in) :: motion
 
       noise_of = on_cone*(motion%scale**2 + tiny(1.0_wp))
@@ -145,6 +158,7 @@ contains
       type(instant_type), intent(in) :: at
       real(wp), intent(in) :: z(2)
 
+      ! Of differences, not of expanded squares: near the cone the terms would cancel.
       excess = (at%p(1) - z(1))**2 + (at%p(2) - z(2))**2 - at%radius**2
    end function excess
 

@@ -38,6 +38,7 @@ contains
       class(moments_type), intent(inout) :: self
       integer, intent(in) :: degree
 
+      ! The storage includes the mirror images, so that the kernels need no case for k - j < 0.
       self%degree = degree
       allocate (self%cosine(-2*degree:2*degree), self%sine(-2*degree:2*degree), source=0.0_wp)
    end subroutine reserve
@@ -51,6 +52,7 @@ contains
 
    !> chi falls by `drop` at an angle whose waves are given: up to the factor 1/m of `finish`, that
    !> is all that an integral of waves takes from there.
+   !> By parts, int chi cos(m tau) = -1/m int chi' sin(m tau): only the jumps of chi count.
    pure subroutine add_step(self, drop, angle, cosines, sines)
       class(moments_type), intent(inout) :: self
       real(wp), intent(in) :: drop, angle
@@ -58,6 +60,7 @@ contains
       real(wp), intent(in) :: cosines(0:), sines(0:)
       integer :: m
 
+      ! m = 0 has no such form: the integral of 1 is the sum of drop times angle.
       self%cosine(0) = self%cosine(0) + drop*angle
       do m = 1, 2*self%degree
          self%cosine(m) = self%cosine(m) + drop*sines(m)
@@ -97,10 +100,13 @@ contains
    !> Add factor times the Fourier coefficients of chi p (harmonic k in coefficient(column)).
    pure subroutine project(self, factor, p, n_retained, harmonic, column, coefficient)
       class(moments_type), intent(in) :: self
+      !> Real factor that multiplies the whole weight, such as mu or a sign.
       real(wp), intent(in) :: factor
       !> (0:degree, cosine and sine).
+      !> Those harmonics of p that are not retained are zero, but are read.
       real(wp), intent(in) :: p(0:self%degree, 2)
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> Added to: (n_coefficients).
       real(wp), intent(inout) :: coefficient(*)
       real(wp) :: on_cosine, on_sine
       integer :: h, j, k
@@ -127,6 +133,8 @@ contains
    end subroutine project
 
    !> int chi p q.
+   !> Both polynomials over 0..degree, not over the retained harmonics only: derivatives of
+   !> predictions are among them.
    pure real(wp) function pairing(self, p, q)
       class(moments_type), intent(in) :: self
       real(wp), intent(in) :: p(0:self%degree, 2), q(0:self%degree, 2)
@@ -149,7 +157,9 @@ contains
    pure subroutine add_gram(self, factor, n_retained, harmonic, column, gram)
       class(moments_type), intent(in) :: self
       real(wp), intent(in) :: factor
+      !> Harmonic numbers and columns of the retained coefficients (fourier_type).
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> (n_coefficients, n_coefficients), added to.
       real(wp), intent(inout) :: gram(:, :)
       real(wp) :: share
       integer :: a, b, i, j, k, o
@@ -158,6 +168,7 @@ contains
          k = harmonic(b)
          o = column(b)
          share = 0.5_wp/pi*factor
+         ! Half for the constant as output, as in `project`.
          if (k == 0) share = 0.5_wp*share
          do a = 1, n_retained
             j = harmonic(a)

@@ -27,6 +27,8 @@ module fw_event_motion
 
    !> P' and R at the two Gauss points of a step, R kept above round-off where N ends; R' and P''
    !> too where a pair lands.
+   !> The floor keeps a = P'/R finite; behind a landing, where a is truly infinite, the arc of
+   !> fw_event_rotation takes over and the floor is never felt.
    type :: gauss_type
       real(wp) :: dp(2, 2) = 0.0_wp, radius(2) = 0.0_wp
       real(wp) :: ddp(2, 2) = 0.0_wp, dradius(2) = 0.0_wp
@@ -50,6 +52,8 @@ module fw_event_motion
       real(wp), allocatable, private :: packed(:, :, :)
       !> Coefficients of what `node` holds (n_coefficients, 9), and of P_x', P_y', N.
       real(wp), allocatable, private :: series(:, :), gauss_series(:, :)
+      !> Exponentials of the halves of the cells (2 n_cells), and which of them are made since
+      !> `fill`.
       type(rotation_type), allocatable, private :: rotation(:)
       logical, allocatable, private :: known(:)
    contains
@@ -80,6 +84,8 @@ contains
    end subroutine reserve
 
    !> State the predicted forces.
+   !> Costs two products for all nodes; the rotations follow on demand, because pairs that stick
+   !> need none.
    subroutine fill(self, cells, prediction, offset)
       class(motion_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
@@ -90,17 +96,20 @@ contains
       nc = cells%n_coefficients
       do c = 1, 3
          do k = 1, nc
+            ! N = -y_n: pressures are positive.
             self%series(k, merge(7, c, c == 3)) = merge(-1.0_wp, 1.0_wp, c == 3)*prediction(c, k)
          end do
       end do
       do h = 1, cells%n_retained
          n = cells%harmonic(h)
          k = cells%column(h)
+         ! Harmonic 0 has a cosine only.
          do j = 0, merge(0, 1, n == 0)
             self%tangential(n, j + 1, :) = prediction(1:2, k + j)
             self%normal(n, j + 1) = -prediction(3, k + j)
          end do
          if (n == 0) cycle
+         ! Columns 1, 2 -> 3, 4 -> 5, 6 are P, P', P''; 7 -> 8 is N -> N'; 9 = N'' comes below.
          do c = 1, 7
             if (c == 5 .or. c == 6) cycle
             associate (to => self%series(:, merge(8, c + 2, c == 7)))
@@ -110,6 +119,7 @@ contains
          end do
          self%series(k:k + 1, 9) = -real(n, wp)**2*self%series(k:k + 1, 7)
       end do
+      ! Parity carries no constant; the offset is all that there is then.
       if (cells%harmonic(1) > 0) self%normal(0, 1) = 0.0_wp
       self%normal(0, 1) = self%normal(0, 1) - offset
       self%gauss_series(:, 1:2) = self%series(:, 3:4)
@@ -118,6 +128,7 @@ contains
       self%steady = .not. any(abs(self%normal(1:, :)) > 0.0_wp)
       do n = 0, self%degree
          do j = 1, 2
+            ! Packed so that one pass over the harmonics yields all three at an angle.
             self%packed(1:3, j, n) = [self%tangential(n, j, :), self%normal(n, j)]
          end do
       end do
@@ -137,6 +148,7 @@ contains
       integer, intent(in) :: node
       integer :: j
 
+      ! Values of the first node, but the angle 2 pi: pieces of the path keep their order by angle.
       j = merge(1, node, node > size(self%known))
       at%angle = cells%node_angle(node)
       at%p = self%node(1:2, j)
@@ -159,6 +171,7 @@ contains
    end subroutine set_normal
 
    !> Any angle.
+   !> Costs a sine, a cosine and three recurrences of `degree` steps: nodes are far cheaper.
    pure type(instant_type) function look(self, angle) result(at)
       class(motion_type), intent(in) :: self
       real(wp), intent(in) :: angle
@@ -176,6 +189,7 @@ contains
       curvature = 0.0_wp
       do m = 1, self%degree
          w = real(m, wp)
+         ! wave is the term of harmonic m, w times its conjugate the slope of it.
          wave = self%packed(:, 1, m)*c + self%packed(:, 2, m)*s
          conjugate = self%packed(:, 2, m)*c - self%packed(:, 1, m)*s
          value = value + wave
@@ -197,10 +211,13 @@ contains
       integer, intent(in) :: half
 
       gauss%dp = self%gauss(1:2, :, half)
+      ! Where contact ends N may be round-off of either sign: the floor keeps the direction finite
+      ! where the force vanishes anyway.
       gauss%radius = max(self%mu*self%gauss(3, :, half), on_cone*self%scale, tiny(1.0_wp))
    end function half_cell
 
    !> Those of any step.
+   !> Of a step from the angle `from` over h, off the grid; with R' and P'', for a landing.
    pure type(gauss_type) function look_gauss(self, from, h) result(gauss)
       class(motion_type), intent(in) :: self
       real(wp), intent(in) :: from, h
@@ -220,6 +237,7 @@ contains
    pure subroutine rotation_of(self, cells, half, rotation)
       class(motion_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
+      !> Half of a cell, 1..2 n_cells.
       integer, intent(in) :: half
       type(rotation_type), intent(out) :: rotation
       type(gauss_type) :: gauss

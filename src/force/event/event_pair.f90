@@ -34,9 +34,11 @@ module fw_event_pair
       !> Whether there is a tangential direction.
       logical :: rubs = .true.
       !> Sets of stick, forward less backward slip, contact, and stick weighted by z.
+      !> As weights: 1 on stick, 1 and -1 on forward and backward slip, 1 on contact, z on stick.
       type(moments_type) :: stick, slip, contact, held
       !> Workspace: waves of an angle (0:2 degree), waves at an origin and integrals of one stick.
       real(wp), allocatable, private :: cosines(:), sines(:), origin(:), integral(:)
+      !> P' and N' (0:degree, cosine and sine); see set_rates.
       real(wp), allocatable, private :: rate(:, :), normal_rate(:, :)
       !> Of a set that is used for a moment.
       type(moments_type) :: one
@@ -77,6 +79,7 @@ contains
    !> filled before.
    pure subroutine follow(self, x_start)
       class(event_pair_type), intent(inout) :: self
+      !> Position at the start of the period [force]; without effect at velocity level.
       real(wp), intent(in) :: x_start
 
       if (.not. self%rubs) then
@@ -99,9 +102,12 @@ contains
       call self%slip%clear()
       call self%contact%clear()
       call self%held%clear()
+      ! Weights of the four sets before and behind the start of segment j; only where they change do
+      ! the moments gain anything.
       before = 0.0_wp
       do j = 1, self%path%n_segments + 1
          behind = 0.0_wp
+         ! Behind the last segment comes the end of the period, where all weights fall to 0.
          if (j <= self%path%n_segments) then
             select case (self%path%phase(j))
             case (phase_stick)
@@ -155,6 +161,7 @@ contains
       associate (c => self%curves)
          call self%contact%project(-1.0_wp, c%normal, n_retained, harmonic, column, normal)
          if (.not. self%rubs) return
+         ! T = P - z on stick, +-mu N on slip: three projections and the mean of z over the sticks.
          call self%stick%project(1.0_wp, c%tangential, n_retained, harmonic, column, tangential)
          call self%slip%project(c%mu, c%normal, n_retained, harmonic, column, tangential)
          call add_means(self%held, -1.0_wp, n_retained, harmonic, column, tangential)
@@ -195,6 +202,8 @@ contains
          k = harmonic(h)
          associate (to => coefficient(column(h):))
             if (k == 0) then
+               ! The same factors as in moments_type: 1/(2 pi) for the constant, 1/pi for the
+               ! others.
                to(1) = to(1) + 0.5_wp/pi*factor*moments%cosine(0)
             else
                to(1) = to(1) + factor/pi*moments%cosine(k)
@@ -222,6 +231,8 @@ contains
       ! Q = -mu y_n.
       call self%slip%add_gram(-self%curves%mu, n_retained, harmonic, column, by_normal)
       do j = 1, self%path%n_segments
+         ! A z that was not set within the turn (stuck throughout) is that of the start: it depends
+         ! on no input.
          if (self%path%phase(j) /= phase_stick .or. .not. self%path%set(j)) cycle
          call integrate_segment(self, j)
          self%integral = 0.0_wp
@@ -229,6 +240,7 @@ contains
          call waves_at(self, self%path%set_at(j), n_retained, harmonic, column)
          do k = 1, size(self%integral)
             by_tangential(:, k) = by_tangential(:, k) - self%integral(k)*self%origin
+            ! z = P - Q (or P + Q): dz/dQ is the weight, and dQ = -mu dy_n.
             by_normal(:, k) = by_normal(:, k) + &
                               (self%curves%mu*self%path%weight(j)*self%integral(k))*self%origin
          end do
@@ -265,6 +277,7 @@ contains
    !> Contact forces at n_time uniform instants: what collocation and histories take.
    pure subroutine values_at(self, n_time, tangential, normal)
       class(event_pair_type), intent(inout) :: self
+      !> The instants are those of collocation or of a history, not the grid of the curves.
       integer, intent(in) :: n_time
       real(wp), intent(out) :: tangential(n_time), normal(n_time)
       real(wp) :: angle, pressure, p
@@ -331,6 +344,7 @@ contains
          case (phase_stick)
             by_tangential(:, k) = waves(:, k)
             if (.not. self%path%set(j)) cycle
+            ! One set of waves serves all instants of a stick.
             if (j /= last) call waves_at(self, self%path%set_at(j), n_retained, harmonic, column)
             last = j
             by_tangential(:, k) = by_tangential(:, k) - self%origin
@@ -354,6 +368,7 @@ contains
 
       path = 0.0_wp
       if (.not. self%rubs) return
+      ! P' and N' where x moves with its bound: x' = P' -+ Q'.
       call set_rates(self)
       associate (c => self%curves)
          path = self%slip%pairing(c%normal, self%rate) - &
@@ -365,6 +380,7 @@ contains
    pure subroutine set_rates(self)
       type(event_pair_type), intent(inout) :: self
 
+      ! All slip is contact less stick; a difference of moments, since both sets are exact.
       self%one%cosine = self%contact%cosine - self%stick%cosine
       self%one%sine = self%contact%sine - self%stick%sine
       associate (c => self%curves)
@@ -386,12 +402,14 @@ contains
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
       !> (n_coefficients).
       real(wp), intent(inout) :: by_tangential(:), by_normal(:)
+      ! Against the waves: slip N, slip P', all slip N', all slip N (P and N at velocity level).
       real(wp) :: raw(size(by_normal), 4)
       integer :: j
 
       raw = 0.0_wp
       call set_rates(self)
       associate (c => self%curves, n => n_retained)
+         ! pi undoes the factor 1/pi of a coefficient: plain integrals are wanted.
          call self%slip%project(pi, c%normal, n, harmonic, column, raw(:, 1))
          call self%slip%project(pi, self%rate, n, harmonic, column, raw(:, 2))
          call self%one%project(pi, self%normal_rate, n, harmonic, column, raw(:, 3))
@@ -399,12 +417,14 @@ contains
          ! Projections halve the constant.
          if (harmonic(1) == 0) raw(column(1), :) = 2.0_wp*raw(column(1), :)
          if (self%remembers) then
+            ! There the input acts through its slope P' or N'.
             call transpose_slope(n, harmonic, column, raw(:, 1))
             call transpose_slope(n, harmonic, column, raw(:, 4))
          end if
          by_tangential = raw(:, 1)
          by_normal = -raw(:, 2) + c%mu*(raw(:, 3) + raw(:, 4))
       end associate
+      ! Without memory the rate is continuous where slip begins: |P| - Q grows from 0.
       if (.not. self%remembers) return
       do j = 1, self%path%n_segments
          select case (self%path%phase(j))
@@ -420,6 +440,7 @@ contains
    !> Integrals of p times the slopes of the waves from those of p times the waves.
    pure subroutine transpose_slope(n_retained, harmonic, column, integral)
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> (n_coefficients), replaced.
       real(wp), intent(inout) :: integral(*)
       real(wp) :: on_cosine
       integer :: h, k
@@ -447,6 +468,8 @@ contains
 
       associate (c => self%curves, path => self%path)
          if (j > 1) then
+            ! Behind slip of the other side N = 0, since both bounds meet z: nothing is added there
+            ! either.
             if (path%phase(j - 1) == phase_open) return
          end if
          call waves_at(self, path%angle(j), n_retained, harmonic, column)
@@ -454,6 +477,7 @@ contains
          ! dL = dP - side dQ, dQ = -mu dy_n.
          by_tangential = by_tangential + side*normal*self%origin
          by_normal = by_normal + normal*c%mu*self%origin
+         ! z itself depends on the inputs at the angle where it was set.
          if (.not. path%set(j)) return
          call waves_at(self, path%set_at(j), n_retained, harmonic, column)
          by_tangential = by_tangential - side*normal*self%origin

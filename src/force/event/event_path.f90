@@ -12,6 +12,9 @@
 !>
 !> Bounds are evaluated once for each breakpoint and compared as stored, so that a bound that
 !> holds z keeps doing so to the last bit.
+!> The order matters: a bound is compared with z at breakpoints only, and the angle where it catches
+!> z between two of them is found afterwards. That angle does not enter z, so its round-off does not
+!> accumulate along the path.
 module fw_event_path
    use fw_event_curves, only: curves_type
    use fw_event_polynomial, only: value_and_slope
@@ -75,9 +78,11 @@ contains
       integer, intent(in) :: degree
       integer :: n
 
+      ! Three functions with 2 degree roots each, and the two ends of the period.
       n = 6*degree + 2
       allocate (self%kind(n), self%break(n), self%lifted(n))
       allocate (self%lower(n), self%upper(n), self%landing(n))
+      ! A stick and a slip in each piece.
       n = 2*n
       allocate (self%phase(n), self%angle(n + 1), self%z(n), self%set_at(n), self%weight(n))
       allocate (self%set(n))
@@ -87,6 +92,7 @@ contains
    pure subroutine trace(self, curves, z_start)
       class(path_type), intent(inout) :: self
       type(curves_type), intent(inout) :: curves
+      !> Position that the period starts from [force].
       real(wp), intent(in) :: z_start
       type(position_type) :: position
       integer :: k
@@ -99,6 +105,7 @@ contains
       call evaluate_bounds(self, curves)
       self%moved = .not. self%closed
       position%z = z_start
+      ! A given start outside of the bounds is taken to the nearer of them.
       if (.not. self%lifted(1)) call clamp(self, 1, position)
       do k = 1, self%n_breaks - 1
          if (self%lifted(k)) then
@@ -107,6 +114,7 @@ contains
             call clamp(self, k + 1, position)
          end if
       end do
+      ! The turn to settle has left z where the period starts: the same turn once more is recorded.
       self%n_segments = 0
       do k = 1, self%n_breaks - 1
          call record(self, curves, k, position)
@@ -122,6 +130,7 @@ contains
       integer, intent(in) :: k
       type(position_type), intent(inout) :: position
 
+      ! Both bounds are P there.
       position = position_type(self%lower(k), self%break(k), self%landing(k), .true.)
    end subroutine let_go
 
@@ -131,6 +140,7 @@ contains
       integer, intent(in) :: k
       type(position_type), intent(inout) :: position
 
+      ! Strictly: a bound that holds z already must not count as a new event.
       if (self%lower(k) > position%z) then
          position = position_type(self%lower(k), self%break(k), -1.0_wp, .true.)
          self%moved = .true.
@@ -154,6 +164,7 @@ contains
       else if (self%lower(k + 1) > position%z) then
          angle = catch_angle(curves, curves%lower, self%break(k), self%break(k + 1), &
                              self%lower(k) - position%z, self%lower(k + 1) - position%z, position%z)
+         ! Caught at the breakpoint itself, there is no stick before.
          if (angle > self%break(k)) call self%append(self%break(k), phase_stick, position)
          call self%append(angle, phase_forward, position)
          call clamp(self, k + 1, position)
@@ -193,6 +204,8 @@ contains
 
       n = self%n_segments
       if (n > 0) then
+         ! Breakpoints of the other bound split no slip; a stick goes on where its z was set at one
+         ! angle.
          if (self%phase(n) == phase) then
             if (phase /= phase_stick) return
             if (self%set_at(n) >= position%set_at .and. self%set_at(n) <= position%set_at) return
@@ -217,6 +230,7 @@ contains
 
       call find_contact(self, curves)
       call add_roots(self, curves, at_lower, .false.)
+      ! State at tau = 0, from where each root turns it over: sign conventions as in find_roots.
       above = curves%values(1) >= 0.0_wp
       call add_roots(self, curves, at_upper, .false.)
       below = curves%values(1) < 0.0_wp
@@ -227,6 +241,7 @@ contains
          if (self%kind(k) == at_lower) above = .not. above
          if (self%kind(k) == at_upper) below = .not. below
          phase = phase_stick
+         ! P > Q and P < -Q at once means Q < 0, which is open.
          if (above) phase = phase_forward
          if (below) phase = phase_backward
          if (phase /= phase_stick) self%moved = .true.
@@ -263,6 +278,7 @@ contains
       self%break(1) = 0.0_wp
       self%kind(1) = at_end
       if (curves%steady) then
+         ! No pressure at all, not even an infinitesimal one, counts as open.
          self%lifted(1) = curves%normal(0, 1) <= 0.0_wp
       else
          n = 1
@@ -313,6 +329,7 @@ contains
       real(wp) :: angle
       integer :: k, j, kind
 
+      ! Insertion: the roots of each function are in order already, and few.
       do k = 2, self%n_breaks
          angle = self%break(k)
          kind = self%kind(k)
@@ -346,6 +363,7 @@ contains
          if (self%kind(k) == at_lift .and. abs(dn) > 0.0_wp) then
             ! Without friction nothing sticks, and z has no use for its derivative.
             if (curves%mu > 0.0_wp) self%landing(k) = -dp/(curves%mu*dn)
+            ! N = 0 to the last bit at its root, so that both bounds are the same number there.
             n = 0.0_wp
          else if (self%lifted(k)) then
             n = 0.0_wp
@@ -353,6 +371,7 @@ contains
          self%lower(k) = p - curves%mu*n
          self%upper(k) = p + curves%mu*n
       end do
+      ! The end of the period is its start to the last bit: z repeats exactly.
       self%lower(self%n_breaks) = self%lower(1)
       self%upper(self%n_breaks) = self%upper(1)
       self%landing(self%n_breaks) = 0.0_wp

@@ -4,6 +4,9 @@
 !> A limit that does not depend on the start is found by Newton's method on the map of a turn
 !> (fw_settling), and has a derivative of its own. Any other is where plain turns from the start
 !> lead, and carries the derivative of the way to it.
+!> With x = z at tau = 0, T(x) its value after a turn and M = dT/dx, the two derivatives by inputs p
+!> are dx/dp = (I - M)^-1 dT/dp of a unique limit, and M dx/dp + dT/dp carried from turn to turn
+!> otherwise.
 module fw_event_planar
    use fw_event_cells, only: cells_type
    use fw_event_motion, only: motion_type
@@ -25,12 +28,14 @@ module fw_event_planar
    public :: planar_pair_type
 
    !> Slip for less than this angle in a period is what the tolerance of the march leaves of none.
+   ! M is all but the identity then, and (I - M)^-1 round-off.
    real(wp), parameter :: brief = 1.0e-3_wp
 
    !> A turn of one pair.
    type, extends(period_map) :: planar_map
       type(motion_type) :: motion
       type(planar_path_type) :: path
+      ! Set while a procedure of the pair runs, so that a turn needs no argument for it.
       type(cells_type), pointer :: cells => null()
       !> The last turn: where it went from and to, and its derivative.
       real(wp) :: from(2) = 0.0_wp, to(2) = 0.0_wp, m(2, 2) = 0.0_wp
@@ -75,6 +80,7 @@ contains
       allocate (self%force(cells%n_coefficients, 3), source=0.0_wp)
    end subroutine reserve
 
+   !> A turn of period_map: the path from x [force], where it ends, and the derivative of that.
    subroutine turn(self, x, after, m)
       class(planar_map), intent(inout) :: self
       real(wp), intent(in) :: x(2)
@@ -96,6 +102,7 @@ contains
       real(wp), intent(in) :: x_start(2)
 
       self%map%cells => cells
+      ! Knots and rotations depend on the prediction alone: made once, they serve all turns.
       call self%map%motion%fill(cells, prediction, offset)
       call self%map%path%find_knots(self%map%motion, cells)
       self%closed = self%map%path%closed
@@ -118,12 +125,14 @@ contains
 
       self%moved = .not. self%closed
       associate (map => self%map, scale => self%map%motion%scale)
+         ! A pair that sticks or is led to the same place repeats at once, and needs no more.
          call map%turn(x_start, after, m)
          self%moved = self%moved .or. map%path%slips
          self%turns = 1
          if (map%motion%remembers .and. &
              maxval(abs(after - x_start)) > periodic_tolerance*scale) then
             x = after
+            ! x is anywhere now; only a unique limit may be taken from there.
             call settle(map, scale, periodic_tolerance, x, settled)
             call invert(map%m, inverse, unique)
             ! A pair that slips in its limit has but one.
@@ -149,6 +158,7 @@ contains
             call map%turn(x, after, m)
             if (maxval(abs(after - x)) <= periodic_tolerance*scale) return
             x = after
+            ! Enough: it creeps. What is left of the way is taken by Newton's method.
             if (self%turns == shakedown_turns) exit
             self%turns = self%turns + 1
          end do
@@ -176,6 +186,7 @@ contains
       real(wp), intent(out) :: values(:, :)
 
       call self%integral%sample(self%map%path, self%map%motion, cells, values(1:2, :))
+      ! Open where N < 0.
       values(3, :) = min(-self%map%motion%node(7, ::2), 0.0_wp)
    end subroutine sample
 
@@ -204,6 +215,8 @@ contains
       if (.not. unique) then
          self%map%cells => cells
          x = x_start
+         ! The turns of the march once more, with the derivatives carried along: they were not known
+         ! to be wanted then, and cost far more than a turn.
          do k = 1, self%turns - 1
             call self%map%turn(x, after, m)
             call derivatives%carry(self%map%path, self%map%motion, cells)
@@ -214,6 +227,7 @@ contains
       end if
       call derivatives%accumulate(self%map%path, self%map%motion, cells, fourier)
       associate (gradient => derivatives%gradient)
+         ! Gradient by inputs plus that by the start times dx/dp; the last two rows are the start.
          if (unique) call dgemm('N', 'N', n, 2*nc + 1, 2, 1.0_wp, &
                                 matmul(derivatives%tangent%dz(:n, :), transpose(inverse)), n, &
                                 gradient(n + 1:, :), 2, 1.0_wp, gradient, n + 2)
@@ -233,6 +247,7 @@ contains
 
       n = cells%n_retained
       nc = cells%n_coefficients
+      ! Normal forces do not depend on the tangential prediction.
       jacobian(:, 2*nc + 1:) = 0.0_wp
       if (fourier%projects) then
          do c = 1, 2
@@ -244,6 +259,7 @@ contains
          return
       end if
       do k = 1, cells%n_cells
+         ! dy_n at the instants that bear.
          if (self%map%motion%node(7, 2*k - 1) < 0.0_wp) cycle
          do c = 1, nc
             jacobian(2*nc + 1:, 2*nc + c) = jacobian(2*nc + 1:, 2*nc + c) + &
@@ -276,6 +292,7 @@ contains
          k = k + merge(1, 2, computed(h) == 0)
       end do
       if (.not. fourier%has_constant()) return
+      ! The means are known also where the balance leaves harmonic 0 out.
       force(1, 1:2) = self%integral%mean
       force(1, 3) = 0.0_wp
       call self%integral%contact%project(-1.0_wp, self%map%motion%normal, 1, [0], [1], force(:, 3))

@@ -32,6 +32,7 @@ module fw_event_planar_derivative
    public :: planar_derivative_type, new_derivative
 
    !> Rows that one matrix product takes.
+   ! Enough for the product to run at the speed of dgemm, and small beside the gradient.
    integer, parameter :: buffer_size = 128
 
    type :: planar_derivative_type
@@ -81,6 +82,7 @@ contains
       type(slide_type) :: slide
       integer :: i, k
 
+      ! Sticks change nothing along their way: dz holds from their start to their end.
       call self%tangent%start()
       do i = 1, path%n_pieces
          call begin_piece(self, path, motion, cells, i, .false.)
@@ -131,17 +133,20 @@ contains
       type(instant_type) :: at
 
       associate (piece => path%piece(i), tangent => self%tangent)
+         ! A piece that goes on from the one before has no switch.
          if (.not. piece%begins .or. motion%mu <= 0.0_wp) return
          at = motion%look(piece%from)
          if (piece%phase == phase_stick) then
             if (piece%lands) then
                call tangent%land(cells, at)
             else if (i > 1) then
+               ! Stick behind slip: its position is that of the last direction.
                call tangent%stop_slip(motion, cells, at, path%piece(i - 1)%v(:, 3))
             else if (.not. motion%remembers) then
                tangent%dz = 0.0_wp
             end if
          else if (.not. piece%lands) then
+            ! Slip behind a landing starts within `advance`, with the angle of P'.
             call tangent%set_waves(cells, piece%from)
             if (.not. motion%remembers) tangent%dz = 0.0_wp
             call tangent%begin_slip(at, piece%z)
@@ -179,6 +184,7 @@ contains
       integer :: c
 
       associate (last => path%piece(max(path%n_pieces, 1)), tangent => self%tangent)
+         ! Open (or without friction) at the end: z goes with P, and has forgotten its start.
          if (path%lifted(path%n_knots - 1) .or. motion%mu <= 0.0_wp) then
             tangent%dz = 0.0_wp
             call tangent%set_waves(cells, 0.0_wp)
@@ -194,6 +200,8 @@ contains
    !> A row with its projector; products are made once there is no room for more.
    subroutine add_row(self, row, projector, weight)
       class(planar_derivative_type), intent(inout) :: self
+      !> Derivative of something by the inputs (n_inputs), what it adds to each coefficient
+      !> (n_output), and its weight in the quadrature (0: of no node).
       real(wp), intent(in) :: row(:), projector(:), weight
 
       if (self%n_rows == buffer_size) call self%flush_rows()
@@ -226,6 +234,7 @@ contains
 
       nc = cells%n_coefficients
       call self%tangent%set_waves(cells, piece%to)
+      ! The waves' antiderivative is -slope/n**2: int cos = sin/n.
       integral = self%tangent%slope
       call self%tangent%set_waves(cells, piece%from)
       integral = integral - self%tangent%slope
@@ -240,6 +249,7 @@ contains
       end do
       do c = 1, 2
          projector = 0.0_wp
+         ! T = P - z; the part of P is in the Gram matrix of the sticks (fw_event_planar).
          projector((c - 1)*nc + 1:c*nc) = -cells%weight*integral
          call self%add_row(self%tangent%dz(:, c), projector, 0.0_wp)
       end do
@@ -259,6 +269,7 @@ contains
       slide = slide_of(piece, motion, cells)
       do k = 1, 3
          if (k > 1) call self%tangent%advance(motion, cells, slide, k - 1)
+         ! The quadrature of the force (fw_event_planar_force), so that derivative and force agree.
          weight = simpson(k)*(piece%to - piece%from)
          if (self%measures) call add_path_node(self, motion, cells, slide, k, weight)
          if (motion%mu <= 0.0_wp) cycle
@@ -292,6 +303,7 @@ contains
       nc = cells%n_coefficients
       projector = 0.0_wp
       associate (at => slide%at(k))
+         ! n = (-t_2, t_1).
          t = direction_of(slide%v(:, k))
          if (projects) then
             if (slide%cell > 0) then
@@ -304,6 +316,7 @@ contains
             call turn_node(self, cells, slide, k, weight)
          end if
          if (self%measures .and. motion%remembers) then
+            ! d(P'.t) = P'.n dphi.
             projector(2*nc + 1) = weight*at%normal*(t(1)*at%dp(2) - t(2)*at%dp(1))
          end if
       end associate
@@ -330,6 +343,7 @@ contains
       integer :: c
 
       t = weight*direction_of(slide%v(:, k))
+      ! Nodes are collected over the period, and meet their waves in one product at the end.
       if (slide%cell > 0) then
          associate (to => self%node(:, node_of(self, slide, k)))
             to = to + t
@@ -356,6 +370,7 @@ contains
 
       call self%tangent%set_waves(cells, slide%at(k)%angle)
       t = direction_of(slide%v(:, k))
+      ! As in the force: a pull just below zero, before a stop, is none.
       rate = weight*max(pull(motion, slide%at(k), slide%v(:, k)), 0.0_wp)
       normal = weight*slide%at(k)%normal
       nc = self%tangent%nc
@@ -390,6 +405,8 @@ contains
                  1.0_wp, self%sine, n)
       call moments%reserve(cells%degree)
       do c = 1, 2
+         ! Moments of t by quadrature in the place of exact ones: then the Gram matrix is the same
+         ! formula.
          call moments%set(self%cosine(:, c), self%sine(:, c))
          call moments%add_gram(-motion%mu, cells%n_retained, cells%harmonic, cells%column, &
                                self%gradient(2*nc + 1:3*nc, (c - 1)*nc + 1:c*nc))
@@ -412,9 +429,12 @@ contains
       do k = first_instant(cells, piece%from), cells%n_cells
          if (cells%node_angle(2*k - 1) >= piece%to) exit
          associate (weight => fourier%analysis(:, k))
+            ! Collocation may skip instants.
             if (.not. any(abs(weight) > 0.0_wp)) cycle
             if (piece%phase == phase_slip) then
                at = motion%at_node(cells, 2*k - 1)
+               ! Instants are starts of cells, and a stretch of slip covers no more than a cell: its
+               ! start.
                t = direction_of(piece%v(:, 1))
                projector(:nc) = -at%radius*t(2)*weight
                projector(nc + 1:2*nc) = at%radius*t(1)*weight

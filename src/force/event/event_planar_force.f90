@@ -2,6 +2,9 @@
 !> forces, shares of stick, slip and open, and the path of friction. Stick and contact are
 !> integrated exactly, slip by Simpson's rule over every stretch: an error of fourth order in the
 !> width of the cells.
+!>
+!> In stick T = P - z, so that with the sets chi the coefficients are G(chi_stick) P less those of z
+!> on the sticks; in slip T = R t at three nodes of each stretch; F_n = -G(chi_contact) N.
 module fw_event_planar_force
    use fw_event_cells, only: cells_type
    use fw_event_cells, only: waves_at
@@ -38,6 +41,7 @@ module fw_event_planar_force
       type(moments_type) :: stick, contact, held(2)
       !> Tangential forces at the nodes times the weights of the quadrature (2, 2 n_cells).
       real(wp), allocatable, private :: node(:, :)
+      !> Workspace: waves up to 2 degree at an angle, and the retained ones with their slopes.
       real(wp), allocatable, private :: cosines(:), sines(:), wave(:), slope(:)
    contains
       procedure :: reserve
@@ -78,6 +82,7 @@ contains
       call self%stick%clear()
       call self%held(1)%clear()
       call self%held(2)%clear()
+      ! Nodes of whole cells only collect their forces here: one product for all of them below.
       do i = 1, path%n_pieces
          associate (piece => path%piece(i))
             if (piece%phase == phase_stick) then
@@ -102,6 +107,7 @@ contains
    !> One end of a stick: what the set and z lose there.
    pure subroutine add_stick(self, angle, drop, z)
       type(planar_force_type), intent(inout) :: self
+      !> `drop` is what the weight of the set loses there: -1 at the start, 1 at the end.
       real(wp), intent(in) :: angle, drop, z(2)
       integer :: c
 
@@ -122,6 +128,7 @@ contains
       real(wp) :: force(2), width
       integer :: c, j, k
 
+      ! The integral of N times the speed of z, which is the pull.
       width = piece%to - piece%from
       self%share(2) = self%share(2) + 0.5_wp/pi*width
       slide = slide_of(piece, motion, cells)
@@ -131,6 +138,7 @@ contains
                                  simpson(k)*width*at%normal*max(pull(motion, at, v), 0.0_wp)
             force = simpson(k)*width*at%radius*direction_of(v)
             if (piece%cell > 0) then
+               ! The end of the last cell is the first node.
                j = modulo(2*piece%cell + k - 3, 2*cells%n_cells) + 1
                self%node(:, j) = self%node(:, j) + force
                cycle
@@ -152,6 +160,8 @@ contains
       logical :: before, behind
 
       call self%contact%clear()
+      ! As if the set began before 0 with weight 1: the first knot then only enters where it is
+      ! open, and at the angle 0 that is the same as a start there.
       before = .true.
       do k = 1, path%n_knots
          ! Behind the last knot nothing bears.
@@ -183,6 +193,7 @@ contains
             call self%held(c)%finish()
             call self%stick%project(1.0_wp, motion%tangential(:, :, c), n, harmonic, column, &
                                     self%projected(:, c))
+            ! The mean by itself, since harmonic 0 may not be among the retained ones.
             call self%stick%project(1.0_wp, motion%tangential(:, :, c), 1, [0], [1], &
                                     self%mean(c:c))
             self%mean(c) = self%mean(c) - 0.5_wp/pi*self%held(c)%cosine(0)
@@ -214,6 +225,7 @@ contains
                if (cells%node_angle(2*k - 1) >= piece%to) exit
                at = motion%at_node(cells, 2*k - 1)
                if (piece%phase == phase_slip) then
+                  ! Starts of cells are starts of stretches of slip.
                   values(:, k) = at%radius*direction_of(piece%v(:, 1))
                else
                   values(:, k) = at%p - piece%z
@@ -228,6 +240,7 @@ contains
       type(cells_type), intent(in) :: cells
       real(wp), intent(in) :: angle
 
+      ! By division, then corrected for its rounding, in either direction.
       k = int(0.5_wp*angle/cells%half) + 1
       if (cells%node_angle(2*k - 1) < angle) k = k + 1
       if (k > 1 .and. cells%node_angle(2*k - 3) >= angle) k = k - 1

@@ -7,6 +7,9 @@
 !>
 !> A turn maps the position z at the start of a period to that at its end; its derivative is carried
 !> along: slip keeps of dz what is normal to the force, a landing nothing.
+!>
+!> States on the way are the phase, z (stick), and the half-angle vector v (slip); with them go the
+!> derivatives of z and of the angle phi by the position at the start of the turn.
 module fw_event_planar_path
    use fw_event_cells, only: cells_type
    use fw_event_exit, only: find_exit
@@ -37,6 +40,7 @@ module fw_event_planar_path
       integer :: phase = phase_stick
       !> The phase before it was another one; and that was open.
       logical :: begins = .true., lands = .false.
+      !> Angles, from < to.
       real(wp) :: from = 0.0_wp, to = 0.0_wp
       !> Position of a stick, or of that before slip which begins.
       real(wp) :: z(2) = 0.0_wp
@@ -73,6 +77,8 @@ module fw_event_planar_path
 
 contains
 
+   !> Knots: the ends of the cells and at most 2 degree roots of N. Pieces: two for each knot and
+   !> spare.
    pure subroutine reserve(self, cells)
       class(planar_path_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
@@ -93,6 +99,7 @@ contains
       logical :: lifted
 
       n_lifts = 0
+      ! A constant N, which has no roots; 0 counts as open.
       lifted = motion%normal(0, 1) <= 0.0_wp
       if (.not. motion%steady) then
          self%values = motion%node(7, ::2)
@@ -110,6 +117,7 @@ contains
             if (self%lift(j) >= cells%node_angle(2*k - 1)) exit
             lifted = .not. lifted
             call add_knot(self, self%lift(j), lifted, 0)
+            ! The cell that the root splits is no whole one any more.
             if (self%n_knots > 1) self%cell(self%n_knots - 1) = 0
             j = j + 1
          end do
@@ -117,6 +125,7 @@ contains
       end do
    end subroutine find_knots
 
+   !> A cell of 0 says that no whole cell starts there.
    pure subroutine add_knot(self, angle, lifted, cell)
       type(planar_path_type), intent(inout) :: self
       real(wp), intent(in) :: angle
@@ -130,6 +139,7 @@ contains
    end subroutine add_knot
 
    !> The slip of a piece with its instants.
+   !> Instants are not kept with the pieces: they are many numbers, and wanted for slip alone.
    pure type(slide_type) function slide_of(piece, motion, cells) result(slide)
       type(piece_type), intent(in) :: piece
       type(motion_type), intent(in) :: motion
@@ -162,19 +172,23 @@ contains
       self%n_pieces = 0
       self%slips = .false.
       self%lands = .false.
+      ! Identity: the position of the start is the input.
       self%by_z = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
       self%by_phi = 0.0_wp
       at = motion%at_node(cells, 1)
       call start(self, motion, at, z_start)
       do k = 1, self%n_knots - 1
+         ! Open from one knot to the next, since N keeps its sign there.
          if (self%lifted(k)) then
             if (self%phase == phase_stick) self%piece(self%n_pieces)%to = self%knot(k)
             self%phase = phase_open
             cycle
          end if
+         ! The cheap way first; most cells hold no switch.
          call pass_cell(self, motion, cells, self%cell(k), passes)
          if (passes) cycle
          at = instant_at(self, motion, cells, k)
+         ! Open until here: the knot is a root of N.
          if (self%phase == phase_open) call land(self, motion, at)
          call bear(self, motion, cells, k, at)
       end do
@@ -211,6 +225,7 @@ contains
       if (self%phase == phase_stick) then
          last = 2*cell + 1
          if (cell == cells%n_cells) last = 1
+         ! Both ends of the cell as columns of `node`: no instant is built.
          passes = sticks_on(motion, self%z, motion%node(:, 2*cell - 1), motion%node(:, last))
       else if (motion%remembers) then
          v(:, 1) = self%v
@@ -218,6 +233,7 @@ contains
          if (.not. passes) return
          call add_slip(self, cells%node_angle(2*cell - 1), cells%node_angle(2*cell + 1), v, cell)
          self%v = v(:, 3)
+         ! The rotation of the cell turns neighbours of phi by `gain` times as much.
          self%by_phi = gain*self%by_phi
       end if
    end subroutine pass_cell
@@ -247,6 +263,7 @@ contains
       if (motion%remembers) self%z = z_start
       self%phase = phase_open
       if (self%lifted(1)) return
+      ! A start outside of the cone is a force too large: it slips from there in its direction.
       if (is_pushed(motion, at, self%z)) then
          call begin_slip(self, at)
       else
@@ -265,6 +282,7 @@ contains
       z_end = self%z
       if (self%phase == phase_stick) return
       m = 0.0_wp
+      ! Open, or without friction: z goes with P.
       z_end = at%p
       if (self%phase == phase_open .or. motion%mu <= 0.0_wp) return
       call position_of_slip(at, self%v, self%by_phi, z_end, m)
@@ -296,11 +314,13 @@ contains
       if (.not. motion%remembers) then
          call begin_slip(self, at)
       else if (norm2(at%dp) < at%dradius) then
+         ! R grows faster than P moves away from z = P(landing): the cone catches up at once.
          self%z = at%p
          call begin_stick(self, at%angle)
          self%piece(self%n_pieces)%lands = .true.
       else
          self%phase = phase_slip
+         ! Slip in the direction in which P leaves; R = 0 here, so only its limit is known.
          self%v = half_angle(at%dp)
          self%begins = .true.
          self%behind_landing = .true.
@@ -350,18 +370,21 @@ contains
          to = motion%at_node(cells, 2*cell + 1)
       else
          to = instant_at(self, motion, cells, k + 1)
+         ! The last knot is at 2 pi, although its instant is that of 0.
          to%angle = self%knot(k + 1)
       end if
       if (motion%mu <= 0.0_wp) then
          call slide_freely(self, motion, at, to)
          return
       end if
+      ! Stick and slip by turns, until the knot is reached.
       do i = 1, max_switches
          if (self%phase == phase_stick) then
             ! Each knot to come may need two.
             if (self%n_pieces + 2*(self%n_knots - k + 2) > size(self%piece)) return
             call find_exit(motion, self%z, to, at, found)
             if (.not. found) return
+            ! A switch within the cell: what is left of it is no whole cell.
             cell = 0
             self%piece(self%n_pieces)%to = at%angle
             call begin_slip(self, at)
@@ -391,9 +414,11 @@ contains
       at = slide%at(3)
       stops = slide%stops
       self%v = slide%v(:, 3)
+      ! Two steps, one gain each.
       self%by_phi = (slide%gain(1)*slide%gain(2))*self%by_phi
       if (.not. stops) return
       self%z = 0.0_wp
+      ! At velocity level there is no position, and T = P where it sticks.
       if (motion%remembers) call position_of_slip(at, self%v, self%by_phi, self%z, self%by_z)
       call begin_stick(self, at%angle)
    end subroutine slip_to
@@ -427,6 +452,7 @@ contains
       type(slide_type) :: slide
       integer :: k
 
+      ! A stick that the start has opened is taken back: nothing sticks without friction.
       if (self%phase == phase_stick) self%n_pieces = self%n_pieces - 1
       self%phase = phase_slip
       self%slips = .true.

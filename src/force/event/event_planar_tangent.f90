@@ -44,6 +44,7 @@ module fw_event_planar_tangent
 
 contains
 
+   !> nc is the number of coefficients of one component.
    pure type(tangent_type) function new_tangent(nc) result(self)
       integer, intent(in) :: nc
 
@@ -55,12 +56,15 @@ contains
 
    !> A turn starts: its position is an input.
    pure subroutine start(self)
+      !> Derivatives by the coefficients go on from the turn before; the position at the start of
+      !> this turn is an input of its own.
       class(tangent_type), intent(inout) :: self
 
       self%dphi = 0.0_wp
       self%dz(self%n_inputs - 1:, :) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
    end subroutine start
 
+   !> Kept, because two events at one angle ask for the same waves.
    pure subroutine set_waves(self, cells, angle)
       class(tangent_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
@@ -70,6 +74,7 @@ contains
    end subroutine set_waves
 
    !> Contact begins with stick: z = P at a root of N, which moves by -dN/N' with N = -y_n.
+   !> A position before the landing is lost, with all that it depended on.
    pure subroutine land(self, cells, at)
       class(tangent_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
@@ -80,6 +85,7 @@ contains
       self%dz = 0.0_wp
       do c = 1, 2
          self%dz((c - 1)*self%nc + 1:c*self%nc, c) = self%wave
+         ! dz_c = P_c' dtheta, dtheta = -dN/N' = wave/N' dy_n.
          self%dz(2*self%nc + 1:3*self%nc, c) = (at%dp(c)/at%dnormal)*self%wave
       end do
    end subroutine land
@@ -92,6 +98,7 @@ contains
       real(wp) :: d(2), n(2)
 
       d = at%p - z
+      ! The angle of d changes by n.dd/|d|, n being normal to d; here n is divided by |d| already.
       n = [-d(2), d(1)]/max(dot_product(d, d), tiny(1.0_wp))
       self%dphi = -(n(1)*self%dz(:, 1) + n(2)*self%dz(:, 2))
       self%dphi(:self%nc) = self%dphi(:self%nc) + n(1)*self%wave
@@ -112,6 +119,7 @@ contains
       if (.not. motion%remembers) return
       call self%set_waves(cells, at%angle)
       t = direction_of(v)
+      ! z = P - R t: dz = dP - t dR - R n dphi, with dR = -mu dy_n.
       self%dz(:, 1) = at%radius*t(2)*self%dphi
       self%dz(:, 2) = -at%radius*t(1)*self%dphi
       do c = 1, 2
@@ -129,6 +137,7 @@ contains
       type(motion_type), intent(inout) :: motion
       type(cells_type), intent(in) :: cells
       type(slide_type), intent(in) :: slide
+      !> 1 up to the middle of the stretch, 2 from there to its end.
       integer, intent(in) :: step
       type(gauss_type) :: gauss
       type(rotation_type) :: rotation
@@ -137,6 +146,7 @@ contains
 
       if (motion%mu <= 0.0_wp) return
       if (.not. motion%remembers) then
+         ! Velocity level: the force points along P itself, whatever came before.
          call self%set_waves(cells, slide%at(step + 1)%angle)
          self%dz = 0.0_wp
          call self%begin_slip(slide%at(step + 1), [0.0_wp, 0.0_wp])
@@ -155,6 +165,7 @@ contains
          end if
          rotation = new_rotation(h, gauss%dp(:, 1)/gauss%radius(1), gauss%dp(:, 2)/gauss%radius(2))
          block
+            ! Off the grid: a step that a switch cuts short, rare enough for waves on the stack.
             real(wp) :: wave(self%nc, 2), slope(self%nc, 2)
 
             do i = 1, 2
@@ -188,6 +199,8 @@ contains
       end do
       associate (nc => self%nc, dphi => self%dphi)
          do k = 1, nc
+            ! P' at a Gauss point depends on the coefficients by the slopes of the waves, R by the
+            ! waves.
             dphi(k) = gain*dphi(k) + by(1, 1)*slope(k, 1) + by(1, 2)*slope(k, 2)
             dphi(nc + k) = gain*dphi(nc + k) + by(2, 1)*slope(k, 1) + by(2, 2)*slope(k, 2)
             dphi(2*nc + k) = gain*dphi(2*nc + k) + by_radius(1)*wave(k, 1) + &
@@ -201,6 +214,7 @@ contains
    !> input y_n; so do its Gauss points, by the share of the step that is still ahead of them.
    pure subroutine add_landing(self, motion, cells, slide, gauss)
       type(tangent_type), intent(inout) :: self
+      !> The stretch whose first step starts at the landing, and P', R, P'', R' at its Gauss points.
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       type(slide_type), intent(in) :: slide
@@ -230,6 +244,8 @@ contains
          t = [cos(n(1)), sin(n(1))]
          n = [-t(2), t(1)]
          call self%set_waves(cells, slide%at(1)%angle + s)
+         ! The two conditions R phi' = P'.n of the arc, differentiated; `inverse` solves them for
+         ! the changes of its slope and curvature.
          condition = dot_product(t, gauss%dp(:, i))*first
          condition(:, 1) = condition(:, 1) - n(1)*self%slope
          condition(:, 2) = condition(:, 2) - n(2)*self%slope
@@ -243,6 +259,7 @@ contains
       end do
       self%dphi(:3*self%nc) = reshape(first + h*change(:, :, 1) + h**2*change(:, :, 2), &
                                       [3*self%nc])
+      ! The step ends at a fixed angle: it gets shorter as the landing comes later.
       self%dphi(2*self%nc + 1:3*self%nc) = self%dphi(2*self%nc + 1:3*self%nc) - &
          (arc%slope + 2.0_wp*arc%curvature*h)*dtheta
       self%dphi(3*self%nc + 1:) = 0.0_wp

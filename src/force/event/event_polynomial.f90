@@ -48,6 +48,7 @@ contains
    end function value_of
 
    !> p and its derivative at an angle, with no room for the waves.
+   !> p as above, degree >= 0.
    pure subroutine value_and_slope(degree, p, angle, value, slope)
       integer, intent(in) :: degree
       real(wp), intent(in) :: p(0:degree, 2), angle
@@ -71,6 +72,7 @@ contains
    end subroutine value_and_slope
 
    !> Coefficients of dp/dtau.
+   !> In the same storage; the constant has none.
    pure subroutine differentiate(degree, p, derivative)
       integer, intent(in) :: degree
       real(wp), intent(in) :: p(0:degree, 2)

@@ -25,14 +25,17 @@ module fw_event_roots
    end type bounds_type
 
    !> End of a cell.
+   !> p and p' at an angle; the slope is per radian, not per cell.
    type :: knot_type
       real(wp) :: angle, value, slope
    end type knot_type
 
    !> Halvings after which two roots in a cell, or none, make no difference to double precision.
+   ! Width 2 pi/n 2**(-26) squared is below round-off: a parabola cannot dip that much more.
    integer, parameter :: max_depth = 26
    !> Round-off of a sum of waves relative to the sum of its amplitudes.
    real(wp), parameter :: round_off = 1.0e-15_wp
+   ! Halving alone takes 52 from a bracket of the size of 1.
    integer, parameter :: newton_steps = 60
    !> Relative accuracy of an angle.
    real(wp), parameter :: angle_tolerance = 4.0e-16_wp
@@ -47,6 +50,7 @@ contains
       real(wp) :: largest, amplitude, third, fourth
       integer :: m
 
+      ! Valid for n > 2 degree: the cosine is positive.
       largest = maxval(abs(values))/cos(pi*real(degree, wp)/real(n, wp))
       third = 0.0_wp
       fourth = 0.0_wp
@@ -57,6 +61,7 @@ contains
       end do
       self%third = min(third, real(degree, wp)**3*largest)
       self%fourth = min(fourth, real(degree, wp)**4*largest)
+      ! Of `scale`, since p may be a small difference of large terms.
       self%noise = round_off*scale
    end function new_bounds
 
@@ -73,10 +78,12 @@ contains
       integer :: k
 
       bounds = new_bounds(n, degree, p, values, scale)
+      ! Nothing but round-off has no roots: touching zero everywhere is no switch.
       if (maxval(abs(values)) <= bounds%noise) return
       width = 2.0_wp*pi/real(n, wp)
       right = knot_type(0.0_wp, values(1), slopes(1))
       do k = 1, n
+         ! The end of the last cell is the first sample, at the angle 2 pi.
          left = right
          right = knot_type(width*real(k, wp), values(modulo(k, n) + 1), slopes(modulo(k, n) + 1))
          if (monotone(left, right, bounds)) then
@@ -90,6 +97,8 @@ contains
    end subroutine find_roots
 
    !> Search a cell without a certificate, its left half first.
+   !> Iterative instead of recursive, with the right ends that wait on a stack: a cell is finished
+   !> before its neighbour is looked at, so the roots come in ascending order.
    pure subroutine halve(degree, p, left, right, bounds, n_roots, roots)
       integer, intent(in) :: degree
       real(wp), intent(in) :: p(0:degree, 2)
@@ -126,6 +135,7 @@ contains
       end do
    end subroutine halve
 
+   !> Zero counts as positive at both ends, so that a root on a knot is found in one cell only.
    pure logical function changes_sign(left, right)
       type(knot_type), intent(in) :: left, right
 
@@ -138,6 +148,7 @@ contains
       type(bounds_type), intent(in) :: bounds
       real(wp) :: least
 
+      ! p' differs from the line between its end values by at most w**2 M_3/8.
       least = 0.125_wp*(right%angle - left%angle)**2*bounds%third
       monotone = min(left%slope, right%slope) > least .or. max(left%slope, right%slope) < -least
    end function monotone
@@ -152,12 +163,14 @@ contains
       keeps_sign = .false.
       if (changes_sign(left, right)) return
       width = right%angle - left%angle
+      ! Error of the Hermite cubic, w**4 M_4/4!/16 at the middle.
       deviation = width**4*bounds%fourth/384.0_wp
       side = merge(1.0_wp, -1.0_wp, left%value >= 0.0_wp)
       ! Control points of the cubic bound it from below.
       b = side*[left%value, left%value + width*left%slope/3.0_wp, &
                 right%value - width*right%slope/3.0_wp, right%value]
       keeps_sign = minval(b) > deviation
+      ! Near zero at an end only halving can tell.
       if (keeps_sign .or. min(b(1), b(4)) <= deviation) return
       ! Its only minimum inside, if any, is the root of the slope with positive curvature.
       a = [b(1), 3.0_wp*(b(2) - b(1)), 3.0_wp*(b(1) - 2.0_wp*b(2) + b(3)), &
@@ -178,6 +191,8 @@ contains
    end function keeps_sign
 
    !> A cell whose values and slopes are round-off holds nothing that matters.
+   !> Also its curvature, which the bound of the third derivative contains: without it a dip between
+   !> two small ends would pass.
    pure logical function negligible(left, right, bounds)
       type(knot_type), intent(in) :: left, right
       type(bounds_type), intent(in) :: bounds
@@ -197,6 +212,7 @@ contains
       integer, intent(inout) :: n_roots
       real(wp), intent(inout) :: roots(:)
 
+      ! Ascending order holds, because cells are visited from left to right.
       ! The polynomial has no more roots than fit; round-off may repeat one.
       if (n_roots == size(roots)) return
       n_roots = n_roots + 1
@@ -221,10 +237,12 @@ contains
       if (abs(left_value) <= 0.0_wp) return
       angle = right
       if (abs(right_value) <= 0.0_wp) return
+      ! The first guess is that of the chord.
       angle = left + (right - left)*(left_value/(left_value - right_value))
       do k = 1, newton_steps
          call value_and_slope(degree, p, angle, value, slope)
          value = value - level
+         ! The bracket shrinks on the side whose sign the value has.
          if ((value > 0.0_wp) .eqv. (left_value > 0.0_wp)) then
             low = angle
          else
@@ -235,6 +253,7 @@ contains
             step = -value/slope
             if (angle + step > low .and. angle + step < high) trial = angle + step
          end if
+         ! Either criterion: on a flat root the value is round-off long before the angle settles.
          if (abs(value) <= noise .or. high - low <= angle_tolerance*(1.0_wp + angle)) return
          step = trial - angle
          angle = trial

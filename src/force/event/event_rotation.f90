@@ -37,6 +37,7 @@ module fw_event_rotation
    end type rotation_type
 
    !> phi = phi_0 + slope s + curvature s**2 behind a landing.
+   !> phi_0 is the direction of P' at the landing.
    type :: arc_type
       real(wp) :: slope = 0.0_wp, curvature = 0.0_wp
       !> Matrix of the two conditions by slope and curvature, inverted.
@@ -50,6 +51,8 @@ contains
       real(wp), intent(in) :: v(2)
       real(wp) :: t(2)
 
+      ! Difference of squares as a product: no cancellation where the direction is near +-90
+      ! degrees.
       t(1) = (v(1) - v(2))*(v(1) + v(2))
       t(2) = 2.0_wp*v(1)*v(2)
    end function direction_of
@@ -79,6 +82,8 @@ contains
       real(wp), intent(in) :: h, a_1(2), a_2(2)
 
       self%h = h
+      ! The symmetric part is the mean of A_1 and A_2 times h, the antisymmetric one their
+      ! commutator.
       self%p = 0.25_wp*h*(a_1(1) + a_2(1))
       self%q = 0.25_wp*h*(a_1(2) + a_2(2))
       self%r = commutator*h**2*(a_2(1)*a_1(2) - a_2(2)*a_1(1))
@@ -87,8 +92,11 @@ contains
 
    !> exp(Omega) = cosh (1 + ratio Omega): ratio = tanh(s)/s, s**2 = p**2 + q**2 - r**2, its
    !> derivative by s**2, and 1/cosh**2.
+   !> s**2 < 0 (much rotation by the commutator) makes them tan and 1/cos**2; the factor cosh itself
+   !> drops out, because v is normalised.
    pure subroutine hyperbolic(square, ratio, slope, decay)
       real(wp), intent(in) :: square
+      !> Both grow without bound as s**2 nears -(pi/2)**2 from above.
       real(wp), intent(out) :: ratio, slope, decay
       !> Below this the series are exact to round-off.
       real(wp), parameter :: small = 1.0e-3_wp
@@ -108,6 +116,7 @@ contains
          decay = 1.0_wp - square*ratio**2
          return
       end if
+      ! Direct formulas lose digits to ratio - decay for small s, which the series covers.
       s = sqrt(abs(square))
       if (square > 0.0_wp) then
          t = tanh(s)
@@ -121,6 +130,7 @@ contains
    end subroutine hyperbolic
 
    !> Half-angle vector (of length 1) after a step, and the derivative of phi by that before it.
+   !> A length other than 1 of v would go through to the direction unharmed, but not to `gain`.
    pure subroutine rotate(step, v, after, gain)
       type(rotation_type), intent(in) :: step
       real(wp), intent(in) :: v(2)
@@ -142,6 +152,7 @@ contains
       real(wp), intent(out) :: by_a_1(2), by_a_2(2)
       real(wp) :: m(2), after(2), by(3), along
 
+      ! d phi = 2 cross(v, dv)/|v|**2, phi being twice the angle of v.
       associate (p => step%p, q => step%q, r => step%r, ratio => step%ratio)
          m = [p*v(1) + (q + r)*v(2), (q - r)*v(1) - p*v(2)]
          after = v + ratio*m
@@ -151,6 +162,7 @@ contains
          by(3) = -along*r + ratio*cross(after, [v(2), -v(1)])
       end associate
       by = 2.0_wp*by/dot_product(after, after)
+      ! p and q depend on both a alike; r by the product of one with the other turned.
       by_a_1 = 0.25_wp*step%h*by(1:2) + commutator*step%h**2*by(3)*[-a_2(2), a_2(1)]
       by_a_2 = 0.25_wp*step%h*by(1:2) + commutator*step%h**2*by(3)*[a_1(2), -a_1(1)]
    end subroutine rotation_derivative
@@ -162,6 +174,8 @@ contains
    end function cross
 
    !> The quadratic behind a landing, over a step of length h in the direction v at its start.
+   !> Newton's method in slope and curvature, from a given slope and none; its last iterate is
+   !> taken.
    pure function new_arc(h, v, p_slope, radius, slope) result(arc)
       !> P' (2, Gauss point), R (Gauss point), and phi' at the landing.
       real(wp), intent(in) :: h, v(2), p_slope(2, 2), radius(2), slope
@@ -176,6 +190,7 @@ contains
             s = gauss_point(i)*h
             angle = phi + arc%slope*s + arc%curvature*s**2
             t = [cos(angle), sin(angle)]
+            ! R phi' - P'.n at both Gauss points.
             f(i) = radius(i)*(arc%slope + 2.0_wp*arc%curvature*s) - cross(t, p_slope(:, i))
             j(i, 1) = radius(i) + s*dot_product(t, p_slope(:, i))
             j(i, 2) = 2.0_wp*radius(i)*s + s**2*dot_product(t, p_slope(:, i))
@@ -187,6 +202,7 @@ contains
          change = arc%inverse(:, 1)*f(1) + arc%inverse(:, 2)*f(2)
          arc%slope = arc%slope - change(1)
          arc%curvature = arc%curvature - change(2)
+         ! Changes of the angle over the step, in radians.
          if (maxval(abs(change)*[h, h**2]) <= 1.0e-14_wp) return
       end do
    end function new_arc

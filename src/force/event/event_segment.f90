@@ -15,6 +15,7 @@ module fw_event_segment
    public :: segment_type, new_segment
 
    type :: segment_type
+      !> Angle of its start; friction coefficient; the least R, as gauss_type has it.
       real(wp), private :: from = 0.0_wp, mu = 0.0_wp, least = 0.0_wp
       !> P_x, P_y, N in powers of the angle behind `from`.
       real(wp), private :: c(3, 0:5) = 0.0_wp
@@ -25,6 +26,7 @@ module fw_event_segment
 
 contains
 
+   !> From two instants with second derivatives; a width of 0 gives the parabola of the first.
    pure type(segment_type) function new_segment(motion, from, to) result(self)
       type(motion_type), intent(in) :: motion
       type(instant_type), intent(in) :: from, to
@@ -38,6 +40,8 @@ contains
       self%c(:, 1) = [from%dp, from%dnormal]
       self%c(:, 2) = 0.5_wp*[from%ddp, from%ddnormal]
       if (w <= 0.0_wp) return
+      ! Coefficients of the quintic Hermite interpolation, of value, slope and curvature at both
+      ! ends.
       ! What value, slope and half the curvature at the end lack.
       d0 = ([to%p, to%normal] - self%c(:, 0) - w*(self%c(:, 1) + w*self%c(:, 2)))/w**3
       d1 = ([to%dp, to%dnormal] - self%c(:, 1) - 2.0_wp*w*self%c(:, 2))/w**2

@@ -29,6 +29,7 @@ module fw_event_slide
    integer, parameter :: max_trials = 60
    real(wp), parameter :: angle_tolerance = 1.0e-8_wp
 
+   ! State of slip along the stretch; what the path notes of it is in piece_type.
    type :: slide_type
       !> Start, middle and end with the half-angle vectors there.
       type(instant_type) :: at(3)
@@ -44,9 +45,11 @@ module fw_event_slide
 contains
 
    !> Slip over a whole cell, if it passes without a stop.
+   !> The cheap way through most cells: rotations of the grid only, no series, no instants.
    pure subroutine glide(motion, cells, cell, v, gain, passes)
       type(motion_type), intent(inout) :: motion
       type(cells_type), intent(in) :: cells
+      !> Number of the cell, 1..n_cells.
       integer, intent(in) :: cell
       !> Half-angle vectors at the three nodes; the first is given.
       real(wp), intent(inout) :: v(2, 3)
@@ -60,6 +63,7 @@ contains
       gain = 1.0_wp
       call pull_at_node(motion, 2*cell - 1, v(:, 1), f, before)
       passes = f >= 0.0_wp
+      ! The pull must not be negative at a node: without friction enough to stop it, slip goes on.
       do k = 1, 2
          if (.not. passes) return
          call motion%rotation_of(cells, 2*cell + k - 2, rotation)
@@ -82,6 +86,7 @@ contains
       real(wp), intent(out) :: f, slope
       real(wp) :: t(2), across, radius
 
+      ! across is P'.n, hence the rate of the direction is across/R.
       t = direction_of(v)
       associate (at => motion%node(:, node))
          across = t(1)*at(4) - t(2)*at(3)
@@ -97,6 +102,7 @@ contains
       type(cells_type), intent(in) :: cells
       !> The end, on the cell self%cell if that is not 0.
       type(instant_type), intent(in) :: to
+      !> Start and its direction on entry; `stops` and the end on return.
       type(slide_type), intent(inout) :: self
       type(instant_type) :: last
       integer :: k
@@ -105,11 +111,13 @@ contains
       self%at(3) = to
       call take_steps(motion, cells, self)
       self%stops = .false.
+      ! The first half that stops ends the stretch; what the second half found is void.
       do k = 1, 2
          call find_stop(motion, self, k, last, stops)
          if (.not. stops) cycle
          self%stops = .true.
          self%cell = 0
+         ! Two equal steps again over the shorter stretch, so that the quadrature keeps its form.
          self%at(3) = last
          call take_steps(motion, cells, self)
          return
@@ -125,6 +133,7 @@ contains
       integer :: k
 
       if (self%cell == 0) then
+         ! No cell: three instants of the series, and quintics between them.
          self%at(2) = motion%look(0.5_wp*(self%at(1)%angle + self%at(3)%angle))
          do k = 1, 2
             call turned(motion, new_segment(motion, self%at(k), self%at(k + 1)), self%at(k), &
@@ -146,6 +155,7 @@ contains
 
    !> Direction of slip after a step of any length on a segment that starts with it.
    pure subroutine turned(motion, segment, from, to, v, lands, after, gain)
+      !> From `from` to `to`, on the segment between them (or a longer one that starts with it).
       type(motion_type), intent(in) :: motion
       type(segment_type), intent(in) :: segment
       type(instant_type), intent(in) :: from, to
@@ -160,6 +170,7 @@ contains
       gain = 1.0_wp
       h = to%angle - from%angle
       if (h <= 0.0_wp) return
+      ! At velocity level the direction is that of P at once.
       if (.not. motion%remembers) then
          after = half_angle(to%p)
          return
@@ -179,6 +190,7 @@ contains
    end subroutine turned
 
    !> The quadratic behind a landing.
+   !> phi' at the landing by l'Hospital's rule: R' phi' = P''.n - |P'| phi'.
    pure type(arc_type) function landing_arc(from, gauss, v, h) result(arc)
       type(instant_type), intent(in) :: from
       type(gauss_type), intent(in) :: gauss
@@ -191,6 +203,7 @@ contains
    end function landing_arc
 
    !> What drives slip on.
+   !> P'.t - R': while it is positive, the edge of the cone takes z along.
    pure real(wp) function pull(motion, at, v)
       type(motion_type), intent(in) :: motion
       type(instant_type), intent(in) :: at
@@ -204,6 +217,7 @@ contains
    end function pull
 
    !> Its rate along the path.
+   !> d/dtau (P'.t - R') = P''.t - R'' + P'.n phi', with phi' = P'.n/R.
    pure real(wp) function pull_slope(motion, at, v) result(slope)
       type(motion_type), intent(in) :: motion
       type(instant_type), intent(in) :: at
@@ -223,6 +237,7 @@ contains
 
    !> Whether and where slip stops in a step: with a negative pull at its end, or between where the
    !> cubic through both ends dips below zero.
+   !> Rising pulls at both ends, or falling at both, cannot hide a dip that the cubic would show.
    pure subroutine find_stop(motion, self, step, last, stops)
       type(motion_type), intent(in) :: motion
       type(slide_type), intent(in) :: self
@@ -257,6 +272,7 @@ contains
          if (.not. stops) then
             last = self%at(step + 1)
          else if (f(1) <= 0.0_wp) then
+            ! No pull at the start of the step: slip stops there.
             last = from
          else
             call find_zero(motion, segment, from, from_v, lands, f, df, last)
@@ -266,6 +282,7 @@ contains
 
    !> Where the pull becomes zero before `last`: Newton's method within the bracket, from the root
    !> of the cubic through both ends.
+   !> The direction is integrated anew from `from` to every trial: its error is that of one step.
    pure subroutine find_zero(motion, segment, from, v, lands, f_ends, df_ends, last)
       type(motion_type), intent(in) :: motion
       type(segment_type), intent(in) :: segment
@@ -294,6 +311,7 @@ contains
          if (slope < 0.0_wp) then
             trial = last%angle - f/slope
          else
+            ! A slope that is not negative points the wrong way: halve.
             trial = low
          end if
          if (trial <= low .or. trial >= high) trial = 0.5_wp*(low + high)
@@ -303,6 +321,7 @@ contains
    end subroutine find_zero
 
    !> Root in 0..1 of the cubic with values f of other signs and slopes df at 0 and 1, nearly.
+   !> Three steps of Newton's method from the chord, or fewer; a start, not a result.
    pure real(wp) function first_guess(f, df) result(t)
       real(wp), intent(in) :: f(2), df(2)
       real(wp) :: a(2), value, slope
@@ -320,6 +339,7 @@ contains
 
    !> Where the cubic with values f and slopes df at 0 and width, rising and then falling, is
    !> largest.
+   !> Rising at 0 and falling at width: the caller has seen to it.
    pure real(wp) function summit(f, df, width)
       real(wp), intent(in) :: f(2), df(2), width
       real(wp) :: a(3), root
