@@ -5,7 +5,7 @@ program fw_run_program
    use fw_cli, only: cli_options, get_arguments, parse_arguments
    use fw_error, only: error_type, status_ok
    use fw_help, only: write_help
-   use fw_interrupt, only: catch_interrupts
+   use fw_signals, only: catch_interrupts
    use fw_key_text, only: write_keys
    use fw_outcome, only: outcome_type
    use fw_progress, only: progress_type, new_progress

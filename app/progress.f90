@@ -2,10 +2,10 @@
 module fw_progress
    use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit
-   use fw_interrupt, only: was_interrupted
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
+   use fw_signals, only: was_interrupted
    use fw_text, only: to_text
    use fw_values, only: number_text
    implicit none (type, external)
@@ -34,6 +34,7 @@ module fw_progress
       procedure :: on_point
       procedure :: on_message
       procedure :: on_end
+      procedure :: poll
       procedure, private :: clear_bar
    end type progress_type
 
@@ -59,6 +60,13 @@ contains
       if (verbose) progress%draws_bar = .false.
    end function new_progress
 
+   !> Signals arrive at any time.
+   subroutine poll(self)
+      class(progress_type), intent(inout) :: self
+
+      if (was_interrupted()) self%stop_requested = .true.
+   end subroutine poll
+
    subroutine on_start(self, case_title, n_points)
       class(progress_type), intent(inout) :: self
       character(*), intent(in) :: case_title
@@ -80,7 +88,6 @@ contains
       type(point_type), intent(in) :: point
       logical :: is_due
 
-      if (was_interrupted()) self%stop_requested = .true.
       if (self%quiet) return
       ! A point that failed is worth a line wherever it is shown.
       is_due = self%verbose .or. .not. point%converged

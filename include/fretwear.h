@@ -7,7 +7,8 @@
  *   Nothing prints and nothing ends the program.
  * - Handles share nothing: different threads may use different handles at the same time. One
  *   handle serves one thread at a time; while a call is at work on it, its callback may read
- *   (fw_get, fw_size, fw_count, fw_get_text), every other call is refused with FW_USAGE.
+ *   (fw_get, fw_size, fw_count, fw_get_text), any thread may end it (fw_stop), and every other
+ *   call is refused with FW_USAGE.
  * - A handle that was destroyed, or never created, is recognised and refused with FW_USAGE.
  * - Units are those of the model, as long as they fit each other; omega is in rad/s.
  * - Callbacks must return: no longjmp and no C++ exception may pass through the library.
@@ -34,7 +35,7 @@ enum fw_status {
    FW_INPUT = 3,         /* something is wrong in the case */
    FW_NOT_CONVERGED = 4, /* what was computed is there, marked */
    FW_IO = 5,            /* a file cannot be read or written */
-   FW_STOPPED = 6        /* by the callback; what was computed is there */
+   FW_STOPPED = 6        /* by the callback, fw_stop or case%max_seconds; what was computed is there */
 };
 
 typedef struct fw_session *fw_handle;
@@ -109,6 +110,11 @@ int fw_check(fw_handle handle);
 /* Run the whole case, whatever its analysis. A result file is written where output%file names
    one; the results are in the handle in any case. Forgets earlier points. */
 int fw_run_case(fw_handle handle);
+
+/* The one function for a handle that is at work in another thread: fw_run_case or fw_solve there
+   ends, within a point too, with FW_STOPPED; the points that were finished are kept. FW_USAGE where
+   no call is at work on the handle. Not for signal handlers: let a thread call it. */
+int fw_stop(fw_handle handle);
 
 /* Or step by step. fw_start builds the system for the frequencies between sweep%start and
    sweep%end and forgets earlier points; every change of the case asks for a new start. fw_solve

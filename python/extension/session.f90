@@ -44,6 +44,7 @@ module fw_python_session
       procedure :: on_point
       procedure :: on_message
       procedure :: on_end
+      procedure :: poll
    end type python_observer
 
    character(*), parameter :: line_end = new_line('a')
@@ -129,6 +130,13 @@ contains
       self%message = error%message
       status = error%status
    end subroutine conclude
+
+   !> Python may set the flag at any time.
+   subroutine poll(self)
+      class(python_observer), intent(inout) :: self
+
+      self%stop_requested = self%stop_requested .or. self%control(control_stop) /= 0_i8
+   end subroutine poll
 
    subroutine on_start(self, case_title, n_points)
       class(python_observer), intent(inout) :: self

@@ -41,11 +41,13 @@ _BETWEEN_CALLS = 0.1
 
 
 def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool = True,
-        progress: Progress | None = None, stop: threading.Event | None = None) -> Result:
+        progress: Progress | None = None, stop: threading.Event | Callable[[], object] | None = None,
+        max_seconds: float | None = None) -> Result:
     """Run a case and open its result.
 
     The library computes in this process with the interpreter lock released; the numbers are those
-    of `fw_run`, to the last digit. Ctrl-C stops the run and keeps what is done.
+    of `fw_run`, to the last digit. Ctrl-C stops the run, within a point too, and keeps the points
+    that are done.
 
     Parameters
     ----------
@@ -59,8 +61,11 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     progress : callable, optional
         Called now and then with the points done and the points to come (0: not known); True shows
         them in a line, in a notebook too.
-    stop : threading.Event, optional
-        Set it, in any thread, to stop the run as Ctrl-C does.
+    stop : threading.Event or callable, optional
+        Set the event, in any thread, to stop the run as Ctrl-C does; a function is called about
+        ten times a second, and stops the run by returning what is true.
+    max_seconds : float, optional
+        Stop the run after this time; the key `max_seconds` of `case` (default: no limit).
 
     Returns
     -------
@@ -78,6 +83,7 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     RunInterrupted
         The run was stopped (a KeyboardInterrupt); its `result` holds the points up to there.
     """
+    is_stopped = _stop_function(stop)
     if progress is not None and not isinstance(progress, bool) and not callable(progress):
         raise InputError(f"progress: is a {type(progress).__name__}, must be True or a function of "
                          "the points done and the points to come")
@@ -85,10 +91,12 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         case = Case.from_file(case)
     if file is not None:
         case = case.replace(output={"file": os.path.abspath(file)})
+    if max_seconds is not None:
+        case = case.replace(case={"max_seconds": max_seconds})
     in_memory = not case.names_output
     with case.open() as session:
         tell = _Line() if progress is True else progress or None
-        status, interrupted = _watched(session, tell, stop, in_memory=in_memory)
+        status, interrupted = _watched(session, tell, is_stopped, in_memory=in_memory)
         if isinstance(tell, _Line):
             tell.end()
         report = (session.text("remarks") + session.text("summary")).splitlines()
@@ -207,6 +215,17 @@ def _refuse_twice(group: str, own: Mapping[str, object], given: Mapping[str, obj
                          "it out, or make a Case and run it")
 
 
+def _stop_function(stop: object) -> Callable[[], object] | None:
+    """What tells whether to stop: an event is asked whether it is set."""
+    if stop is None:
+        return None
+    asked = getattr(stop, "is_set", stop)
+    if not callable(asked):
+        raise InputError(f"stop: is a {type(stop).__name__}, must be a threading.Event or a function "
+                         "without arguments")
+    return asked
+
+
 class _Line:
     """Points done, in one line of the standard error that changes."""
 
@@ -232,7 +251,7 @@ class _Line:
 _Tell = Callable[[int, int], object]
 
 
-def _watched(session: Session, progress: _Tell | None, stop: threading.Event | None, *,
+def _watched(session: Session, progress: _Tell | None, stop: Callable[[], object] | None, *,
              in_memory: bool) -> tuple[int, bool]:
     """Run a session so that it can be interrupted; its status, and whether it was.
 
@@ -258,7 +277,7 @@ def _watched(session: Session, progress: _Tell | None, stop: threading.Event | N
 
 
 def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: _Tell | None,
-          stop: threading.Event | None) -> None:
+          stop: Callable[[], object] | None) -> None:
     if progress is None and stop is None:
         worker.join()
         return
@@ -266,7 +285,7 @@ def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: _Tell 
     while True:
         worker.join(_BETWEEN_CALLS)
         at_work = worker.is_alive()
-        if stop is not None and stop.is_set():
+        if stop is not None and stop():
             control[0] = 1
         if progress is not None and told != control[1]:
             told = int(control[1])

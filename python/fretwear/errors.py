@@ -69,7 +69,7 @@ class OutputError(FretwearError, OSError):
 
 
 class RunInterrupted(KeyboardInterrupt):
-    """A run was stopped (Ctrl-C); the points up to there are saved.
+    """A run was stopped (Ctrl-C, `stop`, `max_seconds`); the points up to there are saved.
 
     Parameters
     ----------

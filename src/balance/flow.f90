@@ -68,6 +68,7 @@ contains
       m = balance%structure%n_coordinates
       nh = balance%fourier%n_retained
       self%balance => balance
+      self%interrupt => balance%interrupt
       self%n = balance%n
       self%reference = balance%reference
       self%reduced = .false.

@@ -41,6 +41,7 @@ contains
       type(hdhb_system) :: self
 
       self%balance => balance
+      self%interrupt => balance%interrupt
       self%n = balance%n
       self%reduced = balance%reduced
       allocate (self%coefficients(self%n), self%product(self%n), source=0.0_wp)

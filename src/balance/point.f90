@@ -28,6 +28,8 @@ module fw_point
       !> Largest magnitude over the period (n_observed).
       real(wp), allocatable :: amplitude(:)
       logical :: converged = .false.
+      !> What is worth telling of the way to it; not allocated where nothing is.
+      character(:), allocatable :: note
       !> What gave the solution.
       integer :: served_by = served_by_none
       !> Harmonics of the balance and instants per period; 0 where they are those of the case.

@@ -41,6 +41,7 @@ module fw_c_interface
    use fw_error, only: error_type
    use fw_error, only: status_ok
    use fw_error, only: status_usage
+   use fw_handles, only: ask_to_stop
    use fw_handles, only: delete_handle
    use fw_handles, only: enter
    use fw_handles, only: handle_type
@@ -292,6 +293,12 @@ contains
 
       status = int(call_run(id_of(handle)), c_int)
    end function c_run_case
+
+   integer(c_int) function c_stop(handle) bind(c, name='fw_stop') result(status)
+      type(c_ptr), value :: handle
+
+      status = int(ask_to_stop(id_of(handle)), c_int)
+   end function c_stop
 
    !> omega in rad/s, in any order; the last converged point is the first guess.
    integer(c_int) function c_solve(handle, omega) bind(c, name='fw_solve') result(status)

@@ -67,6 +67,8 @@ module fw_callbacks
 
    !> One object serves both languages: whichever functions are set are called.
    type, extends(observer_type) :: callback_observer
+      !> Set by another thread to end the call at work.
+      logical :: asked_to_stop = .false.
       !> Number of the handle, for programs in Fortran 77.
       integer :: handle = 0
       !> Function pointers and the data that go back to them, of fw_on_progress and fw_on_message.
@@ -80,9 +82,19 @@ module fw_callbacks
       procedure :: on_point
       procedure :: on_message
       procedure :: on_end
+      procedure :: poll
    end type callback_observer
 
 contains
+
+   subroutine poll(self)
+      class(callback_observer), intent(inout) :: self
+      logical :: asked
+
+      !$omp atomic read
+      asked = self%asked_to_stop
+      if (asked) self%stop_requested = .true.
+   end subroutine poll
 
    !> There is nothing to say before the first point.
    subroutine on_start(self, case_title, n_points)

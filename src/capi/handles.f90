@@ -13,7 +13,7 @@ module fw_handles
    implicit none (type, external)
    private
 
-   public :: handle_type, new_handle, find_handle, delete_handle, enter, leave
+   public :: handle_type, new_handle, find_handle, delete_handle, enter, leave, ask_to_stop
 
    type :: handle_type
       integer :: id = 0
@@ -112,6 +112,7 @@ contains
          if (.not. slots(i)%handle%busy) then
             handle => slots(i)%handle
             handle%busy = .true.
+            handle%observer%asked_to_stop = .false.
          end if
       end if
       !$omp end critical (fretwear_handles)
@@ -119,6 +120,24 @@ contains
       handle%message = ''
       call handle%floating_point%enter()
    end subroutine enter
+
+   !> Ask the call at work on a session to end, from any thread; refused where there is none.
+   integer function ask_to_stop(id) result(status)
+      integer, intent(in) :: id
+      integer :: i
+
+      status = status_usage
+      !$omp critical (fretwear_handles)
+      i = slot_of(id)
+      if (i > 0) then
+         if (slots(i)%handle%busy) then
+            !$omp atomic write
+            slots(i)%handle%observer%asked_to_stop = .true.
+            status = status_ok
+         end if
+      end if
+      !$omp end critical (fretwear_handles)
+   end function ask_to_stop
 
    !> End a call: keep the message of an error and return its status.
    integer function leave(handle, error) result(status)

@@ -13,6 +13,7 @@
 module fw_accuracy
    use fw_case, only: case_type
    use fw_error, only: error_type
+   use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_laws, only: is_rigid
    use fw_level, only: describe_levels
@@ -62,6 +63,8 @@ module fw_accuracy
       real(wp) :: worst = 0.0_wp, worst_omega = 0.0_wp
       !> (numbers of harmonics, doublings of the instants)
       type(level_type), allocatable :: level(:, :)
+      !> What may end the work on the present point.
+      class(interrupt_type), pointer, private :: interrupt => null()
    contains
       procedure :: start
       procedure :: solve
@@ -144,6 +147,7 @@ contains
       integer :: iterations, failures, at_best(2)
       logical :: finer
 
+      self%interrupt => request%interrupt
       iterations = 0
       failures = 0
       at_best = [self%current, self%doublings]
@@ -202,7 +206,8 @@ contains
       if (allocated(error)) return
       associate (level => self%level(k, doublings))
          call level%take_over(self%level(self%current, self%doublings))
-         call level%solve(case, point_request(omega=omega, fallback=.false., &
+         call level%solve(case, point_request(omega=omega, interrupt=self%interrupt, &
+                                              fallback=.false., &
                                               histories=case%output%histories), point, error)
       end associate
       if (allocated(error)) return

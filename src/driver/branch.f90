@@ -1,6 +1,7 @@
 !> A frequency response along its branch, through folds: continuation = 'arclength'.
 module fw_branch
    use, intrinsic :: iso_fortran_env, only: int64
+   use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_case, only: case_type
    use fw_continuation, only: arclength_type
@@ -24,6 +25,7 @@ module fw_branch
    use fw_solution, only: find_stability
    use fw_solution, only: is_lasting
    use fw_strategy, only: new_request
+   use fw_strategy, only: note_time_limit
    use fw_sweep, only: point_source
    implicit none (type, external)
    private
@@ -72,7 +74,7 @@ contains
    subroutine next_on_branch(self, case, observer, point, more, error)
       class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
-      class(observer_type), intent(inout) :: observer
+      class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
@@ -90,17 +92,22 @@ contains
    subroutine solve_first(self, case, observer, point, error)
       class(branch_source), intent(inout) :: self
       type(case_type), intent(in) :: case
-      class(observer_type), intent(inout) :: observer
+      class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
 
       ! What the first point leaves, the whole path inherits.
       self%level%solver%method%newton%loosest = tight_forcing
-      call self%level%solve(case, new_request(case, case%sweep%start), point, error)
+      call observer%limit_point(case%solver%max_seconds)
+      call self%level%solve(case, new_request(case, case%sweep%start, observer), point, error)
       if (allocated(error)) return
+      if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
+      call observer%limit_point(0.0_wp)
+      if (allocated(point%note)) call observer%on_message(point%note)
       self%has_begun = .true.
       self%has_no_start = .not. point%converged
       if (point%converged) then
+         self%level%system%interrupt => observer
          call self%branch%begin(case, self%level%system, self%level%solver%x, error)
       else
          call observer%on_message('the first point did not converge: no branch to follow')
@@ -180,6 +187,7 @@ contains
       allocate (self%whole)
       call build_system(case, self%whole, error, keep_all=.true.)
       if (allocated(error)) return
+      self%whole%interrupt => system%interrupt
       call self%whole%set_frequency(case%sweep%start, error)
       if (allocated(error)) return
       ! One and the same law.
@@ -194,6 +202,8 @@ contains
       newton%options = case%solver
       call newton%solve(self%whole, whole_x, report)
       call self%curve%corrector%linear%add_work(newton%linear)
+      if (report%interrupted) call stop_run(system%interrupt, error)
+      if (allocated(error)) return
       if (report%converged) then
          self%system => self%whole
       else

@@ -8,6 +8,7 @@ module fw_frequency_response
    use fw_case, only: analysis_time
    use fw_case, only: case_type
    use fw_error, only: error_type
+   use fw_error, only: status_stopped
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
@@ -67,7 +68,7 @@ contains
       select type (source)
       type is (frequency_source)
          if (case%analysis == analysis_frf .and. size(source%omega) > 1) then
-            call finder%start(case, source%omega, source, strategy)
+            call finder%start(case, source%omega, source, strategy, observer)
             call sinks%add(finder)
             call remark_range(case, finder%modes, summary%remarks)
          end if
@@ -79,6 +80,7 @@ contains
       if (.not. (allocated(error) .or. state%was_stopped)) then
          call find_peaks(case, finder, writer, summary, error)
          if (.not. allocated(error)) call add_rows(case, finder, sinks, writer, state, error)
+         call note_stop(observer, state, error)
       end if
       call finder%clear()
    end subroutine run_frequency_response
@@ -100,6 +102,21 @@ contains
       end do
       if (finder%added%n > 0) call writer%sort_points(case%sweep%end < case%sweep%start, error)
    end subroutine add_rows
+
+   !> A stop while peaks were looked for: the rows are whole, and the peaks are left out.
+   subroutine note_stop(observer, state, error)
+      class(observer_type), intent(inout) :: observer
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (.not. allocated(error)) return
+      if (error%status /= status_stopped) return
+      deallocate (error)
+      state%was_stopped = .true.
+      state%is_incomplete = .true.
+      call observer%on_message('stopped while peaks between the points were looked for: they '// &
+                               'are left out')
+   end subroutine note_stop
 
    !> The maxima between the rows go to the result and the summary.
    subroutine find_peaks(case, finder, writer, summary, error)

@@ -1,15 +1,16 @@
 !> How progress leaves a run: the driver calls an observer and writes nothing itself. And how a
 !> run is stopped from outside: what was computed until then is kept.
 module fw_observer
+   use fw_interrupt, only: interrupt_type
    use fw_point, only: point_type
    implicit none (type, external)
    private
 
    public :: observer_type, silent_observer
 
-   type, abstract :: observer_type
-      !> Set by any callback to end the run after the present point.
-      logical :: stop_requested = .false.
+   !> Any callback may set `stop_requested` to end the run; what asks for the end at other times
+   !> is seen by `poll`.
+   type, abstract, extends(interrupt_type) :: observer_type
    contains
       !> Before the first point.
       procedure(start_callback), deferred :: on_start

@@ -10,6 +10,8 @@ module fw_outcome
    type :: outcome_type
       !> status_ok, status_not_converged, or status_stopped where the observer ended the run.
       integer :: status = status_ok
+      !> Its time was over (case%max_seconds).
+      logical :: out_of_time = .false.
       !> A short table for people, one line each.
       type(string_type), allocatable :: summary(:)
    end type outcome_type

@@ -15,6 +15,7 @@ module fw_peak_finder
    use fw_joint_modes, only: state_sliding
    use fw_joint_modes, only: state_stuck
    use fw_kinds, only: pi
+   use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_peak, only: found_bound
    use fw_peak, only: found_jump
@@ -70,6 +71,7 @@ module fw_peak_finder
       !> Where points come from, and who solves more of them.
       class(point_source), pointer :: source => null()
       class(point_strategy), pointer :: strategy => null()
+      class(interrupt_type), pointer :: interrupt => null()
       !> Modes of the joint in the range of the sweep.
       type(joint_mode_type), allocatable :: modes(:)
       !> Solutions of the search, and their iterations.
@@ -95,17 +97,20 @@ module fw_peak_finder
 contains
 
    !> Get ready for a sweep over frequencies.
-   subroutine start(self, case, omega, source, strategy)
+   subroutine start(self, case, omega, source, strategy, interrupt)
       class(peak_finder), intent(inout) :: self
       type(case_type), intent(in) :: case
       !> In the order of the rows (n_points) [rad/s].
       real(wp), intent(in) :: omega(:)
       class(point_source), intent(in), target :: source
       class(point_strategy), intent(in), target :: strategy
+      !> What may end the search.
+      class(interrupt_type), intent(in), target :: interrupt
       integer :: n
 
       self%source => source
       self%strategy => strategy
+      self%interrupt => interrupt
       self%is_active = .true.
       n = size(omega)
       self%in_order = all(omega(2:) > omega(:n - 1)) .or. all(omega(2:) < omega(:n - 1))
@@ -446,7 +451,8 @@ contains
       request = point_request(omega=omega, fallback=.false.)
       if (case%sweep%refine) request = new_request(case, omega)
       request%fallback = .false.
-      call self%strategy%solve(case, request, point, error)
+      request%interrupt => self%interrupt
+      call self%strategy%solve_in_time(case, request, point, error)
       if (allocated(error)) return
       self%n_solved = self%n_solved + 1
       self%iterations = self%iterations + point%iterations

@@ -4,6 +4,7 @@ module fw_point_solver
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_case, only: case_type
+   use fw_interrupt, only: stop_run
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_guess, only: free_guess
@@ -31,6 +32,7 @@ module fw_point_solver
    use fw_solver_options, only: solver_kinsol
    use fw_solver_options, only: solver_powell
    use fw_solver_options, only: solver_pseudo_time
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
@@ -45,6 +47,8 @@ module fw_point_solver
    !> solution exists, or where none is found in this way.
    integer, parameter :: max_point_failures = 2
    !> First and smallest step of the load on the way to a first solution.
+   !> Iterations spent on a point after which no other way to it is begun, over max_iterations.
+   integer, parameter :: most_work = 50
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
    type :: point_solver
@@ -63,6 +67,9 @@ module fw_point_solver
       integer :: flow_failures = 0
       !> Points without a solution since the last one with it.
       integer :: point_failures = 0
+      !> Iterations of a point from which on no other way is begun, and whether that was so.
+      integer :: work_limit = huge(1)
+      logical :: out_of_work = .false.
       !> What gave the present solution.
       integer :: served_by = served_by_none
    contains
@@ -99,8 +106,17 @@ contains
       call system_clock(clock, rate)
       self%omega_wanted = request%omega
       self%best_residual = huge(1.0_wp)
+      self%work_limit = most_work*case%solver%max_iterations
+      self%out_of_work = .false.
+      system%interrupt => request%interrupt
       call reach(self, case, system, request, report, point%iterations, error)
+      if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
+      nullify (system%interrupt)
       if (allocated(error)) return
+      if (self%out_of_work .and. .not. report%converged) then
+         point%note = 'work limit: the other ways to omega = '//to_text(request%omega)// &
+                      ' rad/s were left after '//to_text(point%iterations)//' iterations'
+      end if
       self%point_failures = merge(0, self%point_failures + 1, report%converged)
       if (report%converged) point%served_by = self%served_by
       if (.not. report%converged .and. self%best_residual < huge(1.0_wp)) then
@@ -131,6 +147,18 @@ contains
       point%seconds = real(clock_end - clock, wp)/real(rate, wp)
    end subroutine solve
 
+   !> Whether other ways to the point are worth beginning.
+   logical function goes_on(self, report, iterations)
+      class(point_solver), intent(inout) :: self
+      type(solver_report), intent(in) :: report
+      integer, intent(in) :: iterations
+
+      goes_on = .not. (report%converged .or. report%interrupted)
+      if (.not. goes_on) return
+      self%out_of_work = iterations >= self%work_limit
+      goes_on = .not. self%out_of_work
+   end function goes_on
+
    !> Newton from the best guesses known. Where all fail: pseudo-time; then from the last point on
    !> the sweep by halves, or to the first point by raising the load; Newton again, with LU where
    !> GMRES failed; and at last from the solution without contact, which may lie on another branch.
@@ -151,16 +179,18 @@ contains
       self%method%newton%linear%lu_left_out = .false.
       call from_guesses(self, system, request%omega, report, iterations, error)
       if (allocated(error)) return
-      if (report%converged .or. .not. request%fallback) return
+      if (.not. request%fallback) return
+      if (.not. goes_on(self, report, iterations)) return
       if (self%point_failures < max_point_failures) then
          call by_other_ways(self, case, system, request%omega, report, iterations, error)
-         if (allocated(error) .or. report%converged) return
+         if (allocated(error)) return
+         if (.not. goes_on(self, report, iterations)) return
       end if
       if (self%method%newton%linear%lu_left_out) then
          self%method%newton%linear%lu_follows = .true.
          call from_guesses(self, system, request%omega, report, iterations, error)
          self%method%newton%linear%lu_follows = .false.
-         if (allocated(error) .or. report%converged) return
+         if (allocated(error) .or. report%converged .or. report%interrupted) return
       end if
       call from_free_guess(self, system, request%omega, report, iterations)
    end subroutine reach
@@ -181,7 +211,7 @@ contains
          if (allocated(error)) return
          self%flow_failures = merge(0, self%flow_failures + 1, report%converged)
          if (report%converged) self%n_by_flow = self%n_by_flow + 1
-         if (report%converged) return
+         if (.not. goes_on(self, report, iterations)) return
       end if
       if (self%n_converged == 0) then
          call raise_load(self, system, omega, report, iterations, error)
@@ -204,6 +234,7 @@ contains
       call free_guess(system, self%x)
       call attempt(self, system, last_report)
       iterations = iterations + last_report%iterations
+      report%interrupted = last_report%interrupted
       if (.not. last_report%converged) return
       report = last_report
       self%served_by = served_by_free_guess
@@ -272,6 +303,7 @@ contains
             self%x = reached
             step = 0.5_wp*step
             if (step < smallest_load_step) exit
+            if (.not. goes_on(self, report, iterations)) exit
          end if
       end do
       system%load_share = 1.0_wp
@@ -312,14 +344,14 @@ contains
       middle = 0.5_wp*(self%omega_last + omega)
       call from_guesses(self, system, middle, report, iterations, error)
       if (allocated(error)) return
-      if (.not. report%converged .and. depth < max_halvings) then
+      if (depth < max_halvings .and. goes_on(self, report, iterations)) then
          call approach(self, system, middle, depth + 1, report, iterations, error)
          if (allocated(error)) return
       end if
       if (report%converged) then
          call from_guesses(self, system, omega, report, iterations, error)
          if (allocated(error)) return
-         if (.not. report%converged .and. depth < max_halvings) then
+         if (depth < max_halvings .and. goes_on(self, report, iterations)) then
             call approach(self, system, omega, depth + 1, report, iterations, error)
             if (allocated(error)) return
          end if
@@ -352,7 +384,8 @@ contains
          end select
          call attempt(self, system, report)
          iterations = iterations + report%iterations
-         if (report%converged .or. .not. self%method%newton%options%fallback) exit
+         if (report%converged .or. report%interrupted) exit
+         if (.not. self%method%newton%options%fallback) exit
       end do
       if (.not. report%converged) return
       self%served_by = served_by_other_guess

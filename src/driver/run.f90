@@ -19,6 +19,7 @@ module fw_run
    use fw_run_state, only: run_state
    use fw_summary, only: summary_type
    use fw_summary, only: new_summary
+   use fw_text, only: to_text
    use fw_threads, only: thread_scope
    use fw_wear_response, only: run_wear
    implicit none (type, external)
@@ -73,6 +74,7 @@ contains
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
       observer%stop_requested = .false.
+      call observer%limit_run(case%max_seconds)
       if (present(image)) then
          call writer%open(case, error, in_memory=.true.)
       else if (is_wanted(write_file)) then
@@ -91,6 +93,7 @@ contains
       call system_clock(clock_end)
       elapsed = real(clock_end - clock, wp)/real(rate, wp)
       outcome%status = state%status()
+      outcome%out_of_time = observer%run_out
       if (allocated(error)) then
          if (state%n_points == 0) then
             call writer%discard()
@@ -104,6 +107,8 @@ contains
          call writer%add_remarks(summary%remarks%name, summary%remarks%text, error)
          if (allocated(error)) return
       end if
+      if (observer%run_out) call observer%on_message('time limit: the run ended after case'// &
+         '%max_seconds = '//to_text(case%max_seconds)//' s')
       call writer%close(trim(state%words()), elapsed, error, summary%skipped, summary%sampling)
       if (present(image)) call move_alloc(writer%image, image)
       outcome%summary = summary%lines(state, elapsed)

@@ -342,9 +342,11 @@ contains
       recorder%list => self%points
       recorder%observer => observer
       call threads%enter(self%case%threads)
-      call self%strategy%solve(self%case, new_request(self%case, omega), point, error)
+      call self%strategy%solve_in_time(self%case, new_request(self%case, omega, observer), point, &
+                                       error)
       call threads%leave()
       if (allocated(error)) return
+      if (allocated(point%note)) call recorder%on_message(point%note)
       if (allocated(self%strategy%note)) call recorder%on_message(self%strategy%note)
       call recorder%on_point(self%points%n + 1, 0, point)
    end subroutine solve

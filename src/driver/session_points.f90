@@ -29,6 +29,7 @@ module fw_session_points
       procedure :: on_point
       procedure :: on_message
       procedure :: on_end
+      procedure :: poll
    end type point_recorder
 
 contains
@@ -58,6 +59,13 @@ contains
       if (allocated(self%item)) deallocate (self%item)
       self%n = 0
    end subroutine clear
+
+   subroutine poll(self)
+      class(point_recorder), intent(inout) :: self
+
+      call self%observer%poll()
+      self%stop_requested = self%stop_requested .or. self%observer%stop_requested
+   end subroutine poll
 
    subroutine on_start(self, case_title, n_points)
       class(point_recorder), intent(inout) :: self

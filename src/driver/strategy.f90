@@ -3,14 +3,16 @@
 module fw_strategy
    use fw_case, only: case_type
    use fw_error, only: error_type
+   use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_summary, only: summary_type
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: point_strategy, point_request, new_request, solver_memory
+   public :: point_strategy, point_request, new_request, note_time_limit, solver_memory
 
    !> What is asked of a point.
    type :: point_request
@@ -20,6 +22,8 @@ module fw_strategy
       logical :: fallback = .true.
       !> Floquet multipliers; contact forces, states and energies; histories over the period.
       logical :: stability = .false., contact = .false., histories = .false.
+      !> What may end the work on it; null where nothing does.
+      class(interrupt_type), pointer :: interrupt => null()
    end type point_request
 
    !> A solution to go on from, wherever the points have gone since.
@@ -39,6 +43,7 @@ module fw_strategy
       procedure(start_strategy), deferred :: start
       procedure(solve_point), deferred :: solve
       procedure(describe_work), deferred :: describe
+      procedure :: solve_in_time
       procedure :: remember => remember_nothing
       procedure :: recall => recall_nothing
    end type point_strategy
@@ -98,13 +103,43 @@ contains
       end associate
    end subroutine recall_nothing
 
+   !> Solve within the time that the case gives a point. A stop is an error of status_stopped.
+   subroutine solve_in_time(self, case, request, point, error)
+      class(point_strategy), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      if (associated(request%interrupt)) call request%interrupt%limit_point(case%solver%max_seconds)
+      call self%solve(case, request, point, error)
+      if (.not. associated(request%interrupt)) return
+      if (.not. (allocated(error) .or. point%converged)) then
+         call note_time_limit(request%interrupt, case%solver%max_seconds, point)
+      end if
+      call request%interrupt%limit_point(0.0_wp)
+   end subroutine solve_in_time
+
+   !> Say of a point without a solution that its time was over, where it was.
+   subroutine note_time_limit(interrupt, seconds, point)
+      class(interrupt_type), intent(inout) :: interrupt
+      real(wp), intent(in) :: seconds
+      type(point_type), intent(inout) :: point
+
+      if (seconds <= 0.0_wp .or. .not. interrupt%is_due()) return
+      point%note = 'time limit: no solution at omega = '//to_text(point%omega)// &
+                   ' rad/s within solver%max_seconds = '//to_text(seconds)//' s'
+   end subroutine note_time_limit
+
    !> What a case asks of its points.
-   pure function new_request(case, omega) result(request)
+   function new_request(case, omega, interrupt) result(request)
       type(case_type), intent(in) :: case
       !> [rad/s]
       real(wp), intent(in) :: omega
+      class(interrupt_type), intent(inout), target, optional :: interrupt
       type(point_request) :: request
 
+      if (present(interrupt)) request%interrupt => interrupt
       request%omega = omega
       request%fallback = case%solver%fallback
       request%stability = case%sweep%stability

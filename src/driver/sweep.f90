@@ -4,6 +4,7 @@ module fw_sweep
    use fw_case, only: analysis_time
    use fw_case, only: case_type
    use fw_error, only: error_type
+   use fw_error, only: status_stopped
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
@@ -34,7 +35,7 @@ module fw_sweep
          class(point_source), intent(inout) :: self
          type(case_type), intent(in) :: case
          !> Told what is worth knowing on the way.
-         class(observer_type), intent(inout) :: observer
+         class(observer_type), intent(inout), target :: observer
          type(point_type), intent(out) :: point
          logical, intent(out) :: more
          type(error_type), allocatable, intent(out) :: error
@@ -68,19 +69,23 @@ contains
       type(case_type), intent(in) :: case
       class(point_source), intent(inout) :: source
       type(sink_list), intent(inout) :: sinks
-      class(observer_type), intent(inout) :: observer
+      class(observer_type), intent(inout), target :: observer
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
       logical :: more
 
-      do while (.not. observer%stop_requested)
+      do while (.not. observer%is_stopping())
          call source%next(case, observer, point, more, error)
          if (allocated(error) .or. .not. more) exit
          call sinks%take(point, error)
          if (allocated(error)) exit
          call state%note(point)
       end do
+      if (allocated(error)) then
+         ! The point at work when the stop came is no row.
+         if (error%status == status_stopped) deallocate (error)
+      end if
       if (.not. allocated(error)) call source%finish(case, observer)
       state%was_stopped = observer%stop_requested
       state%is_incomplete = state%is_incomplete .or. .not. source%is_covered()
@@ -115,15 +120,17 @@ contains
    subroutine next_frequency(self, case, observer, point, more, error)
       class(frequency_source), intent(inout) :: self
       type(case_type), intent(in) :: case
-      class(observer_type), intent(inout) :: observer
+      class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
 
       more = self%n_given < size(self%omega)
       if (.not. more) return
-      call self%strategy%solve(case, new_request(case, self%omega(self%n_given + 1)), point, error)
+      call self%strategy%solve_in_time(case, new_request(case, self%omega(self%n_given + 1), &
+                                                         observer), point, error)
       if (allocated(error)) return
+      if (allocated(point%note)) call observer%on_message(point%note)
       if (allocated(self%strategy%note)) call observer%on_message(self%strategy%note)
       self%n_given = self%n_given + 1
    end subroutine next_frequency

@@ -132,7 +132,7 @@ contains
       if (allocated(error)) return
       call integrate_in_time(self%structure, case%model%observe_matrix, request%omega, case%time, &
                              max(case%solver%tolerance, tightest_change), state, &
-                             case%harmonics%n_harmonics, point, error)
+                             case%harmonics%n_harmonics, point, error, request%interrupt)
       if (allocated(error)) return
       if (.not. request%histories) then
          deallocate (point%history)
@@ -152,12 +152,14 @@ contains
       type(point_request), intent(in) :: request
       type(time_state), intent(out) :: state
       type(error_type), allocatable, intent(out) :: error
+      type(point_request) :: start
       type(point_type) :: balance
       integer :: h, n_harmonics
 
       n_harmonics = self%start_case%harmonics%n_harmonics
-      call self%solver%solve(self%start_case, self%system, &
-                             new_request(self%start_case, request%omega), balance, error)
+      start = new_request(self%start_case, request%omega)
+      start%interrupt => request%interrupt
+      call self%solver%solve(self%start_case, self%system, start, balance, error)
       if (allocated(error)) return
       if (.not. balance%converged) then
          self%note = 'harmonic balance did not converge: the integration in time starts from '// &

@@ -5,6 +5,7 @@ module fw_wear_response
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
+   use fw_error, only: status_stopped
    use fw_hbm, only: hbm_system
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
@@ -22,6 +23,7 @@ module fw_wear_response
    use fw_solution, only: is_lasting
    use fw_run_state, only: run_state
    use fw_strategy, only: new_request
+   use fw_strategy, only: note_time_limit
    use fw_summary, only: summary_type
    use fw_wear_march, only: steady_not_reached
    use fw_wear_march, only: steady_words
@@ -100,8 +102,17 @@ contains
       if (allocated(error)) return
       call observer%on_start(case%title, 0)
       call run%solver%start(case, case%harmonics, run%balance%n)
-      call run%solver%solve(case, run%balance, new_request(case, case%sweep%start), point, error)
-      if (allocated(error)) return
+      call observer%limit_point(case%solver%max_seconds)
+      call run%solver%solve(case, run%balance, new_request(case, case%sweep%start, observer), &
+                            point, error)
+      if (allocated(error)) then
+         call give_up_early(state, error)
+         call observer%on_end()
+         return
+      end if
+      if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
+      call observer%limit_point(0.0_wp)
+      if (allocated(point%note)) call observer%on_message(point%note)
       if (point%converged) then
          call start_march(run, case, point, error)
          if (.not. allocated(error)) call march_on(run, restart, error)
@@ -116,6 +127,17 @@ contains
       end if
       call run%recorder%restart_rows%close()
    end subroutine run_wear
+
+   !> A stop before the first state is an outcome, and no error.
+   subroutine give_up_early(state, error)
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (error%status /= status_stopped) return
+      deallocate (error)
+      state%was_stopped = .true.
+      state%is_incomplete = .true.
+   end subroutine give_up_early
 
    !> The rows of a result that is incomplete until the run says otherwise.
    subroutine start_recorder(recorder, case, observer, writer, summary, state, error)
@@ -147,6 +169,7 @@ contains
 
       call new_wear_system(run%balance, case%contact, case%wear%coefficient, &
                            case%wear%law == wear_energy, run%system)
+      run%system%interrupt => run%recorder%observer
       call first_state(run%system, run%solver%x, point, run%state)
       associate (march => run%march)
          march%options = case%wear

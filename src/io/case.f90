@@ -3,7 +3,9 @@
 module fw_case
    use fw_key, only: key
    use fw_key, only: key_visitor
+   use fw_key_range, only: at_least
    use fw_key_range, only: from_to
+   use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_contact_data, only: contact_type, spring_type
    use fw_harmonics_options, only: harmonics_options
@@ -41,6 +43,8 @@ module fw_case
       integer :: analysis = analysis_frf
       !> OpenMP threads (0: all).
       integer :: threads = 0
+      !> Time after which the run ends with what is done [s] (0: none).
+      real(wp) :: max_seconds = 0.0_wp
       type(model_type) :: model
       type(contact_type) :: contact
       type(spring_type) :: springs
@@ -76,6 +80,8 @@ contains
                               'integration in time'), self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)
+      call keys%bind(key('max_seconds', 'time after which the run ends with the points that '// &
+                         'are done; 0: none', at_least(0.0_wp), unit='s'), self%max_seconds)
    end subroutine bind_case_keys
 
    !> The keys of group &output but for what is observed.

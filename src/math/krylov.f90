@@ -6,6 +6,8 @@
 !> taken is the Euclidean one of the right-hand side's space, so the caller scales where it matters.
 module fw_krylov
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use fw_interrupt, only: interrupt_type
+   use fw_interrupt, only: must_end
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
    implicit none (type, external)
@@ -15,7 +17,10 @@ module fw_krylov
 
    !> A square linear operator with a preconditioner.
    type, abstract :: linear_operator
+      !> What may end work with it early; null where nothing does.
+      class(interrupt_type), pointer :: interrupt => null()
    contains
+      procedure :: is_interrupted
       procedure(apply_operator), deferred :: apply
       procedure(apply_preconditioner), deferred :: precondition
    end type linear_operator
@@ -80,6 +85,13 @@ contains
       allocate (self%coefficients(self%restart + 1))
    end subroutine reserve
 
+   !> Whether work with it is to end.
+   logical function is_interrupted(self)
+      class(linear_operator), intent(in) :: self
+
+      is_interrupted = must_end(self%interrupt)
+   end function is_interrupted
+
    !> Solve A x = b to norm(b - A x) <= tolerance * norm(b), from x = 0.
    subroutine solve(self, operator, b, x, tolerance, converged)
       !> Workspace, with the counts of this solution on return.
@@ -105,6 +117,7 @@ contains
       converged = norm <= 0.0_wp
       self%basis(:, 1) = b
       do while (.not. converged .and. self%iterations < self%max_iterations)
+         if (operator%is_interrupted()) exit
          before = norm
          call build_cycle(self, operator, norm, target, used)
          call add_correction(self, operator, used, x)
@@ -154,6 +167,7 @@ contains
          ! abs(rhs(j + 1)) is the norm of the residual by the least-squares theory: no product is
          ! spent on watching it.
          if (abs(self%rhs(j + 1)) <= target .or. self%iterations >= self%max_iterations) exit
+         if (operator%is_interrupted()) exit
       end do
    end subroutine build_cycle
 

@@ -6,6 +6,7 @@ module fw_branch_mark
    use fw_corrector, only: corrector_type
    use fw_corrector, only: max_corrections
    use fw_error, only: error_type
+   use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_newton, only: solver_report
    use fw_parameter_system, only: parameter_system
@@ -79,6 +80,8 @@ contains
       call system%set_parameter(bound, error)
       if (allocated(error)) return
       do
+         call stop_run(system%interrupt, error)
+         if (allocated(error)) return
          call system%residual(point%x, r)
          associate (report => point%report)
             report%residual = norm2(r)/system%reference

@@ -12,6 +12,7 @@ module fw_corrector
    use fw_branch_point, only: branch_point
    use fw_branch_point, only: metric_type
    use fw_error, only: error_type
+   use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
    use fw_linear_step, only: linear_step_type
@@ -108,7 +109,8 @@ contains
       stalled = 0
       longer = 0
       do
-         call system%set_parameter(next%p, error)
+         call stop_run(system%interrupt, error)
+         if (.not. allocated(error)) call system%set_parameter(next%p, error)
          if (allocated(error)) return
          call system%residual(next%x, r)
          associate (report => next%report)
@@ -153,7 +155,8 @@ contains
       best = huge(1.0_wp)
       best_share = 1.0_wp
       do k = 0, max_halvings
-         call system%set_parameter(from%p + share*dp, error)
+         call stop_run(system%interrupt, error)
+         if (.not. allocated(error)) call system%set_parameter(from%p + share*dp, error)
          if (allocated(error)) return
          call system%residual(from%x + share*step, r)
          norm = norm2(r)/system%reference
@@ -274,7 +277,8 @@ contains
       integer :: n
 
       if (point%orientation /= 0 .or. .not. self%oriented .or. self%stands(point)) return
-      call system%set_parameter(point%p, error)
+      call stop_run(system%interrupt, error)
+      if (.not. allocated(error)) call system%set_parameter(point%p, error)
       if (allocated(error)) return
       allocate (r(system%n))
       call system%residual(point%x, r)

@@ -36,6 +36,7 @@ contains
       type(difference_system) :: self
 
       self%inner => inner
+      self%interrupt => inner%interrupt
       self%n = inner%n
       self%reference = inner%reference
       inner%reduced = .false.
@@ -156,6 +157,7 @@ contains
       integer :: j
 
       do j = 1, self%n
+         if (self%is_interrupted()) return
          unit = 0.0_wp
          unit(j) = 1.0_wp
          call difference(self, unit, step_size(self), matrix(:self%n, j))

@@ -133,6 +133,7 @@ contains
       call system%residual(x, state%r)
       report%residual = norm2(state%r)/system%reference
       report%converged = report%residual <= self%options%tolerance
+      report%interrupted = .not. report%converged .and. system%is_interrupted()
    end subroutine solve
 
    subroutine run(self, state, iterations)
@@ -283,7 +284,7 @@ contains
       call look(state, x_values, r_values)
       status = callback_ok
       if (.not. ieee_is_finite(norm2(r_values))) status = callback_smaller
-      if (state%best <= state%tolerance) status = callback_fatal
+      if (state%best <= state%tolerance .or. state%system%is_interrupted()) status = callback_fatal
    end function evaluate
 
    !> Callback: Jacobian times vector.
@@ -303,7 +304,7 @@ contains
       v => values(vector, state%system%n)
       p => values(product, state%system%n)
       call state%system%apply(v, p)
-      status = callback_ok
+      if (.not. state%system%is_interrupted()) status = callback_ok
    end function multiply
 
    !> Callback: build the preconditioner.

@@ -144,7 +144,7 @@ contains
          self%gmres%max_iterations = most
          self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
          self%worth_keeping = done .and. self%gmres%iterations <= limit
-         if (done) return
+         if (done .or. system%is_interrupted()) return
          call build(self, system)
       end if
       call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
@@ -170,7 +170,7 @@ contains
       if (n > 0 .and. .not. self%factored) then
          call iterate(self, system, tolerance, done)
          if (.not. done .and. self%kind /= linear_krylov .and. n <= lu_possible_up_to) then
-            if (self%lu_follows) then
+            if (self%lu_follows .and. .not. system%is_interrupted()) then
                call factor(self, system, n, done)
                if (.not. done) return
             else

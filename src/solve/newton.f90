@@ -19,6 +19,8 @@ module fw_newton
       integer :: iterations = 0
       !> norm(R)/reference at the end.
       real(wp) :: residual = huge(1.0_wp)
+      !> Ended from outside before its time.
+      logical :: interrupted = .false.
    end type solver_report
 
    type :: newton_solver
@@ -66,6 +68,8 @@ contains
          report%converged = norm <= self%options%tolerance
          if (report%converged .or. report%iterations >= self%options%max_iterations) exit
          if (.not. ieee_is_finite(norm) .or. stalled > patience) exit
+         report%interrupted = system%is_interrupted()
+         if (report%interrupted) exit
          call self%linear%solve(system, self%r, forcing, self%step, done)
          report%iterations = report%iterations + 1
          if (.not. done) exit
@@ -112,6 +116,7 @@ contains
             best_fraction = fraction
          end if
          if (trial_norm <= (1.0_wp - 1.0e-4_wp*fraction)*norm) exit
+         if (system%is_interrupted()) exit
          fraction = 0.5_wp*fraction
       end do
       done = best_norm < huge(1.0_wp)

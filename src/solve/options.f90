@@ -55,6 +55,8 @@ module fw_solver_options
       !> On norm(R)/norm(F).
       real(wp) :: tolerance = 1.0e-8_wp
       integer :: max_iterations = 60
+      !> Time after which a point counts as not converged [s] (0: none).
+      real(wp) :: max_seconds = 0.0_wp
       !> Try other ways to the solution where the first fails.
       logical :: fallback = .true.
       !> Leave out work that a case does not need (stuck pairs, components that nothing moves).
@@ -115,6 +117,9 @@ contains
                          'load', above(0.0_wp) .and. below(1.0_wp)), self%tolerance)
       call keys%bind(key('max_iterations', 'steps from each guess', at_least(1)), &
                      self%max_iterations)
+      call keys%bind(key('max_seconds', 'time after which a point counts as not converged; 0: '// &
+                         'none; along a branch that of the first point', at_least(0.0_wp), &
+                         unit='s'), self%max_seconds)
       call keys%bind(key('fallback', 'try other ways where the first guess fails'), self%fallback)
       call keys%bind(key('skips', 'leave out stuck pairs and components that nothing moves'), &
                      self%skips)

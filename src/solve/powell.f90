@@ -112,6 +112,7 @@ contains
       report%residual = norm2(state%r)/system%reference
       report%converged = report%residual <= self%options%tolerance
       report%iterations = state%n_jacobians
+      report%interrupted = .not. report%converged .and. system%is_interrupted()
       deallocate (state)
    end subroutine solve
 
@@ -180,7 +181,7 @@ contains
          state%best = norm
          state%best_x = x
       end if
-      if (norm <= state%tolerance) task = -1
+      if (norm <= state%tolerance .or. state%system%is_interrupted()) task = -1
    end subroutine evaluate_residual
 
    subroutine evaluate_jacobian(state, x, jacobian, task)

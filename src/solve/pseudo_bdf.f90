@@ -262,6 +262,7 @@ contains
       state%linearized = .false.
       status = callback_ok
       if (.not. ieee_is_finite(norm2(rate_values))) status = callback_smaller
+      if (state%system%is_interrupted()) status = callback_fatal
    end function evaluate
 
    !> Callback: -P^-1 J times vector.
@@ -290,7 +291,7 @@ contains
       call state%system%apply(v, p)
       p = -p
       call state%system%flow_solve(p)
-      status = callback_ok
+      status = merge(callback_fatal, callback_ok, state%system%is_interrupted())
    end function multiply
 
    !> Callback: preconditioner for 1 + gamma P^-1 J.

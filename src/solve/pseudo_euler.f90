@@ -70,6 +70,7 @@ contains
          if (done) exit
          self%rejected = self%rejected + 1
          x = self%x_old
+         if (report%interrupted) exit
          self%step = self%shrinkage*self%step
          if (self%step < self%shortest*self%scales%time) exit
          if (self%accepted + self%rejected >= self%options%max_steps) exit

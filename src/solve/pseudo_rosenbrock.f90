@@ -70,6 +70,7 @@ contains
          if (done) exit
          x = self%x_old
          self%rejected = self%rejected + 1
+         if (system%is_interrupted()) exit
          if (self%step < shortest*self%scales%time .or. .not. self%adaptive .or. &
              self%accepted + self%rejected >= self%options%max_steps) exit
       end do

@@ -118,6 +118,11 @@ contains
                              to_text(scheme%rejected)//' refused'
             exit
          end if
+         report%interrupted = system%is_interrupted()
+         if (report%interrupted) then
+            report%message = 'ended from outside'
+            exit
+         end if
          call advance(self, system, x, scheme, done)
          if (.not. done) then
             report%message = scheme%message
@@ -127,7 +132,9 @@ contains
       end do
       call scheme%finish()
       call system%clear_shift()
-      if (self%end_with_newton .and. len(report%message) > 0 .and. scheme%accepted > 0) then
+      report%interrupted = .not. done .and. system%is_interrupted()
+      if (self%end_with_newton .and. len(report%message) > 0 .and. scheme%accepted > 0 .and. &
+          .not. report%interrupted) then
          ! A last resort: the flow has not arrived, but may have come near.
          x = self%best_x
          call try_newton(self, system, x, progress, report, done)

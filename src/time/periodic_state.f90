@@ -10,6 +10,7 @@
 !> plain iteration, which falls steadily on the way to any periodic state, is accepted at
 !> `chatter_tolerance`.
 module fw_periodic_state
+   use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -20,13 +21,16 @@ module fw_periodic_state
    type, abstract :: period_map
       !> Weights that give the entries of the state a common unit (n_state).
       real(wp), allocatable :: weight(:)
+      !> What may end the integration early; null where nothing does.
+      class(interrupt_type), pointer :: interrupt => null()
    contains
       procedure(integrate_interface), deferred :: integrate
    end type period_map
 
    abstract interface
       !> State at the end of a period from that at its start, and the weighted range of the state
-      !> within the period; `done` is false where the integration failed.
+      !> within the period; `done` is false where the integration failed or
+      !> was ended from outside.
       subroutine integrate_interface(self, start, finish, range, done)
          import :: period_map, wp
          implicit none (type, external)

@@ -36,6 +36,7 @@ module fw_smooth_integration
    use fsundials_nvector_mod, only: n_vector
    use fsunlinsol_dense_mod, only: fsunlinsol_dense
    use fsunmatrix_dense_mod, only: fsundensematrix
+   use fw_interrupt, only: must_end
    use fw_kinds, only: i8
    use fw_kinds, only: pi
    use fw_kinds, only: wp
@@ -243,6 +244,7 @@ contains
          self%record%observed(:, k) = matmul(self%observe, y(:n))
          instant = 2.0_wp*pi*real(k, wp)/real(self%record%n_steps, wp)
          done = fcvode(memory, instant, y_vector, reached, cv_normal) >= 0
+         done = done .and. .not. must_end(self%interrupt)
          if (.not. done) return
          range = max(range, norm2(self%weight*([y(:n), self%omega*y(n + 1:)] - start)))
       end do

@@ -1,6 +1,8 @@
 !> Periodic response by integration in time, with the method that the structure needs: the
 !> reference for harmonic balance on the same model, contact laws and loads.
 module fw_time_solution
+   use fw_interrupt, only: interrupt_type
+   use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_error, only: error_type
    use fw_period_record, only: averaged_coefficients
@@ -36,7 +38,7 @@ contains
    !> contact forces, shares and work; `iterations` are the periods, `residual` the change from
    !> one period to the next.
    subroutine integrate_in_time(structure, observe, omega, options, tolerance, state, n_harmonics, &
-                                point, error)
+                                point, error, interrupt)
       type(time_structure), intent(in) :: structure
       !> Observed quantities (n_observed, n_dof).
       real(wp), intent(in) :: observe(:, :)
@@ -49,6 +51,8 @@ contains
       integer, intent(in) :: n_harmonics
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
+      !> What may end it early (default: nothing); a stop of the run is an error of status_stopped.
+      class(interrupt_type), pointer, intent(in), optional :: interrupt
       type(periodic_report) :: report
       type(smooth_integration) :: smooth
       type(time_stepper) :: stepper
@@ -56,15 +60,21 @@ contains
 
       if (is_smooth(structure, omega)) then
          call new_smooth_integration(structure, observe, omega, options%steps_per_period, smooth)
+         if (present(interrupt)) smooth%interrupt => interrupt
          vector = [state%displacement, state%velocity]
          call find_periodic_state(smooth, options%n_periods, tolerance, vector, report)
+         call stop_run(smooth%interrupt, error)
+         if (allocated(error)) return
          call fill_point(smooth%record, n_harmonics, point)
       else
          call new_time_stepper(structure, observe, omega, options%steps_per_period, stepper, error)
          if (allocated(error)) return
+         if (present(interrupt)) stepper%interrupt => interrupt
          vector = stepper%pack_state(state%displacement, state%velocity, &
                                      row_memory(structure, state%corrected))
          call find_periodic_state(stepper, options%n_periods, tolerance, vector, report)
+         call stop_run(stepper%interrupt, error)
+         if (allocated(error)) return
          call fill_point(stepper%record, n_harmonics, point)
          report%converged = report%converged .and. stepper%record%n_failed == 0
       end if

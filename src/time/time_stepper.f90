@@ -14,6 +14,7 @@
 !> backward difference of its path; high modes are not damped by the scheme, so that light contact
 !> nodes may chatter; impacts on contact with mass are plastic by assumption.
 module fw_time_stepper
+   use fw_interrupt, only: must_end
    use fw_kinds, only: wp
    use fw_kinds, only: pi
    use fw_contact_step, only: contact_problem
@@ -161,7 +162,10 @@ contains
       self%memory = start(2*n + 1:)
       call self%record%clear()
       range = 0.0_wp
+      finish = start
       do k = 1, self%record%n_steps
+         done = .not. must_end(self%interrupt)
+         if (.not. done) return
          call advance(self, k)
          finish(:n) = self%displacement
          finish(n + 1:2*n) = self%velocity

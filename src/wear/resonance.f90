@@ -105,7 +105,7 @@ contains
          call try(self, stepper, system, best, best%omega - spacing, low, iterations, error)
       end if
       do i = 1, max_climb
-         if (allocated(error)) return
+         if (allocated(error) .or. system%is_interrupted()) return
          spacing = climb_factor*spacing
          if (high%amplitude > best%amplitude .and. high%amplitude >= low%amplitude) then
             low = best
@@ -152,7 +152,7 @@ contains
          end if
          width = [width(2), high%omega - low%omega]
          call try(self, stepper, system, best, omega, trial, iterations, error)
-         if (allocated(error)) return
+         if (allocated(error) .or. system%is_interrupted()) return
          if (trial%amplitude > best%amplitude) then
             if (trial%omega > best%omega) low = best
             if (trial%omega < best%omega) high = best

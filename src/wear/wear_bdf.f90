@@ -273,6 +273,7 @@ contains
       f(n + 1:) = state%system%force_of_depth(dx(n + 1:) - state%system%rate)
       status = callback_ok
       if (.not. ieee_is_finite(norm2(f))) status = callback_smaller
+      if (state%system%is_interrupted()) status = callback_fatal
    end function evaluate
 
    !> Callback: derivative of the coupled system; an implicit step of 1/factor cycles has it.

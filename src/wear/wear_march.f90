@@ -130,11 +130,18 @@ contains
          else
             call one_step(self, system, state, after, iterations)
          end if
+         if (self%options%follow_resonance .and. .not. (allocated(self%ending) .or. &
+             system%is_interrupted())) then
+            call self%resonance%follow(self%stepper, system, after, iterations, error)
+            if (allocated(error)) exit
+         end if
+         ! The step at work when the stop came is not taken.
+         if (system%is_interrupted()) then
+            self%ending = 'stopped by its observer'
+            self%gave_up = .false.
+         end if
          if (allocated(self%ending)) exit
          state = after
-         if (.not. self%options%follow_resonance) cycle
-         call self%resonance%follow(self%stepper, system, state, iterations, error)
-         if (allocated(error)) exit
       end do
       call self%bdf%finish()
    end subroutine run
@@ -218,6 +225,7 @@ contains
          call self%stepper%advance(system, before, cycles, after, report)
          iterations = iterations + report%iterations
          if (report%converged) call confirm(self, system, after, report, iterations)
+         if (system%is_interrupted()) return
          if (.not. report%converged) then
             halvings = halvings + 1
             self%gave_up = halvings > max_halvings

@@ -119,7 +119,7 @@ contains
             call linear_step(self, system, before, cycles, after, report)
          end if
          ! At a kink linear steps may go to and fro; Newton's method with its line search does not.
-         if (.not. report%converged) then
+         if (.not. (report%converged .or. system%is_interrupted())) then
             call try_implicitly(self, system, before, cycles, after, report)
          end if
       case default
@@ -241,7 +241,7 @@ contains
       do k = 1, max_corrections
          call self%newton%linear%solve(system, self%r, linear_tolerance, self%step, done)
          report%iterations = k
-         if (.not. done) return
+         if (.not. done .or. system%is_interrupted()) return
          after%x = after%x + self%step
          associate (depth => after%x(n + 1:), start => before%x(n + 1:))
             depth = min(max(depth, start), start + depth_allowance*self%max_depth_step)

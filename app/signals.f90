@@ -1,6 +1,6 @@
-!> SIGINT and SIGTERM ask a run to end after the present point, so that its result file is
-!> complete as far as it goes; a second one ends the program at once.
-module fw_interrupt
+!> SIGINT and SIGTERM ask a run to end, so that its result file is complete as far as it goes; a
+!> second one ends the program at once.
+module fw_signals
    use, intrinsic :: iso_c_binding, only: c_associated
    use, intrinsic :: iso_c_binding, only: c_char
    use, intrinsic :: iso_c_binding, only: c_funloc
@@ -21,7 +21,7 @@ module fw_interrupt
    logical, volatile :: interrupted = .false.
 
    character(*), parameter :: announcement = new_line('a')// &
-      'fw_run: ends after the present point; once more ends it at once'//new_line('a')
+      'fw_run: ends with the points that are done; once more ends it at once'//new_line('a')
 
    interface
       function c_signal(number, handler) bind(c, name='signal') result(previous)
@@ -89,4 +89,4 @@ contains
       end associate
    end subroutine on_signal
 
-end module fw_interrupt
+end module fw_signals
