@@ -53,8 +53,8 @@ contains
          '  fw_run --set harmonics%n_harmonics=7 --set contact%mu=0.3 -o h7.h5 case.nml', &
          '', &
          'Exit status: 0 done; 2 wrong usage; 3 wrong input; 4 not converged (what was computed', &
-         'is saved); 5 a file cannot be read or written; 6 ended by SIGINT or SIGTERM after the', &
-         'present point (what was computed is saved); 1 anything else.'
+         'is saved); 5 a file cannot be read or written; 6 ended by SIGINT, SIGTERM or', &
+         'case%max_seconds (the points that are done are saved); 1 anything else.'
    end subroutine write_help
 
 end module fw_help

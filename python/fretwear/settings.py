@@ -25,6 +25,8 @@ class CaseGroup(TypedDict, total=False):
     analysis: Literal["frf", "point", "wear", "time"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
+    #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
+    max_seconds: float
 
 
 class Structure(TypedDict, total=False):
@@ -203,6 +205,9 @@ class Solver(TypedDict, total=False):
     tolerance: float
     #: steps from each guess (default: 60)
     max_iterations: int
+    #: [s] time after which a point counts as not converged; 0: none; along a branch that of the
+    #: first point (default: 0)
+    max_seconds: float
     #: try other ways where the first guess fails (default: .true.)
     fallback: bool
     #: leave out stuck pairs and components that nothing moves (default: .true.)

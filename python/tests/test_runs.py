@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import typing
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,8 @@ SECTOR: Groups = {
     "structure": {"modal_damping": 1e-3, "rotation_speed": 460.8}, "contact": {"mu": 0.5},
     "load": {"harmonic_scale": 0.5}, "harmonics": {"n_harmonics": 3, "n_time": 128},
     "output": {"observe": ["tip"]}}
+#: A stop takes some tenths of a second [s]; the rest is for machines that do other things.
+STOPPED_WITHIN = 5.0
 # Rubbing oscillator: one dof, one pair without a normal direction.
 PAIR = fw.ContactPairs([[1, 0, 0]], mu=1.0, normal_load=0.5, tangential_stiffness=1.0)
 RUBBING = fw.Model([[1.0]], [[0.04]], [[1.0]], contact=PAIR, cosine=[1.0], title="rubbing")
@@ -357,6 +360,49 @@ def test_a_stop_from_another_thread_ends_the_run() -> None:
     worker.join(30.0)
     assert not worker.is_alive()
     assert ended and ended[0] is not None and ended[0].status == "stopped"
+
+
+def endless_point() -> fw.Case:
+    """One point that no guess solves, each taking its time: minutes with all fallbacks."""
+    return fw.Case(EXAMPLE / "blade_sector" / "sector_48.h5", **SECTOR).replace(
+        harmonics={"n_harmonics": 7, "n_time": 8192}, solver={"tolerance": 1e-30},
+        case={"analysis": "point"}, sweep={"start": 1017.8, "unit": "Hz"})
+
+
+@pytest.mark.parametrize("by_function", [False, True])
+def test_a_stop_acts_within_a_point(by_function: bool) -> None:
+    stop = threading.Event()
+    results: list[fw.Result | None] = []
+
+    def run_until_stopped() -> None:
+        try:
+            fw.run(endless_point(), stop=stop.is_set if by_function else stop)
+        except fw.RunInterrupted as interrupted:
+            results.append(interrupted.result)
+
+    worker = threading.Thread(target=run_until_stopped)
+    worker.start()
+    worker.join(1.5)
+    assert worker.is_alive()
+    stop.set()
+    worker.join(STOPPED_WITHIN)
+    assert not worker.is_alive()
+    assert results[0] is not None and results[0].status == "stopped" and not results[0].n_points
+
+
+def test_a_run_ends_after_its_seconds() -> None:
+    begun = time.monotonic()
+    with pytest.raises(fw.RunInterrupted) as stopped:
+        fw.run(endless_point(), max_seconds=0.5)
+    assert time.monotonic() - begun < 0.5 + STOPPED_WITHIN
+    assert stopped.value.result is not None and stopped.value.result.status == "stopped"
+
+
+def test_what_cannot_stop_a_run_is_refused() -> None:
+    with pytest.raises(fw.InputError, match="stop: is a int, must be a threading.Event"):
+        fw.run(endless_point(), stop=typing.cast(Any, 1))
+    with pytest.raises(fw.InputError, match="max_seconds"):
+        fw.run(endless_point(), max_seconds=-1.0)
 
 
 # -------------------------------------------------------------------------------- the session

@@ -228,7 +228,7 @@ contains
       if (.not. allocated(error)) then
          select case (handle%session%outcome%status)
          case (status_stopped)
-            call fatal_error(error, 'stopped '//stopped_by(handle)//' after '// &
+            call fatal_error(error, 'stopped by '//trim(stopped_by(handle))//' after '// &
                              to_text(handle%session%points%n)//' points', status_stopped)
          case (status_not_converged)
             call fatal_error(error, 'not every point converged, or the branch ended early: see '// &
@@ -243,11 +243,11 @@ contains
    !> Who ended a run.
    pure function stopped_by(handle) result(words)
       type(handle_type), intent(in) :: handle
-      character(:), allocatable :: words
+      character(16) :: words
 
-      words = 'by the callback'
-      if (handle%observer%asked_to_stop) words = 'by fw_stop'
-      if (handle%session%outcome%out_of_time) words = 'by case%max_seconds'
+      words = 'the callback'
+      if (handle%observer%asked_to_stop) words = 'fw_stop'
+      if (handle%session%outcome%out_of_time) words = 'case%max_seconds'
    end function stopped_by
 
    !> How many there are of something: 'points', 'frequencies', 'dofs', 'pairs', 'observed',

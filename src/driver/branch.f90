@@ -217,14 +217,9 @@ contains
       type(arclength_type), intent(inout) :: curve
       !> Half width of a mode without damping, over its frequency.
       real(wp), parameter :: least = 1.0e-4_wp
-      logical, allocatable :: vibrates(:)
 
-      associate (b => system%structure%basis)
-         vibrates = b%k_i > 0.0_wp .and. b%m_i > 0.0_wp
-         curve%pole = sqrt(pack(b%k_i, vibrates)/pack(b%m_i, vibrates))
-         curve%pole_width = max(0.5_wp*pack(b%c_i, vibrates)/pack(b%m_i, vibrates), &
-                                least*curve%pole)
-      end associate
+      call system%structure%held_modes(curve%pole, curve%pole_width)
+      curve%pole_width = max(curve%pole_width, least*curve%pole)
    end subroutine find_poles
 
    subroutine release(self)

@@ -42,6 +42,7 @@ contains
                   'needs more preload, friction or support, or a smaller static load'
       end if
       call solve_share(system, method, 1.0_wp, x, done, only_set=.true.)
+      if (system%is_interrupted()) reason = 'why was not looked for to the end'
    end subroutine explain_failure
 
    !> The largest share of the vibratory load that has a solution, from the position at rest on.

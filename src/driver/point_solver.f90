@@ -47,8 +47,10 @@ module fw_point_solver
    !> solution exists, or where none is found in this way.
    integer, parameter :: max_point_failures = 2
    !> First and smallest step of the load on the way to a first solution.
-   !> Iterations spent on a point after which no other way to it is begun, over max_iterations.
-   integer, parameter :: most_work = 50
+   !> Iterations spent on a point after which no other way to it is begun, over max_iterations, of
+   !> which at least as many count. (Where a sector loses its hold, points take 470 at most, and
+   !> none of those with a solution took more than 25.)
+   integer, parameter :: most_work = 20, least_counted = 60
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
    type :: point_solver
@@ -106,12 +108,11 @@ contains
       call system_clock(clock, rate)
       self%omega_wanted = request%omega
       self%best_residual = huge(1.0_wp)
-      self%work_limit = most_work*case%solver%max_iterations
+      self%work_limit = most_work*max(case%solver%max_iterations, least_counted)
       self%out_of_work = .false.
       system%interrupt => request%interrupt
       call reach(self, case, system, request, report, point%iterations, error)
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
-      nullify (system%interrupt)
       if (allocated(error)) return
       if (self%out_of_work .and. .not. report%converged) then
          point%note = 'work limit: the other ways to omega = '//to_text(request%omega)// &

@@ -57,6 +57,7 @@ module fw_structure_operator
       procedure(read_static), deferred :: static_stiffness
       procedure(split_one), deferred :: split
       procedure(read_mass), deferred :: mass
+      procedure(list_modes), deferred :: held_modes
       procedure(sum_magnitudes), deferred :: magnitudes
    end type structure_operator
 
@@ -169,6 +170,14 @@ module fw_structure_operator
          class(structure_operator), intent(in) :: self
          real(wp), intent(out) :: matrix(:, :)
       end subroutine read_mass
+
+      !> Modes of the structure with its relative coordinates held, as it vibrates while all of its
+      !> contact sticks: angular frequencies and half-power half widths [rad/s] (n_modes).
+      pure subroutine list_modes(self, frequency, half_width)
+         import :: structure_operator, wp
+         class(structure_operator), intent(in) :: self
+         real(wp), allocatable, intent(out) :: frequency(:), half_width(:)
+      end subroutine list_modes
 
       !> (|K| + |theta_n| |M|) times amplitudes, without what is condensed: elastic and inertial
       !> forces before they cancel (n_coordinates).

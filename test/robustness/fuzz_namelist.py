@@ -6,7 +6,7 @@ from fuzz_bases import namelists
 #: Keys of every group, as `fw_run --keys` has them (a test compares): an input depends on the seed
 #: alone, not on the program. Names that belong nowhere come on top.
 KEYS = {
-    "case": ["title", "analysis", "threads"],
+    "case": ["title", "analysis", "threads", "max_seconds"],
     "model": ["source", "file", "n_dof", "mass", "stiffness", "damping", "rayleigh_mass",
               "rayleigh_stiffness", "modal_damping", "rotation_speed"],
     "contact": ["n_pairs", "law", "side_1", "side_2", "mu", "gap", "area", "normal_load",
@@ -17,9 +17,9 @@ KEYS = {
     "harmonics": ["method", "n_harmonics", "n_time", "n_collocation", "filter_harmonics",
                   "sampling", "parity", "adaptive", "adaptive_tolerance", "accuracy"],
     "sweep": ["frequencies", "start", "end", "unit", "continuation", "n_points", "max_points",
-              "stability", "refine"],
-    "solver": ["kind", "linear", "jacobian", "tolerance", "max_iterations", "fallback",
-               "skips"],
+              "stability"],
+    "solver": ["kind", "linear", "jacobian", "tolerance", "max_iterations", "max_seconds",
+               "fallback", "skips"],
     "pseudo_time": ["flow", "scheme", "step", "cfl", "max_steps"],
     "wear": ["scheme", "law", "order", "coefficient", "n_cycles", "max_depth_step",
              "error_tolerance", "steady_tolerance", "max_steps", "check_steps", "follow_resonance"],

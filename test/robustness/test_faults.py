@@ -26,10 +26,10 @@ def case(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_a_run_after_the_present_point(case, number):
+def test_a_signal_ends_a_run_with_the_points_that_are_done(case, number):
     status, errors = case.stop(number)
     assert status == 6, errors
-    assert "ends after the present point" in errors
+    assert "ends with the points that are done" in errors
     with h5py.File(case.result) as file:
         assert len(file["omega"]) >= fault_cases.SEEN
     assert case.equals_reference("stopped")
