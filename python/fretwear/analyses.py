@@ -36,12 +36,15 @@ __all__ = ["frf", "run", "wear"]
 #: the standard error.
 Progress = Union[bool, Callable[[int, int], object]]
 
+#: What is asked whether to stop.
+Stop = Union[threading.Event, Callable[[], object]]
+
 #: Time between two calls of a progress function [s].
 _BETWEEN_CALLS = 0.1
 
 
 def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool = True,
-        progress: Progress | None = None, stop: threading.Event | Callable[[], object] | None = None,
+        progress: Progress | None = None, stop: Stop | None = None,
         max_seconds: float | None = None) -> Result:
     """Run a case and open its result.
 
@@ -221,8 +224,8 @@ def _stop_function(stop: object) -> Callable[[], object] | None:
         return None
     asked = getattr(stop, "is_set", stop)
     if not callable(asked):
-        raise InputError(f"stop: is a {type(stop).__name__}, must be a threading.Event or a function "
-                         "without arguments")
+        raise InputError(f"stop: is a {type(stop).__name__}, must be a threading.Event or a "
+                         "function without arguments")
     return asked
 
 

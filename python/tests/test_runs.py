@@ -399,7 +399,7 @@ def test_a_run_ends_after_its_seconds() -> None:
 
 
 def test_what_cannot_stop_a_run_is_refused() -> None:
-    with pytest.raises(fw.InputError, match="stop: is a int, must be a threading.Event"):
+    with pytest.raises(fw.InputError, match=r"stop: is a int, must be a threading.Event"):
         fw.run(endless_point(), stop=typing.cast(Any, 1))
     with pytest.raises(fw.InputError, match="max_seconds"):
         fw.run(endless_point(), max_seconds=-1.0)
