@@ -569,18 +569,11 @@ contains
       class(plain_structure), intent(in) :: self
       real(wp), allocatable, intent(out) :: frequency(:), half_width(:)
       logical, allocatable :: vibrates(:)
-      real(wp), allocatable :: damping(:)
-      integer :: j
 
       associate (b => self%basis)
          vibrates = b%k_i > 0.0_wp .and. b%m_i > 0.0_wp
-         if (allocated(b%c_ii)) then
-            damping = [(b%c_ii(j, j), j=1, b%n_internal)]
-         else
-            damping = b%c_i
-         end if
          frequency = sqrt(pack(b%k_i, vibrates)/pack(b%m_i, vibrates))
-         half_width = 0.5_wp*pack(damping, vibrates)/pack(b%m_i, vibrates)
+         half_width = 0.5_wp*pack(b%c_i, vibrates)/pack(b%m_i, vibrates)
       end associate
    end subroutine held_modes
 
