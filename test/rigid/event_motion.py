@@ -40,7 +40,7 @@ class Structure:
         return len(self.mass)
 
     def linear(self, stuck):
-        """The system of the dofs that move: their numbers, eigenvalues, vectors, inverse, answer."""
+        """The dofs that move: their numbers, eigenvalues, vectors, inverse, answer."""
         if stuck not in self.cache:
             free = [i for i in range(self.n) if i not in stuck]
             m, c, k = (a[np.ix_(free, free)] for a in (self.mass, self.damping, self.stiffness))

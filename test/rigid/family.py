@@ -16,9 +16,9 @@ import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
-import numpy as np  # noqa: E402
-from project import PROGRAM  # noqa: E402
-from rigid_cases import (  # noqa: E402
+import numpy as np
+from project import PROGRAM
+from rigid_cases import (
     BOTH,
     ONE,
     THREE,
@@ -28,7 +28,7 @@ from rigid_cases import (  # noqa: E402
     random_structure,
     reference_of,
 )
-from sections import DOCUMENT, write_section  # noqa: E402
+from sections import DOCUMENT, write_section
 
 N_HARMONICS = 9
 TAIL = 255
@@ -57,9 +57,9 @@ def measure(n_cases, laws):
 def table(rows, skipped, n_cases):
     """Lines of the section."""
     count = n_cases - skipped
-    lines = [f"{n_cases} random structures of one to three masses, one or two of which rub; {count} "
-             f"have a motion in which each of these slips. H = {N_HARMONICS}; root mean square "
-             "error of the worst mass, as a part of its vibration.", "",
+    lines = [f"{n_cases} random structures of one to three masses, one or two of which rub; "
+             f"{count} have a motion in which each of these slips. H = {N_HARMONICS}; root mean "
+             "square error of the worst mass, as a part of its vibration.", "",
              "| law | median | nine of ten below | largest | not converged | false, counted as "
              "converged | iterations, median |", "|---|---|---|---|---|---|---|"]
     for name, values in rows.items():

@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
-import cases  # noqa: E402
-from event_motion import Piece, Structure, history, periodic  # noqa: E402
-from project import PROGRAM  # noqa: E402
+import cases
+from event_motion import Piece, Structure, history, periodic
+from project import PROGRAM
 
 #: Instants at which motions are compared.
 N_TIME = 4096
