@@ -31,6 +31,7 @@ contains
          call forces%add(new_polynomial(springs%coefficient, springs%power, highest_harmonic), &
                          reshape(spring_row, [1, springs%n_springs]))
       end if
+      ! Without pairs the law is built all the same, empty: nothing has to ask whether there is one.
       call new_law(contact%law, law)
       call law%build(contact, pair_row > 0)
       if (by_events .and. law%facts%has_events) then
@@ -38,6 +39,7 @@ contains
          call move_alloc(located, law)
       end if
       call forces%add(law, pair_row)
+      ! Where in the list the pairs stand.
       forces%pairs = forces%n_laws
    end subroutine new_forces
 

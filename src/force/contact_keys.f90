@@ -1,4 +1,9 @@
 !> The keys of groups &contact and &spring.
+!>
+!> One procedure for each group of keys that is read at the same place, because some keys need
+!> others first: sizes before arrays, the law before its stiffnesses, sides before what goes with
+!> their dofs. A value that a model file gave is in the components already, and stays where the
+!> namelist has none.
 module fw_contact_keys
    use fw_contact_data, only: contact_type, spring_type, memory_words
    use fw_key, only: key
@@ -24,6 +29,7 @@ module fw_contact_keys
 
 contains
 
+   !> The number of pairs, which becomes the size 'n_pairs' of all arrays of the group.
    subroutine bind_pairs(keys, contact)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -34,6 +40,7 @@ contains
       call keys%set_size('n_pairs', contact%n_pairs)
    end subroutine bind_pairs
 
+   !> The law, by a word of fw_laws.
    subroutine bind_law(keys, contact)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -43,9 +50,11 @@ contains
                           contact%law, law_words)
    end subroutine bind_law
 
+   !> Dofs of both sides; a pair between one side and the ground has no side 2.
    subroutine bind_sides(keys, contact, needed)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
+      !> Pairs were announced, and no file gave their dofs.
       logical, intent(in) :: needed
 
       call keys%bind(key('side_1', 'dofs of t1, t2, n on one side; 0: none, negative: with its '// &
@@ -57,6 +66,7 @@ contains
                          absent=of_file), contact%side_2, default=0)
    end subroutine bind_sides
 
+   !> Friction coefficients; with friction at rest only the pairs with tangential dofs need one.
    subroutine bind_friction(keys, contact, needed)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -67,6 +77,7 @@ contains
                      needed)
    end subroutine bind_friction
 
+   !> Gap and area; the area turns forces into pressures, which only wear asks for.
    subroutine bind_gap(keys, contact, needs_area)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -79,6 +90,7 @@ contains
                          only="analysis = 'wear'"), contact%area, needs_area)
    end subroutine bind_gap
 
+   !> A constant force in the place of the normal dof that a pair does not have.
    subroutine bind_normal_load(keys, contact, needed)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -110,6 +122,7 @@ contains
       end do
    end subroutine bind_laws
 
+   !> What the march of rigid laws takes; others ignore it, and say so in `only`.
    subroutine bind_march(keys, contact)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -121,6 +134,7 @@ contains
                               'the last point ended'), contact%memory, memory_words)
    end subroutine bind_march
 
+   !> The depth that an earlier run of wear ended with.
    subroutine bind_worn(keys, path, step)
       class(key_visitor), intent(inout) :: keys
       !> Not allocated where there is none.

@@ -81,6 +81,7 @@ contains
    !> Friction of rigid pairs, predicted from velocities, which need no memory.
    pure type(friction_law) function rigid_friction_of_rates() result(law)
       law = rigid_friction()
+      ! A derivative by tau in both tangential directions, none in the normal one.
       law%prediction%order = [1, 1, 0]
       law%facts%remembers = .false.
    end function rigid_friction_of_rates
@@ -121,6 +122,7 @@ contains
       end do
    end subroutine take_constants
 
+   !> Blocks of pairs are marched together, so that all arrays run over the pairs first.
    subroutine reserve(self, fourier, work)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -158,6 +160,7 @@ contains
 
       call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time)
       do k = 1, fourier%n_time
+         ! Gap, wear and constant loads: means that are no part of the coefficients.
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
       call work%measure_scale()
@@ -173,6 +176,8 @@ contains
       call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force)
       call classify(room, work)
       if (work%measures_slip) then
+         ! The march has ended where it started, so one more turn over the same prediction is the
+         ! period.
          call slip_work(self%n_elements, fourier%n_time, self%mu, work%prediction_time, &
                         self%facts%remembers, work%x, work%slip)
       end if
@@ -185,10 +190,12 @@ contains
       integer :: i, k
 
       do i = 1, size(work%state)
+         ! Margin and pressure are the smallest over all turns, warm-up included.
          if (room%margin(i) >= 0.0_wp .and. work%pressure(i) > 0.0_wp) then
             work%state(i) = pair_stuck
             cycle
          end if
+         ! The smallest pressure is zero for mixed and open pairs alike: the forces tell.
          work%state(i) = pair_open
          if (work%pressure(i) > 0.0_wp) work%state(i) = pair_mixed
          do k = 1, size(work%force_time, 3)
@@ -206,11 +213,14 @@ contains
       integer, intent(in) :: n_time, first, last
       integer :: turn
 
+      ! The start is stated, never left from before: a residual must not depend on the one before
+      ! it.
       work%x(first:last, :) = work%x_start(first:last, :)
       room%margin(first:last) = huge(1.0_wp)
       work%pressure(first:last) = huge(1.0_wp)
       room%settled(first:last) = .false.
       if (.not. self%facts%remembers) then
+         ! At velocity level there is no position that could drift.
          work%drift(first:last) = 0.0_wp
          call project_turn(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
                            work%force_time, room%margin, work%pressure)
@@ -220,10 +230,13 @@ contains
       work%turns(first:last) = 0
       do turn = 1, plain_turns
          call march_turn(self, work, room, n_time, first, last, turn)
+         ! Blocks go on until their slowest pair repeats; the others only repeat on.
          if (all(work%turns(first:last) > 0)) return
       end do
       call find_limits(self, work, room, n_time, first, last)
+      ! The turn from the limit fills the forces; it also judges whether the limit is one.
       call march_turn(self, work, room, n_time, first, last, plain_turns + 1)
+      ! Not settled: the derivative carries as many turns as are worth their cost.
       where (work%turns(first:last) == 0) work%turns(first:last) = shakedown_turns
    end subroutine march
 
@@ -302,6 +315,7 @@ contains
       share = 0.0_wp
       do k = 1, n_time
          do i = 1, self%n_elements
+            ! lambda_n is negative in contact.
             limit = -self%mu(i)*work%force_time(i, 3, k)
             tangential = norm2(work%force_time(i, 1:2, k))
             if (work%force_time(i, 3, k) >= 0.0_wp) then

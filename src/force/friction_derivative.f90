@@ -15,6 +15,8 @@ submodule(fw_friction) fw_friction_derivative
 
 contains
 
+   ! The state that the derivative belongs to stays beside it: rows of stuck pairs leave the
+   ! problem.
    module procedure linearize
       integer :: nc
 
@@ -43,6 +45,8 @@ contains
       !$omp parallel default(none) shared(self, fourier, room, work, nc) &
       !$omp private(rows, dx, y, by_start, weight, x, i, unique) &
       !$omp if(self%n_elements >= pairs_for_threads)
+      ! Of one pair at a time, for each thread: of all pairs it would be the largest array of the
+      ! program.
       allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
       allocate (by_start(2, 2, fourier%n_time), weight(2, 2, nc))
       !$omp do schedule(dynamic)
@@ -53,6 +57,7 @@ contains
          call project(work%jacobian(:, :, i), fourier, rows, y(3, :), self%present(3, i))
          if (unique) call project_start(work%jacobian(:, :, i), fourier, dx, by_start, weight)
          if (.not. work%measures_slip) cycle
+         ! The path of slip needs the rows themselves, not only their projections.
          if (unique) call add_start(3*nc, fourier%n_time, by_start, dx, rows)
          call slip_gradient(fourier%n_time, nc, fourier%synthesis, y, self%mu(i), &
                             self%present(:, i), self%facts%remembers, x, rows, &
@@ -75,7 +80,9 @@ contains
       real(wp), intent(in) :: y(3, fourier%n_time)
       !> Corrected position at the end of the period.
       real(wp), intent(out) :: x(2)
+      !> d lambda_t by inputs (coefficient, component), for each tangential component and instant.
       real(wp), intent(inout) :: rows(fourier%n_coefficients, 3, 2, fourier%n_time)
+      !> d x at the end by inputs (coefficient, component, tangential component).
       real(wp), intent(inout) :: dx(fourier%n_coefficients, 3, 2)
       logical, intent(out) :: unique
       !> Of a unique limit: derivative of the position at the instants by that at the start.
@@ -93,6 +100,7 @@ contains
                                self%mu(pair), touch*work%scale(pair), self%present(:, pair), &
                                inverse, x, rows, dx)
       else
+         ! From the start once more, with derivatives, as many turns as the march took.
          x = work%x_start(pair, :)
          dx = 0.0_wp
          call march_derivative(fourier%n_time, fourier%n_coefficients, work%turns(pair), &
@@ -121,6 +129,8 @@ contains
       if (.not. has_normal) return
       ! A pair that bears throughout keeps its coefficients; of any other, the instants of the
       ! rarer state are added up.
+      ! G over all instants is the identity where the transform is exact, so that the fewer of both
+      ! kinds can be summed.
       closes = 2*count(y_n < 0.0_wp) > fourier%n_time .and. fourier%projects .and. &
                fourier%n_time > 2*maxval(fourier%harmonic)
       factor = merge(-1.0_wp, 1.0_wp, closes)

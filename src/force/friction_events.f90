@@ -27,6 +27,7 @@ module fw_friction_events
       procedure :: fractions
    end type friction_by_events
 
+   !> Paths of all pairs: what evaluation leaves for derivative, samples and results.
    type, extends(law_room) :: event_room
       type(event_contact_type) :: paths
    end type event_room
@@ -39,6 +40,7 @@ contains
 
       self%prediction = law%prediction
       self%facts = law%facts
+      ! All other facts stay: the same law, evaluated in another way.
       self%facts%follows_events = .true.
       self%n_elements = law%n_elements
       self%n_components = law%n_components
@@ -47,6 +49,7 @@ contains
       if (allocated(law%mu)) self%mu = law%mu
    end function follow_events
 
+   !> The instants of `fourier` are a grid that isolates events: four for each wave are enough.
    subroutine reserve(self, fourier, work)
       class(friction_by_events), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -70,6 +73,7 @@ contains
       type is (event_room)
          call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
                                   work%force, work%x)
+         ! One turn settles and one is recorded, whatever the load: there is nothing to count.
          work%turns = 1
          work%drift = room%paths%drift
          call work%measure_scale()
@@ -86,12 +90,15 @@ contains
 
       do i = 1, size(work%state)
          work%pressure(i) = merge(1.0_wp, 0.0_wp, paths%closed(i))
+         ! Open and stuck pairs have a derivative of 0 and 1; any other one needs its block.
          work%state(i) = pair_mixed
          if (paths%open(i)) work%state(i) = pair_open
          if (paths%closed(i) .and. .not. paths%moved(i)) work%state(i) = pair_stuck
       end do
    end subroutine classify_paths
 
+   !> Blocks of the pairs that are neither open nor stuck throughout; those of others are not
+   !> filled.
    subroutine linearize(self, fourier, work)
       class(friction_by_events), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -110,6 +117,7 @@ contains
       end select
    end subroutine linearize
 
+   !> Forces at the instants, read off the path: for histories alone.
    subroutine sample(self, work)
       class(friction_by_events), intent(in) :: self
       type(force_workspace), intent(inout) :: work
@@ -121,9 +129,11 @@ contains
       end select
    end subroutine sample
 
+   !> Of harmonics that the balance may have left out too.
    subroutine coefficients(self, work, computed, fourier, force)
       class(friction_by_events), intent(in) :: self
       type(force_workspace), intent(inout) :: work
+      !> Harmonics of the last evaluation, and those that are wanted.
       type(fourier_type), intent(in) :: computed
       type(fourier_type), intent(inout) :: fourier
       real(wp), intent(inout) :: force(:, :, :)
@@ -135,6 +145,7 @@ contains
       end select
    end subroutine coefficients
 
+   !> Shares of stick, slip and open (3, n_pairs), by durations.
    pure subroutine fractions(self, work, share)
       class(friction_by_events), intent(in) :: self
       type(force_workspace), intent(in) :: work

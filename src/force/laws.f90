@@ -33,6 +33,7 @@ contains
    end subroutine new_law
 
    !> What holds of the law of a number.
+   !> For checks of the input, which come before any pair is built.
    type(law_facts) function facts_of(number) result(facts)
       integer, intent(in) :: number
       class(pair_law), allocatable :: law
@@ -42,6 +43,7 @@ contains
    end function facts_of
 
    !> Whether the law of a number predicts from the balance.
+   !> Rigid laws have no stiffness of their own, hence no derivative in time.
    logical function is_rigid(number)
       integer, intent(in) :: number
       class(pair_law), allocatable :: law

@@ -14,6 +14,8 @@ module fw_polynomial_law
    type, extends(force_law) :: polynomial_law
       !> Force per length**power (n_elements).
       real(wp), allocatable :: coefficient(:)
+      !> Whole numbers from 1 on (n_elements): 1 is a linear spring, odd ones keep the parity of the
+      !> motion.
       integer, allocatable :: power(:)
       !> Harmonics above this one are filtered from the elongations (LaBryer and Attar 2009).
       integer :: highest_harmonic = huge(0)
@@ -36,6 +38,7 @@ contains
       integer, intent(in) :: highest_harmonic
       logical :: present(1, size(coefficient))
 
+      ! A spring is an element of one component, whose prediction is its elongation.
       present = .true.
       call self%take_elements(present)
       self%prediction%stiffness = 1.0_wp
@@ -59,6 +62,8 @@ contains
       integer :: i, k
 
       if (self%n_elements == 0) return
+      ! Before the instants: products of what is filtered would fold back into the retained
+      ! harmonics.
       call low_pass(self, fourier, work%prediction)
       call fourier%to_time(self%n_elements, work%prediction, work%prediction_time)
       do k = 1, fourier%n_time
@@ -68,6 +73,7 @@ contains
          end do
       end do
       call fourier%to_coefficients(self%n_elements, work%force_time, work%force)
+      ! Every spring has a block in the derivative.
       work%state = pair_mixed
    end subroutine evaluate
 
@@ -100,6 +106,7 @@ contains
          do k = 1, fourier%n_time
             slope = self%slope_at(i, work%prediction_time(i, 1, k))
             do j = 1, nc
+               ! G = analysis diag(slope) synthesis, transposed: the first index is the input.
                work%jacobian(:, j, i) = work%jacobian(:, j, i) + &
                                         (slope*fourier%analysis(j, k))*fourier%synthesis(:, k)
             end do
@@ -112,6 +119,7 @@ contains
       end do
    end subroutine linearize
 
+   !> d force/d elongation [force/length] of an element.
    elemental real(wp) function slope_at(self, element, y) result(slope)
       class(polynomial_law), intent(in) :: self
       integer, intent(in) :: element

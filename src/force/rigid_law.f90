@@ -56,6 +56,7 @@ module fw_rigid_law
 
 contains
 
+   !> Events are needed: above H the motion has kinks that no number of instants resolves.
    pure type(rigid_law) function friction_of_high_order() result(law)
       law%prediction = prediction_type(takes_balance=.true., has_inertia=.true.)
       law%facts = law_facts(remembers=.true., can_stick=.true., can_open=.true., &
@@ -85,11 +86,13 @@ contains
       logical :: massive(2, self%n_elements), present(3, self%n_elements)
       integer :: i, j
 
+      ! An inertia of zero (a massless direction) leaves the displacement law.
       massive = .false.
       if (allocated(self%prediction%inertia)) then
          massive = transpose(self%prediction%inertia(:, 1:2)) > 0.0_wp
       end if
       present = self%present
+      ! The paths see such a pair with its normal direction only.
       present(1:2, :) = present(1:2, :) .and. .not. massive
       call new_event_contact(self%mu, present, .true., fourier, room%paths)
       room%pair = pack([(i, i=1, self%n_elements)], any(massive, dim=1))
@@ -144,6 +147,7 @@ contains
       integer :: i
 
       do i = 1, size(work%state)
+         ! What asks for the pressure compares it with zero.
          work%pressure(i) = merge(1.0_wp, 0.0_wp, room%paths%closed(i))
          work%state(i) = state_of(room%paths%open(i), room%paths%closed(i), room%paths%moved(i))
       end do
@@ -165,6 +169,7 @@ contains
       integer :: i, j
 
       do j = 1, room%n_massive
+         ! All pairs at once: one transform for their grids.
          call fill_rows(fourier, work, room%pair(j), room%direction(j), &
                         room%rows(6*j - 5:6*j, :))
       end do
@@ -187,6 +192,7 @@ contains
       real(wp), intent(inout) :: rows(:, :)
 
       rows(1, :) = work%prediction(pair, direction, :)
+      ! N is a pressure, y_n a force that opens.
       rows(4, :) = -work%prediction(pair, 3, :)
       rows(2:3, :) = 0.0_wp
       rows(5:6, :) = 0.0_wp
@@ -222,6 +228,7 @@ contains
       integer :: h, k, n
 
       associate (p => self%prediction, c => pair%curves)
+         ! In the angle: rates are multiplied by omega, accelerations by its square.
          pair%waves%oscillator = new_oscillator(work%rate**2*p%inertia(i, direction), &
                                                 work%rate*p%damping(i, direction), &
                                                 p%stiffness(i, direction))
@@ -235,6 +242,7 @@ contains
             c%normal(n, 2) = rows(4, k + 1)
          end do
          if (.not. fourier%has_constant()) c%normal(0, 1) = 0.0_wp
+         ! The gap acts through the mean of the prediction.
          c%normal(0, 1) = c%normal(0, 1) - work%offset(i)
          do k = 1, 6
             c%samples(:, k) = values(k, :)
@@ -248,6 +256,7 @@ contains
       work%force(i, direction, :) = force(:, 1)
       work%x(i, direction) = pair%path%z_end
       work%turns(i) = pair%n_turns
+      ! Relative to the motion there, a force here.
       work%drift(i) = pair%drift*work%scale(i)
       work%state(i) = state_of(pair%path%open, pair%path%closed, pair%path%moved)
    end subroutine follow_pair
@@ -268,6 +277,7 @@ contains
       end select
    end subroutine linearize
 
+   !> Blocks of pairs with mass come after those of the paths, whose normal part they keep.
    subroutine linearize_pairs(self, fourier, room, work)
       class(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -308,6 +318,7 @@ contains
       call pair%derivative(fourier%n_retained, fourier%harmonic, fourier%column, by_tangential, &
                            by_normal, normal)
       jacobian(t + 1:t + nc, t + 1:t + nc) = by_tangential
+      ! The normal prediction acts on friction through Q = -mu y_n.
       if (has_normal) jacobian(2*nc + 1:, t + 1:t + nc) = by_normal
    end subroutine linearize_pair
 

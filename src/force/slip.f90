@@ -17,11 +17,13 @@ module fw_slip
 contains
 
    !> S of every pair [force**2].
+   !> The trapezoidal rule in the pressure, over the moves of x from instant to instant.
    pure subroutine slip_work(n_pairs, n_time, mu, y, remembers, x_end, work)
       integer, intent(in) :: n_pairs, n_time
       real(wp), intent(in) :: mu(n_pairs)
       !> Predicted forces.
       real(wp), intent(in) :: y(n_pairs, 3, n_time)
+      !> False at velocity level, where each instant slips at the rate y - lambda from x = 0.
       logical, intent(in) :: remembers
       !> Corrected position at the end of a periodic march.
       real(wp), intent(in) :: x_end(n_pairs, 2)
@@ -32,12 +34,14 @@ contains
       do i = 1, n_pairs
          work(i) = 0.0_wp
          x = x_end(i, :)
+         ! The pressure of the last instant: the period closes on itself.
          before = max(-y(i, 3, n_time), 0.0_wp)
          do k = 1, n_time
             call advance(mu(i), y(i, :, k), x, p, path)
             if (remembers) then
                work(i) = work(i) + 0.5_wp*(p + before)*path
             else
+               ! The rate is per radian, so that the spacing of the instants is the measure.
                work(i) = work(i) + 2.0_wp*pi/real(n_time, wp)*p*path
                x = 0.0_wp
             end if
@@ -52,6 +56,7 @@ contains
       real(wp), intent(inout) :: x(2)
       !> Pressure force, and length of the move of x.
       real(wp), intent(out) :: p, path
+      !> Unit vector of the move; zero where there is none.
       real(wp), intent(out), optional :: direction(2)
       real(wp) :: d(2), length, move(2)
 
@@ -60,6 +65,7 @@ contains
       length = sqrt(d(1)**2 + d(2)**2)
       path = 0.0_wp
       if (present(direction)) direction = 0.0_wp
+      ! Stick. An open pair (p = 0) follows y.
       if (length <= mu*p) return
       move = d - (mu*p/length)*d
       path = length - mu*p
@@ -79,6 +85,7 @@ contains
       real(wp), intent(in) :: x_end(2)
       !> d lambda_t / d inputs of the last turn (n_coef, 3, tangential component, instant).
       real(wp), intent(in) :: rows(n_coef, 3, 2, n_time)
+      !> dS by the coefficients of (t1, t2, n).
       real(wp), intent(out) :: gradient(n_coef, 3)
       !> dS/dx and dS/dp at the instants.
       real(wp) :: by_x(2, n_time), by_p(n_time)
@@ -100,6 +107,8 @@ contains
       call dgemv('N', n_coef, n_time, -1.0_wp, base, n_coef, by_p, 1, 1.0_wp, gradient(:, 3), 1)
    end subroutine slip_gradient
 
+   !> S is a function of the positions and pressures at the instants: its derivatives by both,
+   !> summed by the two intervals that meet in an instant.
    pure subroutine weights_of_path(n_time, y, mu, x_end, by_x, by_p)
       integer, intent(in) :: n_time
       real(wp), intent(in) :: y(3, n_time), mu, x_end(2)
@@ -121,9 +130,11 @@ contains
          before = p
          last = k
       end do
+      ! p = max(-y_n, 0): an open instant does not answer.
       where (y(3, :) >= 0.0_wp) by_p = 0.0_wp
    end subroutine weights_of_path
 
+   !> As weights_of_path at velocity level, where instants do not know of each other.
    pure subroutine weights_of_rate(n_time, y, mu, by_x, by_p)
       integer, intent(in) :: n_time
       real(wp), intent(in) :: y(3, n_time), mu

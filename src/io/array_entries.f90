@@ -1,4 +1,7 @@
 !> Which value of which assignment each element of an array takes.
+!>
+!> Several assignments may fill one array, as mu(1) = 0.3 and mu(2:3) = 2*0.4. No element may be
+!> given twice in a file; an override of the command line replaces what the file gave.
 module fw_array_entries
    use fw_namelist_data, only: namelist_type, entry_type, section_type, value_count, &
                                stray_word
@@ -18,11 +21,13 @@ contains
    !> Add one assignment to the sources of an array. On failure `message` says why.
    subroutine spread_entry(input, i_entry, dims, repeats, source, message)
       type(namelist_type), intent(in) :: input
+      !> Number of the assignment in it.
       integer, intent(in) :: i_entry
       !> Shape of the whole array.
       integer, intent(in) :: dims(:)
       !> Whether one value holds for all elements.
       logical, intent(in) :: repeats
+      !> Of all elements (product(dims)), with 0 where none is given yet.
       type(source_type), intent(inout) :: source
       character(:), allocatable, intent(out) :: message
       integer, allocatable :: elements(:)
@@ -41,6 +46,7 @@ contains
          end if
          do i = 1, size(elements)
             if (source%entry(elements(i)) == 0) cycle
+            ! An override may give what the file has given.
             if (allocated(entry%option)) cycle
             message = 'is given twice (first in line '// &
                       to_text(input%entries(source%entry(elements(i)))%line)//'): keep one'
@@ -52,6 +58,7 @@ contains
    end subroutine spread_entry
 
    !> Multiply out the repeat counts.
+   !> Which value of the entry each of its elements takes.
    subroutine number_values(entry, elements, single, value)
       type(entry_type), intent(in) :: entry
       integer, intent(in) :: elements(:)
@@ -91,9 +98,11 @@ contains
       do i = 1, size(dims)
          last = dims(i)
          offsets = [integer ::]
+         ! Without subscripts the whole dimension.
          if (size(sections) == 0) then
             offsets = sequence(1, last)
          else
+            ! An open end is the last one.
             if (sections(i)%last > 0) last = sections(i)%last
             if (last > dims(i) .or. sections(i)%first > dims(i)) then
                message = 'has the subscript '//to_text(max(last, sections(i)%first))// &
@@ -107,6 +116,7 @@ contains
       end do
    end subroutine list_elements
 
+   !> first..last; empty where last is before it.
    pure function sequence(first, last) result(numbers)
       integer, intent(in) :: first, last
       integer, allocatable :: numbers(:)
@@ -131,6 +141,7 @@ contains
       end do
    end function combine
 
+   !> ` (3 x 4)` for a whole array of several dimensions: a bare product says little.
    pure function count_text(dims, has_sections) result(text)
       integer, intent(in) :: dims(:)
       logical, intent(in) :: has_sections

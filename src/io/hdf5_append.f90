@@ -54,12 +54,14 @@ module fw_hdf5_append
    !> Kinds of elements; a logical is what h5py shows as bool.
    integer, parameter :: growing_real = 1, growing_integer = 2, growing_logical = 3
 
+   ! The rows of scalars would else fill chunks of thousands, and the file with them.
    integer, parameter :: chunk_bytes = 65536, max_chunk_rows = 1024
    !> Of the table that finds a chunk in memory: any number serves for one chunk.
    integer(size_t), parameter :: cache_slots = 7_size_t
 
    !> A dataset of rows, in the file while that is open. Not to be copied.
    type :: growing_dataset
+      !> Rows so far, those that were skipped included.
       integer :: n_rows = 0
       integer(hid_t), private :: id = -1_hid_t, type_id = -1_hid_t
       character(:), allocatable, private :: name
@@ -101,15 +103,18 @@ contains
       integer :: status
 
       self%name = name
+      ! The row itself is the last dimension in Fortran: the first one as h5py shows it.
       self%row = [int(row_shape, hsize_t), 1_hsize_t]
       self%type_id = element_type(kind_of)
       limit = self%row
       limit(size(limit)) = h5s_unlimited_f
+      ! Chunks must have an extent; rows of size 0 are stored as nothing.
       chunk = max(self%row, 1_hsize_t)
       chunk(size(chunk)) = rows_per_chunk(self, expected_rows)
       call h5pcreate_f(h5p_dataset_create_f, creation, status)
       call h5pset_chunk_f(creation, size(chunk), chunk, status)
       if (kind_of == growing_real) then
+         ! Rows that are skipped read as what they are: not there.
          call h5pset_fill_value_f(creation, self%type_id, &
                                   ieee_value(1.0_wp, ieee_quiet_nan), status)
       end if
@@ -135,6 +140,7 @@ contains
       call h5pset_chunk_cache_f(access, cache_slots, bytes*int(n_elements, size_t), 1.0, status)
    end function cache_of_one
 
+   !> Optional results are never created; callers ask before they append.
    pure logical function is_created(self)
       class(growing_dataset), intent(in) :: self
 
@@ -142,9 +148,11 @@ contains
    end function is_created
 
    !> Leave n rows at their fill value.
+   !> As rows of points that do not have this result.
    subroutine skip(self, file, n, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
+      !> Rows to copy, from the first on; the source has at least that many.
       integer, intent(in) :: n
       type(error_type), allocatable, intent(out) :: error
 
@@ -175,6 +183,7 @@ contains
                               error)
       end if
       if (allocated(error)) return
+      ! Opened once for all rows, which go over one by one: the whole may not fit memory.
       call h5dopen_f(source%id, self%name, id, status)
       do i = 1, n
          call copy_row(self, file, source, id, i, error)
@@ -183,6 +192,7 @@ contains
       call h5dclose_f(id, status)
    end subroutine copy_rows
 
+   !> As bytes: no conversion can change a bit.
    subroutine copy_row(self, file, source, id, i, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file, source
@@ -203,6 +213,7 @@ contains
       address = c_loc(buffer)
       if (product(self%row) > 0) then
          start = 0
+         ! HDF5 counts from 0.
          start(rank) = i - 1
          call h5dget_space_f(id, space, status)
          call h5sselect_hyperslab_f(space, h5s_select_set_f, start, self%row, status)
@@ -259,6 +270,7 @@ contains
       self%id = -1_hid_t
    end subroutine close
 
+   !> One number a row.
    subroutine append_real_0(self, file, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -306,6 +318,7 @@ contains
       call self%append_raw(file, dims, h5kind_to_type(wp, h5_real_kind), c_loc(values), error)
    end subroutine append_flat
 
+   !> One whole number a row.
    subroutine append_integer(self, file, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -318,6 +331,7 @@ contains
                            c_loc(buffer), error)
    end subroutine append_integer
 
+   !> One truth value a row, a byte in the file.
    subroutine append_logical(self, file, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -329,6 +343,7 @@ contains
       call self%append_raw(file, [integer ::], self%type_id, c_loc(buffer), error)
    end subroutine append_logical
 
+   !> One row from an address, of a given type in memory and a shape that is checked.
    subroutine append_raw(self, file, dims, memory_type, address, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -346,6 +361,7 @@ contains
       else if (any(dims /= self%row(:n - 1))) then
          call dataset_failure(file, self%name, 'takes rows of another shape', error)
       end if
+      ! A row of size 0 still counts as one.
       if (.not. allocated(error)) call self%grow(file, 1, error)
       if (allocated(error) .or. product(self%row) == 0) return
       start = 0
@@ -354,11 +370,13 @@ contains
       call h5sselect_hyperslab_f(space, h5s_select_set_f, start, self%row, status)
       call h5screate_simple_f(n, self%row, memory, status)
       call h5dwrite_f(self%id, memory_type, address, status, memory, space)
+      ! Closed whatever came of the writing, or handles would leak with a full disk.
       call h5sclose_f(memory, ignored)
       call h5sclose_f(space, ignored)
       if (status < 0) call dataset_failure(file, self%name, 'cannot be written (disk full?)', error)
    end subroutine append_raw
 
+   !> The new rows read as the fill value until they are written.
    subroutine grow(self, file, n, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -378,6 +396,7 @@ contains
       end if
    end subroutine grow
 
+   !> At least one, however large it is.
    integer(hsize_t) function rows_per_chunk(self, expected_rows) result(rows)
       class(growing_dataset), intent(in) :: self
       integer, intent(in), optional :: expected_rows
@@ -404,6 +423,7 @@ contains
       case (growing_integer)
          type_id = copied(h5kind_to_type(kind(0), h5_integer_kind))
       case default
+         ! An enumeration of bytes with FALSE = 0 and TRUE = 1 is what h5py takes for bool.
          byte = h5kind_to_type(c_int8_t, h5_integer_kind)
          call h5tenum_create_f(byte, type_id, status)
          flag = 0
@@ -413,6 +433,7 @@ contains
       end select
    end function element_type
 
+   !> A copy of our own, so that every type can be closed alike.
    integer(hid_t) function copied(predefined) result(type_id)
       integer(hid_t), intent(in) :: predefined
       integer :: status

@@ -1,5 +1,8 @@
 !> Attributes of HDF5 objects: one string, integer or real number, and lists of strings (which are
 !> written only).
+!>
+!> An attribute is named by its object, an absolute name ('/' is the file), and its own name.
+!> Messages have both, and the path of the file.
 module fw_hdf5_attribute
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_c_binding, only: c_ptr
@@ -57,6 +60,7 @@ module fw_hdf5_attribute
 contains
 
    !> Has this object such an attribute?
+   !> False also where the object itself is missing: optional attributes are asked for first.
    logical function has_attribute(file, object, name) result(found)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
@@ -66,6 +70,7 @@ contains
       found = found .and. status >= 0
    end function has_attribute
 
+   !> One string, of variable or fixed length.
    subroutine read_attribute_text(file, object, name, text, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
@@ -86,6 +91,7 @@ contains
       end if
    end subroutine read_attribute_text
 
+   !> One whole number of any width, read as 64 bits, because HDF5 clips silently what does not fit.
    subroutine read_attribute_integer(file, object, name, value, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
@@ -108,6 +114,7 @@ contains
       end if
    end subroutine read_attribute_integer
 
+   !> One number; whole ones are welcome.
    subroutine read_attribute_real(file, object, name, value, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
@@ -125,6 +132,7 @@ contains
       value = found
    end subroutine read_attribute_real
 
+   !> A string, as a scalar.
    subroutine write_attribute_text(file, object, name, value, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name, value
@@ -146,6 +154,7 @@ contains
       call put_attribute(file, object, name, [size(values)], values, error)
    end subroutine write_attribute_texts
 
+   !> Strings of variable length; no dimensions make a scalar.
    subroutine put_attribute(file, object, name, dims, strings, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
@@ -211,12 +220,14 @@ contains
       call h5aget_space_f(id, space, status)
       call h5sget_simple_extent_npoints_f(space, n, status)
       call h5sclose_f(space, status)
+      ! A list of one is taken for a scalar: MATLAB writes no other.
       if (n == 1 .and. any(class == classes)) return
       call h5aclose_f(id, status)
       call attribute_failure(file, object, name, 'is of the wrong type, expected one '// &
                              class_words(classes(1)), error)
    end subroutine open_attribute
 
+   !> What was expected, in words.
    pure function class_words(class) result(words)
       integer, intent(in) :: class
       character(:), allocatable :: words
@@ -226,6 +237,7 @@ contains
       if (class == h5t_float_f) words = 'real number'
    end function class_words
 
+   !> Read one element to an address, converted to a type of memory, and close the attribute.
    subroutine read_and_close(file, object, name, id, type_id, address, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
@@ -252,6 +264,7 @@ contains
       integer(hid_t) :: space
       integer :: status, ignored
 
+      ! HDF5 cannot change the type or the shape of an attribute.
       if (has_attribute(file, object, name)) then
          call h5adelete_by_name_f(file%id, object, name, status)
       end if
@@ -261,6 +274,7 @@ contains
       if (status < 0) call attribute_failure(file, object, name, 'cannot be created', error)
    end subroutine new_attribute
 
+   !> One number from an address, as a scalar.
    subroutine write_number(file, object, name, type_id, address, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name
@@ -277,6 +291,7 @@ contains
       if (status < 0) call attribute_failure(file, object, name, 'cannot be written', error)
    end subroutine write_number
 
+   !> Raise an error: `text` continues "<file>: attribute <name> of <object> ".
    subroutine attribute_failure(file, object, name, text, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: object, name, text

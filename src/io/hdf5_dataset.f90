@@ -37,6 +37,7 @@ module fw_hdf5_dataset
    character(*), parameter :: kind_words(*) = &
       [character(14) :: 'real numbers', 'integers', 'strings']
 
+   ! More than any dataset of a model or a result has.
    integer, parameter :: max_rank = 8
    !> No more elements than 4 GB of reals: a dense model beyond that cannot be solved here, and
    !> a damaged file can claim any size.
@@ -59,7 +60,9 @@ contains
    subroutine open_dataset(file, name, kind, rank, dataset, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
+      !> One of the kinds above, and the rank that is expected.
       integer, intent(in) :: kind, rank
+      !> Its dimensions are known before anything is allocated.
       type(dataset_type), intent(out) :: dataset
       type(error_type), allocatable, intent(out) :: error
       integer :: status
@@ -99,11 +102,13 @@ contains
 
       status = 0
       buffer = address
+      ! Nothing to read: HDF5 refuses an address of no elements.
       if (product(dataset%dims) > 0) call h5dread_f(dataset%id, type_id, buffer, status)
       call h5dclose_f(dataset%id, ignored)
       if (status < 0) call dataset_failure(file, name, 'cannot be read (damaged file?)', error)
    end subroutine read_dataset_raw
 
+   !> Open a dataset and note its dimensions.
    subroutine inspect(file, name, dataset, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -113,6 +118,7 @@ contains
       integer(hid_t) :: space
       integer :: status, extent
 
+      ! Asked first: opening what is missing would be reported like damage.
       if (.not. file%exists(name)) then
          call dataset_failure(file, name, 'is missing', error)
          return
@@ -135,6 +141,7 @@ contains
       call h5sclose_f(space, status)
    end subroutine inspect
 
+   !> Refuse elements of another class, with what they are and what is expected.
    subroutine check_kind(file, name, dataset, kind, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -161,6 +168,7 @@ contains
                            trim(kind_words(kind)), error)
    end subroutine check_kind
 
+   !> Refuse another rank, and a size that cannot be meant or is not stored.
    subroutine check_size(file, name, dataset, rank, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -191,6 +199,7 @@ contains
                            ', more than can be read or is stored (damaged file?)', error)
    end subroutine check_size
 
+   !> The class of elements, as h5py's users know it.
    pure function class_word(class) result(word)
       integer, intent(in) :: class
       character(:), allocatable :: word

@@ -81,6 +81,7 @@ contains
          call fatal_error(error, path//': no such file', status_io)
          return
       end if
+      ! Three failures apart: no access, no HDF5, and HDF5 that is damaged.
       call h5fis_hdf5_f(path, found, status)
       if (status < 0) then
          call fatal_error(error, path//': cannot be read (a folder, or not permitted?)', status_io)
@@ -148,6 +149,7 @@ contains
    !> The bytes that the file would have on a disk.
    subroutine image(self, bytes, error)
       class(hdf5_file), intent(in) :: self
+      !> What a file on a disk would hold, byte by byte.
       integer(c_int8_t), allocatable, target, intent(out) :: bytes(:)
       type(error_type), allocatable, intent(out) :: error
       type(c_ptr) :: address
@@ -158,6 +160,7 @@ contains
       if (allocated(error)) return
       n = 0_size_t
       address = c_null_ptr
+      ! First the size, then the bytes.
       call h5fget_file_image_f(self%id, address, 0_size_t, status, n)
       problem = 0
       if (status >= 0) allocate (bytes(n), stat=problem)
@@ -188,6 +191,7 @@ contains
 
       if (self%id < 0) return
       call h5fclose_f(self%id, status)
+      ! Also after a failure: HDF5 does not take a second attempt.
       self%id = -1_hid_t
       if (status < 0) call fatal_error(error, self%path//': closing failed (disk full?)', status_io)
    end subroutine close

@@ -1,4 +1,8 @@
 !> Reading datasets of real numbers and integers, rank 0 to 4.
+!>
+!> The ranks differ in their allocation alone. Files come from others: type, rank and size are
+!> checked before anything is allocated (fw_hdf5_dataset), and arrays have the reversed order of
+!> dimensions.
 module fw_hdf5_read
    use, intrinsic :: iso_c_binding, only: c_loc
    use fw_error, only: error_type
@@ -36,6 +40,7 @@ module fw_hdf5_read
 
 contains
 
+   !> `values` is defined on every way out, 0 with an error.
    subroutine read_real_0(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -51,6 +56,7 @@ contains
       if (.not. allocated(error)) values = found(1)
    end subroutine read_real_0
 
+   !> Allocated only without an error in type, rank and size.
    subroutine read_real_1(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -175,6 +181,7 @@ contains
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
       type(dataset_type), intent(in) :: dataset
+      !> All elements, whatever the rank.
       integer, intent(in) :: n
       real(wp), intent(out), target :: values(n)
       type(error_type), allocatable, intent(out) :: error
@@ -193,6 +200,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer(i8), allocatable, target :: wide(:)
 
+      ! Half a file of garbage must not be read as numbers: they start as 0.
       allocate (wide(n), source=0_i8)
       call read_dataset_raw(file, name, dataset, h5kind_to_type(i8, h5_integer_kind), &
                             c_loc(wide), error)

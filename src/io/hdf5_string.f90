@@ -1,5 +1,8 @@
 !> Strings of HDF5, in datasets and attributes: variable length or fixed, UTF-8 or ASCII, as
 !> h5py and MATLAB write them. Written are variable-length UTF-8 strings, which h5py shows as str.
+!>
+!> Datasets and attributes have the same strings behind different routines of HDF5: `is_attribute`
+!> says which. All procedures leave closing what they were given to the caller.
 module fw_hdf5_string
    use, intrinsic :: iso_c_binding, only: c_associated
    use, intrinsic :: iso_c_binding, only: c_char
@@ -72,6 +75,7 @@ contains
 
       allocate (strings(n))
       status = 0
+      ! HDF5 would read nothing from an address of nothing.
       if (n == 0) return
       if (is_attribute) then
          call h5aget_type_f(id, file_type, status)
@@ -87,6 +91,7 @@ contains
       call h5tclose_f(file_type, ignored)
    end subroutine get_strings
 
+   !> Strings of variable length: HDF5 gives addresses of memory that it has allocated.
    subroutine get_variable(id, is_attribute, file_type, strings, status)
       integer(hid_t), intent(in) :: id, file_type
       logical, intent(in) :: is_attribute
@@ -106,6 +111,7 @@ contains
          do i = 1, size(strings)
             strings(i)%text = text_at(texts(i))
          end do
+         ! Given back to HDF5, or it would leak with every file.
          call h5screate_simple_f(1, [size(strings, kind=hsize_t)], space, ignored)
          buffer = c_loc(texts)
          call h5dvlen_reclaim_f(memory_type, space, h5p_default_f, buffer, ignored)
@@ -114,6 +120,7 @@ contains
       call h5tclose_f(memory_type, ignored)
    end subroutine get_variable
 
+   !> Strings of one fixed length, padded by nulls or blanks.
    subroutine get_fixed(id, is_attribute, file_type, strings, status)
       integer(hid_t), intent(in) :: id, file_type
       logical, intent(in) :: is_attribute
@@ -124,6 +131,7 @@ contains
       integer :: i, padding
 
       call h5tget_size_f(file_type, length, status)
+      ! Before the buffer is allocated.
       if (length < 1 .or. length > max_length) status = -1
       if (status < 0) return
       call h5tget_strpad_f(file_type, padding, status)
@@ -146,6 +154,7 @@ contains
       integer(hid_t) :: type_id
       integer :: i, j, at, ignored
 
+      ! All strings in one buffer, each with its null, and addresses into it.
       allocate (buffer(sum([(len(strings(i)%text) + 1, i=1, size(strings))])))
       at = 1
       do i = 1, size(strings)
@@ -165,6 +174,7 @@ contains
       call h5tclose_f(type_id, ignored)
    end subroutine put_strings
 
+   !> Read to an address with a type of memory.
    subroutine get_raw(id, is_attribute, memory_type, address, status)
       integer(hid_t), intent(in) :: id, memory_type
       logical, intent(in) :: is_attribute
@@ -200,6 +210,7 @@ contains
       integer :: i, n
 
       n = findloc(letters, c_null_char, dim=1) - 1
+      ! No null: the letters fill the fixed length.
       if (n < 0) n = size(letters)
       allocate (character(n) :: text)
       do i = 1, n

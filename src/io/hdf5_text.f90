@@ -1,4 +1,6 @@
 !> Datasets of strings, rank 0 and 1.
+!>
+!> Read are all kinds of strings that fw_hdf5_string knows, written those of variable length.
 module fw_hdf5_text
    use fw_error, only: error_type
    use fw_hdf5_dataset, only: dataset_type
@@ -35,6 +37,7 @@ module fw_hdf5_text
 
 contains
 
+   !> A scalar; not allocated with an error.
    subroutine read_text_0(file, name, text, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -46,6 +49,7 @@ contains
       if (.not. allocated(error)) call move_alloc(strings(1)%text, text)
    end subroutine read_text_0
 
+   !> A list, one dimension long.
    subroutine read_text_1(file, name, texts, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -75,6 +79,7 @@ contains
       call write_strings(file, name, shape(texts), texts, error)
    end subroutine write_text_1
 
+   !> All strings of a dataset of a rank, in the order of the file.
    subroutine read_strings(file, name, rank, strings, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -91,6 +96,7 @@ contains
       if (status < 0) call dataset_failure(file, name, 'cannot be read (damaged file?)', error)
    end subroutine read_strings
 
+   !> A dataset and the groups above it; no dimensions make a scalar.
    subroutine write_strings(file, name, dims, strings, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -107,6 +113,7 @@ contains
       call h5tclose_f(type_id, ignored)
       if (allocated(error)) return
       status = 0
+      ! An empty list is a dataset all the same.
       if (size(strings) > 0) call put_strings(id, .false., strings, status)
       call h5dclose_f(id, ignored)
       if (status < 0) call dataset_failure(file, name, 'cannot be written (disk full?)', error)

@@ -1,4 +1,6 @@
 !> Writing datasets of real numbers and integers, rank 0 to 4.
+!>
+!> A dataset is written once and whole; what grows point by point is fw_hdf5_append's.
 module fw_hdf5_write
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_c_binding, only: c_ptr
@@ -50,6 +52,7 @@ contains
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
       integer(hid_t), intent(in) :: type_id, space
+      !> The caller closes it, and the space.
       integer(hid_t), intent(out) :: id
       type(error_type), allocatable, intent(out) :: error
       !> Dataset creation property list (chunks, fill value).
@@ -64,6 +67,7 @@ contains
       access_properties = h5p_default_f
       if (present(access)) access_properties = access
       call h5pcreate_f(h5p_link_create_f, links, status)
+      ! Groups on the way come by themselves.
       call h5pset_create_inter_group_f(links, 1, status)
       call h5dcreate_f(file%id, name, type_id, space, id, status, properties, links, &
                        access_properties)
@@ -88,6 +92,7 @@ contains
    subroutine write_dataset_raw(file, name, dims, type_id, address, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
+      !> In the order of Fortran, empty for a scalar.
       integer, intent(in) :: dims(:)
       integer(hid_t), intent(in) :: type_id
       type(c_ptr), intent(in) :: address
@@ -194,6 +199,7 @@ contains
       call put_integer(file, name, shape(values), values, error)
    end subroutine write_integer_4
 
+   !> All elements in their order in memory, whatever the rank.
    subroutine put_real(file, name, dims, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name

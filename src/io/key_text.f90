@@ -1,4 +1,7 @@
 !> The keys of a case as text for a reader, or as JSON for a program.
+!>
+!> The declarations of the keys are the one source: what is printed here is what the reader does,
+!> and the tables of the guide and the settings of the Python package are made from the JSON.
 module fw_key_text
    use fw_error, only: error_type, fatal_error, status_usage
    use fw_key_range, only: range_type
@@ -16,6 +19,7 @@ contains
 
    !> Write the keys of a group ('': of all of them), for a reader or as JSON.
    subroutine write_keys(unit, group, as_json, error)
+      !> Of a file, or of the standard output.
       integer, intent(in) :: unit
       character(*), intent(in) :: group
       logical, intent(in) :: as_json
@@ -45,6 +49,8 @@ contains
       if (as_json) write (unit, '(a)') '}'
    end subroutine write_keys
 
+   !> A group for a reader: each key with what it accepts, its shape, unit and default, and its
+   !> help.
    subroutine write_group(unit, keys, g)
       integer, intent(in) :: unit
       type(record_list), intent(in) :: keys
@@ -65,6 +71,7 @@ contains
       end do
    end subroutine write_group
 
+   !> ` in L`, or nothing.
    function unit_text(entry) result(text)
       type(record_type), intent(in) :: entry
       character(:), allocatable :: text
@@ -73,6 +80,7 @@ contains
       if (len_trim(entry%key%unit) > 0) text = ' in '//trim(entry%key%unit)
    end function unit_text
 
+   !> ` [0.5]`, or what holds where the key is absent.
    function default_text(entry) result(text)
       type(record_type), intent(in) :: entry
       character(:), allocatable :: text
@@ -96,6 +104,7 @@ contains
       if (entry%key%repeats) text = ', one for all or '//trim(entry%key%shape)//' of them'
    end function shape_text
 
+   !> A group as a member of the object of all groups.
    subroutine write_group_json(unit, keys, g, is_last)
       integer, intent(in) :: unit
       type(record_list), intent(in) :: keys
@@ -109,6 +118,7 @@ contains
       is_first = .true.
       do k = 1, size(keys%records)
          if (keys%records(k)%group /= keys%groups(g)%text) cycle
+         ! The comma comes before each but the first: which key is the last of a group is not known.
          if (.not. is_first) write (unit, '(a)') ','
          write (unit, '(a)', advance='no') '  '//key_json(keys%records(k))
          is_first = .false.
@@ -116,6 +126,7 @@ contains
       write (unit, '(a)') '}}'//trim(merge(' ', ',', is_last))
    end subroutine write_group_json
 
+   !> A key as a member of its group; what does not apply to it is left out.
    function key_json(entry) result(text)
       type(record_type), intent(in) :: entry
       character(:), allocatable :: text
@@ -170,6 +181,7 @@ contains
 
       text = '"'
       do i = 1, len(content)
+         ! Only these two need a backslash.
          if (scan(content(i:i), '"\') > 0) text = text//'\'
          text = text//content(i:i)
       end do

@@ -1,5 +1,8 @@
 !> A model that the calling program holds in arrays, put together part by part. The parts bear the
 !> names of the datasets of a model file, and have their sizes.
+!>
+!> Each part is checked for its size as it comes, so that the call that is wrong is the one that is
+!> told; what the values must be (finite, symmetric) is checked with those of files later.
 module fw_memory_model
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -32,6 +35,7 @@ module fw_memory_model
    character(*), parameter :: text_names(*) = &
       [character(20) :: 'title', 'unit_system', 'contact/patch']
 
+   !> A model in the making; `parts` has the shape of one that was read from a file.
    type :: memory_model_type
       integer :: n_dof = 0
       integer :: n_pairs = 0
@@ -71,11 +75,13 @@ contains
    !> makes no difference; contact/position is (3, n_pairs) with the coordinate innermost.
    subroutine put_reals(self, name, values, error)
       class(memory_model_type), intent(inout) :: self
+      !> The name of a dataset, such as 'load/cosine'.
       character(*), intent(in) :: name
       real(wp), intent(in) :: values(:)
       type(error_type), allocatable, intent(out) :: error
       integer :: rows, columns
 
+      ! Loads; the other kinds change it.
       rows = self%n_dof
       columns = 1
       if (any(matrix_names == name)) columns = self%n_dof
@@ -87,6 +93,7 @@ contains
          call unknown_name(name, [matrix_names, load_names, pair_names], 'real', error)
          return
       end if
+      ! The product in 64 bits: n_dof**2 passes the range of 32.
       call check_size(name, size(values, kind=i8), rows, columns, error)
       if (allocated(error)) return
       associate (parts => self%parts)
@@ -132,6 +139,7 @@ contains
       end if
       call check_size(name, size(values, kind=i8), 3, self%n_pairs, error)
       if (allocated(error)) return
+      ! Component innermost, as in a file that h5py shows as (n_pairs, 3).
       if (name == 'contact/side_1') self%parts%side_1 = reshape(values, [3, self%n_pairs])
       if (name == 'contact/side_2') self%parts%side_2 = reshape(values, [3, self%n_pairs])
    end subroutine put_integers
@@ -176,6 +184,7 @@ contains
       real(wp), allocatable :: rows(:, :)
       integer :: i, n
 
+      ! All are checked before any is added.
       do i = 1, size(names)
          call check_size(names(i)%text, size(columns, 1, kind=i8), self%n_dof, 1, error)
          if (.not. allocated(error) .and. len_trim(names(i)%text) == 0) then
@@ -194,6 +203,7 @@ contains
          end do
          allocate (rows(n + size(names), self%n_dof))
          rows(:n, :) = parts%observe_matrix
+         ! Stored by rows, as in a model file; the caller's factors stand in columns.
          rows(n + 1:, :) = transpose(columns)
          call move_alloc(rows, parts%observe_matrix)
       end associate
@@ -212,10 +222,12 @@ contains
       if (len(missing) > 0) then
          call fatal_error(error, 'the model in memory lacks '//missing, status_input)
       else if (self%n_pairs > 0 .and. .not. allocated(self%parts%side_2)) then
+         ! Everything against the ground.
          allocate (self%parts%side_2(3, self%n_pairs), source=0)
       end if
    end subroutine check
 
+   !> Column by column, since reshape would copy the whole once more; n_dof**2 values were checked.
    subroutine take_matrix(name, values, order, matrix, error)
       character(*), intent(in) :: name
       real(wp), intent(in) :: values(:)
@@ -236,6 +248,7 @@ contains
       end do
    end subroutine take_matrix
 
+   !> Refuse another number of values than the part has.
    subroutine check_size(name, n_given, rows, columns, error)
       character(*), intent(in) :: name
       integer(i8), intent(in) :: n_given
@@ -250,6 +263,7 @@ contains
                        status_input)
    end subroutine check_size
 
+   !> Say which names there are.
    subroutine unknown_name(name, names, kind_of, error)
       character(*), intent(in) :: name, names(:), kind_of
       type(error_type), allocatable, intent(out) :: error

@@ -1,4 +1,7 @@
 !> The two ends of a namelist assignment: its subscripts and its values.
+!>
+!> Of a line  key(2:3) = 2*1.5, 'text'  this is  (2:3)  and  2*1.5, 'text'. What the values mean is
+!> up to the key: here they stay text, with their line for messages.
 module fw_namelist_values
    use fw_cursor, only: cursor_type
    use fw_error, only: error_type, fatal_error, status_input
@@ -14,6 +17,7 @@ contains
    !> Subscripts in parentheses, if any; the cursor is left behind them.
    subroutine parse_sections(cursor, place, entry, error)
       type(cursor_type), intent(inout) :: cursor
+      !> What messages start with, such as "case.nml: &contact mu".
       character(*), intent(in) :: place
       type(entry_type), intent(inout) :: entry
       type(error_type), allocatable, intent(out) :: error
@@ -26,6 +30,7 @@ contains
       if (cursor%peek() /= '(') return
       cursor%position = cursor%position + 1
       call cursor%take_through(')', content, ok)
+      ! So that each subscript ends in a comma.
       content = content//','
       do while (ok .and. len(content) > 0)
          comma = index(content, ',')
@@ -40,9 +45,11 @@ contains
    !> One subscript: `2`, `1:3`, `2:`, `:4` or `:`.
    type(section_type) function to_section(text, ok) result(section)
       character(*), intent(in) :: text
+      !> False where it is none, or below 1, or its end is before its start.
       logical, intent(out) :: ok
       integer :: colon, status
 
+      ! Digits and a colon only: list-directed reading would take far more.
       ok = verify(text, '0123456789: ') == 0 .and. len_trim(text) > 0
       if (.not. ok) return
       status = 0
@@ -71,13 +78,17 @@ contains
       integer :: n
       logical :: after_value
 
+      ! Doubled as needed: lists of matrices are long.
       allocate (values(8))
       n = 0
       after_value = .false.
       do
          call cursor%skip_blank()
          if (cursor%at_end() .or. cursor%is_at_key()) exit
+         ! The end of a group; on the command line a slash may be part of a path.
          if (cursor%in_file .and. scan(cursor%peek(), '/&') > 0) exit
+         ! One comma behind a value; a second one stands where a value is expected, and is refused
+         ! there.
          if (cursor%peek() == ',' .and. after_value) then
             cursor%position = cursor%position + 1
             after_value = .false.
@@ -105,6 +116,7 @@ contains
 
       value%line = cursor%line
       call cursor%take_word(value%text)
+      ! A star in the first place is no repeat count.
       star = index(value%text, '*')
       ok = .true.
       if (star > 1) then
@@ -120,6 +132,7 @@ contains
                           to_text(huge(1))//' (line '//to_text(value%line)//'); a text '// &
                           'needs quotes', status_input)
       else if (len(value%text) == 0 .and. scan(cursor%peek(), '''"') > 0) then
+         ! Also behind a repeat count: 3*'text'.
          value%quoted = .true.
          call cursor%take_quoted(value%text, ok)
          if (.not. ok) call fatal_error(error, place//': a text is not closed by its quote in '// &

@@ -1,5 +1,8 @@
 !> The linear structure of a case: groups &model and &load, from the namelist, a model file or
 !> the calling program.
+!>
+!> The source is chosen first, because it decides which other keys may be given. `raw` collects the
+!> parts from whatever source; finish_model checks them and adds rotation and damping.
 module fw_read_model
    use fw_error, only: error_type
    use fw_kinds, only: wp
@@ -22,6 +25,7 @@ module fw_read_model
 
    public :: read_model, read_loads, finish_model
 
+   !> HDF5 can crash over a damaged file: reading is tried in a process of its own first.
    type, extends(trial_type) :: model_trial
    contains
       procedure :: read => read_in_trial

@@ -1,4 +1,7 @@
 !> What the keys of the namelist groups with options mean together.
+!>
+!> Single values have passed the range of their key already (fw_key_range). Here are the refusals
+!> that need two keys or the analysis, and what follows from other keys where one is left out.
 module fw_read_options
    use fw_case, only: analysis_frf, analysis_time
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
@@ -49,6 +52,7 @@ contains
    !> With an accuracy n_harmonics is the most.
    subroutine choose_for_accuracy(reader, options)
       type(reader_type), intent(inout) :: reader
+      !> n_harmonics is amended where it was left out, also in the effective input.
       type(harmonics_options), intent(inout) :: options
 
       if (.not. reader%given('harmonics', 'n_harmonics')) then
@@ -82,6 +86,7 @@ contains
       call options%bind_keys(reader, analysis == analysis_frf)
       call check_ends(reader, analysis, options)
       if (allocated(options%frequencies)) call take_list(reader, analysis, options)
+      ! Everything inside is in rad/s; the effective input keeps the unit of the user.
       if (options%unit == unit_hertz) then
          if (allocated(options%frequencies)) options%frequencies = 2.0_wp*pi*options%frequencies
          options%start = 2.0_wp*pi*options%start
@@ -102,6 +107,7 @@ contains
             call reader%refuse('sweep', trim(others(i)), 'is given beside frequencies, which '// &
                                'says it: keep one of the two')
          end if
+         ! None of the three shall stand in the effective input beside the list.
          call reader%amend('sweep', trim(others(i)), '')
       end do
       if (all(analysis /= [analysis_frf, analysis_time])) then
@@ -111,6 +117,7 @@ contains
          call reader%refuse('sweep', 'frequencies', "does not go with continuation = "// &
                             "'arclength', whose points are its own: give start and end")
       end if
+      ! Refused before: it was given, but not as it must be.
       if (size(options%frequencies) == 0) return
       options%n_points = size(options%frequencies)
       options%start = options%frequencies(1)
@@ -125,6 +132,7 @@ contains
 
       if (analysis /= analysis_frf .or. options%continuation /= continuation_arclength) return
       if (.not. (reader%given('sweep', 'start') .and. reader%given('sweep', 'end'))) return
+      ! To round-off, since both may come from a computation.
       if (abs(options%end - options%start) > epsilon(1.0_wp)*abs(options%start)) return
       call reader%refuse('sweep', 'end', '= '//number_text(options%end)//': must differ '// &
                          "from start with continuation = 'arclength', which follows the "// &

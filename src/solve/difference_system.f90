@@ -10,11 +10,14 @@ module fw_difference_system
    public :: difference_system, new_difference_system
 
    !> Step relative to the unknowns: the root of the unit round-off.
+   ! Truncation grows with the step, round-off with its inverse: both are some 1e-8 there. Near a
+   ! corner of the contact law a difference mixes two pieces, which no step avoids.
    real(wp), parameter :: relative_step = 1.0e-8_wp
 
    type, extends(parameter_system) :: difference_system
       class(parameter_system), pointer, private :: inner => null()
       !> The last point and its residual.
+      !> and scratch of the same length (n each).
       real(wp), allocatable, private :: x(:), r(:), trial(:), ahead(:)
    contains
       procedure :: set_parameter
@@ -31,7 +34,9 @@ module fw_difference_system
 
 contains
 
+   !> All unknowns take part: what a reduction leaves out rests on the analytic derivative.
    function new_difference_system(inner) result(self)
+      !> Has to outlive the new system, which changes its `reduced`.
       class(parameter_system), intent(inout), target :: inner
       type(difference_system) :: self
 
@@ -45,6 +50,7 @@ contains
          source=0.0_wp)
    end function new_difference_system
 
+   !> The last point is of the old parameter then: evaluate before anything else.
    subroutine set_parameter(self, parameter, error)
       class(difference_system), intent(inout) :: self
       real(wp), intent(in) :: parameter
@@ -65,6 +71,7 @@ contains
       call self%inner%parameter_derivative(x, dr)
    end subroutine parameter_derivative
 
+   !> Keeps the point, from which differences are taken.
    subroutine residual(self, x, r)
       class(difference_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
@@ -76,6 +83,7 @@ contains
       self%r = r
    end subroutine residual
 
+   !> Nothing is prepared; all n unknowns stay.
    subroutine linearize(self, n_linear)
       class(difference_system), intent(inout) :: self
       integer, intent(out) :: n_linear
@@ -83,6 +91,7 @@ contains
       n_linear = self%n
    end subroutine linearize
 
+   !> The whole right-hand side.
    subroutine reduce(self, r, rhs)
       class(difference_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:)
@@ -93,6 +102,7 @@ contains
       rhs = -r
    end subroutine reduce
 
+   !> The solution is the step.
    subroutine expand(self, r, solution, step)
       class(difference_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:), solution(:)
@@ -103,6 +113,7 @@ contains
       step = solution
    end subroutine expand
 
+   !> One residual for a product, and the inner system is left at the displaced point.
    subroutine apply(self, vector, product)
       class(difference_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: vector(:)
@@ -112,6 +123,7 @@ contains
       product = 0.0_wp
       length = maxval(abs(vector))
       if (length <= 0.0_wp) return
+      ! Scaled so that no unknown moves by more than the step.
       call difference(self, vector, step_size(self)/length, product)
    end subroutine apply
 
@@ -134,6 +146,7 @@ contains
       step_size = relative_step*max(maxval(abs(self%x)), tiny(1.0_wp)/relative_step**2)
    end function step_size
 
+   !> From the analytic derivative: what only speeds up need not be checked.
    subroutine build_preconditioner(self)
       class(difference_system), intent(inout) :: self
       integer :: n
@@ -150,6 +163,7 @@ contains
       call self%inner%precondition(vector)
    end subroutine precondition
 
+   !> n residuals for the whole matrix (n, n).
    subroutine assemble(self, matrix)
       class(difference_system), intent(inout) :: self
       real(wp), intent(inout), contiguous :: matrix(:, :)

@@ -86,6 +86,7 @@ module fw_kinsol
    !> Length of a cycle of SPGMR and cycles after the first.
    integer(c_int), parameter :: krylov_length = 60, krylov_restarts = 5
    !> Shortest step, relative to the unknowns: the line search gives up below it.
+   ! Far below what the tolerance of the residual asks for: it must not end a slow path.
    real(wp), parameter :: shortest_step = 1.0e-10_wp
    !> Longest step, times the size of the unknowns; generous, since that is a guess.
    real(wp), parameter :: longest_step = 1.0e4_wp
@@ -113,6 +114,7 @@ contains
       logical :: reduced
 
       self%krylov_iterations = 0
+      ! KINSOL's vectors have a fixed length, so all unknowns take part.
       reduced = system%reduced
       system%reduced = .false.
       state%system => system
@@ -120,6 +122,7 @@ contains
       state%best_x = x
       state%seen = x
       allocate (state%r(system%n))
+      ! The guess may be the solution, and counts as the best so far.
       call look(state, x, state%r)
       ! No iterations would mean 200 to KINSOL.
       if (state%best > state%tolerance .and. state%best < huge(1.0_wp) .and. &
@@ -148,6 +151,7 @@ contains
 
       iterations = 0
       x = state%best_x
+      ! Scaled unknowns and residuals are of the order of one, as the tests of KINSOL want them.
       allocate (x_scale(size(x)), source=1.0_wp/typical_size(state))
       allocate (r_scale(size(x)), source=1.0_wp/state%system%reference)
       call create(objects, x, x_scale, r_scale, done)
@@ -172,14 +176,18 @@ contains
       size = 0.0_wp
       if (done) then
          call state%system%build_preconditioner()
+         ! The step of the linear joint from here has the size of the answer.
          call state%system%precondition(state%r)
          size = norm2(state%r)
       end if
       if (.not. ieee_is_finite(size)) size = 0.0_wp
       size = max(size, norm2(state%best_x))/sqrt(real(state%system%n, wp))
+      ! Also where it is NaN.
       if (.not. size > 0.0_wp) size = 1.0_wp
    end function typical_size
 
+   !> Objects over arrays of the caller, which stay his; `done` is false without memory, and what
+   !> was made until then is freed by `free`.
    subroutine create(objects, x, x_scale, r_scale, done)
       type(kinsol_objects), intent(inout) :: objects
       real(wp), intent(inout), contiguous, target :: x(:), x_scale(:), r_scale(:)
@@ -198,6 +206,7 @@ contains
       done = c_associated(objects%memory) .and. associated(objects%linear)
    end subroutine create
 
+   !> Each status is looked at once all are set: none of the calls depends on another one.
    subroutine configure(self, objects, state, done)
       class(kinsol_solver), intent(in) :: self
       type(kinsol_objects), intent(inout) :: objects
@@ -219,12 +228,15 @@ contains
          status(8) = fkinsetfuncnormtol(memory, self%options%tolerance/root_n)
          status(9) = fkinsetscaledsteptol(memory, shortest_step)
          status(10) = fkinsetmaxnewtonstep(memory, longest_step*root_n)
+         ! The preconditioner is built anew in every step: an old one costs more iterations than it
+         ! saves.
          status(11) = fkinsetmaxsetupcalls(memory, 1_c_long)
       end associate
       done = all(status == 0)
       if (done) done = fsunlinsol_spgmrsetmaxrestarts(objects%linear, krylov_restarts) == 0
    end subroutine configure
 
+   !> The solver before what it refers to.
    subroutine free(self)
       class(kinsol_objects), intent(inout) :: self
       integer(c_int) :: status
@@ -283,6 +295,7 @@ contains
       r_values => values(r, state%system%n)
       call look(state, x_values, r_values)
       status = callback_ok
+      ! The line search shortens a step into nowhere; at the solution nothing more is wanted.
       if (.not. ieee_is_finite(norm2(r_values))) status = callback_smaller
       if (state%best <= state%tolerance .or. state%system%is_interrupted()) status = callback_fatal
    end function evaluate
@@ -298,6 +311,7 @@ contains
 
       call c_f_pointer(data, state)
       call linearize_at(state, values(x, state%system%n), done)
+      ! Zero tells KINSOL that the product has taken note of a new point.
       new_x = 0
       status = callback_fatal
       if (.not. done) return

@@ -30,6 +30,7 @@ module fw_linear_step
       integer :: kind = linear_auto
       type(lu_type) :: lu
       type(gmres_type) :: gmres
+      !> Of the reduced problem (n_linear).
       real(wp), allocatable :: rhs(:), solution(:)
       !> Whether `lu` holds the factors of the last derivative.
       logical :: factored = .false.
@@ -73,6 +74,7 @@ contains
       !> Relative residual asked of an iterative solution.
       real(wp), intent(in) :: tolerance
       real(wp), intent(out), contiguous :: step(:)
+      !> False where the matrix is singular; GMRES that fails is no reason (see solve_prepared).
       logical, intent(out) :: done
 
       call self%prepare(system, done)
@@ -109,6 +111,7 @@ contains
          if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_up_to)) then
             call factor(self, system, n, done)
          else
+            ! The system knows whether its state is still that of the preconditioner.
             self%kept = self%keeps .and. self%worth_keeping .and. system%preconditioner_fits()
             if (.not. self%kept) call build(self, system)
          end if
@@ -135,10 +138,12 @@ contains
       real(wp) :: decades
       integer :: limit, most
 
+      ! Iterations grow with the digits asked for: only their rate compares.
       decades = -log10(tolerance)
       if (self%kept) then
          limit = int(kept_factor*self%fresh_rate*decades) + kept_excess
          most = self%gmres%max_iterations
+         ! Twice the limit: what is nearly done is let finish, what is hopeless is cut.
          self%gmres%max_iterations = min(most, 2*limit)
          call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
          self%gmres%max_iterations = most
@@ -184,6 +189,7 @@ contains
          self%solution = self%rhs
          call self%lu%solve(self%solution)
       end if
+      ! Steps of the rows that left the problem are added, and stand in the right-hand side already.
       call system%expand(r, self%solution, step)
    end subroutine solve_prepared
 

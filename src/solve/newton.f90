@@ -28,18 +28,21 @@ module fw_newton
       type(linear_step_type) :: linear
       !> Largest relative residual asked of iterative linear solutions.
       real(wp) :: loosest = 1.0e-2_wp
+      !> Residual at the last point, step, and point that is tried (n).
       real(wp), allocatable :: r(:), step(:), trial(:)
    contains
       procedure :: solve
    end type newton_solver
 
    !> Shortest fraction of a step that is tried.
+   ! Down to a sixteenth: at a corner shorter steps only creep towards it.
    integer, parameter :: max_halvings = 4
    !> Factor between the relative residual asked of iterative linear solutions and the square of
    !> the last decrease (Eisenstat and Walker 1996, choice 2): a step that the corners of the
    !> contact law will spoil need not be solved well.
    real(wp), parameter :: forcing_factor = 0.1_wp
    !> Part of the tolerance that the linear residual may take of the last step.
+   ! So small that the last step meets the tolerance at its first trial.
    real(wp), parameter :: last_step_share = 0.03_wp
    !> Steps without a new smallest residual after which the path counts as cycling.
    integer, parameter :: patience = 6
@@ -61,6 +64,7 @@ contains
       call system%residual(x, self%r)
       norm = norm2(self%r)/system%reference
       best = norm
+      ! Nothing is known of the decrease before the first step.
       forcing = self%loosest
       stalled = 0
       do
@@ -72,12 +76,14 @@ contains
          if (report%interrupted) exit
          call self%linear%solve(system, self%r, forcing, self%step, done)
          report%iterations = report%iterations + 1
+         ! A singular derivative, or one that no linear solver copes with.
          if (.not. done) exit
          before = norm
          call search(self, system, x, norm, done)
          if (.not. done) exit
          forcing = min(self%loosest, next_forcing(before, norm, self%options%tolerance))
          stalled = stalled + 1
+         ! Creeping by less than a hundredth counts as none.
          if (norm < 0.99_wp*best) stalled = 0
          best = min(best, norm)
       end do
@@ -115,12 +121,14 @@ contains
             best_norm = trial_norm
             best_fraction = fraction
          end if
+         ! Armijo's condition, all but a plain decrease.
          if (trial_norm <= (1.0_wp - 1.0e-4_wp*fraction)*norm) exit
          if (system%is_interrupted()) exit
          fraction = 0.5_wp*fraction
       end do
       done = best_norm < huge(1.0_wp)
       if (.not. done) return
+      ! The system was left at a worse trial: back to the best.
       if (fraction < best_fraction .or. halving > max_halvings) then
          self%trial = x + best_fraction*self%step
          call system%residual(self%trial, self%r)

@@ -49,11 +49,14 @@ module fw_solver_options
 
    !> Options of a nonlinear solution (group &solver).
    type :: solver_options
+      !> One of the constants above, as are all whole numbers with words.
       integer :: kind = solver_newton
       integer :: linear = linear_auto
       integer :: jacobian = jacobian_analytic
       !> On norm(R)/norm(F).
       real(wp) :: tolerance = 1.0e-8_wp
+      !> Steps of Newton's method from each guess; Jacobians of Powell's; nonlinear iterations of
+      !> KINSOL.
       integer :: max_iterations = 60
       !> Time after which a point counts as not converged [s] (0: none).
       real(wp) :: max_seconds = 0.0_wp
@@ -80,13 +83,18 @@ module fw_solver_options
 
    !> The frequencies of a case (group &sweep).
    type :: sweep_options
+      !> In the unit of `unit` while it is read, in rad/s from then on. Below start the sweep goes
+      !> down.
       real(wp) :: start = 0.0_wp
       real(wp) :: end = 0.0_wp
+      !> Points of a natural sweep, both ends included; of a branch the number that sets its first
+      !> step.
       integer :: n_points = 1
       !> Frequencies one by one, which start, end and n_points then follow from.
       real(wp), allocatable :: frequencies(:)
       integer :: unit = unit_rad_per_second
       integer :: continuation = continuation_natural
+      !> A branch may turn round without end.
       integer :: max_points = 1000
       !> Compute the Floquet multipliers of every point.
       logical :: stability = .false.

@@ -32,6 +32,7 @@ module fw_powell
       type(solver_options) :: options
       !> Residuals evaluated in the last solution.
       integer :: evaluations = 0
+      !> Workspace of hybrj (n), (n, n), packed triangle n (n + 1)/2, and four vectors.
       real(wp), allocatable :: f(:), jacobian(:, :), scale(:), triangle(:), qtf(:), work(:, :)
    contains
       procedure :: solve
@@ -46,6 +47,7 @@ module fw_powell
    !> Residuals for each Jacobian allowed.
    integer, parameter :: evaluations_per_jacobian = 10
    !> Times that hybrj starts anew from the best point, as long as each start gains this factor.
+   ! A start that went astray leaves Broyden's updates and a radius behind that no longer serve.
    integer, parameter :: max_restarts = 5
    real(wp), parameter :: worth_restarting = 0.9_wp
    !> First trust radius, times the norm of the scaled unknowns; the second value is for restarts,
@@ -170,10 +172,13 @@ contains
 
       call state%system%residual(x, f)
       state%seen = x
+      ! Scaled, since hybrj compares norms of residuals with numbers of the order of one.
       f = f/state%system%reference
       norm = norm2(f)
       if (.not. ieee_is_finite(norm)) then
+         ! Nothing finite so far: the guess itself is hopeless.
          if (state%best >= huge(1.0_wp)) task = -1
+         ! Some finite vector in a residual's place; huge numbers would make NaN of the updates.
          f = refused*min(state%best, 1.0_wp/epsilon(1.0_wp))
          return
       end if

@@ -102,6 +102,7 @@ module fw_pseudo_bdf
    !> First step, relative to the scale of pseudo-time.
    real(wp), parameter :: first_step = 1.0e-3_wp
    !> Share of the fall of the residual that the accuracy follows, and the end of it.
+   ! The accuracy starts to fall once the residual has fallen a hundredfold.
    real(wp), parameter :: following = 100.0_wp, finest = 1.0e-9_wp
 
    !> The Fortran interface of this function cannot say that there is no matrix: it takes an
@@ -116,6 +117,7 @@ module fw_pseudo_bdf
 
 contains
 
+   !> A step given by the user is the first one only; CVODE chooses all others.
    subroutine start(self, system, x, done)
       class(bdf_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system
@@ -134,6 +136,7 @@ contains
       if (self%step <= 0.0_wp) self%step = first_step*self%scales%time
       call open_context(self%context, done)
       if (.not. done) return
+      ! CVODE works on the array of the caller: x is the state after every step.
       self%x => wrap(x, self%context)
       self%memory = fcvodecreate(cv_bdf, self%context)
       done = associated(self%x) .and. c_associated(self%memory)
@@ -178,6 +181,7 @@ contains
       self%state%linearized = .false.
       self%state%seen = huge(1.0_wp)
       call tighten(self)
+      ! Out of reach, so that one step ends where its error says.
       far = self%time + max(1.0e3_wp*self%step, self%scales%time)
       status = fcvode(self%memory, far, self%x, reached, cv_one_step)
       done = status >= 0
@@ -188,6 +192,7 @@ contains
       else
          self%message = 'BDF: CVODE gave up with status '//to_text(int(status))
       end if
+      ! CVODE leaves the system wherever it looked last.
       call system%residual(x, self%r)
    end subroutine advance
 
@@ -200,6 +205,7 @@ contains
       self%state%accuracy = min(self%state%accuracy, share*self%accuracy)
    end subroutine tighten
 
+   !> CVODE counts from its start: the numbers replace, not add.
    subroutine count_work(self)
       class(bdf_scheme), intent(inout) :: self
       integer(c_long) :: errors(1), failures(1), iterations(1)
@@ -218,6 +224,7 @@ contains
       self%step = next(1)
    end subroutine count_work
 
+   !> The reverse order of `start`; harmless where that failed half-way.
    subroutine finish(self)
       class(bdf_scheme), intent(inout) :: self
       integer(c_int) :: status
@@ -240,6 +247,7 @@ contains
 
       call c_f_pointer(data, state)
       w => values(weight, state%system%n)
+      ! Absolute and relative at once: unknowns that are small beside the others need no digits.
       w = 1.0_wp/(state%accuracy*(state%unknown + abs(values(x, state%system%n))))
       status = callback_ok
    end function weigh
@@ -261,6 +269,7 @@ contains
       state%seen = x_values
       state%linearized = .false.
       status = callback_ok
+      ! CVODE then tries a smaller step.
       if (.not. ieee_is_finite(norm2(rate_values))) status = callback_smaller
       if (state%system%is_interrupted()) status = callback_fatal
    end function evaluate
@@ -281,6 +290,7 @@ contains
       x_values => values(x, state%system%n)
       v => values(vector, state%system%n)
       p => values(product, state%system%n)
+      ! Products belong to the point that was evaluated last.
       if (any(abs(x_values - state%seen) > 0.0_wp)) then
          call state%system%residual(x_values, state%work)
          state%seen = x_values
@@ -311,12 +321,14 @@ contains
       call c_f_pointer(data, state)
       x_values => values(x, state%system%n)
       state%gamma = gamma
+      ! The shifted system is R + P (x - x_0)/gamma, whose derivative is wanted.
       call state%system%set_shift(gamma, x_values)
       call state%linear%prepare(state%system, x_values, state%work, done)
       call state%system%clear_shift()
       ! What the system knows of x belongs to the shift.
       state%seen = huge(1.0_wp)
       state%linearized = .false.
+      ! Always: the derivative is that of this point.
       renewed = 1
       status = merge(callback_ok, callback_smaller, done)
    end function set_up

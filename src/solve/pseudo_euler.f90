@@ -60,6 +60,7 @@ contains
       type(solver_report) :: report
 
       self%x_old = x
+      ! A hundredth of the residual at hand: nothing is gained by following the path more closely.
       self%newton%options%tolerance = max(self%solver%tolerance, &
                                           self%accuracy*norm2(self%r)/system%reference)
       do
@@ -79,6 +80,7 @@ contains
          call system%accept(x)
          self%accepted = self%accepted + 1
          self%time = self%time + self%step
+         ! Long steps become Newton's method on R itself.
          self%step = merge(self%growth, self%growth_hard, report%iterations <= easy)*self%step
       else
          self%message = 'implicit Euler: no step converges, however short'

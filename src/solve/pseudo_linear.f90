@@ -15,10 +15,12 @@ module fw_pseudo_linear
 
    !> Relative residual of iterative solutions. The schemes estimate their errors from differences
    !> of such solutions.
+   ! Far looser solutions would be taken for errors of the step, and shorten it.
    real(wp), parameter :: tolerance = 1.0e-6_wp
 
    type :: shifted_linear
       integer :: kind = linear_auto
+      !> Factors, or GMRES with the preconditioner.
       logical :: direct = .true.
       !> The point (n), and whether the system is linearized there.
       real(wp), allocatable :: x(:)
@@ -51,6 +53,7 @@ contains
       call system%residual(x, r)
       call system%linearize(n_linear)
       self%current = .true.
+      ! A system that leaves rows out in spite of `reduced` cannot be handled here.
       done = n_linear == system%n
       if (.not. done) return
       self%direct = self%kind == linear_lu .or. &
@@ -61,6 +64,7 @@ contains
          call self%lu%factor(singular)
          done = .not. singular
       else
+         ! Without a shift of its own: the system knows that one is set.
          call system%build_preconditioner()
       end if
    end subroutine prepare

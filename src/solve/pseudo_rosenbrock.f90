@@ -24,12 +24,14 @@ module fw_pseudo_rosenbrock
       !> Adapt the step to the error.
       logical :: adaptive = .true.
       type(shifted_linear) :: linear
+      !> Start of the step, P k and residuals of the stages (n each).
       real(wp), allocatable :: x_old(:), r0(:), r1(:), k1(:), k2(:), k3(:), p1(:), p2(:)
    contains
       procedure :: start
       procedure :: advance
    end type rosenbrock_scheme
 
+   ! d makes the pair L-stable, e the third stage of order 3 (Shampine and Reichelt 1997).
    real(wp), parameter :: d = 1.0_wp/(2.0_wp + sqrt(2.0_wp)), e = 6.0_wp + sqrt(2.0_wp)
    !> First step, relative to the scale of pseudo-time, and the shortest one.
    real(wp), parameter :: first_step = 1.0e-2_wp, shortest = 1.0e-12_wp
@@ -65,6 +67,7 @@ contains
       do
          taken = self%step
          call try_step(self, system, x, error)
+         ! With a fixed step only failure is refused.
          done = error <= 1.0_wp .or. (.not. self%adaptive .and. ieee_is_finite(error))
          if (self%adaptive) self%step = taken*change(error)
          if (done) exit
@@ -77,6 +80,7 @@ contains
       if (done) then
          self%accepted = self%accepted + 1
          self%time = self%time + taken
+         ! Memory of the contact moves on with the flow, if it is carried.
          call system%accept(x)
          call system%clear_shift()
       else
@@ -97,6 +101,7 @@ contains
       logical :: done
 
       h = self%step
+      ! What a failure returns; change() then shortens the step as far as it may.
       error = huge(1.0_wp)
       call system%set_shift(h*d, self%x_old)
       call self%linear%prepare(system, self%x_old, self%r0, done)
@@ -104,6 +109,7 @@ contains
       self%k1 = -self%r0/(h*d)
       call solve_stage(self, system, self%k1, done)
       if (.not. done) return
+      ! P k1 is needed twice: in the shifted residual and in the next right-hand side.
       call system%flow_product(self%k1, self%p1)
 
       x = self%x_old + 0.5_wp*h*self%k1
@@ -162,6 +168,7 @@ contains
    end function relative_norm
 
    !> Factor of the step after an error.
+   ! Zero error: any growth would do.
    pure real(wp) function change(error)
       real(wp), intent(in) :: error
 

@@ -38,6 +38,7 @@ module fw_pseudo_runge_kutta
    !> the radius of stability (2.6), or twice that where P^-1 J is not normal. What exceeds it has
    !> stepped over a region stiffer than where it started.
    real(wp), parameter :: too_stiff = 5.0_wp
+   ! Shorter steps would not arrive within any number of them.
    real(wp), parameter :: smallest_cfl = 1.0e-3_wp
    !> Relative to the scale of pseudo-time: where the derivative nearly vanishes.
    real(wp), parameter :: longest_step = 1.0e3_wp
@@ -65,6 +66,7 @@ contains
 
       self%x_old = x
       before = norm2(self%r)
+      ! Doubling at the pace of the refreshes lets a bad region be left slowly.
       if (modulo(self%accepted, refresh) == 0) self%cfl = min(self%options%cfl, 2.0_wp*self%cfl)
       if (modulo(self%accepted, refresh) == 0 .or. self%grew) call choose_steps(self, system, x)
       do
@@ -74,6 +76,7 @@ contains
          if (done) exit
          self%rejected = self%rejected + 1
          x = self%x_old
+         ! Back at the start of the step, also for the system.
          call system%residual(x, self%r)
          self%cfl = 0.5_wp*self%cfl
          if (self%cfl < smallest_cfl .or. &
@@ -99,6 +102,7 @@ contains
       if (self%options%step > 0.0_wp) then
          self%steps = min(self%steps, self%options%step*self%cfl/self%options%cfl)
       end if
+      ! For the record only: with local steps there is no common time.
       self%step = minval(self%steps)
    end subroutine choose_steps
 
@@ -121,6 +125,7 @@ contains
          else
             coefficient = five_stages(stage)
          end if
+         ! All stages start at x_old: the scheme keeps two vectors, whatever its stages.
          x = self%x_old - coefficient*self%steps*self%rate
          call system%residual(x, self%r)
          done = ieee_is_finite(norm2(self%r))
@@ -132,6 +137,7 @@ contains
       end do
    end subroutine take_step
 
+   !> Compares the change of the rate with the motion that caused it: an estimate of h |P^-1 J|.
    pure logical function is_too_long(self, x)
       type(runge_kutta_scheme), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:)

@@ -72,6 +72,7 @@ module fw_pseudo_time
 contains
 
    !> A scheme by its number in the options.
+   !> Only the type and its options; `start` makes the workspace, once sizes and scales are known.
    subroutine new_scheme(scheme, options, pseudo)
       class(pseudo_scheme), allocatable, intent(out) :: scheme
       type(solver_options), intent(in) :: options
@@ -103,6 +104,7 @@ contains
 
       report%message = ''
       self%newton%options = self%options
+      ! Newton's method on the way either arrives soon or not at all.
       self%newton%options%max_iterations = min(newton_iterations, self%options%max_iterations)
       self%best_x = x
       self%trial = x
@@ -113,6 +115,7 @@ contains
       end select
       call begin(self, system, x, scheme, progress, report, done)
       do while (.not. done)
+         ! Both count: a scheme that refuses for ever must end too.
          if (scheme%accepted + scheme%rejected >= self%pseudo%max_steps) then
             report%message = 'steps run out: '//to_text(scheme%accepted)//' taken, '// &
                              to_text(scheme%rejected)//' refused'
@@ -130,6 +133,7 @@ contains
          end if
          call judge(self, system, x, scheme, progress, report, done)
       end do
+      ! On every way out, since SUNDIALS holds memory of its own.
       call scheme%finish()
       call system%clear_shift()
       report%interrupted = .not. done .and. system%is_interrupted()
@@ -164,9 +168,11 @@ contains
          report%message = 'the residual of the guess is not a number'
          return
       end if
+      ! Time and unknowns have no natural unit: steps and errors are relative to these.
       call estimate_scales(system, self%options%linear, x, scheme%r, scheme%scales)
       call scheme%start(system, x, started)
       if (started) then
+         ! Newton's method has its turn once the flow has gained something.
          progress%tried_norm = progress%first
          progress%tried_step = scheme%step
          done = .false.
@@ -215,6 +221,7 @@ contains
       end if
       done = norm <= self%options%tolerance
       if (done) return
+      ! Written so that NaN runs away too.
       if (.not. norm <= runaway*max(1.0_wp, progress%first)) then
          report%message = 'the flow runs away from its start: it has no stable steady state '// &
                           'there, or the steps are too long for the scheme'
@@ -260,6 +267,7 @@ contains
 
       x = self%best_x
       call system%clear_shift()
+      ! The system is left at the point that is returned.
       call system%residual(x, scheme%r)
       report%residual = norm2(scheme%r)/system%reference
       report%converged = report%residual <= self%options%tolerance
@@ -267,6 +275,7 @@ contains
       report%rejected = scheme%rejected
       report%time = scheme%time
       report%iterations = scheme%linear_solves + progress%newton_iterations
+      ! An explicit scheme solves nothing: its steps are its work.
       if (scheme%linear_solves == 0) report%iterations = report%iterations + scheme%accepted + &
                                                          scheme%rejected
       if (report%converged) report%message = ''

@@ -36,6 +36,7 @@ contains
       done = done .and. c_associated(context)
    end subroutine open_context
 
+   !> Last of all objects; harmless where there is none.
    subroutine close_context(context)
       type(c_ptr), intent(inout) :: context
       integer(c_int) :: status
@@ -50,6 +51,7 @@ contains
       type(c_ptr), intent(in) :: context
       type(n_vector), pointer :: vector
 
+      ! Without a copy: the array has to outlive the vector, and be passed on as a target.
       vector => fn_vmake_serial(size(array, kind=c_int64_t), array, context)
    end function wrap
 
@@ -69,6 +71,7 @@ contains
       real(c_double), pointer :: first(:)
 
       first => fn_vgetarraypointer(vector)
+      ! The interface declares one entry; the memory behind it has n.
       call c_f_pointer(c_loc(first(1)), array, [n])
    end function values
 

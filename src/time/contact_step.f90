@@ -21,6 +21,8 @@ module fw_contact_step
 
    integer, parameter :: state_open = 0, state_stick = 1, state_slip = 2
 
+   ! Newton's method ends in some five steps or not at all; sweeps converge slowly, but nearly
+   ! always.
    integer, parameter :: max_newton = 20, max_sweeps = 400
    !> On the projections, relative to the largest force; where Newton's method stagnates at the
    !> round-off of the smallest steps, the looser one will do.
@@ -38,6 +40,8 @@ module fw_contact_step
       !> Largest force seen, the scale of the tolerance.
       real(wp) :: scale = 0.0_wp
       ! Workspace.
+      !> Projection parameter, lambda - projection, s (n_rows each), slopes of the projections
+      !> (component, component, n_pairs).
       real(wp), allocatable :: rate(:), mismatch(:), relative(:), slope(:, :, :)
       type(lu_type) :: lu
    contains
@@ -46,6 +50,7 @@ module fw_contact_step
 
 contains
 
+   !> All pairs start closed and stuck, which the first evaluation corrects.
    pure function new_contact_problem(structure) result(self)
       type(time_structure), intent(in) :: structure
       type(contact_problem) :: self
@@ -65,6 +70,7 @@ contains
    subroutine solve(self, structure, w, done)
       class(contact_problem), intent(inout) :: self
       type(time_structure), intent(in) :: structure
+      !> Symmetric, positive semidefinite; its diagonal positive, or a row could not be moved.
       real(wp), intent(in) :: w(:, :)
       logical, intent(out) :: done
       integer :: iteration
@@ -72,6 +78,7 @@ contains
 
       done = .true.
       if (structure%n_rows == 0) return
+      ! The guess is the force of the last step.
       call set_rates(self, structure, w)
       do iteration = 1, max_newton
          call evaluate(self, structure, w)
@@ -81,6 +88,7 @@ contains
          if (singular) exit
       end do
       call evaluate(self, structure, w)
+      ! Cycling at round-off is no reason for sweeps.
       done = maxval(abs(self%mismatch)) <= loose_tolerance*self%scale .and. .not. singular
       if (.not. done) call sweep(self, structure, w, done)
    end subroutine solve
@@ -99,6 +107,7 @@ contains
       end do
       do i = 1, structure%n_pairs
          if (any(structure%row(1:2, i) == 0)) cycle
+         ! One parameter, so that the projection onto the disc commutes with turning the axes.
          mean = 2.0_wp/(w(structure%row(1, i), structure%row(1, i)) + &
                         w(structure%row(2, i), structure%row(2, i)))
          self%rate(structure%row(1:2, i)) = mean
@@ -112,6 +121,7 @@ contains
       real(wp), intent(in) :: w(:, :)
       integer :: i, r
 
+      ! The largest force so far, not of this step: between two contacts all forces vanish.
       self%scale = max(self%scale, maxval(abs(self%force)))
       self%relative = self%free
       do r = 1, structure%n_rows
@@ -140,7 +150,9 @@ contains
          r = structure%row(c, i)
          if (r > 0) y(c) = self%force(r) + self%rate(r)*self%relative(r)
       end do
+      ! A constant load takes the place of the normal row.
       if (structure%row(3, i) == 0) y(3) = -structure%normal_load(i)
+      ! The gap decides first: an open gap bears nothing, whatever y says.
       p = merge(max(-y(3), 0.0_wp), 0.0_wp, self%closed(i))
       length = norm2(y(1:2))
       limit = structure%mu(i)*p
@@ -159,6 +171,7 @@ contains
                self%state(i) = state_slip
                e = y(1:2)/length
                y(1:2) = limit*e
+               ! d of limit e: the disc turns the force, and grows with p.
                slope(1:2, 1) = -limit/length*e*e(1)
                slope(1:2, 2) = -limit/length*e*e(2)
                slope(1, 1) = slope(1, 1) + limit/length
@@ -195,6 +208,7 @@ contains
                   q = structure%row(d, i)
                   if (q == 0 .or. abs(self%slope(c, d, i)) <= 0.0_wp) cycle
                   jacobian(r, q) = jacobian(r, q) - self%slope(c, d, i)
+                  ! 1 - slope (1 - rate W), row by row.
                   jacobian(r, :) = jacobian(r, :) + self%slope(c, d, i)*self%rate(q)*w(q, :)
                end do
             end do
@@ -221,12 +235,14 @@ contains
       real(wp) :: change, tangent
       integer :: i, c, r, k
 
+      ! Newton's method may have left NaN or infinities behind.
       self%force = merge(self%force, 0.0_wp, abs(self%force) <= huge(1.0_wp))
       do k = 1, max_sweeps
          call evaluate(self, structure, w)
          done = maxval(abs(self%mismatch)) <= tolerance*self%scale
          if (done) return
          do i = 1, structure%n_pairs
+            ! With the relative motion as the pairs before have left it.
             call project_pair(self, structure, i)
             do c = 1, 3
                r = structure%row(c, i)

@@ -11,6 +11,7 @@ module fw_time_options
    type :: time_options
       !> Largest number of periods to integrate.
       integer :: n_periods = 500
+      !> Steps of a period before refinement; the error of the midpoint rule falls with its square.
       integer :: steps_per_period = 1000
    contains
       procedure :: bind_keys

@@ -32,6 +32,7 @@ module fw_period_record
 
 contains
 
+   !> Sizes stay; `clear` begins a new period.
    pure function new_period_record(n_observed, n_pairs, n_steps) result(self)
       integer, intent(in) :: n_observed, n_pairs, n_steps
       type(period_record) :: self
@@ -59,6 +60,7 @@ contains
    !> Fourier coefficients (0, c1, s1, ..) (2H+1) of samples at tau_k = 2 pi k/n, k = 0..n-1: the
    !> trapezoidal rule, exact below half of n harmonics.
    pure function sampled_coefficients(samples, n_harmonics) result(coefficients)
+      !> (n_steps), n_steps > 2 n_harmonics.
       real(wp), intent(in) :: samples(:)
       integer, intent(in) :: n_harmonics
       real(wp) :: coefficients(2*n_harmonics + 1)
@@ -76,6 +78,7 @@ contains
 
       coefficients = shifted_coefficients(means, n_harmonics, 1)
       do n = 1, n_harmonics
+         ! The mean of two ends is less than the wave in the middle by that factor.
          coefficients(2*n:2*n + 1) = coefficients(2*n:2*n + 1)/cos(n*pi/size(means))
       end do
    end function averaged_coefficients
@@ -93,6 +96,7 @@ contains
       coefficients(2:) = 0.0_wp
       do k = 1, n_steps
          do n = 1, n_harmonics
+            ! In integers, because n tau_k loses digits for many steps and high harmonics.
             angle = pi*real(modulo(n*(2*(k - 1) + half_steps), 2*n_steps), wp)/real(n_steps, wp)
             coefficients(2*n) = coefficients(2*n) + samples(k)*cos(angle)
             coefficients(2*n + 1) = coefficients(2*n + 1) + samples(k)*sin(angle)
@@ -113,6 +117,7 @@ contains
       left = samples(modulo(k - 2, n) + 1)
       right = samples(modulo(k, n) + 1)
       curvature = left - 2.0_wp*mid + right
+      ! A parabola that opens away from zero has no summit between the samples.
       largest = abs(mid)
       if (curvature*mid >= 0.0_wp) return
       largest = abs(mid - (right - left)**2/(8.0_wp*curvature))

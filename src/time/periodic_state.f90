@@ -35,6 +35,7 @@ module fw_periodic_state
          import :: period_map, wp
          implicit none (type, external)
          class(period_map), intent(inout) :: self
+         !> (n_state).
          real(wp), intent(in), contiguous :: start(:)
          real(wp), intent(out), contiguous :: finish(:)
          real(wp), intent(out) :: range
@@ -91,9 +92,11 @@ contains
          call map%integrate(state, image, range, done)
          report%n_periods = report%n_periods + 1
          if (.not. done) return
+         ! In the common unit, in which least squares are taken too.
          change = map%weight*(image - state)
          report%change = norm2(change)/max(range, tiny(1.0_wp))
          n_idle = merge(0, n_idle + 1, report%change < best)
+         ! Once given up, acceleration stays so.
          plain = plain .or. n_idle > patience
          report%converged = report%change <= tolerance .or. &
             (plain .and. n_idle > 2*patience .and. report%change <= chatter_tolerance)
@@ -101,6 +104,7 @@ contains
          if (report%change/worst_growth > best .or. plain) then
             n_history = 0
          else if (report%n_periods > n_settling) then
+            ! Differences of two following periods: n periods give n - 1 of them.
             call remember(n_history, d_image, d_change, image - last_image, change - last_change)
          end if
          best = min(best, report%change)
@@ -114,10 +118,12 @@ contains
    pure subroutine remember(n_history, d_image, d_change, new_image, new_change)
       integer, intent(inout) :: n_history
       real(wp), intent(inout) :: d_image(:, :), d_change(:, :)
+      !> Image as integrated, change weighted.
       real(wp), intent(in) :: new_image(:), new_change(:)
       integer :: j
 
       n_history = min(n_history + 1, max_history)
+      ! The oldest falls out; few and short columns, next to a period of integration.
       do j = n_history, 2, -1
          d_image(:, j) = d_image(:, j - 1)
          d_change(:, j) = d_change(:, j - 1)
@@ -146,6 +152,7 @@ contains
          before = norm2(basis(:, k))
          call orthogonalize(k, basis, carried)
          after = norm2(basis(:, k))
+         ! The column takes no part, and the next one its place.
          if (after <= dependent*before) cycle
          n_used = k
          basis(:, k) = basis(:, k)/after

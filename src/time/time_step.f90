@@ -15,18 +15,21 @@ contains
       logical :: done
 
       associate (s => self%structure, step => self%step(level))
+         ! The load of the whole step acts in its middle, where the contact problem is written.
          call mean_load(self, instant, step%duration, self%load)
          call step%free_increment(s, self%displacement, self%velocity, self%load, self%increment)
          call take_rows(s, self%displacement, self%row_position)
          call take_rows(s, self%velocity, self%row_velocity)
          call take_rows(s, self%increment, self%row_increment)
          call set_references(self, step%h)
+         ! As a guess, and so that a refused step leaves no trace.
          self%contact%force = self%last_force
          call self%contact%solve(s, step%delassus, done)
          call step%add_forces(s, self%contact%force, self%increment)
          call take_rows(s, self%increment, self%row_increment)
       end associate
       accepted = .true.
+      ! The smallest step is taken as it is; what was not solved is counted.
       if (level < self%n_levels) accepted = done .and. .not. any_change(self)
       if (accepted .and. .not. done) self%record%n_failed = self%record%n_failed + 1
    end subroutine try_step
@@ -38,6 +41,7 @@ contains
       real(wp), intent(out) :: load(:)
       real(wp) :: middle, share
 
+      ! The mean of both ends of a wave is its middle times this.
       share = cos(0.5_wp*self%omega*duration)
       middle = 2.0_wp*pi*instant + 0.5_wp*self%omega*duration
       load = self%structure%load(:, 1) + share*cos(middle)*self%structure%load(:, 2) + &
@@ -64,16 +68,20 @@ contains
 
       associate (s => self%structure, free => self%contact%free)
          do i = 1, s%n_pairs
+            ! Contact in positions finds out by itself whether it is closed.
             self%contact%closed(i) = .true.
             do c = 1, 3
                r = s%row(c, i)
                if (r == 0) cycle
                if (.not. in_positions(s, r)) then
+                  ! v+ = 4 d/h - v: v+ = 0 at d = h v/4.
                   free(r) = self%row_increment(r) - 0.25_wp*h*self%row_velocity(r)
                   if (c == 3) self%contact%closed(i) = self%row_position(r) + s%gap(i) <= 0.0_wp
                else if (c == 3) then
+                  ! Half-way position with its gap: zero where it just closes.
                   free(r) = self%row_increment(r) + (self%row_position(r) + s%gap(i))
                else
+                  ! Half-way position from where it sticks.
                   free(r) = self%row_increment(r) + (self%row_position(r) - self%memory(r))
                end if
             end do
@@ -101,6 +109,7 @@ contains
       any_change = .false.
       associate (s => self%structure)
          do i = 1, s%n_pairs
+            ! Unknown (-1) before the first step.
             if (self%contact%state(i) /= self%last_state(i) .and. self%last_state(i) >= 0) then
                any_change = .true.
             else if (self%contact%state(i) == state_slip) then
@@ -109,9 +118,11 @@ contains
                   r = s%row(c, i)
                   if (r > 0) turn = turn + self%contact%force(r)*self%last_force(r)
                end do
+               ! Slip that turns by more than a right angle has stopped in between.
                any_change = turn < 0.0_wp
             else if (.not. self%contact%closed(i)) then
                r = s%row(3, i)
+               ! Twice the increment is the whole step: the gap would be closed at its end.
                any_change = self%row_position(r) + 2.0_wp*self%row_increment(r) + s%gap(i) < 0.0_wp
             end if
             if (any_change) return
@@ -127,6 +138,7 @@ contains
 
       share = self%step(level)%duration/self%step(0)%duration
       associate (s => self%structure)
+         ! Displacements in the middle of the step, which massless directions alone have.
          self%mean = self%displacement + self%increment
          if (s%n_pairs > 0) call record_contact(self, share, sample)
          call s%project(self%increment, self%part)
@@ -135,6 +147,7 @@ contains
             self%record%observed_mean(:, sample) = self%record%observed_mean(:, sample) + &
                share*matmul(self%observe, self%mean - self%load)
          end if
+         ! With d the half of the displacement over the step: v+ = 4 d/h - v.
          self%velocity = 4.0_wp/self%step(level)%h*self%part - self%velocity
          ! u+ = u + 2 d with mass, u + d without.
          self%displacement = self%displacement + self%increment + self%part
@@ -161,11 +174,14 @@ contains
                record%force(c, i, sample) = record%force(c, i, sample) + share*contact%force(r)
                record%slip(c, i, sample) = record%slip(c, i, sample) + &
                                            share*(self%row_position(r) + self%row_increment(r))
+               ! Of a row with mass: its whole motion works against the mean force.
                step_length = 2.0_wp*self%row_increment(r)
                force = contact%force(r)
                if (in_positions(s, r)) then
                   step_length = 0.0_wp
                   if (c < 3 .and. contact%state(i) /= state_stick) then
+                     ! A row in positions works by the move of its corrected position alone; elastic
+                     ! energy returns.
                      step_length = contact%relative(r)
                      self%memory(r) = self%memory(r) + step_length
                      ! From the middle of the last step to that of this one.

@@ -39,6 +39,7 @@ module fw_time_stepper
 
    type, extends(period_map) :: time_stepper
       type(time_structure) :: structure
+      !> [rad/time] of the load.
       real(wp) :: omega = 0.0_wp
       !> Steps of every size: full ones, halves, quarters, .. (0:n_levels).
       type(step_operator), allocatable :: step(:)
@@ -53,6 +54,7 @@ module fw_time_stepper
       ! Workspace: increment and parts (n_dof); displacement, velocity, increment of rows (n_rows).
       real(wp), allocatable :: increment(:), load(:), part(:), mean(:)
       real(wp), allocatable :: row_position(:), row_velocity(:), row_increment(:), last_force(:)
+      !> Forces (n_rows) and states (n_pairs, -1: none yet) of the last step that was taken.
       integer, allocatable :: last_state(:)
    contains
       procedure :: integrate
@@ -66,9 +68,11 @@ module fw_time_stepper
          integer, intent(in) :: level
          !> Start of the step as a share of the period.
          real(wp), intent(in) :: instant
+         !> False: nothing has changed, a shorter step is due.
          logical, intent(out) :: accepted
       end subroutine try_step
 
+      !> Only behind a try_step of the same level.
       module subroutine accept_step(self, level, sample)
          class(time_stepper), intent(inout) :: self
          integer, intent(in) :: level, sample
@@ -95,10 +99,12 @@ contains
       self%omega = omega
       self%n_levels = 0
       if (structure%n_pairs > 0) then
+         ! So many that the smallest step is the square of the full one, as a share of the period.
          self%n_levels = min(most_levels, ceiling(log(real(steps_per_period, wp))/log(2.0_wp)))
       end if
       allocate (self%step(0:self%n_levels))
       do level = 0, self%n_levels
+         ! Factors of every level are kept: the same few sizes return in every period.
          call new_step_operator(structure, 2.0_wp*pi/(omega*steps_per_period*2.0_wp**level), &
                                 omega, self%step(level), error)
          if (allocated(error)) return
@@ -125,6 +131,7 @@ contains
          n = s%n_dof
          allocate (self%weight(2*n + s%n_rows), source=0.0_wp)
          do i = 1, n
+            ! Diagonals alone: units, not norms, are wanted.
             self%weight(i) = sqrt(abs(s%stiffness(i, i)) + self%omega**2*max(s%mass(i, i), 0.0_wp))
             self%weight(n + i) = sqrt(max(s%mass(i, i), 0.0_wp))
          end do
@@ -139,10 +146,12 @@ contains
    !> State vector of a displacement and velocity (n_dof) and of corrected positions (n_rows).
    pure function pack_state(self, displacement, velocity, memory) result(state)
       class(time_stepper), intent(in) :: self
+      !> As the balance has them at tau = 0.
       real(wp), intent(in) :: displacement(:), velocity(:), memory(:)
       real(wp), allocatable :: state(:)
       real(wp) :: massive_velocity(self%structure%n_dof)
 
+      ! Massless directions have no velocity; what a series gives them is left out.
       call self%structure%project(velocity, massive_velocity)
       state = [displacement, massive_velocity, memory]
    end function pack_state
@@ -152,6 +161,7 @@ contains
       class(time_stepper), intent(inout) :: self
       real(wp), intent(in), contiguous :: start(:)
       real(wp), intent(out), contiguous :: finish(:)
+      !> Largest weighted distance from the start: what the change over a period is compared with.
       real(wp), intent(out) :: range
       logical, intent(out) :: done
       integer :: k, n
@@ -172,6 +182,7 @@ contains
          finish(2*n + 1:) = self%memory
          range = max(range, norm2(self%weight*(finish - start)))
       end do
+      ! False for NaN too.
       done = norm2(finish) <= huge(1.0_wp)
    end subroutine integrate
 
@@ -192,6 +203,7 @@ contains
          instant = (real(sample - 1, wp) + real(position, wp)/real(whole, wp))/ &
                    real(self%record%n_steps, wp)
          call try_step(self, level, instant, accepted)
+         ! Refused above the last level only: the loop ends.
          if (.not. accepted) then
             level = level + 1
             cycle

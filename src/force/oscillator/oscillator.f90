@@ -13,6 +13,8 @@ module fw_oscillator
    public :: oscillator_type, new_oscillator
 
    type :: oscillator_type
+      !> In the angle tau = omega t: m = omega**2 mass, c = omega damping [force/length], k
+      !> [force/length].
       real(wp) :: m = 1.0_wp, c = 0.0_wp, k = 1.0_wp
       !> Decay c/(2m), k/m, and the root of their difference in absolute value.
       real(wp), private :: decay = 0.0_wp, square = 1.0_wp, root = 1.0_wp
@@ -39,6 +41,7 @@ contains
       self%decay = 0.5_wp*c/m
       self%square = k/m
       difference = self%decay**2 - self%square
+      ! At the difference 0 the other branch is exact: sin(0)/0 is taken as its limit.
       self%overdamped = difference > 0.0_wp
       self%root = sqrt(abs(difference))
    end function new_oscillator
@@ -52,6 +55,7 @@ contains
       real(wp) :: even, odd, angle, slow, fast, sum_of_roots
 
       angle = self%root*t
+      ! Both exponentials by themselves: cosh and sinh would cancel, or overflow for long times.
       if (self%overdamped .and. angle > close_roots) then
          sum_of_roots = self%decay + self%root
          slow = exp(-self%square/sum_of_roots*t)/(2.0_wp*self%root)
@@ -60,6 +64,7 @@ contains
          phi(1, 1) = sum_of_roots*slow - self%square/sum_of_roots*fast
          phi(2, 2) = sum_of_roots*fast - self%square/sum_of_roots*slow
       else
+         ! Here cosh and sinh are of the order of one, and their difference keeps its digits.
          even = exp(-self%decay*t)
          odd = even*t
          if (self%overdamped) then
@@ -72,6 +77,7 @@ contains
          phi(1, 1) = even + self%decay*odd
          phi(2, 2) = even - self%decay*odd
       end if
+      ! Phi = even 1 + odd (A + decay 1), A the matrix of the first-order system.
       phi(1, 2) = odd
       phi(2, 1) = -self%square*odd
    end subroutine propagate
@@ -94,6 +100,8 @@ contains
 
       a = x(1)
       b = x(2)
+      ! At last a = x'''' and b its rate: their energy bounds the third derivative of x' from here
+      ! on.
       do i = 1, 4
          next = -(self%k*a + self%c*b)/self%m
          a = b

@@ -16,6 +16,7 @@ contains
       real(wp) :: start(2, size(by_tangential, 1), 2), unused(0, 2)
 
       if (.not. self%swings) then
+         ! Held or open throughout: the play operator, whose path was taken.
          call self%event_pair_type%derivative(n_retained, harmonic, column, by_tangential, &
                                               by_normal, normal)
          return
@@ -23,6 +24,7 @@ contains
       by_tangential = 0.0_wp
       by_normal = 0.0_wp
       normal = 0.0_wp
+      ! A turn from dX = 0 first: its end is what (1 - M)^-1 turns into the dX_0 that repeats.
       start = 0.0_wp
       call carry(self, n_retained, harmonic, column, .false., start, by_tangential, by_normal, unused)
       call repeat(self%turn%monodromy, start)
@@ -117,6 +119,7 @@ contains
 
    !> dX_0 of the period from dX at the end of a turn that starts with none.
    pure subroutine repeat(monodromy, d)
+      !> M of the turn; 1 - M is regular where the periodic motion stands alone.
       real(wp), intent(in) :: monodromy(2, 2)
       real(wp), intent(inout) :: d(:, :, :)
       real(wp) :: x(2)
@@ -146,14 +149,17 @@ contains
 
       associate (turn => self%turn, o => self%waves%oscillator)
          do j = 1, turn%n_segments
+            ! The segment begins at a stop that moves by d tau = -dx'/a-.
             if (abs(turn%before(j)) > 0.0_wp) then
                if (adds) then
                   call waves_out(n_retained, harmonic, column, turn%angle(j), output)
                   output = output*(jump(self, j)/turn%before(j))
                   call add_outer(-1.0_wp, 2, d, output, by_tangential, by_normal)
                end if
+               ! The velocity behind the stop changes as the stop moves.
                d(2, :, :) = turn%behind(j)/turn%before(j)*d(2, :, :)
             end if
+            ! x stays, and with it its variation; the force takes P - k x.
             if (turn%phase(j) == phase_stick) then
                d(2, :, :) = 0.0_wp
                if (.not. adds) cycle
@@ -166,6 +172,7 @@ contains
             friction = side*self%curves%mu
             call o%propagate(turn%angle(j + 1) - turn%angle(j), phi)
             call driven_waves(o, n_retained, harmonic, column, turn%angle(j), driven)
+            ! From the motion to its free part, which Phi carries ...
             d(:, :, 1) = d(:, :, 1) - driven
             d(:, :, 2) = d(:, :, 2) - friction*driven
             if (size(by_slip, 1) > 0 .and. side /= 0) then
@@ -176,6 +183,8 @@ contains
             do i = 1, 2
                do k = 1, size(d, 2)
                   x = phi(:, 1)*d(1, k, i) + phi(:, 2)*d(2, k, i)
+                  ! ... and back; the driven part answers to P and, in slip, to -side mu N = side mu
+                  ! y_n.
                   d(:, k, i) = x + merge(1.0_wp, friction, i == 1)*driven(:, k)
                end do
             end do

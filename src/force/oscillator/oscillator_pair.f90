@@ -28,6 +28,7 @@ module fw_oscillator_pair
    public :: oscillator_pair_type
 
    type, extends(event_pair_type) :: oscillator_pair_type
+      !> What drives the mass; the segments of the last turn.
       type(waves_type) :: waves
       type(turn_type) :: turn
       !> Whether the path is that of the oscillator, not that of the play operator.
@@ -84,11 +85,13 @@ module fw_oscillator_pair
    !> Angles of the grid for each wave of the highest harmonic, and at least.
    integer, parameter :: grid_per_harmonic = 8, least_grid = 16
    !> Turns without Newton's method first, and all.
+   ! Plain turns shed what the start has of fast decay; Newton's method ends slow decay.
    integer, parameter :: plain_turns = 2, max_turns = 400
    !> Change of X over a turn that counts as none, as a part of the motion, and that below which a
    !> turn that brings no improvement shows round-off.
    real(wp), parameter :: periodic = 1.0e-15_wp, near_round_off = 1.0e-11_wp
    !> Part of the change that a step of Newton's method may leave.
+   ! Else plain turns, which never move two motions apart, are the surer way.
    real(wp), parameter :: sufficient = 0.7_wp
 
 contains
@@ -126,7 +129,9 @@ contains
       !> Position where the assembly starts, times k [force].
       real(wp), intent(in) :: x_start
 
+      ! The play operator first: it decides whether the pair is held, and gives the roots of N.
       call self%event_pair_type%follow(x_start)
+      ! A pair that never bears does not rub, and the balance alone moves it.
       self%swings = self%rubs .and. .not. (is_held(self) .or. self%path%open)
       self%drift = 0.0_wp
       self%n_turns = 1
@@ -154,9 +159,11 @@ contains
       associate (w => self%waves, c => self%curves)
          do s = -1, 1
             do n = 0, c%degree
+               ! U_n = c_n - i s_n, as everywhere.
                force = cmplx(c%tangential(n, 1) - s*c%mu*c%normal(n, 1), &
                              -c%tangential(n, 2) + s*c%mu*c%normal(n, 2), wp)
                answer = (0.0_wp, 0.0_wp)
+               ! Not 0/E_n: an undamped oscillator at its resonance would make NaN of it.
                if (abs(force) > 0.0_wp) answer = force/w%oscillator%impedance(n)
                w%position(n, 1, s) = real(answer, wp)
                w%position(n, 2, s) = -aimag(answer)
@@ -171,6 +178,7 @@ contains
       end associate
       associate (w => self%waves, p => self%path)
          w%starts_open = p%phase(1) == phase_open
+         ! Changes between open and any other phase of the play operator are the roots of N.
          w%n_lifts = 0
          do j = 2, p%n_segments
             if ((p%phase(j) == phase_open) .eqv. (p%phase(j - 1) == phase_open)) cycle
@@ -206,6 +214,7 @@ contains
       associate (o => self%waves%oscillator, turn => self%turn)
          size_of_motion = o%energy_norm([sum(abs(self%waves%position(:, :, 0))), &
                                          sum(abs(self%waves%rate(0)%p))])
+         ! Start at rest where slow sweeping leads.
          x = [self%path%z_end/o%k, 0.0_wp]
          call turn%run(self%waves, x)
          next = turn%last
@@ -224,6 +233,7 @@ contains
                       tried_change <= near_round_off*size_of_motion) then
                      x = tried
                      next = turn%last
+                     ! No gain, but at round-off: enough.
                      if (tried_change > sufficient*change) change = 0.0_wp
                      change = min(change, tried_change)
                      cycle
@@ -237,6 +247,7 @@ contains
             self%n_turns = self%n_turns + 1
          end do
          self%drift = o%energy_norm(turn%last - x)/size_of_motion
+         ! An unfinished turn never counts as settled.
          if (.not. turn%complete) self%drift = huge(1.0_wp)
       end associate
    end subroutine find_period
@@ -253,6 +264,7 @@ contains
          p%phase(:n) = turn%phase(:n)
          p%angle(:n + 1) = turn%angle(:n + 1)
          p%z(:n) = self%waves%oscillator%k*turn%x(1, :n)
+         ! z does not stand for itself here: its derivative is that of the motion.
          p%set(:n) = .false.
          p%moved = .true.
          p%z_end = self%waves%oscillator%k*turn%last(1)
@@ -284,6 +296,7 @@ contains
       end if
       path = 0.0_wp
       do j = 1, self%turn%n_segments
+         ! Only slip wears.
          if (side_of(self%turn%phase(j)) == 0) cycle
          call integrate_free(self%waves%oscillator, self%curves, self%turn%angle(j), &
                              self%turn%angle(j + 1), weight)
@@ -292,6 +305,7 @@ contains
       self%one%cosine = self%contact%cosine - self%stick%cosine
       self%one%sine = self%contact%sine - self%stick%sine
       associate (w => self%waves, c => self%curves)
+         ! Parts of the driven velocities that do not, and do, turn over with the side of slip.
          self%answer = 0.5_wp*(w%rate(-1)%p + w%rate(1)%p)
          path = path + self%slip%pairing(c%normal, self%answer)
          self%answer = 0.5_wp*(w%rate(1)%p - w%rate(-1)%p)

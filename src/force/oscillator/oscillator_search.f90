@@ -49,6 +49,7 @@ module fw_oscillator_search
       real(wp) :: x(2) = 0.0_wp
    end type free_knot
 
+   ! Deeper than in fw_event_roots: a free part may change by orders within a cell.
    integer, parameter :: max_depth = 40, newton_steps = 60
    !> Relative accuracy of an angle.
    real(wp), parameter :: angle_tolerance = 4.0e-16_wp
@@ -104,6 +105,7 @@ contains
          return
       end if
       do while (right%angle < to)
+         ! Nodes of the grid, of which the polynomial is known, and the two ends of the range.
          left = right
          k = k + 1
          if (width*real(k, wp) <= left%angle) cycle
@@ -161,6 +163,7 @@ contains
    end subroutine add_motion
 
    !> Bounds that hold from a knot on.
+   !> The energy of the free part never grows, hence bounds at the left end serve the whole cell.
    pure type(bounds_type) function bounds_from(wave, motion, knot) result(bounds)
       type(wave_type), intent(in) :: wave
       type(motion_type), intent(in) :: motion
@@ -195,6 +198,7 @@ contains
       level(1) = 1
       do while (n_waiting > 0)
          second = waiting(n_waiting)
+         ! Anew for each part: the free part has decayed meanwhile.
          bounds = bounds_from(wave, motion, first)
          last = level(n_waiting) >= max_depth .or. &
                 second%angle - first%angle <= angle_tolerance*(1.0_wp + second%angle)
@@ -228,6 +232,7 @@ contains
       real(wp) :: low, high, step, trial
       integer :: k
 
+      ! `left` is where side f is not negative.
       low = left%angle
       high = right%angle
       angle = low

@@ -69,6 +69,7 @@ contains
       integer, intent(in) :: degree
       integer :: n
 
+      ! A light mass may ring between two switches: many more stops than roots of the bounds.
       n = 64*(degree + 4)
       allocate (self%phase(n), self%angle(n + 1), self%x(2, n), self%free(2, n))
       allocate (self%before(n), self%behind(n))
@@ -87,6 +88,7 @@ contains
    pure subroutine run(self, waves, start)
       class(turn_type), intent(inout) :: self
       type(waves_type), intent(in) :: waves
+      !> X = (x, dx/dtau) at tau = 0.
       real(wp), intent(in) :: start(2)
       real(wp) :: x(2), angle, upto, before, behind
       integer :: phase, lift
@@ -94,6 +96,7 @@ contains
 
       self%n_segments = 0
       self%complete = .true.
+      ! dX by dX(0), carried from event to event (saltation at stops).
       self%monodromy = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
       x = start
       angle = 0.0_wp
@@ -104,6 +107,7 @@ contains
       phase = phase_at(waves, open, angle, x)
       do
          upto = 2.0_wp*pi
+         ! Up to the next change of sign of Q at most; the end of the period is the last one.
          if (lift < waves%n_lifts) upto = waves%lift(lift + 1)
          if (self%n_segments == size(self%phase)) then
             self%complete = .false.
@@ -111,11 +115,13 @@ contains
          end if
          call append(self, waves, phase, angle, x, before, behind)
          if (phase == phase_stick) then
+            ! Stick has no velocity to vary.
             self%monodromy(2, :) = 0.0_wp
             call stick(waves, upto, angle, x, phase, before, behind)
          else
             call slide(self, waves, upto, angle, x, phase, before, behind)
          end if
+         ! A stop or the end of a stick; phase is that behind it.
          if (angle < upto) cycle
          if (upto >= 2.0_wp*pi) exit
          lift = lift + 1
@@ -143,6 +149,7 @@ contains
          call waves%lower%at(angle, low, slope)
          call waves%upper%at(angle, high, slope)
          phase = phase_stick
+         ! At rest outside of P -+ Q: it starts in the direction of the larger force.
          if (waves%oscillator%k*x(1) < low) phase = phase_forward
          if (waves%oscillator%k*x(1) > high) phase = phase_backward
       end if
@@ -199,12 +206,14 @@ contains
                            oscillator=waves%oscillator)
       stops = .false.
       to = upto
+      ! Nothing stops a mass that flies.
       if (phase /= phase_open) then
          call first_root(waves%rate(side), motion, search_start(waves, motion, side, angle, x), &
                          upto, real(side, wp), stops, to)
       end if
       call waves%oscillator%propagate(to - angle, phi)
       call driven_at(waves, side, to, driven)
+      ! In closed form from where the segment began: no error accumulates within it.
       x = driven + matmul_2(phi, motion%x)
       call turn_on(self, phi)
       angle = to
@@ -221,6 +230,7 @@ contains
       real(wp) :: a, b, force, slope, third, fourth, root
 
       from = angle
+      ! Moving already: the first zero of x' is a stop.
       if (abs(x(2)) > 0.0_wp) return
       if (side > 0) then
          call waves%lower%at(angle, force, slope)
@@ -229,12 +239,14 @@ contains
       end if
       associate (o => waves%oscillator)
          a = (force - o%k*x(1))/o%m
+         ! m x''' + c x'' + k x' = slope, with x' = 0.
          b = (slope - o%c*a)/o%m
          call o%bound(motion%x, third, fourth)
       end associate
       third = third + waves%rate(side)%bounds%third
       a = max(side*a, 0.0_wp)
       b = side*b
+      ! Half the positive root of a + b t/2 - M t**2/6 is taken, with a and b times the side.
       root = sqrt(0.25_wp*b**2 + 2.0_wp/3.0_wp*third*a)
       from = angle
       if (third > 0.0_wp) from = angle + 0.5_wp*max(0.5_wp*b + root, 0.0_wp)*3.0_wp/third
@@ -251,6 +263,7 @@ contains
       real(wp), intent(out) :: before, behind
       real(wp) :: forward, backward, slope
 
+      ! Exactly, or round-off would start the next slip in the wrong direction.
       x(2) = 0.0_wp
       call waves%lower%at(angle, forward, slope)
       call waves%upper%at(angle, backward, slope)
@@ -260,12 +273,14 @@ contains
       end associate
       before = merge(forward, backward, phase == phase_forward)
       behind = 0.0_wp
+      ! Neither direction accelerates: friction holds it.
       if (forward <= 0.0_wp .and. backward >= 0.0_wp) then
          phase = phase_stick
       else
          phase = merge(phase_forward, phase_backward, forward > 0.0_wp)
          behind = merge(forward, backward, phase == phase_forward)
       end if
+      ! The saltation of a stop: d tau = -dx'/a-, behind which dx' = a+ d tau turned round.
       if (abs(before) > 0.0_wp) then
          self%monodromy(2, :) = behind/before*self%monodromy(2, :)
       else
@@ -286,6 +301,7 @@ contains
 
       before = 0.0_wp
       behind = 0.0_wp
+      ! k x between P - Q and P + Q holds; the earlier of both ends counts.
       motion%level = waves%oscillator%k*x(1)
       to = upto
       call first_root(waves%lower, motion, angle, to, -1.0_wp, found, root)
@@ -318,6 +334,7 @@ contains
       determinant = (1.0_wp - m(1, 1))*(1.0_wp - m(2, 2)) - m(1, 2)*m(2, 1)
       size_of_matrix = 1.0_wp + maxval(abs(m))
       step = 0.0_wp
+      ! A held pair has M with eigenvalue 1: any position repeats.
       singular = abs(determinant) <= round_off*size_of_matrix**2
       if (singular) return
       step(1) = ((1.0_wp - m(2, 2))*defect(1) + m(1, 2)*defect(2))/determinant
