@@ -1,7 +1,7 @@
 !> The keys of groups &contact and &spring.
 !>
 !> One procedure for each group of keys that is read at the same place, because some keys need
-!> others first: sizes before arrays, the law before its stiffnesses, sides before what goes with
+!> others first: sizes before arrays, the law before its constants, sides before what goes with
 !> their dofs. A value that a model file gave is in the components already, and stays where the
 !> namelist has none.
 module fw_contact_keys
@@ -66,7 +66,7 @@ contains
                          absent=of_file), contact%side_2, default=0)
    end subroutine bind_sides
 
-   !> Friction coefficients; with friction at rest only the pairs with tangential dofs need one.
+   !> Friction coefficients; only pairs with tangential dofs need one.
    subroutine bind_friction(keys, contact, needed)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
@@ -77,7 +77,7 @@ contains
                      needed)
    end subroutine bind_friction
 
-   !> Gap and area; the area turns forces into pressures, which only wear asks for.
+   !> Gap and area; the area turns forces into pressures, which wear alone asks for.
    subroutine bind_gap(keys, contact, needs_area)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact

@@ -1,4 +1,7 @@
 !> Combinations of sound keys that cannot be run, each with what to use instead.
+!>
+!> Ranges of single keys are checked where the keys are declared, and what needs the model where it
+!> is built. The first combination that fails is told: others may follow from it.
 module fw_combinations
    use fw_case, only: case_type, analysis_frf, analysis_point, analysis_time, analysis_wear
    use fw_contact_data, only: contact_type
@@ -53,6 +56,7 @@ contains
       character(:), allocatable :: law
 
       if (case%contact%n_pairs == 0) return
+      ! By what the law can do, not by its name: a new law needs no new check.
       facts = facts_of(case%contact%law)
       law = "contact%law = '"//trim(law_words(case%contact%law))//"'"
       if (facts%needs_projection .and. case%harmonics%method /= method_hbm) then

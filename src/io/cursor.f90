@@ -1,4 +1,7 @@
 !> A place in a text that moves forward through namelist syntax and counts lines.
+!>
+!> Positions count letters of the whole text, so that values may go over several lines; the line is
+!> for messages. All steps are safe at the end of the text.
 module fw_cursor
    use fw_text, only: lower_case
    implicit none (type, external)
@@ -29,6 +32,7 @@ module fw_cursor
 
 contains
 
+   !> Nothing is left under the cursor.
    pure logical function at_end(self)
       class(cursor_type), intent(in) :: self
 
@@ -54,6 +58,7 @@ contains
             end do
          end if
          if (.not. is_blank(self%peek()) .or. self%at_end()) return
+         ! Counted here only: names, words and quoted texts do not contain ends of lines.
          if (self%peek() == newline) self%line = self%line + 1
          self%position = self%position + 1
       end do
@@ -83,6 +88,7 @@ contains
       first = self%position
       do while (.not. self%at_end())
          if (scan(self%peek(), word_end) > 0) then
+            ! On a command line these belong to the word: paths hold slashes.
             if (self%in_file .or. scan(self%peek(), '/!=&;()') == 0) exit
          end if
          self%position = self%position + 1
@@ -104,6 +110,7 @@ contains
       do while (self%peek() /= newline .and. self%peek() /= return)
          if (self%peek() == quote) then
             self%position = self%position + 1
+            ! Two quotes in a row are one letter of the text.
             closed = self%peek() /= quote
             if (closed) return
          end if
@@ -138,6 +145,7 @@ contains
 
       is_at_key = .false.
       if (.not. self%in_file .or. .not. is_name_start(self%peek())) return
+      ! A bounded look ahead: long lists are asked this for every value.
       last = min(len(self%text), self%position + 200)
       ahead%text = self%text(self%position:last)
       call ahead%take_name(name)
@@ -145,18 +153,21 @@ contains
       is_at_key = ahead%peek() == '=' .or. ahead%peek() == '('
    end function is_at_key
 
+   !> A blank, a tab or an end of a line (of either system).
    pure logical function is_blank(letter)
       character, intent(in) :: letter
 
       is_blank = scan(letter, ' '//tab//newline//return) > 0
    end function is_blank
 
+   !> A decimal digit.
    pure logical function is_digit(letter)
       character, intent(in) :: letter
 
       is_digit = letter >= '0' .and. letter <= '9'
    end function is_digit
 
+   !> A letter or an underscore.
    pure logical function is_name_start(letter)
       character, intent(in) :: letter
       character :: lower

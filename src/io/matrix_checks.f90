@@ -35,6 +35,7 @@ contains
       if (allocated(message)) return
       largest = maxval(abs(matrix))
       do j = 1, order
+         ! Zero is ordinary: massless dofs. Definiteness of the whole is not asked for.
          if (is_mass .and. matrix(j, j) < 0.0_wp) then
             message = 'has the negative diagonal entry '//entry_text(matrix, j, j)// &
                       ': a mass is at least 0'
@@ -46,6 +47,7 @@ contains
                          entry_text(matrix, j, i)//': they must be equal'
                return
             end if
+            ! What round-off of writing has left is shared by both.
             matrix(i, j) = 0.5_wp*(matrix(i, j) + matrix(j, i))
             matrix(j, i) = matrix(i, j)
          end do
@@ -71,6 +73,7 @@ contains
       end do
    end subroutine check_vector
 
+   !> Column by column, as the elements stand in memory.
    subroutine find_not_finite(matrix, message)
       real(wp), intent(in) :: matrix(:, :)
       character(:), allocatable, intent(inout) :: message
@@ -85,6 +88,7 @@ contains
       end do
    end subroutine find_not_finite
 
+   !> `(2,3) = 1.5`, with indices from 1.
    function entry_text(matrix, i, j) result(text)
       real(wp), intent(in) :: matrix(:, :)
       integer, intent(in) :: i, j

@@ -23,6 +23,7 @@ module fw_matrix_market
 
    !> What the first line and the size line say.
    type :: header_type
+      !> Entries with their places, or all elements in order; only the lower triangle is given.
       logical :: coordinate = .false., symmetric = .false.
       integer :: n_rows = 0, n_columns = 0, n_entries = 0
    end type header_type
@@ -67,6 +68,7 @@ contains
 
       prefix = prefix_of(path)
       allocate (model%files(0))
+      ! Also those that are missing, as an empty text.
       call append(model%files, found_file(prefix, 'mass'))
       call append(model%files, found_file(prefix, 'stiffness'))
       call append(model%files, found_file(prefix, 'damping'))
@@ -112,6 +114,7 @@ contains
       character(*), intent(in) :: prefix, part
       integer, intent(in) :: i
       character(:), allocatable :: path
+      ! beam_mass.mtx, beam.mass.mtx, beam/mass.mtx, and beam followed by mass.mtx at once.
       character(*), parameter :: joints(*) = ['_', '.', '/', ' ']
 
       path = prefix//trim(joints(i))//part//'.mtx'
@@ -154,6 +157,8 @@ contains
       end do
    end function prefix_of
 
+   !> The first line, which looks like a comment: "%%MatrixMarket matrix <format> <field>
+   !> <symmetry>".
    subroutine read_banner(lines, header, error)
       type(line_reader), intent(inout) :: lines
       type(header_type), intent(inout) :: header
@@ -189,6 +194,7 @@ contains
       header%symmetric = words(5)%text == 'symmetric'
    end subroutine read_banner
 
+   !> What the first line says, and what it should.
    subroutine refuse(lines, found, expected, error)
       type(line_reader), intent(in) :: lines
       character(*), intent(in) :: found, expected
@@ -197,6 +203,7 @@ contains
       call lines%failure('says "'//found//'", expected '//expected, error)
    end subroutine refuse
 
+   !> Rows and columns, and with coordinates the number of entries.
    subroutine read_size(lines, header, error)
       type(line_reader), intent(inout) :: lines
       type(header_type), intent(inout) :: header
@@ -213,12 +220,14 @@ contains
       if (any(numbers(:2) < 1) .or. numbers(3) < 0) then
          call lines%failure('gives a size that is not positive', error)
       else if (header%n_rows > max_elements/header%n_columns) then
+         ! As a quotient: the product may leave the range of the numbers.
          call lines%failure('gives a matrix too large to be held dense', error)
       else if (header%symmetric .and. header%n_rows /= header%n_columns) then
          call lines%failure('gives a symmetric matrix that is not square', error)
       end if
    end subroutine read_size
 
+   !> One entry a line: row, column and value.
    subroutine read_coordinates(lines, header, matrix, error)
       type(line_reader), intent(inout) :: lines
       type(header_type), intent(in) :: header
@@ -235,6 +244,7 @@ contains
                                ') outside of the matrix (counted from 1)', error)
             return
          end if
+         ! Added up, as finite element programs write what they assemble.
          matrix(place(1), place(2)) = matrix(place(1), place(2)) + value
          if (.not. header%symmetric .or. place(1) == place(2)) cycle
          ! An entry of the upper triangle would be counted twice beside its mirror.

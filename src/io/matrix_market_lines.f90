@@ -25,6 +25,7 @@ module fw_matrix_market_lines
 
    type :: line_reader
       character(:), allocatable, private :: path
+      !> Unit of the open file, -1: none; number of the last line that was read.
       integer, private :: unit = -1, line = 0
    contains
       procedure :: open
@@ -40,6 +41,7 @@ module fw_matrix_market_lines
 
 contains
 
+   !> status_io where the file cannot be opened.
    subroutine open(self, path, error)
       class(line_reader), intent(out) :: self
       character(*), intent(in) :: path
@@ -55,6 +57,7 @@ contains
       call fatal_error(error, path//': cannot be opened: '//trim(reason), status_io)
    end subroutine open
 
+   !> Harmless where nothing is open.
    subroutine close(self)
       class(line_reader), intent(inout) :: self
 
@@ -101,6 +104,7 @@ contains
    !> A line of row, column and value.
    subroutine next_entry(self, place, value, error)
       class(line_reader), intent(inout) :: self
+      !> Row and column, from 1; the caller knows the size of the matrix.
       integer, intent(out) :: place(2)
       real(wp), intent(out) :: value
       type(error_type), allocatable, intent(out) :: error
@@ -183,6 +187,7 @@ contains
             return
          end if
          self%line = self%line + 1
+         ! A letter in the spare place: the line goes on.
          if (status /= 0 .or. text(line_length:) /= ' ') then
             call self%failure('cannot be read (not text, or longer than 1024 characters)', error)
             return
@@ -193,6 +198,7 @@ contains
       end do
    end subroutine get_words
 
+   !> Refuse a line with more or fewer words than expected.
    subroutine check_count(self, found, expected, error)
       class(line_reader), intent(in) :: self
       integer, intent(in) :: found, expected
@@ -206,6 +212,7 @@ contains
    pure subroutine split(text, words)
       character(*), intent(in) :: text
       type(string_type), allocatable, intent(out) :: words(:)
+      ! More than any line has: what is behind them is too much all the same.
       integer, parameter :: most = 8
       character(*), parameter :: blanks = ' '//achar(9)//achar(13)
       integer :: n, start, length, first(most), last(most)
@@ -227,6 +234,7 @@ contains
       end do
    end subroutine split
 
+   !> A whole number; status /= 0 where the word is none.
    pure subroutine to_integer(word, number, status)
       character(*), intent(in) :: word
       integer, intent(out) :: number, status
@@ -237,6 +245,7 @@ contains
       if (status == 0) read (word, *, iostat=status) number
    end subroutine to_integer
 
+   !> A finite number; status /= 0 where the word is none.
    pure subroutine to_real(word, number, status)
       character(*), intent(in) :: word
       real(wp), intent(out) :: number

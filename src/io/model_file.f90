@@ -26,6 +26,7 @@ module fw_model_file
 
    public :: file_model_type, read_model_hdf5
 
+   ! What a file must say of itself in its attributes, so that any other HDF5 file is told apart.
    character(*), parameter :: format_name = 'fretwear-model'
    integer, parameter :: known_version = 1
 
@@ -68,6 +69,7 @@ contains
       if (allocated(error)) return
       allocate (model%files(1))
       model%files(1)%text = path
+      ! In this order: the mass gives n_dof, the dofs of side 1 the number of pairs.
       call read_header(file, model, error)
       if (.not. allocated(error)) call read_structure(file, model, error)
       if (.not. allocated(error)) call read_contact(file, model, error)
@@ -76,6 +78,7 @@ contains
       call file%close(ignored)
    end subroutine read_model_hdf5
 
+   !> Format and version, which are required, title and system of units, which are not.
    subroutine read_header(file, model, error)
       type(hdf5_file), intent(in) :: file
       type(file_model_type), intent(inout) :: model
@@ -107,6 +110,7 @@ contains
       end if
    end subroutine read_header
 
+   !> Matrices; only mass and stiffness are required. Symmetry is checked later (fw_read_model).
    subroutine read_structure(file, model, error)
       type(hdf5_file), intent(in) :: file
       type(file_model_type), intent(inout) :: model
@@ -123,6 +127,7 @@ contains
       call read_matrix(file, '/stiffness_rotation', n, model%stiffness_rotation, error)
    end subroutine read_structure
 
+   !> Pairs; a file without group /contact has none.
    subroutine read_contact(file, model, error)
       type(hdf5_file), intent(in) :: file
       type(file_model_type), intent(inout) :: model
@@ -146,6 +151,7 @@ contains
       call read_names(file, '/contact/patch', n, model%patch, error)
    end subroutine read_contact
 
+   !> Loads; an absent one is zero.
    subroutine read_loads(file, model, error)
       type(hdf5_file), intent(in) :: file
       type(file_model_type), intent(inout) :: model
@@ -162,6 +168,7 @@ contains
       call read_vector(file, '/load/static_rotation', n, model%load_static_rotation, error)
    end subroutine read_loads
 
+   !> Observed quantities: by dof numbers, or by a matrix of factors.
    subroutine read_observed(file, model, error)
       type(hdf5_file), intent(in) :: file
       type(file_model_type), intent(inout) :: model
@@ -212,6 +219,7 @@ contains
                                  ' or its negative', error)
             return
          end if
+         ! A negative number observes the dof with its sign turned.
          model%observe_matrix(i, abs(dof(i))) = real(sign(1, dof(i)), wp)
       end do
    end subroutine read_observed_dofs

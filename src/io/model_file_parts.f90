@@ -1,6 +1,10 @@
 !> The kinds of datasets in a model file: each is read with its shape and its values checked.
 !> An absent dataset leaves its target not allocated, unless it is required.
 !> Indices in messages count from 0, as in h5py.
+!>
+!> Shapes are checked before values, and both before anything is used: a message names file,
+!> dataset, what was found and what was expected. All procedures start with the file and the
+!> absolute name.
 module fw_model_file_parts
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_error, only: error_type
@@ -28,6 +32,7 @@ contains
       integer, intent(in) :: n
       real(wp), allocatable, intent(out) :: matrix(:, :)
       type(error_type), allocatable, intent(out) :: error
+      !> Absence is an error (default: it is not).
       logical, intent(in), optional :: required
       integer, intent(in), optional :: n_rows
       real(wp), allocatable :: found(:, :)
@@ -36,6 +41,7 @@ contains
       if (skipped(file, name, required)) return
       call read_dataset(file, name, found, error)
       if (allocated(error)) return
+      ! `found` has the dimensions of h5py reversed: columns first.
       columns = n
       if (n == 0) columns = size(found, 1)
       rows = columns
@@ -48,6 +54,7 @@ contains
       end if
       call check_finite(file, name, shape(found), found, error)
       if (allocated(error)) return
+      ! Back to the order that h5py shows.
       matrix = transpose(found)
    end subroutine read_matrix
 
@@ -71,6 +78,7 @@ contains
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
       integer, intent(in) :: n
+      !> Component innermost: h5py shows (n, 3).
       integer, allocatable, intent(out) :: dofs(:, :)
       type(error_type), allocatable, intent(out) :: error
 
@@ -92,6 +100,7 @@ contains
       if (skipped(file, name)) return
       call get_shape(file, name, dims, error)
       if (allocated(error)) return
+      ! The rank decides before anything is read.
       if (size(dims) > 0) then
          call read_vector(file, name, n, values, error)
          return
@@ -142,6 +151,7 @@ contains
       if (present(required)) skipped = skipped .and. .not. required
    end function skipped
 
+   !> Refuse another shape than the one expected, both in the order of Fortran.
    subroutine check_shape(file, name, found, expected, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -167,6 +177,7 @@ contains
          if (ieee_is_finite(values(i))) cycle
          rest = i - 1
          do j = 1, size(dims)
+            ! Indices from 0, as h5py counts; shape_text turns their order.
             place(j) = mod(rest, dims(j))
             rest = rest/dims(j)
          end do

@@ -54,6 +54,7 @@ contains
       cursor%in_file = .false.
       cursor%text = trim(adjustl(option))
       call cursor%take_name(name)
+      ! take_name goes over the %, so that it holds group and key.
       percent = index(name, '%')
       entry%group = name(:max(percent - 1, 0))
       entry%key = name(percent + 1:)
@@ -155,6 +156,7 @@ contains
                        to_text(cursor%line), status_input)
    end subroutine close_by_name
 
+   !> A key, its subscripts, the = and its values.
    subroutine parse_entry(cursor, source, group, entry, error)
       type(cursor_type), intent(inout) :: cursor
       character(*), intent(in) :: source
@@ -165,6 +167,7 @@ contains
 
       entry%group = group%name
       entry%line = cursor%line
+      ! What every message of this assignment begins with.
       place = source//':'//to_text(cursor%line)//': &'//group%name
       call cursor%take_name(entry%key)
       if (len(entry%key) == 0) then
@@ -185,6 +188,7 @@ contains
       call parse_values(cursor, place, entry, error)
    end subroutine parse_entry
 
+   !> `file:line`, as compilers write it.
    pure function at_line(input, line) result(place)
       type(namelist_type), intent(in) :: input
       integer, intent(in) :: line

@@ -1,4 +1,6 @@
 !> Paths of files, and whole text files.
+!>
+!> What Fortran cannot ask of a system is asked through the C library of POSIX.
 module fw_paths
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_ptr, c_size_t, c_loc, &
                                           c_associated
@@ -99,6 +101,7 @@ contains
       open (newunit=unit, file=path, access='stream', form='unformatted', status='old', &
             action='read', iostat=status, iomsg=reason)
       if (status == 0) then
+         ! As a stream: the text keeps its ends of lines, and its length is known.
          inquire (unit=unit, size=size)
          allocate (character(max(size, 0)) :: text)
          if (size > 0) read (unit, iostat=status, iomsg=reason) text
@@ -114,6 +117,7 @@ contains
 
       resolved = path
       if (path(1:min(1, len(path))) == '/') return
+      ! `directory` ends with its slash.
       if (len(directory) > 0) resolved = directory//path
       if (resolved(1:min(1, len(resolved))) == '/') return
       resolved = current_directory()//resolved
@@ -135,6 +139,7 @@ contains
 
       stem = path(index(path, '/', back=.true.) + 1:)
       dot = index(stem, '.', back=.true.)
+      ! A name that begins with its only point has no extension.
       if (dot > 1) stem = stem(:dot - 1)
    end function stem_of
 
@@ -142,6 +147,7 @@ contains
    subroutine check_writable(path, error)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
+      ! F_OK and W_OK of unistd.h.
       integer(c_int), parameter :: exists = 0, writable = 2
       character(:), allocatable :: directory
 
@@ -195,6 +201,7 @@ contains
          found = length < 0_c_size_t
          if (found) return
          buffer(length + 1) = c_null_char
+         ! A relative link starts at the folder that holds it.
          target = resolve_path(from_buffer(buffer), directory_of(target))
       end do
    end subroutine follow_links
@@ -202,6 +209,7 @@ contains
    !> Whether somebody, this process included, holds a lock (flock) on a file.
    logical function is_locked(path)
       character(*), intent(in) :: path
+      ! LOCK_EX and LOCK_NB of sys/file.h.
       integer(c_int), parameter :: exclusive_without_waiting = 6
       type(c_ptr) :: stream
       integer(c_int) :: status
@@ -209,11 +217,13 @@ contains
       is_locked = .false.
       stream = c_fopen(path//c_null_char, 'r'//c_null_char)
       if (.not. c_associated(stream)) return
+      ! A lock that is obtained goes with the stream at once.
       is_locked = c_flock(c_fileno(stream), exclusive_without_waiting) /= 0
       status = c_fclose(stream)
    end function is_locked
 
    !> '' where the system does not tell.
+   !> The name of the machine, for the record of a run.
    function machine_name() result(name)
       character(:), allocatable :: name
       character(kind=c_char), target :: buffer(longest)
@@ -225,6 +235,7 @@ contains
       end if
    end function machine_name
 
+   !> Through its own entry `.`, which only a folder has.
    logical function is_directory(path)
       character(*), intent(in) :: path
       integer(c_int), parameter :: exists = 0

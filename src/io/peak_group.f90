@@ -38,8 +38,10 @@ contains
       end do
       allocate (coefficients(n, size(peaks)), source=0.0_wp)
       do k = 1, size(peaks)
+         ! Adaptive runs carry fewer harmonics at some peaks.
          coefficients(:size(peaks(k)%coefficients), k) = peaks(k)%coefficients
       end do
+      ! Negative stands for unknown inside the program, NaN in a file.
       width = peaks%bandwidth
       where (width < 0.0_wp) width = ieee_value(1.0_wp, ieee_quiet_nan)
       call write_dataset(file, '/peak/omega', peaks%omega, error)
@@ -50,6 +52,7 @@ contains
       if (allocated(error)) return
       call write_dataset(file, '/peak/coefficients', coefficients, error)
       if (allocated(error)) return
+      ! Places count from 0 in a file, from 1 here.
       call write_dataset(file, '/peak/observed', peaks%observed - 1, error)
       if (allocated(error)) return
       call write_dataset(file, '/peak/found_by', peaks%found_by, error)

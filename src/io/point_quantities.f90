@@ -41,6 +41,7 @@ module fw_point_quantities
       integer :: missing = 0
       !> Whether the integers are places, from 0, in the words for what gave a solution.
       logical :: is_served_by = .false.
+      !> Its numbers in a point, and whether the result of a case has it at all.
       procedure(get_values), pointer, nopass :: get => null()
       procedure(is_wanted), pointer, nopass :: exists => null()
    contains
@@ -85,6 +86,7 @@ contains
       call add('seconds', r, 's', 'point', 'time spent on the point', seconds, always)
       call add('served_by', i, '', 'point', 'what gave the solution, an index into names', &
                served_by, is_response)
+      ! What does not fit a line of the table is set behind it.
       list(size(list))%is_served_by = .true.
       call add('fold', l, '', 'point', 'whether the branch turns here', fold, follows_branch)
       call add('harmonics', i, '1', 'point', 'harmonics of the balance', harmonics, has_levels)
@@ -118,6 +120,7 @@ contains
 
    contains
 
+      !> A line of the table.
       subroutine add(name, kind_of, unit, dimensions, long_name, get, exists)
          character(*), intent(in) :: name, unit, dimensions, long_name
          integer, intent(in) :: kind_of
@@ -146,6 +149,7 @@ contains
       type(string_type), allocatable :: words(:)
       integer :: i, n
 
+      ! The first word is the point itself, which is no dimension of a row.
       words = words_of(trim(self%dimensions), ' ')
       n = size(words)
       allocate (sizes(n - 1))
@@ -191,6 +195,7 @@ contains
       call self%get(point, carried)
       if (.not. allocated(carried)) return
       n = size(carried)
+      ! Points with fewer harmonics have shorter rows: those of a result are all alike.
       if (index(self%dimensions, 'coefficient') > 0) n = max(n, product(self%row_shape(case)))
       allocate (values(n), source=0.0_wp)
       values(:size(carried)) = carried
@@ -206,6 +211,7 @@ contains
       always = .true.
    end function always
 
+   !> Harmonic balance, which may fall back from one way of solution to another.
    pure logical function is_response(case)
       type(case_type), intent(in) :: case
 
@@ -225,6 +231,7 @@ contains
       has_levels = case%harmonics%adaptive .or. is_accurate(case)
    end function has_levels
 
+   !> Whether the harmonics follow from a wanted accuracy.
    pure logical function is_accurate(case)
       type(case_type), intent(in) :: case
 
@@ -328,6 +335,7 @@ contains
       values = [real(point%n_time, wp)]
    end subroutine instants
 
+   !> Unknown where the point failed or no estimate was possible.
    subroutine error_estimate(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -337,6 +345,7 @@ contains
       end if
    end subroutine error_estimate
 
+   !> Unknown where the multipliers are: -1 in the file.
    subroutine stable(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -344,6 +353,7 @@ contains
       if (allocated(point%multipliers)) values = [flag(point%stable)]
    end subroutine stable
 
+   !> Real and imaginary part of each, side by side.
    subroutine multipliers(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -356,6 +366,7 @@ contains
       values(2::2) = aimag(point%multipliers)
    end subroutine multipliers
 
+   !> Its order in memory (direction, pair, coefficient) is that of h5py reversed already.
    subroutine force(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -445,6 +456,7 @@ contains
       flat = reshape(transpose(array), [size(array)])
    end function by_rows
 
+   !> Truth as a number: rows are reals until they are written.
    pure real(wp) function flag(is_true)
       logical, intent(in) :: is_true
 

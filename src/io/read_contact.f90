@@ -1,4 +1,7 @@
 !> Contact pairs and nonlinear springs: groups &contact and &spring on top of a model file.
+!>
+!> The arrays of a file apply only to the pairs of the file: whoever gives another number of pairs
+!> gives their dofs too, and starts without the constants of others.
 module fw_read_contact
    use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
@@ -27,6 +30,7 @@ contains
       type(contact_type), intent(inout) :: contact
       real(wp) :: scale
 
+      ! The order matters: see fw_contact_keys.
       call read_n_pairs(reader, file_model, contact)
       call bind_law(reader, contact)
       call read_sides(reader, contact)
@@ -50,6 +54,7 @@ contains
 
       n_file = 0
       if (allocated(file_model%side_1)) n_file = size(file_model%side_1, 2)
+      ! The default of the key is what the file holds.
       contact%n_pairs = n_file
       call bind_pairs(reader, contact)
       if (contact%n_pairs == n_file .and. n_file > 0) then
@@ -78,6 +83,7 @@ contains
       logical :: needed
 
       needed = .not. (allocated(contact%side_1) .or. reader%failed()) .and. contact%n_pairs > 0
+      ! Dofs of 0 until they are read: with a failure the checks below are not reached.
       if (.not. allocated(contact%side_1)) allocate (contact%side_1(3, contact%n_pairs), source=0)
       call bind_sides(reader, contact, needed)
       if (.not. reader%failed()) call check_sides(reader, contact)
@@ -94,6 +100,7 @@ contains
             if (all(a == 0) .and. all(b == 0)) then
                call refuse_pair(reader, i, 'has no dof on either side: at least one must not be 0')
             end if
+            ! A dof against itself would be a force of the pair on itself.
             do k = t1, n
                if (a(k) == b(k) .and. a(k) > 0) then
                   call refuse_pair(reader, i, 'has dof '//to_text(a(k))//' on both sides: '// &
@@ -109,12 +116,14 @@ contains
       end do
    end subroutine check_sides
 
+   !> A dof may stand for one direction only: t1, t2 and n are independent.
    pure logical function is_repeated(dofs, k)
       integer, intent(in) :: dofs(3), k
 
       is_repeated = dofs(k) > 0 .and. count(dofs == dofs(k)) > 1
    end function is_repeated
 
+   !> Refuse both sides of a pair, by its number from 1.
    subroutine refuse_pair(reader, i, message)
       type(reader_type), intent(inout) :: reader
       integer, intent(in) :: i
@@ -146,6 +155,7 @@ contains
          call reader%refuse('contact', 'normal_load', 'has no meaning: every pair has a normal '// &
                             'dof; press the pairs together with &load static or a negative gap')
       end if
+      ! One value for all may have been meant for the others.
       where (closes) contact%normal_load = 0.0_wp
    end subroutine read_constants
 
@@ -210,6 +220,7 @@ contains
 
       associate (a => contact%side_1(t1:t2, :), b => contact%side_2(t1:t2, :))
          do k = 1, contact%n_pairs
+            ! Turned round, the pair is the same.
             is(k) = (all(a(:, k) == a(:, i)) .and. all(b(:, k) == b(:, i))) .or. &
                     (all(a(:, k) == b(:, i)) .and. all(b(:, k) == a(:, i)))
          end do
@@ -243,6 +254,7 @@ contains
          call reader%refuse('spring', 'n_springs', 'is missing: must be the number of springs')
       end if
       call bind_springs(reader, springs)
+      ! What was needed and not given is a problem already; the arrays only have to exist.
       m = springs%n_springs
       if (.not. allocated(springs%side_1)) allocate (springs%side_1(m), source=0)
       if (.not. allocated(springs%coefficient)) allocate (springs%coefficient(m), source=0.0_wp)

@@ -26,6 +26,7 @@ contains
       !> `file` holds its default on entry.
       type(output_options), intent(inout) :: options
 
+      ! Whether somebody has named the file: the default is a name too.
       options%names_file = reader%given('output', 'file')
       call options%bind_keys(reader)
       if (len_trim(options%file) == 0) then
@@ -50,6 +51,7 @@ contains
       if (allocated(raw%observe_name)) most = most + size(raw%observe_name)
       call bind_observed(reader, most, chosen, is_text)
       if (reader%failed()) return
+      ! Names of a file can be chosen, and dof numbers beside them.
       call list_default(raw, model%n_dof, names, rows)
       if (size(chosen) == 0) then
          call move_alloc(names, model%observe_name)
@@ -115,6 +117,7 @@ contains
       logical :: is_number
 
       name = value
+      ! Names first: a model file may name a quantity by a number.
       do i = 1, size(names)
          if (names(i)%text /= value) cycle
          row = rows(i, :)
@@ -136,6 +139,7 @@ contains
       end if
    end subroutine choose
 
+   !> The last name must not be among those before it: results are looked up by name.
    subroutine refuse_repeated(reader, names)
       type(reader_type), intent(inout) :: reader
       type(string_type), intent(in) :: names(:)

@@ -23,6 +23,7 @@ module fw_read_worn
 
    public :: read_worn
 
+   !> Reading the depths in a process of its own, in case the file is damaged.
    type, extends(trial_type) :: worn_trial
    contains
       procedure :: read => read_in_trial
@@ -74,6 +75,8 @@ contains
       if (reader%tries_files) call try_file(worn_trial(), path, failure)
       if (.not. allocated(failure)) call load_depths(path, depth, failure)
       if (.not. allocated(failure)) return
+      ! What cannot be read at all ends the reading; what is wrong in it is one problem among
+      ! others.
       if (failure%status == status_io) then
          failure%message = reader%place_of('contact', 'worn')//': '//failure%message
          call move_alloc(failure, error)
@@ -82,6 +85,7 @@ contains
       end if
    end subroutine read_depths
 
+   !> Open, check and read; the file is closed on every way out.
    subroutine load_depths(path, depth, error)
       character(*), intent(in) :: path
       real(wp), allocatable, intent(out) :: depth(:, :)
@@ -115,6 +119,7 @@ contains
       call load_depths(path, depth, ignored)
    end subroutine read_in_trial
 
+   !> Refuse depths of another joint, and rows that are not there or not complete.
    subroutine check_depths(reader, path, step, depth, n_pairs)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path

@@ -1,5 +1,9 @@
 !> Reads the keys of the options from a namelist: checks of range, count and repetition, the nearest
 !> key for an unknown one, and the effective input, all from the declarations of the keys.
+!>
+!> A problem is recorded, not raised: reading goes on, so that one run tells everything that is
+!> wrong. A value that is refused leaves its component as it was, and `finish` raises what was
+!> recorded.
 module fw_reader
    use fw_error, only: error_type
    use fw_input, only: input_type
@@ -23,13 +27,16 @@ module fw_reader
    !> An extent of arrays.
    type :: size_type
       character(12) :: name
+      !> Number of elements along it.
       integer :: extent
    end type size_type
 
    type, extends(input_type) :: reader_type
       !> Model files are tried in a process of their own first: for programs of one thread.
       logical :: tries_files = .false.
+      !> Every key that was asked for, with its text in the effective input.
       type(record_list) :: records
+      !> The group that was opened last; extents that were told so far.
       character(:), allocatable, private :: group
       type(size_type), allocatable, private :: sizes(:)
    contains
@@ -88,6 +95,7 @@ contains
       call reader%parse(text, source, overrides, error, origin)
    end subroutine new_reader
 
+   !> Keys bound from now on belong to this group; its help is for the list of keys.
    subroutine open(self, group, help)
       class(reader_type), intent(inout) :: self
       character(*), intent(in) :: group, help
@@ -116,15 +124,18 @@ contains
       call self%records%add(record)
    end subroutine note
 
+   !> A real in its range; the component holds the default.
    subroutine bind_real(self, key, value, needed)
       class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
       real(wp), intent(inout) :: value
+      !> A key that is needed and not given is a problem.
       logical, intent(in), optional :: needed
 
       call self%take_number(key, real_kind, value, needed)
    end subroutine bind_real
 
+   !> A whole number in its range, exact as a real in between.
    subroutine bind_integer(self, key, value, needed)
       class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -137,6 +148,7 @@ contains
       value = nint(number)
    end subroutine bind_integer
 
+   !> A number of either kind: note the key, read it if it is given, keep what holds.
    subroutine take_number(self, key, kind, number, needed)
       class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -157,6 +169,7 @@ contains
       call self%find_scalar(self%group, trim(key%name), accepts, needed, i)
       if (i > 0) then
          call read_number(self%namelist%entries(i)%values(1), kind, key%range, found, ok)
+         ! A value that is refused leaves the default, so that later checks find something sound.
          if (ok) number = found
          if (.not. ok) call self%refuse_value(i, accepts)
       end if
@@ -165,6 +178,7 @@ contains
       end if
    end subroutine take_number
 
+   !> A truth value, in any of the forms that Fortran reads.
    subroutine bind_logical(self, key, value)
       class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -183,6 +197,7 @@ contains
       call self%amend(self%group, trim(key%name), to_text(value))
    end subroutine bind_logical
 
+   !> A text; it stays unallocated where it is not given.
    subroutine bind_text(self, key, value, needed)
       class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -198,6 +213,7 @@ contains
             if (entry%values(1)%quoted) then
                value = entry%values(1)%text
             else if (allocated(entry%raw)) then
+               ! Overrides need no quotes: everything behind the = is the text.
                value = entry%raw
             else
                call self%refuse_value(i, accepts)
@@ -207,6 +223,7 @@ contains
       if (allocated(value)) call self%amend(self%group, trim(key%name), quoted_text(value))
    end subroutine bind_text
 
+   !> One of several words, as its number in their list; upper and lower case are the same.
    subroutine bind_word(self, key, choice, words)
       class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
@@ -224,6 +241,7 @@ contains
             do k = 1, size(words)
                if (lower_case(value%text) == lower_case(words(k))) found = k
             end do
+            ! The right word without quotes: what a namelist READ would not take either.
             if (found > 0 .and. .not. value%quoted &
                 .and. .not. allocated(self%namelist%entries(i)%raw)) then
                call self%refuse_value(i, quoted_text(trim(words(found)))//', in quotes')
@@ -238,10 +256,12 @@ contains
       call self%amend(self%group, trim(key%name), quoted_text(trim(words(choice))))
    end subroutine bind_word
 
+   !> Values that may be numbers or texts, as `observe` has them; what they are is up to the caller.
    subroutine bind_list(self, key, accepts, most, values, is_text)
       class(reader_type), intent(inout) :: self
       type(key_type), intent(in) :: key
       character(*), intent(in) :: accepts
+      !> No more values than this.
       integer, intent(in) :: most
       type(string_type), allocatable, intent(out) :: values(:)
       logical, allocatable, intent(out) :: is_text(:)
@@ -264,6 +284,7 @@ contains
       call multiply_out(self%namelist%entries(i)%values, found)
       text = ''
       do k = 1, size(found)
+         ! Written back in quotes, an unquoted name reads the same again.
          if (verify(found(k)%text, '+-0123456789') > 0) found(k)%quoted = .true.
          call append(values, found(k)%text)
          if (k > 1) text = text//', '
@@ -279,10 +300,12 @@ contains
       character(*), intent(in) :: name
       integer, intent(in) :: extent
 
+      ! A size told anew replaces the old one.
       self%sizes = [pack(self%sizes, self%sizes%name /= name), size_type(name, extent)]
    end subroutine set_size
 
    !> A size that was not told is 0.
+   !> Numbers of a shape such as '3 x n_pairs', in Fortran order.
    pure function extents(self, shape)
       class(reader_type), intent(in) :: self
       character(*), intent(in) :: shape
@@ -294,6 +317,7 @@ contains
       rest = trim(shape)
       do while (len(rest) > 0)
          blank = index(rest//' ', ' ')
+         ! A number, or else the name of a size.
          read (rest(:blank - 1), '(i12)', iostat=status) extent
          if (status /= 0) then
             extent = 0

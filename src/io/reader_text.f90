@@ -22,6 +22,7 @@ contains
       if (len(hint) > 0) then
          hint = '; did you mean '//hint//'?'
       else if (size(words) <= 20) then
+         ! A longer list would bury the message.
          hint = '; known are '//join(words, ', ')
       end if
    end function near
@@ -38,6 +39,7 @@ contains
       if (len(hint) > 0) hint = '; did you mean '//quoted_text(hint)//'?'
    end function did_you_mean
 
+   !> A value as it was written: with its quotes, if it had any.
    pure function shown(value) result(text)
       type(value_type), intent(in) :: value
       character(:), allocatable :: text
@@ -98,6 +100,7 @@ contains
       second = 0
       if (len(text) > 1) second = iachar(text(2:2))
       select case (first)
+      ! Byte ranges of UTF-8 by the length of the character that they begin (RFC 3629).
       case (10, 32:126)
          n = 1
       case (194:223)
@@ -111,6 +114,7 @@ contains
       end select
       if (n > len(text)) n = 0
       do i = 2, n
+         ! Bytes that follow have the form 10xxxxxx.
          if (iand(iachar(text(i:i)), 192) == 128) cycle
          n = 0
          return
@@ -121,6 +125,7 @@ contains
           .or. (first == 244 .and. second > 143)) n = 0
    end function sound_bytes
 
+   !> Words of one length as texts of their own.
    pure function to_strings(words) result(strings)
       character(*), intent(in) :: words(:)
       type(string_type), allocatable :: strings(:)
@@ -132,6 +137,7 @@ contains
       end do
    end function to_strings
 
+   !> `'a', 'b' or 'c'`.
    pure function words_text(words) result(text)
       character(*), intent(in) :: words(:)
       character(:), allocatable :: text
@@ -151,6 +157,7 @@ contains
       integer :: i, rest
 
       text = '('
+      ! The first index runs fastest.
       rest = element - 1
       do i = 1, size(dims)
          if (i > 1) text = text//','
@@ -160,6 +167,7 @@ contains
       text = text//')'
    end function element_text
 
+   !> `3 x 4`.
    pure function dims_text(dims) result(text)
       integer, intent(in) :: dims(:)
       character(:), allocatable :: text
@@ -183,10 +191,12 @@ contains
 
       text = ''
       if (size(numbers) == 0) return
+      ! What may be given as one value for all is written so.
       if (repeats .and. all(abs(numbers - numbers(1)) <= 0.0_wp)) then
          text = kind_text(numbers(1), kind)
          return
       end if
+      ! A column of a matrix in a line, else six numbers.
       per_line = merge(dims(1), 6, size(dims) > 1)
       do i = 1, size(numbers)
          text = text//kind_text(numbers(i), kind)

@@ -1,4 +1,8 @@
 !> An interrupted wear run as its result file tells it, read to be continued.
+!>
+!> A run that is continued gives the numbers of one that was never interrupted. So everything that
+!> they depend on is compared: the keys, the constants of the pairs, and by its first vibration the
+!> structure, whose matrices the file does not hold.
 module fw_restart_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_combinations, only: has_history
@@ -107,6 +111,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine read_restart
 
+   !> Refuse files of other programs, other analyses, and versions without what is needed.
    subroutine check_kind(file, error)
       type(hdf5_file), intent(in) :: file
       type(error_type), allocatable, intent(out) :: error
@@ -144,6 +149,7 @@ contains
       end if
       call read_dataset(file, '/restart/pairs', constants, error)
       if (allocated(error)) return
+      ! To the last bit: they were written as they are.
       own = pair_constants(case%contact)
       if (any(shape(constants) /= shape(own))) then
          call fatal_error(error, file%path//': its run had '//to_text(size(constants, 1))// &
@@ -187,6 +193,7 @@ contains
                        status_input)
    end subroutine count_rows
 
+   !> State and control after the last complete step, and the first state for check_first.
    subroutine read_rows(file, n_pairs, self, error)
       type(hdf5_file), intent(in) :: file
       integer, intent(in) :: n_pairs
@@ -216,6 +223,7 @@ contains
       self%omega = omega(n)
       self%state%cycles = cycles(n)
       self%state%residual = residual(n)
+      ! Unknowns of the march: the vibration, then the depths.
       self%state%x = [vibration(:, n), depth(:, n)]
       self%state%rate = rate(:, n)
       self%control = control(:, n)
@@ -231,6 +239,7 @@ contains
       call read_points(file, omega, residual, control(c_converged, :), self%points, error)
    end subroutine read_rows
 
+   !> What the summary and the observers want of earlier steps.
    subroutine read_points(file, omega, residual, converged, points, error)
       type(hdf5_file), intent(in) :: file
       real(wp), intent(in) :: omega(:), residual(:), converged(:)
@@ -243,6 +252,7 @@ contains
       call read_dataset(file, '/amplitude', amplitude, error)
       if (.not. allocated(error)) call read_dataset(file, '/iterations', iterations, error)
       if (allocated(error)) return
+      ! A killed run may have left some datasets a row longer.
       allocate (points(min(size(converged), size(omega), size(iterations), size(amplitude, 2))))
       do i = 1, size(points)
          points(i)%omega = omega(i)
@@ -261,6 +271,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical :: agrees
 
+      ! Each test only where the one before holds: sizes come first.
       agrees = size(state%x) == size(self%first%x)
       if (agrees) agrees = norm2(state%x - self%first%x) <= same_vibration*norm2(self%first%x)
       if (agrees) agrees = norm2(state%rate - self%first%rate) <= &

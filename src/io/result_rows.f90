@@ -43,7 +43,9 @@ module fw_result_rows
       procedure :: copy => copy_rows
    end type column_type
 
+   !> The rows of a result, one for each point, in as many datasets as its case has quantities.
    type :: row_set
+      !> Rows so far; how many are likely, which sets the size of the chunks.
       integer, private :: n_rows = 0, expected = 1
       !> What of the case tells the shapes of rows; see fw_point_quantities.
       type(case_type), private :: case
@@ -76,6 +78,7 @@ contains
          associate (column => self%columns(i))
             column%quantity = list(i)
             column%row_shape = list(i)%row_shape(case)
+            ! Created late, by the first point that knows it.
             if (any(column%row_shape == unknown_size)) cycle
             call column%create(file, self%case, self%expected, error)
             if (allocated(error)) return
@@ -88,6 +91,7 @@ contains
       type(case_type), intent(in) :: case
       type(case_type), intent(out) :: sizes
 
+      ! Matrices of thousands of dofs must not be held a second time.
       sizes%harmonics = case%harmonics
       sizes%contact%n_pairs = case%contact%n_pairs
       if (allocated(case%model%unit_system)) sizes%model%unit_system = case%model%unit_system
@@ -102,6 +106,7 @@ contains
 
       expected_rows = 1
       if (case%analysis == analysis_wear) then
+         ! The state before any wear is a row of its own.
          expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
       else if (case%analysis == analysis_frf) then
          expected_rows = max(1, case%sweep%n_points)
@@ -197,6 +202,7 @@ contains
       end do
    end subroutine sort
 
+   !> Harmless before the rows are created.
    subroutine close(self)
       class(row_set), intent(inout) :: self
       integer :: i
@@ -224,6 +230,7 @@ contains
       call label_quantity(file, self%quantity, case%model%unit_system, error)
       if (allocated(error) .or. .not. self%quantity%is_served_by) return
       do i = 1, size(words)
+         ! Places count from 0.
          words(i)%text = trim(served_words(i - 1))
       end do
       call write_attribute(file, name, 'names', words, error)
@@ -255,9 +262,11 @@ contains
       real(wp), allocatable, intent(in) :: values(:)
       type(error_type), allocatable, intent(out) :: error
 
+      ! No point has known it so far.
       if (.not. self%dataset%is_created()) return
       if (.not. allocated(values)) then
          if (index(self%quantity%dimensions, 'step') == 1) return
+         ! Integers have no NaN: each says by itself what stands for unknown.
          if (self%quantity%kind_of == growing_integer) then
             call self%dataset%append(file, self%quantity%missing, error)
          else
@@ -294,6 +303,7 @@ contains
       if (.not. self%dataset%is_created()) then
          call get_shape(source, name, dims, error)
          if (allocated(error)) return
+         ! The shape that this run cannot know yet is that of the earlier one.
          self%row_shape = int(dims(:size(dims) - 1))
          call self%create(file, case, expected, error)
          if (allocated(error)) return

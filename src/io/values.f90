@@ -1,4 +1,7 @@
 !> Namelist values as numbers, numbers as namelist text, and ranges in words.
+!>
+!> Text is checked letter by letter before it is read: a list-directed READ would take '2*3', '/' or
+!> nothing at all for a number. Numbers are written so that they read back to the same bits.
 module fw_values
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
@@ -32,6 +35,7 @@ contains
       has_least = range%least > -huge(1.0_wp)
       has_most = range%most < huge(1.0_wp)
       text = kind
+      ! In the order in which one says it: above or at least, then below or at most.
       if (range%above > -huge(1.0_wp)) text = text//' above '//number_text(range%above)
       if (has_least .and. has_most) then
          text = kind//' from '//number_text(range%least)//' to '//number_text(range%most)
@@ -58,6 +62,7 @@ contains
       number = 0.0_wp
       lower = lower_case(text)
       mark = scan(lower, 'edq')
+      ! 1d-3 and 1q-3 are what Fortran programs write.
       if (mark > 0) lower(mark:mark) = 'e'
       ok = is_decimal(lower(:merge(mark - 1, len(lower), mark > 0)))
       if (ok .and. mark > 0) ok = is_whole(lower(mark + 1:))
@@ -72,6 +77,7 @@ contains
       ok = status == 0 .and. ieee_is_finite(number)
    end subroutine read_real
 
+   !> A whole number that fits 32 bits; more than that is no number here.
    subroutine read_integer(text, number, ok)
       character(*), intent(in) :: text
       integer, intent(out) :: number
@@ -85,6 +91,7 @@ contains
       ok = status == 0
    end subroutine read_integer
 
+   !> What a namelist READ takes for a truth value, and no other words that begin with t or f.
    subroutine read_logical(text, flag, ok)
       character(*), intent(in) :: text
       logical, intent(out) :: flag
@@ -106,12 +113,14 @@ contains
    function number_text(number) result(text)
       real(wp), intent(in) :: number
       character(:), allocatable :: text
+      ! Digits: six where they are enough, then up to the 17 that always are.
       integer, parameter :: trials(*) = [6, 15, 16, 17]
       character(40) :: buffer, form
       real(wp) :: back
       logical :: ok
       integer :: i
 
+      ! Only for messages: no key takes it.
       if (.not. ieee_is_finite(number)) then
          write (buffer, *) number
          text = trim(adjustl(buffer))
@@ -138,8 +147,10 @@ contains
       mark = index(scientific, 'E')
       sign = scientific(:merge(1, 0, scientific(1:1) == '-'))
       digits = scientific(len(sign) + 1:len(sign) + 1)//scientific(len(sign) + 3:mark - 1)
+      ! Zeros at the end are needless.
       digits = digits(:max(1, verify(digits, '0', back=.true.)))
       read (scientific(mark + 1:), *) exponent
+      ! As one would write it by hand, up to a million and down to a thousandth.
       if (exponent >= 0 .and. exponent < 7) then
          if (len(digits) < exponent + 1) digits = digits//repeat('0', exponent + 1 - len(digits))
          text = sign//digits(:exponent + 1)
@@ -211,12 +222,14 @@ contains
       if (ok) ok = range%holds(number) .and. .not. value%quoted
    end subroutine read_number
 
+   !> The kind as the list of keys calls it.
    pure character(7) function kind_name(kind)
       character(*), intent(in) :: kind
 
       kind_name = merge('integer', 'real   ', kind == integer_kind)
    end function kind_name
 
+   !> A number of a kind as namelist text.
    function kind_text(number, kind) result(text)
       real(wp), intent(in) :: number
       character(*), intent(in) :: kind

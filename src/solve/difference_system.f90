@@ -17,7 +17,7 @@ module fw_difference_system
    type, extends(parameter_system) :: difference_system
       class(parameter_system), pointer, private :: inner => null()
       !> The last point and its residual.
-      !> and scratch of the same length (n each).
+      !> Scratch of the same length stands behind them (n each).
       real(wp), allocatable, private :: x(:), r(:), trial(:), ahead(:)
    contains
       procedure :: set_parameter

@@ -168,7 +168,7 @@ contains
    end function relative_norm
 
    !> Factor of the step after an error.
-   ! Zero error: any growth would do.
+   !> An error of zero leaves the largest growth.
    pure real(wp) function change(error)
       real(wp), intent(in) :: error
 

@@ -21,8 +21,7 @@ module fw_contact_step
 
    integer, parameter :: state_open = 0, state_stick = 1, state_slip = 2
 
-   ! Newton's method ends in some five steps or not at all; sweeps converge slowly, but nearly
-   ! always.
+   ! Newton's method ends in few steps or not at all; sweeps converge slowly, but seldom fail.
    integer, parameter :: max_newton = 20, max_sweeps = 400
    !> On the projections, relative to the largest force; where Newton's method stagnates at the
    !> round-off of the smallest steps, the looser one will do.
