@@ -63,6 +63,7 @@ contains
       real(wp) :: seconds
       integer :: iterations
 
+      ! Work is summed over all levels that the point took.
       iterations = 0
       seconds = 0.0_wp
       do
@@ -74,6 +75,7 @@ contains
          if (.not. point%converged) exit
          if (force_left_out(level%system, self%n_harmonics(self%current)) &
              <= case%harmonics%adaptive_tolerance) exit
+         ! The best there is: the point counts, and the summary tells.
          if (self%current == size(self%level)) then
             self%n_short = self%n_short + 1
             exit
@@ -83,6 +85,7 @@ contains
       end do
       point%iterations = iterations
       point%seconds = seconds
+      ! Only behind the point: it is reported with the harmonics that it was solved with.
       if (self%current == 1 .or. .not. point%converged) return
       if (force_left_out(level%system, self%n_harmonics(self%current - 1)) &
           <= with_margin*case%harmonics%adaptive_tolerance) then
@@ -90,6 +93,7 @@ contains
       end if
    end subroutine solve
 
+   !> The work of all levels, and how many points would have needed more.
    subroutine describe(self, case, state, summary, message)
       class(adaptive_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
@@ -116,6 +120,7 @@ contains
       self%current = next
    end subroutine change
 
+   !> The level in use and its last solution.
    subroutine remember(self, memory)
       class(adaptive_solver), intent(in) :: self
       type(solver_memory), intent(out) :: memory
@@ -128,6 +133,7 @@ contains
       end associate
    end subroutine remember
 
+   !> Go on with that level: a solution fits no other.
    subroutine recall(self, memory)
       class(adaptive_solver), intent(inout) :: self
       type(solver_memory), intent(in) :: memory

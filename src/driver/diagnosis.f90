@@ -13,6 +13,7 @@ module fw_diagnosis
    public :: explain_failure, finer, takes_scale
 
    !> Halvings of the interval in which the largest share of the load is looked for that converges.
+   ! To 1.6 % of the load: the number is for a reader.
    integer, parameter :: n_halvings = 6
 
 contains
@@ -41,6 +42,7 @@ contains
          reason = 'the joint cannot carry its static load: no position at rest was found; it '// &
                   'needs more preload, friction or support, or a smaller static load'
       end if
+      ! The whole load again, for whoever goes on with the system.
       call solve_share(system, method, 1.0_wp, x, done, only_set=.true.)
       if (system%is_interrupted()) reason = 'why was not looked for to the end'
    end subroutine explain_failure
@@ -62,6 +64,7 @@ contains
                   'steps, or another solver%kind or scheme'
          return
       end if
+      ! The share that has a solution is a lower bound; where none has, it is 0.
       call find_largest_share(system, method, x, lower)
       write (percent, '(f6.1, a)') 100.0_wp*lower, ' %'
       reason = 'above '//trim(adjustl(percent))//' of the vibratory load no periodic '// &
@@ -112,6 +115,7 @@ contains
       logical :: done
       integer :: k
 
+      ! Shares of 0 and 1 have been tried: one converged, the other did not.
       lower = 0.0_wp
       upper = 1.0_wp
       do k = 1, n_halvings

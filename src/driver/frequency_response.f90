@@ -57,10 +57,12 @@ contains
       call new_strategy(case, strategy)
       call strategy%start(case, error)
       if (allocated(error)) return
+      ! The source needs a strategy that is started: a branch shares its system.
       call new_source(case, strategy, source, to_observer%n_points)
       to_file%writer => writer
       to_summary%summary => summary
       to_observer%observer => observer
+      ! The file first, so that no summary counts a point that was not written.
       call sinks%add(to_file)
       call sinks%add(to_summary)
       call sinks%add(to_observer)
@@ -77,6 +79,7 @@ contains
       call observer%on_end()
       call strategy%describe(case, state, summary, message)
       if (len(message) > 0 .and. .not. allocated(error)) call observer%on_message(message)
+      ! A run that was stopped is not made longer by a search.
       if (.not. (allocated(error) .or. state%was_stopped)) then
          call find_peaks(case, finder, writer, summary, error)
          if (.not. allocated(error)) call add_rows(case, finder, sinks, writer, state, error)

@@ -17,6 +17,7 @@ module fw_one_level
 
    public :: one_level
 
+   !> The strategy of a given number of harmonics: one system and one solver serve all points.
    type, extends(point_strategy) :: one_level
       type(level_type) :: level
    contains
@@ -29,6 +30,7 @@ module fw_one_level
 
 contains
 
+   !> Build the system; an error is a case that cannot be computed.
    subroutine start(self, case, error)
       class(one_level), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -37,6 +39,7 @@ contains
       call self%level%build(case, case%harmonics%n_harmonics, error)
    end subroutine start
 
+   !> A point; `note` has what the observer should be told of it, if anything.
    subroutine solve(self, case, request, point, error)
       class(one_level), intent(inout), target :: self
       type(case_type), intent(in) :: case
@@ -44,10 +47,12 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
 
+      ! Of the point before.
       if (allocated(self%note)) deallocate (self%note)
       call self%level%solve(case, request, point, error)
       if (allocated(error)) return
       associate (method => self%level%solver%method)
+         ! Pseudo-time says why it failed; the other solvers have no more to tell than the point.
          if (.not. point%converged .and. allocated(method%message)) then
             self%note = 'pseudo-time: '//method%message
          end if
@@ -68,14 +73,17 @@ contains
                                     state%all_converged())
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
          if (state%was_stopped .or. state%all_converged()) return
+         ! What cannot help in this case is left out.
          message = 'try a finer sweep, the other direction'
          if (takes_scale(system)) message = message//', another penalty_scale (0.3 or 3)'
          message = message//' or '//trim(finer(system))//' for the points above'
+         ! Costs solutions of its own: worth it only where the run gave nothing at all.
          if (state%n_converged == 0) call explain_failure(system, solver%method, message)
          message = 'not converged: '//message
       end associate
    end subroutine describe
 
+   !> The last converged solution, so that points of a search start from it.
    subroutine remember(self, memory)
       class(one_level), intent(in) :: self
       type(solver_memory), intent(out) :: memory
@@ -85,6 +93,7 @@ contains
       memory%omega = self%level%solver%omega_last
    end subroutine remember
 
+   !> Go on from such a solution.
    subroutine recall(self, memory)
       class(one_level), intent(inout) :: self
       type(solver_memory), intent(in) :: memory

@@ -39,6 +39,7 @@ module fw_point_solver
    public :: point_solver
 
    !> Halvings of a frequency step that fails.
+   ! A 64th of a step of the sweep.
    integer, parameter :: max_halvings = 6
    !> Steps of the pseudo-time fallback, and failures in a row after which it is left alone: a
    !> joint that cannot carry its load has no solution to flow to.
@@ -82,6 +83,7 @@ module fw_point_solver
 
 contains
 
+   !> Nothing is known yet; the first solution starts from a guess of the system.
    subroutine start(self, case, harmonics, n)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -129,6 +131,7 @@ contains
       point%omega = request%omega
       point%converged = report%converged
       point%residual = report%residual
+      ! Also of a point that failed: it is written with its mark.
       call recover_point(system, self%x, self%method%harmonics%n_harmonics, request%contact, point)
       call recover_tail(system, case%model, case%contact, point%omega, case%output%tail, point)
       if (request%histories) then
@@ -141,6 +144,7 @@ contains
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then
          associate (contact => system%work(system%forces%pairs))
+            ! The march of the next point starts where that of this one ended.
             contact%x_start = contact%x
          end associate
       end if
@@ -284,6 +288,7 @@ contains
 
       share = 0.0_wp
       step = first_load_step
+      ! The position at rest, from which the load is raised.
       system%load_share = 0.0_wp
       call system%set_frequency(omega, error)
       if (allocated(error)) return
@@ -299,6 +304,7 @@ contains
             reached = self%x
             share = system%load_share
             if (share >= 1.0_wp) exit
+            ! Slower up than down: a failure costs more than a step.
             step = 1.5_wp*step
          else
             self%x = reached
@@ -307,6 +313,7 @@ contains
             if (.not. goes_on(self, report, iterations)) exit
          end if
       end do
+      ! On every way out: the system serves other points after this one.
       system%load_share = 1.0_wp
       if (report%converged) then
          call remember(self, omega)
@@ -342,6 +349,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: middle
 
+      ! omega_last moves on with every success, also within this procedure.
       middle = 0.5_wp*(self%omega_last + omega)
       call from_guesses(self, system, middle, report, iterations, error)
       if (allocated(error)) return
@@ -357,6 +365,7 @@ contains
             if (allocated(error)) return
          end if
       end if
+      ! Left at the frequency that was asked for.
       if (.not. report%converged) call system%set_frequency(omega, error)
    end subroutine approach
 
@@ -376,6 +385,7 @@ contains
       do guess = first, 3
          select case (guess)
          case (1)
+            ! In units of the last interval, which may be shorter than this one.
             step = (omega - self%omega_last)/(self%omega_last - self%omega_before)
             self%x = self%last + step*(self%last - self%before)
          case (2)
@@ -415,9 +425,11 @@ contains
 
       call self%method%solve(system, self%x, report)
       if (report%converged .or. system%load_share < 1.0_wp) return
+      ! Intermediate frequencies and loads are no answer to what was asked.
       if (abs(system%frequency() - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
    end subroutine attempt
 
+   !> Keep the unknowns of the smallest residual; NaN is never smaller.
    subroutine note_best(self, report)
       class(point_solver), intent(inout) :: self
       type(solver_report), intent(in) :: report
@@ -434,13 +446,16 @@ contains
 
       self%last = x
       self%omega_last = omega
+      ! No second point: an extrapolation over two numbers of harmonics would mix them.
       self%n_converged = 1
    end subroutine know
 
+   !> A solution for the guesses of the next points.
    subroutine remember(self, omega)
       class(point_solver), intent(inout) :: self
       real(wp), intent(in) :: omega
 
+      ! The same frequency again: no direction to extrapolate in.
       if (abs(omega - self%omega_last) <= 0.0_wp) then
          self%last = self%x
          return

@@ -73,6 +73,7 @@ contains
       if (allocated(error)) return
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
+      ! Observers may be used again.
       observer%stop_requested = .false.
       call observer%limit_run(case%max_seconds)
       if (present(image)) then
@@ -81,6 +82,8 @@ contains
          call writer%open(case, error)
       end if
       if (allocated(error)) return
+      ! Behind the file, before the first product: results must not depend on the threads of the
+      ! host.
       call threads%enter(case%threads)
       summary = new_summary(case)
       call remark_input(case, summary%remarks)
@@ -96,8 +99,10 @@ contains
       outcome%out_of_time = observer%run_out
       if (allocated(error)) then
          if (state%n_points == 0) then
+            ! A result without points is none.
             call writer%discard()
          else
+            ! What was computed until then stays readable, and says that it is not all.
             call writer%close('failed: '//error%message, elapsed, close_error)
             if (present(image)) call move_alloc(writer%image, image)
          end if

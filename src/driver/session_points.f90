@@ -7,6 +7,7 @@ module fw_session_points
 
    public :: point_list, point_recorder
 
+   !> An item of its own, so that a longer list takes points over without copying them.
    type :: point_item
       type(point_type), allocatable :: point
    end type point_item
@@ -34,6 +35,7 @@ module fw_session_points
 
 contains
 
+   !> The list doubles: the number of points of a branch is not known beforehand.
    subroutine add(self, point)
       class(point_list), intent(inout) :: self
       type(point_type), intent(in) :: point
@@ -53,6 +55,7 @@ contains
       self%item(self%n)%point = point
    end subroutine add
 
+   !> Give the memory back too.
    subroutine clear(self)
       class(point_list), intent(inout) :: self
 
@@ -77,6 +80,7 @@ contains
       self%stop_requested = self%observer%stop_requested
    end subroutine on_start
 
+   !> Kept first: the other observer may ask for the very point that it is told of.
    subroutine on_point(self, index, n_points, point)
       class(point_recorder), intent(inout) :: self
       integer, intent(in) :: index, n_points

@@ -11,6 +11,7 @@ module fw_sinks
 
    public :: point_sink, sink_list, writer_sink, summary_sink, observer_sink
 
+   !> Takes points one by one; an error ends the run.
    type, abstract :: point_sink
    contains
       procedure(take_point), deferred :: take
@@ -26,18 +27,21 @@ module fw_sinks
       end subroutine take_point
    end interface
 
+   !> The result file, which holds a point when `take` returns.
    type, extends(point_sink) :: writer_sink
       type(result_writer), pointer :: writer => null()
    contains
       procedure :: take => write_point
    end type writer_sink
 
+   !> Counts and extremes for the summary.
    type, extends(point_sink) :: summary_sink
       type(summary_type), pointer :: summary => null()
    contains
       procedure :: take => add_point
    end type summary_sink
 
+   !> Whoever watches, or asks for the end.
    type, extends(point_sink) :: observer_sink
       class(observer_type), pointer :: observer => null()
       !> Points told so far, and to come in all (0: not known).
@@ -60,6 +64,7 @@ module fw_sinks
 
 contains
 
+   !> Sinks are few: the list grows by one.
    subroutine add(self, sink)
       class(sink_list), intent(inout) :: self
       class(point_sink), intent(in), target :: sink
@@ -83,6 +88,7 @@ contains
 
       if (.not. allocated(self%items)) return
       do i = 1, size(self%items)
+         ! A sink that fails keeps the point from those behind it: the file comes first.
          call self%items(i)%sink%take(point, error)
          if (allocated(error)) return
       end do

@@ -60,6 +60,7 @@ module fw_solution
 
 contains
 
+   !> Options of all solvers, of which `kind` chooses; systems come with each call.
    subroutine start(self, case, harmonics)
       class(solution_method), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -87,6 +88,7 @@ contains
       integer :: m
 
       if (self%in_time) then
+         ! Values at the instants as unknowns; outside of here only coefficients are known.
          in_time = new_hdhb(system)
          m = system%structure%n_coordinates
          allocate (values(system%n))
@@ -122,6 +124,7 @@ contains
       associate (contact => system%work(system%forces%pairs))
          is_lasting = contact%all_periodic()
          if (system%n_pairs == 0) return
+         ! A law that holds even what is unloaded, such as a linear spring, keeps the structure.
          do k = 1, system%forces%n_laws
             if (system%forces%entry(k)%law%facts%holds_unloaded) return
          end do
@@ -144,10 +147,12 @@ contains
       end if
       reduced = system%reduced
       by_differences = new_difference_system(system)
+      ! The solver sees a system like any other, whose products are differences.
       call solve_with(self, by_differences, x, report)
       system%reduced = reduced
    end subroutine solve_system
 
+   !> By the solver that the case asks for; pseudo-time has an entry of its own.
    subroutine solve_with(self, system, x, report)
       class(solution_method), intent(inout) :: self
       class(parameter_system), intent(inout), target :: system

@@ -19,6 +19,7 @@ module fw_sweep
 
    public :: point_source, frequency_source, run_sweep, sweep_frequency, sweep_frequencies
 
+   !> Where points come from: given frequencies, or a branch that chooses its own.
    type, abstract :: point_source
    contains
       procedure(next_point), deferred :: next
@@ -80,6 +81,7 @@ contains
          if (allocated(error) .or. .not. more) exit
          call sinks%take(point, error)
          if (allocated(error)) exit
+         ! Counted only once all sinks have it.
          call state%note(point)
       end do
       if (allocated(error)) then
@@ -110,6 +112,7 @@ contains
       end associate
    end subroutine remember
 
+   !> What the strategy knows: the frequencies themselves hold nothing.
    subroutine remember_strategy(self, memory)
       class(frequency_source), intent(in) :: self
       type(solver_memory), intent(out) :: memory
@@ -117,6 +120,7 @@ contains
       call self%strategy%remember(memory)
    end subroutine remember_strategy
 
+   !> Solve at the next frequency of the list; a point that fails is given all the same.
    subroutine next_frequency(self, case, observer, point, more, error)
       class(frequency_source), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -135,6 +139,7 @@ contains
       self%n_given = self%n_given + 1
    end subroutine next_frequency
 
+   !> A run that was stopped or failed has not given all.
    pure logical function all_given(self)
       class(frequency_source), intent(in) :: self
 

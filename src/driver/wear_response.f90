@@ -122,6 +122,7 @@ contains
       call observer%on_end()
       if (.not. allocated(error)) call report_end(run, restart, error)
       if (.not. allocated(error) .and. case%wear%check_steps .and. point%converged) then
+         ! Last, because it uses the system of the run for itself.
          call compare_halved(run%recorder, run%system, run%march, run%first, run%first_omega, &
                               run%state, error)
       end if
@@ -178,6 +179,7 @@ contains
          end if
          march%stepper = new_wear_stepper(march%options, case%pseudo_time%scheme, &
                                           run%solver%method%newton)
+         ! Also where it is not followed: the march has no case for its absence.
          march%resonance = resonance_type(n_harmonics=case%harmonics%n_harmonics, &
                                           first=case%sweep%start)
          if (case%wear%follow_resonance) then
@@ -185,6 +187,7 @@ contains
                                          error)
          end if
       end associate
+      ! Where check_steps starts once more.
       run%first = run%state
       run%first_omega = run%system%frequency()
    end subroutine start_march
@@ -207,6 +210,7 @@ contains
          call run%march%run(run%system, run%state, recorder, error, resumed=restart%n_rows > 0)
       end associate
       if (allocated(error) .or. .not. run%march%gave_up) return
+      ! The failure is one at these depths.
       run%balance%depth = run%state%x(run%system%n_vibration() + 1:)
       call explain_failure(run%balance, run%solver%method, reason)
       run%march%ending = run%march%ending//': '//reason
@@ -222,6 +226,7 @@ contains
       call explain_failure(run%balance, run%solver%method, reason)
       run%march%options = run%recorder%case%wear
       run%march%ending = 'nothing was worn: '//reason
+      ! A row marked as not converged, so that the result is not empty.
       call run%recorder%writer%add_point(point, error)
       call run%recorder%summary%add(point)
       call run%recorder%state%note(point)
@@ -284,6 +289,7 @@ contains
       type(hdf5_file) :: source
       type(error_type), allocatable :: ignored
 
+      ! No file is written: nothing to copy.
       if (recorder%writer%file%id < 0) return
       !$omp critical (fretwear_io)
       call source%open_read(restart%path, error)
@@ -388,6 +394,7 @@ contains
       type(point_type), intent(in) :: point
       type(wear_state), intent(out) :: state
 
+      ! Vibration, then depths: the unknowns of the coupled system.
       state%x = [x, system%depth]
       call stand_at(system, state%x)
       state%rate = system%rate
@@ -428,6 +435,7 @@ contains
       point%wear_volume = patch_volumes(self%case%contact, point%depth)
       point%iterations = iterations
       point%residual = state%residual
+      ! A state of the march is judged as any point is.
       point%converged = is_lasting(system%hbm_system)
       point%converged = point%converged .and. state%residual <= self%case%solver%tolerance
       call recover_point(system%hbm_system, state%x(:n), self%case%harmonics%n_harmonics, &

@@ -25,6 +25,7 @@ module fw_wear_options
    integer, parameter :: wear_archard = 1, wear_energy = 2
 
    type :: wear_options
+      !> One of the constants above.
       integer :: scheme = wear_implicit
       !> Depth proportional to pressure times slip (Archard), or to friction energy.
       integer :: law = wear_archard
@@ -106,6 +107,7 @@ contains
       controls_error = self%error_tolerance > 0.0_wp .or. self%max_depth_step <= 0.0_wp
    end function controls_error
 
+   !> Error of a step over the largest depth, the default where none was given.
    pure real(wp) function tolerance(self)
       class(wear_options), intent(in) :: self
 

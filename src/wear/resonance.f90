@@ -70,8 +70,10 @@ contains
 
       best%omega = system%frequency()
       best%state = state
+      ! The system stands at the state already.
       best%amplitude = amplitude_of(self, system, state)
       if (self%first <= 0.0_wp) self%first = best%omega
+      ! Later searches start with what the last parabola has told.
       if (self%spacing <= 0.0_wp) self%spacing = first_spacing*best%omega
       call bracket(self, stepper, system, low, best, high, iterations, error)
       if (allocated(error)) return
@@ -176,6 +178,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(trial_type) :: trial
 
+      ! An end of the range, or a frequency without solution: the best point stays.
       if (min(low%amplitude, high%amplitude) < (1.0_wp - flat)*best%amplitude) return
       call try(self, stepper, system, best, vertex(low, best, high), trial, iterations, error)
       if (trial%amplitude >= 0.0_wp) best = trial
@@ -208,6 +211,7 @@ contains
 
       trial%omega = omega
       trial%state = from%state
+      ! Outside of the range: an amplitude below zero, as of a solution that failed.
       if (omega < follow_range(1)*self%first .or. omega > follow_range(2)*self%first) return
       call system%set_frequency(omega, error)
       if (allocated(error)) return
@@ -216,6 +220,7 @@ contains
       if (report%converged) trial%amplitude = amplitude_of(self, system, trial%state)
    end subroutine try
 
+   !> Largest displacement of the first observed quantity [length].
    real(wp) function amplitude_of(self, system, state) result(amplitude)
       type(resonance_type), intent(in) :: self
       type(wear_system), intent(inout) :: system

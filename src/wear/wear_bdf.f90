@@ -104,6 +104,7 @@ module fw_wear_bdf
 
 contains
 
+   !> Between `start` and `finish`.
    logical function is_started(self)
       class(bdf_integrator), intent(in) :: self
 
@@ -134,7 +135,9 @@ contains
       self%state%least_depth = least_depth
       self%y_values = x
       self%slope_values = 0.0_wp
+      ! IDA takes w' from its vector of slopes; q' is of no equation.
       self%slope_values(n + 1:) = rate
+      ! 1 marks what is differential: the depths.
       self%kind_values = 0.0_wp
       self%kind_values(n + 1:) = 1.0_wp
       call open_context(self%context, done)
@@ -151,6 +154,7 @@ contains
       if (done) call configure(self, cycles, first_step, n_cycles, done)
    end subroutine start
 
+   !> Each status is looked at once all are set.
    subroutine configure(self, cycles, first_step, n_cycles, done)
       class(bdf_integrator), intent(inout) :: self
       real(wp), intent(in) :: cycles, first_step, n_cycles
@@ -164,6 +168,7 @@ contains
          status(3) = fidasetuserdata(memory, c_loc(self%state))
          status(4) = fidawftolerances(memory, c_funloc(weigh))
          status(5) = fidasetid(memory, self%kind_of)
+         ! Errors are those of the depths alone.
          status(6) = fidasetsuppressalg(memory, 1_c_int)
          status(7) = set_linear_solver(memory, c_loc(self%spgmr), c_null_ptr)
          status(8) = fidasetpreconditioner(memory, c_funloc(set_up), c_funloc(precondition))
@@ -217,6 +222,7 @@ contains
       self%n_solved = int(solved(1))
    end subroutine advance
 
+   !> The reverse order of `start`; harmless where that failed half-way.
    subroutine finish(self)
       class(bdf_integrator), intent(inout) :: self
       integer(c_int) :: status
@@ -270,6 +276,7 @@ contains
       dx => values(slope, state%system%n)
       f => values(residual, state%system%n)
       call state%system%residual(x, f)
+      ! In units of force, so that both parts of the residual have one scale.
       f(n + 1:) = state%system%force_of_depth(dx(n + 1:) - state%system%rate)
       status = callback_ok
       if (.not. ieee_is_finite(norm2(f))) status = callback_smaller
@@ -292,6 +299,7 @@ contains
       status = merge(callback_ok, callback_smaller, done)
    end function set_up
 
+   !> The derivative of an implicit step of 1/factor cycles at x.
    subroutine prepare(state, x, factor, done)
       type(bdf_state), intent(inout) :: state
       real(wp), intent(in), contiguous :: x(:)
