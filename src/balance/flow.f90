@@ -75,6 +75,8 @@ contains
       allocate (self%p(m, m, nh), self%factors(nh), self%input(m, nh), self%output(m, nh))
       allocate (self%start(self%n), self%moved(self%n), self%shifted(self%n), source=0.0_wp)
       do h = 1, nh
+         ! Not to be used then: see solve_by_flow.
+         if (self%is_interrupted()) exit
          call fill_flow(balance, flow, h, self%p(:, :, h))
          call factor_flow(self, h)
       end do

@@ -102,6 +102,8 @@ contains
       allocate (stiffness(m, m))
       tension = 0.0_wp
       do h = 1, system%fourier%n_retained
+         ! A harmonic of many pairs takes tenths of a second; nobody looks at the rest then.
+         if (system%is_interrupted()) exit
          call system%structure%block(system%structure_state, h, stiffness)
          force = system%structure_state%load(:, h)
          if (system%fourier%harmonic(h) > 0) force = system%load_share*force

@@ -184,6 +184,8 @@ contains
       type(flow_system) :: flow
       real(wp), allocatable :: whole_x(:)
 
+      report%interrupted = system%is_interrupted()
+      if (report%interrupted) return
       if (.not. allocated(self%whole)) then
          allocate (self%whole)
          call build_system(case, self%whole, error, keep_all=.true., of_level=self%harmonics)
@@ -202,6 +204,8 @@ contains
       allocate (whole_x(self%whole%n))
       call carry_solution(system, x, self%whole, whole_x)
       call new_flow(self%whole, pseudo%flow, flow)
+      report%interrupted = flow%is_interrupted()
+      if (report%interrupted) return
       solver%options = case%solver
       solver%pseudo = pseudo
       call solver%solve(flow, whole_x, outcome)
