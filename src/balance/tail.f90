@@ -3,8 +3,8 @@
 !>
 !>   u_n = -Z_n**-1 B^T lambda_n,   Z_n = K - (n omega)**2 M + i n omega C,   H < n <= n_tail.
 !>
-!> Z_n is that of all dofs and factored anew for each harmonic: this is done once a point, for models
-!> of some hundred dofs.
+!> Z_n is that of all dofs and factored anew for each harmonic: this is done once a point, for
+!> models of some hundred dofs.
 module fw_tail
    use fw_contact_data, only: contact_type
    use fw_fourier, only: coefficient_count

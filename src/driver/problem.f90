@@ -201,8 +201,8 @@ contains
 
    !> Whether events are located. Left to the program, they are where that is exact (one tangential
    !> direction) and nothing asks for instants: as fast as sampling, faster from 7 harmonics on, and
-   !> more accurate (measured by `make bench-precision`). With an accuracy to keep, also for few pairs
-   !> with two directions: for one or 16, fewer instants make up for what each costs; for 48 not.
+   !> more accurate (measured by `make bench-precision`). With an accuracy to keep, also for few
+   !> pairs with two directions: for one or 16, fewer instants make up for what each costs; for 48 not.
    pure logical function locates_events(case, harmonics, joint)
       type(case_type), intent(in) :: case
       type(harmonics_options), intent(in) :: harmonics

@@ -292,7 +292,8 @@ contains
    end subroutine coefficients
 
    !> Coefficients of the forces of the harmonics 0..highest at the last evaluation, whatever
-   !> harmonics it had (n_elements, n_components, 2 highest + 1); left alone where facts know of none.
+   !> harmonics it had (n_elements, n_components, 2 highest + 1); left alone where facts say
+   !> that there is none.
    subroutine tail(self, work, highest, force)
       class(force_law), intent(in) :: self
       type(force_workspace), intent(inout) :: work

@@ -95,8 +95,8 @@ contains
       call keys%bind(key('histories', 'write one period of every quantity at every point; '// &
                          'large'), self%histories)
       call keys%bind(key('contact', 'write contact forces, states and dissipation'), self%contact)
-      call keys%bind(key('tail', 'highest harmonic of the answer that is given back, above those '// &
-                         'of the balance; 0: theirs', from_to(0, 10000), &
+      call keys%bind(key('tail', 'highest harmonic of the answer that is given back, above '// &
+                         'those of the balance; 0: theirs', from_to(0, 10000), &
                          only="law = 'rigid'"), self%tail)
    end subroutine bind_output_keys
 

@@ -60,14 +60,14 @@ contains
       facts = facts_of(case%contact%law)
       law = "contact%law = '"//trim(law_words(case%contact%law))//"'"
       if (facts%needs_projection .and. case%harmonics%method /= method_hbm) then
-         call fatal_error(error, law//" needs harmonics%method = 'hbm': its forces are integrals "// &
-                          "between events, which collocation does not take", status_input)
+         call fatal_error(error, law//" needs harmonics%method = 'hbm': its forces are "// &
+                          "integrals between events, which collocation does not take", status_input)
       else if (facts%needs_projection .and. case%harmonics%sampling == sampling_uniform) then
          call fatal_error(error, law//" follows events: leave harmonics%sampling out, or take "// &
                           "'events'", status_input)
       else if (case%output%tail > 0 .and. .not. facts%has_tail) then
-         call fatal_error(error, "output%tail needs contact%law = 'rigid', whose forces are known "// &
-                          'in every harmonic', status_input)
+         call fatal_error(error, "output%tail needs contact%law = 'rigid', whose forces are "// &
+                          'known in every harmonic', status_input)
       else if (case%output%tail > 0 .and. any(both_tangents(case%contact))) then
          call fatal_error(error, 'output%tail needs pairs with one tangential direction', &
                           status_input)
@@ -81,8 +81,8 @@ contains
          call fatal_error(error, law//" does not go with harmonics%sampling = 'events': its "// &
                           "force is smooth; leave it to 'auto'", status_input)
       else if (case%analysis == analysis_time .and. .not. facts%is_integrated) then
-         call fatal_error(error, law//" does not go with case%analysis = 'time', which does not "// &
-                          'know the law', status_input)
+         call fatal_error(error, law//" does not go with case%analysis = 'time', which does "// &
+                          'not know the law', status_input)
       else if (case%analysis == analysis_wear .and. .not. facts%measures_slip) then
          call fatal_error(error, law//" does not wear yet: use 'dlft' (nodes without mass), "// &
                           "'dlft_velocity' or 'penalty' for analysis = 'wear'", status_input)

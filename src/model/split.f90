@@ -45,8 +45,8 @@ contains
             if (j == i) cycle
             mode(:nb) = b%blocks(j, j, :)
             coupling(:nb) = b%blocks(j, i, :)
-            call take_mode(mode(2), mode(3), mode(1), coupling(2), coupling(3), coupling(1), limit, &
-                           m, c, k)
+            call take_mode(mode(2), mode(3), mode(1), coupling(2), coupling(3), coupling(1), &
+                           limit, m, c, k)
          end do
          do j = 1, b%n_internal
             damping = b%c_i(j)

@@ -26,16 +26,18 @@ contains
       normal = 0.0_wp
       ! A turn from dX = 0 first: its end is what (1 - M)^-1 turns into the dX_0 that repeats.
       start = 0.0_wp
-      call carry(self, n_retained, harmonic, column, .false., start, by_tangential, by_normal, unused)
+      call carry(self, n_retained, harmonic, column, .false., start, by_tangential, by_normal, &
+                 unused)
       call repeat(self%turn%monodromy, start)
       call self%contact%add_gram(1.0_wp, n_retained, harmonic, column, normal)
       call self%stick%add_gram(1.0_wp, n_retained, harmonic, column, by_tangential)
       call self%slip%add_gram(-self%curves%mu, n_retained, harmonic, column, by_normal)
-      call carry(self, n_retained, harmonic, column, .true., start, by_tangential, by_normal, unused)
+      call carry(self, n_retained, harmonic, column, .true., start, by_tangential, by_normal, &
+                 unused)
    end procedure derivative_of_oscillator
 
-   !> With W = k int N |x'|, dW/k = int dN |x'| + int N s dx', s the side of slip: stops add nothing,
-   !> for x' = 0 there.
+   !> With W = k int N |x'|, dW/k = int dN |x'| + int N s dx', s the side of slip: stops add
+   !> nothing, for x' = 0 there.
    module procedure path_of_oscillator
       real(wp) :: start(2, size(by_normal), 2), none(0, 0), slope(size(by_normal), 2)
       integer :: j
