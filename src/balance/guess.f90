@@ -29,6 +29,7 @@ contains
       do round = 1, max_rounds
          call linear_solution(system, closed, x, tension)
          if (.not. any(closed .and. tension > 0.0_wp)) exit
+         ! Only ever opened: a round that closed pairs again could go on for ever.
          closed = closed .and. .not. tension > 0.0_wp
       end do
    end subroutine stuck_guess
@@ -71,6 +72,7 @@ contains
       allocate (stiffness(size(free), size(free)))
       call system%structure%block(system%structure_state, 1, stiffness)
       associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+         ! Closed without friction: rigid normal rows are held, elastic ones keep their stiffness.
          do i = 1, system%n_pairs
             row = system%joint%row(3, i)
             if (row == 0) cycle
@@ -91,6 +93,7 @@ contains
       type(hbm_system), intent(in) :: system
       logical, intent(in) :: closed(:)
       real(wp), intent(out), contiguous :: x(:)
+      !> Zero where there is no normal dof, and without a harmonic 0.
       real(wp), intent(out) :: tension(:)
       complex(wp), allocatable :: q(:, :), force(:)
       complex(wp), allocatable :: stiffness(:, :)
@@ -106,6 +109,7 @@ contains
          if (system%is_interrupted()) exit
          call system%structure%block(system%structure_state, h, stiffness)
          force = system%structure_state%load(:, h)
+         ! Only the vibratory load is raised from zero; the static one acts throughout.
          if (system%fourier%harmonic(h) > 0) force = system%load_share*force
          held = .false.
          call close_pairs(system, closed, h, stiffness, force, held, q(:, h))
@@ -122,6 +126,8 @@ contains
       logical, intent(in) :: closed(:)
       integer, intent(in) :: h
       complex(wp), intent(inout) :: stiffness(:, :), force(:), q(:)
+      !> Coordinates of rigid closed pairs, whose values stand in q; with elastic pairs none is
+      !> held.
       logical, intent(inout) :: held(:)
       integer :: i, c, j, row
       real(wp) :: gap
@@ -183,6 +189,7 @@ contains
       call lu%reserve(size(free))
       lu%matrix = stiffness(free, free)
       call lu%factor(singular)
+      ! A guess of zero is as good as any: whether there is a solution is not decided here.
       if (singular) return
       call lu%solve(1, rhs)
       q(free) = rhs(:, 1)
@@ -206,6 +213,7 @@ contains
             if (row == 0) cycle
             if (p%takes_balance) then
                j = system%incidence%coordinate_of(row)
+               ! What is left of the balance of a held row is the force that holds it.
                tension(i) = system%load(j, 1) - &
                             real(sum(stiffness(j, :)*q), wp)
             else

@@ -22,6 +22,7 @@ submodule(fw_hbm) fw_hbm_linear
 
 contains
 
+   ! Laws first: which coordinates are solved at once follows from the states of their elements.
    module procedure linearize
       integer :: k
 
@@ -117,8 +118,10 @@ contains
                   if (row(c, i) == 0) cycle
                   j = self%incidence%coordinate_of(row(c, i))
                   place = self%place(j)
+                  ! Active: its step comes of the linear problem.
                   if (place > 0 .and. place <= self%n_active) cycle
                   step(j, :) = -r(j, :)/p%stiffness(i, c)
+                  ! eps is an impedance there, another one in each harmonic.
                   if (p%has_inertia) call turn_row(self, p, i, c, .true., step(j, :))
                end do
             end do
@@ -288,6 +291,7 @@ contains
          n = self%fourier%harmonic(h)
          if (n == 0) cycle
          k = self%fourier%column(h)
+         ! E_n = k - (n omega)**2 m + i n omega c.
          slope = cmplx(-2.0_wp*n**2*self%frequency()*prediction%inertia(element, component), &
                        n*prediction%damping(element, component), wp)* &
                  cmplx(u(k), -u(k + 1), wp)
@@ -398,6 +402,7 @@ contains
          call dgemv('T', n, n, 1.0_wp, work%jacobian(1, 1, element), n, work%input(1, element), 1, &
                     0.0_wp, work%output(1, element), 1)
       else
+         ! Stuck throughout: G = 1.
          work%output(:, element) = work%input(:, element)
       end if
    end subroutine multiply_derivative_of

@@ -36,6 +36,7 @@ module fw_hdhb
 contains
 
    !> Wrap a balance; its number of instants must be that of its coefficients.
+   !> Has no structure of its own: every call goes through the coefficients.
    function new_hdhb(balance) result(self)
       type(hbm_system), intent(inout), target :: balance
       type(hdhb_system) :: self
@@ -83,6 +84,7 @@ contains
       call self%to_values(m, self%product, r)
    end subroutine residual
 
+   !> [rad/s].
    subroutine set_parameter(self, parameter, error)
       class(hdhb_system), intent(inout) :: self
       real(wp), intent(in) :: parameter
@@ -91,6 +93,7 @@ contains
       call self%balance%set_parameter(parameter, error)
    end subroutine set_parameter
 
+   !> That in coefficients, at the instants: the transform does not depend on the frequency.
    subroutine parameter_derivative(self, x, dr)
       class(hdhb_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
@@ -103,6 +106,7 @@ contains
       call self%to_values(m, self%product, dr)
    end subroutine parameter_derivative
 
+   !> Coordinates leave by whole rows, so the reduced problem of the coefficients serves.
    subroutine linearize(self, n_linear)
       class(hdhb_system), intent(inout) :: self
       integer, intent(out) :: n_linear
@@ -111,6 +115,7 @@ contains
       call self%balance%linearize(n_linear)
    end subroutine linearize
 
+   !> The active rows of the right-hand side, at the instants.
    subroutine reduce(self, r, rhs)
       class(hdhb_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:)
@@ -121,6 +126,7 @@ contains
       call self%to_values(self%balance%n_active, self%product(:size(rhs)), rhs)
    end subroutine reduce
 
+   !> Steps of all coordinates, at the instants.
    subroutine expand(self, r, solution, step)
       class(hdhb_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:), solution(:)
@@ -135,6 +141,7 @@ contains
       call self%to_values(m, self%coefficients, step)
    end subroutine expand
 
+   !> J v with the derivative in coefficients between two transforms.
    subroutine apply(self, vector, product)
       class(hdhb_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: vector(:)
@@ -153,6 +160,7 @@ contains
       call self%balance%build_preconditioner()
    end subroutine build_preconditioner
 
+   !> Per harmonic, as in coefficients: the transforms are exact inverses of each other.
    subroutine precondition(self, vector)
       class(hdhb_system), intent(inout) :: self
       real(wp), intent(inout), contiguous :: vector(:)

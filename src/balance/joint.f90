@@ -46,6 +46,7 @@ contains
       logical, allocatable :: moving(:)
       integer :: i, c, n_rows
 
+      ! Before the rows are numbered: what never moves needs none.
       call find_moving_dofs(model, contact, springs, moving)
       allocate (self%row(3, contact%n_pairs), source=0)
       allocate (self%idle(3, contact%n_pairs), source=.false.)
@@ -94,6 +95,7 @@ contains
       end do
       moving(0) = .false.
       do
+         ! Until nothing more is reached: each round goes one element further at least.
          n_moving = count(moving)
          do i = 1, model%n_dof
             if (.not. moving(i)) cycle

@@ -40,6 +40,7 @@ contains
             point%coefficients(1, :) = real(observed(:, h), wp)
          else
             point%coefficients(2*n, :) = real(observed(:, h), wp)
+            ! U_n = uc_n - i us_n.
             point%coefficients(2*n + 1, :) = -aimag(observed(:, h))
          end if
       end do
@@ -59,6 +60,7 @@ contains
 
       y = 0.0_wp
       do h = 1, target%fourier%n_retained
+         ! By its number: retained harmonics of both may differ in their places.
          j = findloc(source%fourier%harmonic, target%fourier%harmonic(h), dim=1)
          if (j == 0) cycle
          do c = 0, merge(0, 1, target%fourier%harmonic(h) == 0)
@@ -77,6 +79,7 @@ contains
       integer :: i, j, first_x, first_y, n_relative
 
       n_relative = source%structure%n_relative
+      ! All coordinates of a coefficient stand together: relative ones, then kept modes.
       first_x = (from - 1)*source%structure%n_coordinates
       first_y = (to - 1)*target%structure%n_coordinates
       y(first_y + 1:first_y + n_relative) = x(first_x + 1:first_x + n_relative)
@@ -102,6 +105,7 @@ contains
       n_pairs = system%n_pairs
       pairs = system%forces%pairs
       allocate (force(n_pairs, 3, coefficient_count(n_harmonics)))
+      ! Harmonics were left out: those come from the law, the retained ones follow below.
       if (system%fourier%n_retained <= n_harmonics) then
          all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
          call system%forces%entry(pairs)%law%coefficients(system%work(pairs), system%fourier, &
@@ -140,6 +144,7 @@ contains
             if (system%fourier%harmonic(h) == 0) cycle
             k = system%fourier%column(h)
             do i = 1, system%n_pairs
+               ! Harmonic 0 does no work over a cycle.
                point%dissipation(i) = point%dissipation(i) + pi*system%fourier%harmonic(h)* &
                                       sum(f(i, :, k)*u(i, :, k + 1) - f(i, :, k + 1)*u(i, :, k))
             end do
@@ -168,6 +173,7 @@ contains
       call system%incidence%gather(reshape(system%joint%row, [3*n_pairs]), m, &
                                    system%fourier%n_coefficients, q, slip)
       slip_time = matmul(slip, system%fourier%synthesis)
+      ! Rows ran component by component of each pair, as (3, n_pairs) does.
       point%slip_history = reshape(slip_time, [3, n_pairs, n_time])
       pairs = system%forces%pairs
       call system%forces%entry(pairs)%law%sample(system%work(pairs))
@@ -206,6 +212,7 @@ contains
             call evaluate(coefficients, tau, value, slope, curvature)
             if (abs(curvature) <= 0.0_wp) exit
             step = -slope/curvature
+            ! No further than a cell: beyond it another extremum would be found twice.
             tau = tau + max(-spacing, min(spacing, step))
          end do
          call evaluate(coefficients, tau, value, slope, curvature)
@@ -213,6 +220,7 @@ contains
       end do
    end function largest_magnitude
 
+   !> u, u' and u'' at an angle, by turning a unit vector from harmonic to harmonic.
    pure subroutine evaluate(coefficients, tau, value, slope, curvature)
       real(wp), intent(in) :: coefficients(:), tau
       real(wp), intent(out) :: value, slope, curvature
