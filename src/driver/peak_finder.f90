@@ -23,6 +23,7 @@ module fw_peak_finder
    use fw_peak, only: found_search
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
+   use fw_peak_rules, only: find_edge
    use fw_peak_rules, only: find_next
    use fw_peak_rules, only: is_maximum
    use fw_peak_rules, only: lies_on_jump
@@ -48,7 +49,7 @@ module fw_peak_finder
    real(wp), parameter :: turn = 0.6_wp*pi
    !> Mode whose resonance is wider than this many intervals shows in the rows.
    real(wp), parameter :: intervals_of_width = 3.0_wp
-   !> Linear response at a mode, over the present one, below which it hides no maximum.
+   !> Linear response at a mode, over the present vibration, below which it hides no maximum.
    real(wp), parameter :: least_part = 0.1_wp
    !> Mean share of the period in one state from which the joint counts as in it.
    real(wp), parameter :: mostly = 0.9_wp
@@ -220,7 +221,8 @@ contains
       hides_mode = mode%omega > below%omega .and. mode%omega < above%omega .and. &
                    intervals_of_width*(above%omega - below%omega) > mode%width
       if (.not. hides_mode) return
-      hides_mode = any(mode%amplitude > least_part*max(below%amplitude, above%amplitude)) .and. &
+      hides_mode = any(mode%amplitude > least_part*max(below%amplitude - below%mean, &
+                                                       above%amplitude - above%mean)) .and. &
                    (is_in_state(mode%state, below) .or. is_in_state(mode%state, above))
    end function hides_mode
 
@@ -259,6 +261,7 @@ contains
       end do
       call look_inside(self, case, budget, error)
       if (.not. allocated(error)) call climb(self, case, budget, error)
+      if (.not. allocated(error)) call measure_widths(self, case, budget, error)
       ! What becomes a row now is known here already.
       self%is_active = .false.
    end subroutine search
@@ -381,6 +384,41 @@ contains
          if (allocated(error)) return
       end do
    end subroutine climb
+
+   !> Solve at the edges of the highest peak of every quantity where no row is near them.
+   subroutine measure_widths(self, case, budget, error)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: budget
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: omega
+      integer :: i, k, side
+      logical :: found, known
+
+      if (self%samples%n < 3) return
+      do i = 1, size(self%samples%item(1)%at%amplitude)
+         do side = -1, 1, 2
+            ! Found anew, for a solution moves the places.
+            k = place_of_highest(self%samples, i)
+            if (.not. is_maximum(self%samples, k, i)) exit
+            call find_edge(self%samples, k, i, side, omega, found, known)
+            if (known .or. .not. found) cycle
+            call solve_at(self, case, omega, budget, error, k)
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine measure_widths
+
+   pure integer function place_of_highest(samples, i) result(place)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: i
+      integer :: k
+
+      place = 1
+      do k = 2, samples%n
+         if (samples%item(k)%at%amplitude(i) > samples%item(place)%at%amplitude(i)) place = k
+      end do
+   end function place_of_highest
 
    !> The maximum that is not known well enough and may be the highest, relative to what is known of
    !> its quantity.

@@ -4,11 +4,12 @@ module fw_peak_rules
    use fw_kinds, only: wp
    use fw_samples, only: sample_list
    use fw_samples, only: sample_type
+   use fw_samples, only: swing_of
    use fw_samples, only: vertex_of
    implicit none (type, external)
    private
 
-   public :: is_maximum, find_next, width_of, lies_on_jump
+   public :: is_maximum, find_next, width_of, find_edge, lies_on_jump
 
    !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
    real(wp), parameter :: round_off = 1.0e-7_wp
@@ -28,15 +29,17 @@ contains
    pure logical function is_maximum(samples, k, i)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
-      real(wp) :: a
+      real(wp) :: a, rise
 
       is_maximum = .false.
       if (k <= 1 .or. k >= samples%n) return
-      a = samples%item(k)%at%amplitude(i)
-      is_maximum = a >= samples%item(k - 1)%at%amplitude(i) .and. &
-                   a > (1.0_wp + round_off)*samples%item(k + 1)%at%amplitude(i) .or. &
-                   a > (1.0_wp + round_off)*samples%item(k - 1)%at%amplitude(i) .and. &
-                   a >= samples%item(k + 1)%at%amplitude(i)
+      associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
+                 right => samples%item(k + 1)%at)
+         a = middle%amplitude(i)
+         rise = round_off*swing_of(middle, i, middle%mean(i))
+         is_maximum = a >= left%amplitude(i) .and. a > right%amplitude(i) + rise .or. &
+                      a > left%amplitude(i) + rise .and. a >= right%amplitude(i)
+      end associate
    end function is_maximum
 
    !> Where to solve next for the maximum of quantity i at sample k; `done` where it is known.
@@ -45,7 +48,7 @@ contains
       integer, intent(in) :: k, i
       !> [rad/s]
       real(wp), intent(out) :: omega
-      !> Amplitude that may be found.
+      !> Rise above the mean position that may be found.
       real(wp), intent(out) :: promise
       logical, intent(out) :: done
       real(wp) :: curvature, vertex
@@ -57,7 +60,7 @@ contains
          left_is_known = side_is_known(left, middle, right, i)
          right_is_known = side_is_known(right, middle, left, i)
          omega = within(vertex, left%omega, middle%omega, right%omega)
-         done = promise <= (1.0_wp + small_gain)*middle%amplitude(i)
+         done = promise <= (1.0_wp + small_gain)*swing_of(middle, i, middle%mean(i))
          if (.not. done) then
             ! A vertex next to the middle tells nothing where a neighbour is far below.
             done = abs(omega - middle%omega) <= same_frequency*middle%omega
@@ -79,14 +82,15 @@ contains
    pure logical function side_is_known(side, middle, other, i) result(known)
       type(sample_type), intent(in) :: side, middle, other
       integer, intent(in) :: i
-      real(wp) :: slope
+      real(wp) :: slope, swing
 
-      known = side%amplitude(i) >= near*middle%amplitude(i) .or. &
+      swing = swing_of(middle, i, middle%mean(i))
+      known = swing_of(side, i, middle%mean(i)) >= near*swing .or. &
               abs(side%omega - middle%omega) <= same_frequency*middle%omega
-      if (known .or. other%amplitude(i) < near*middle%amplitude(i)) return
+      if (known .or. swing_of(other, i, middle%mean(i)) < near*swing) return
       slope = (middle%amplitude(i) - other%amplitude(i))/ &
               max(abs(middle%omega - other%omega), tiny(1.0_wp))
-      known = slope*abs(side%omega - middle%omega) <= small_gain*middle%amplitude(i)
+      known = slope*abs(side%omega - middle%omega) <= small_gain*swing
    end function side_is_known
 
    !> A frequency towards a neighbour that is far below, where the peak would have fallen a little.
@@ -101,7 +105,8 @@ contains
       half = 0.5_wp*abs(side%omega - middle%omega)
       distance = half
       if (curvature > 0.0_wp) then
-         distance = sqrt(rise/curvature)/middle%amplitude(i)/(2.0_wp*middle%omega)
+         distance = sqrt(rise/curvature)/swing_of(middle, i, middle%mean(i)) &
+                    /(2.0_wp*middle%omega)
       end if
       distance = min(max(distance, 2.0_wp*margin*half), half)
       omega = middle%omega + sign(distance, side%omega - middle%omega)
@@ -119,50 +124,64 @@ contains
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
 
-      associate (a => samples%item(k)%at%amplitude(i))
-         lies_on_jump = samples%item(k - 1)%at%amplitude(i) < near*a .or. &
-                        samples%item(k + 1)%at%amplitude(i) < near*a
+      associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
+                 right => samples%item(k + 1)%at, mean => samples%item(k)%at%mean(i))
+         lies_on_jump = min(swing_of(left, i, mean), swing_of(right, i, mean)) &
+                        < near*swing_of(middle, i, mean)
       end associate
    end function lies_on_jump
 
-   !> Width at half of the power [rad/s], below 0 where there is none: between samples the root of
-   !> what 1/A**2 rises by is a straight line in omega**2, as it is for a single mode.
+   !> Width at half of the power of the vibration [rad/s], below 0 where there is none: between
+   !> samples the root of what 1/A**2 rises by is a straight line in omega**2, as it is for a single
+   !> mode.
    pure real(wp) function width_of(samples, k, i) result(width)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
       real(wp) :: edge(2)
+      logical :: found, known
       integer :: side
 
       width = -1.0_wp
       do side = 1, 2
-         edge(side) = edge_of(samples, k, i, 2*side - 3)
-         if (edge(side) < 0.0_wp) return
+         call find_edge(samples, k, i, 2*side - 3, edge(side), found, known)
+         if (.not. known) return
       end do
       width = edge(2) - edge(1)
    end function width_of
 
-   !> Where the amplitude has fallen to that over the root of 2, going up or down from sample k.
-   pure real(wp) function edge_of(samples, k, i, direction) result(omega)
+   !> Where the vibration has fallen to that of the peak over the root of 2, going up or down from
+   !> sample k. It is known where a sample is near: one that has fallen `far` times deeper may stand
+   !> behind another mode.
+   pure subroutine find_edge(samples, k, i, direction, omega, found, known)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i, direction
+      !> [rad/s]
+      real(wp), intent(out) :: omega
+      logical, intent(out) :: found, known
       real(wp) :: peak, inner(2), outer(2), share
+      real(wp), parameter :: far = 2.0_wp, at_edge = 0.9_wp
       integer :: j
 
       omega = -1.0_wp
-      peak = samples%item(k)%at%amplitude(i)
+      found = .false.
+      known = .false.
+      peak = swing_of(samples%item(k)%at, i, samples%item(k)%at%mean(i))
       inner = [samples%item(k)%at%omega**2, 0.0_wp]
       j = k
       do
          j = j + direction
          if (j < 1 .or. j > samples%n) return
          associate (at => samples%item(j)%at)
-            outer = [at%omega**2, sqrt(max((peak/at%amplitude(i))**2 - 1.0_wp, 0.0_wp))]
+            outer = [at%omega**2, sqrt(max((peak/swing_of(at, i, samples%item(k)%at%mean(i)))**2 &
+                                           - 1.0_wp, 0.0_wp))]
          end associate
          if (outer(2) >= 1.0_wp) exit
          inner = outer
       end do
+      found = .true.
+      known = outer(2) <= far .or. inner(2) >= at_edge
       share = (1.0_wp - inner(2))/(outer(2) - inner(2))
       omega = sqrt(inner(1) + share*(outer(1) - inner(1)))
-   end function edge_of
+   end subroutine find_edge
 
 end module fw_peak_rules

@@ -10,13 +10,15 @@ module fw_samples
    implicit none (type, external)
    private
 
-   public :: sample_type, sample_list, new_sample, phase_step, vertex_of, balance_point
+   public :: sample_type, sample_list, new_sample, phase_step, vertex_of, balance_point, swing_of
 
    type :: sample_type
       !> [rad/s]
       real(wp) :: omega = 0.0_wp
       !> Largest magnitude over the period, magnitude and phase of the first harmonic (n_observed).
       real(wp), allocatable :: amplitude(:), first(:), phase(:)
+      !> Magnitude of the mean over the period (n_observed).
+      real(wp), allocatable :: mean(:)
       !> Observed coefficients (2H+1, n_observed), and from where to go on; only where a peak may be
       !> near.
       real(wp), allocatable :: coefficients(:, :)
@@ -58,6 +60,7 @@ contains
       sample%omega = point%omega
       sample%amplitude = point%amplitude
       sample%coefficients = point%coefficients
+      sample%mean = abs(point%coefficients(1, :))
       allocate (sample%first, sample%phase, mold=point%amplitude)
       sample%first = 0.0_wp
       sample%phase = 0.0_wp
@@ -144,28 +147,44 @@ contains
       omega = sqrt((below%first(i)*below%omega**2 + above%first(i)*above%omega**2)/total)
    end function balance_point
 
+   !> What an amplitude rises above a mean position: a static load moves every sample alike, and
+   !> must not make a small vibration look flat.
+   pure real(wp) function swing_of(sample, i, mean) result(swing)
+      type(sample_type), intent(in) :: sample
+      integer, intent(in) :: i
+      !> The position [length], the same for samples that are compared.
+      real(wp), intent(in) :: mean
+      !> Part of an amplitude that is round-off.
+      real(wp), parameter :: least = 1.0e-12_wp
+
+      swing = max(sample%amplitude(i) - mean, least*sample%amplitude(i))
+   end function swing_of
+
    !> The parabola through three samples of which the middle one is the highest.
    pure subroutine vertex_of(left, middle, right, i, omega, amplitude, curvature)
       type(sample_type), intent(in) :: left, middle, right
       integer, intent(in) :: i
-      !> Of the vertex [rad/s]; the middle where there is none.
+      !> Of the vertex [rad/s], and its rise above the mean position of the middle; the middle where
+      !> there is none.
       real(wp), intent(out) :: omega, amplitude
-      !> Half of the second derivative of 1/A**2 by omega**2.
+      !> Half of the second derivative of 1/A**2, A above the mean position, by omega**2.
       real(wp), intent(out) :: curvature
-      real(wp) :: s(2), g(2), slope, least
+      real(wp) :: s(2), g(2), slope, least, swing
 
+      swing = swing_of(middle, i, middle%mean(i))
       ! Steps from the middle.
       s = [left%omega, right%omega]**2 - middle%omega**2
-      g = 1.0_wp/[left%amplitude(i), right%amplitude(i)]**2 - 1.0_wp/middle%amplitude(i)**2
+      g = 1.0_wp/[swing_of(left, i, middle%mean(i)), swing_of(right, i, middle%mean(i))]**2 &
+          - 1.0_wp/swing**2
       omega = middle%omega
-      amplitude = middle%amplitude(i)
+      amplitude = swing
       curvature = 0.0_wp
       if (.not. all(abs(s) > 0.0_wp)) return
       curvature = (g(2)/s(2) - g(1)/s(1))/(s(2) - s(1))
       slope = g(1)/s(1) - curvature*s(1)
       if (.not. curvature > 0.0_wp) return
       omega = sqrt(max(middle%omega**2 - 0.5_wp*slope/curvature, left%omega**2))
-      least = 1.0_wp/middle%amplitude(i)**2 - 0.25_wp*slope**2/curvature
+      least = 1.0_wp/swing**2 - 0.25_wp*slope**2/curvature
       ! Three points far out on the flanks may put the vertex below zero: no height follows.
       amplitude = huge(1.0_wp)
       if (least > 0.0_wp) amplitude = 1.0_wp/sqrt(least)

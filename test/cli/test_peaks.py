@@ -46,6 +46,22 @@ def test_rows_stay_those_that_were_asked_for(tmp_path):
     assert np.hypot(*coefficients[best, 1:3]) == pytest.approx(amplitude[best], rel=1e-6)
 
 
+@pytest.mark.parametrize("static", [0.0, 100.0])
+def test_a_static_load_hides_no_peak_and_its_width_is_that_of_the_vibration(tmp_path, static):
+    damping, force = 0.002, 0.01
+    run(tmp_path, {
+        "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": damping},
+        "load": {"static": static, "cosine": force},
+        "harmonics": {"n_harmonics": 1},
+        "sweep": {"start": 0.5, "end": 2.0, "n_points": 11}})
+    with h5py.File(tmp_path / "case.h5") as file:
+        best = file["peak/amplitude"][:].argmax()
+        amplitude, width = file["peak/amplitude"][best], file["peak/bandwidth"][best]
+    # Of a mode of weak damping, to the first order in it.
+    assert amplitude - static == pytest.approx(force / damping, rel=peak_family.RIGHT)
+    assert width == pytest.approx(damping, rel=0.02)
+
+
 @pytest.mark.parametrize("down", [False, True])
 def test_refined_rows_hold_the_peak_in_the_order_of_the_sweep(tmp_path, down):
     groups, true = peak_family.linear(3)
