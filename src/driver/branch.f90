@@ -155,7 +155,8 @@ contains
          curve%finish = case%sweep%end
          curve%max_points = case%sweep%max_points
          curve%x_scale = displacement_scale(self%system)
-         if (.not. associated(self%whole)) call find_poles(system, curve)
+         ! Of a structure that is taken whole, too: a pair that sticks leaves no unknowns there.
+         call find_poles(system, curve)
          curve%step = 1.0_wp/real(default_steps, wp)
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       end associate

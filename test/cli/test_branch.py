@@ -25,6 +25,21 @@ CASE = """
 &sweep start = 0.3 end = 2.0 n_points = 50 continuation = 'arclength' /
 """
 
+# A small structure whose last dof sticks: nothing of its linear problems is left.
+MASS = np.diag([0.00953, 0.614, 0.372, 0.00101])
+STIFFNESS = np.array([[3.42, -1.6, 0, 0], [-1.6, 2.99, -1.39, 0], [0, -1.39, 2.12, -0.733],
+                      [0, 0, -0.733, 1.25]])
+DAMPING = np.array([[1.88e-4, -2.29e-5, 3.21e-5, 5.13e-8], [-2.29e-5, 9.07e-3, 4.35e-3, 7.01e-6],
+                    [3.21e-5, 4.35e-3, 4.43e-3, -2.09e-5], [5.13e-8, 7.01e-6, -2.09e-5, 4.76e-5]])
+LOAD = np.array([-0.0111, 0.0114, 0.0133, 0])
+STUCK = """
+&model n_dof = 4 mass = {mass} stiffness = {stiffness} damping = {damping} /
+&contact n_pairs = 1 side_1 = 4, 0, 0 mu = 0.3 normal_load = 0.00444 /
+&load cosine = {load} /
+&harmonics n_harmonics = 1 /
+&sweep start = 47.9 end = 16.5 n_points = 31 continuation = 'arclength' /
+"""
+
 
 def _residual(omega: float, row: np.ndarray) -> float:
     """Balance of one row of coefficients by plain sums over 256 instants."""
@@ -202,4 +217,23 @@ def test_the_resonance_of_a_stuck_joint_is_not_passed_over(fw_run) -> None:
         assert np.diff(file["omega"][:]).min() > 0
     # The top of a natural sweep of 1201 points; rows stand within a fifth of the width.
     assert amplitude.max() == pytest.approx(0.06774, rel=0.02)
+    assert len(amplitude) < 120
+
+
+def test_a_small_stuck_joint_has_the_resonances_of_what_it_holds(fw_run) -> None:
+    """Judge: the structure without the dof that sticks, solved by NumPy."""
+    values = {"mass": MASS, "stiffness": STIFFNESS, "damping": DAMPING, "load": LOAD}
+    (fw_run.directory / "held.nml").write_text(STUCK.format(
+        **{name: ", ".join(repr(float(x)) for x in a.ravel()) for name, a in values.items()}))
+    done = fw_run("-o", "held.h5", "held.nml")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(fw_run.directory / "held.h5") as file:
+        amplitude = file["amplitude"][:]
+    assert not amplitude[:, 3].any()
+    mass, stiffness, damping = (a[:3, :3] for a in (MASS, STIFFNESS, DAMPING))
+    omega = np.linspace(18.9, 19.1, 4001)[:, None, None]
+    held = np.linalg.solve(stiffness - omega**2 * mass + 1j * omega * damping,
+                           LOAD[:3, None].astype(complex))
+    # Rows stand within a fifth of the width of the resonance.
+    assert amplitude[:, 0].max() == pytest.approx(np.abs(held[:, 0, 0]).max(), rel=0.02)
     assert len(amplitude) < 120
