@@ -27,6 +27,7 @@ module fw_peak_finder
    use fw_peak_rules, only: find_next
    use fw_peak_rules, only: is_maximum
    use fw_peak_rules, only: lies_on_jump
+   use fw_peak_rules, only: negligible
    use fw_peak_rules, only: width_of
    use fw_point, only: point_type
    use fw_samples, only: balance_point
@@ -56,10 +57,12 @@ module fw_peak_finder
    !> Solutions for the resonance of an interval, and failures next to a maximum that end its
    !> search; each halves the way that is tried.
    integer, parameter :: most_trials = 6, most_failures = 5
-   !> Solutions of a search in all: so many, or this part of the rows.
-   integer, parameter :: least_budget = 40, budget_share = 4
+   !> Solutions of a search in all: so many, or this part of the rows, but no more than the last.
+   integer, parameter :: least_budget = 40, budget_share = 20, most_budget = 200
    !> Part of the first interval at which it is seen whether the amplitude rises into the range.
    real(wp), parameter :: step_inside = 0.1_wp
+   !> Samples from which on those far from maxima are thinned out: long sweeps need no more memory.
+   integer, parameter :: most_samples = 128
    !> Neighbouring samples, relative.
    real(wp), parameter :: same_frequency = 1.0e-7_wp
 
@@ -141,6 +144,9 @@ contains
       call self%samples%insert(sample, place)
       self%n_following = self%n_following + 1
       if (self%in_order .and. self%n_following >= 2) call look_back(self, place)
+      if (modulo(self%n_rows, most_samples) == 0 .and. self%samples%n >= most_samples) then
+         call self%samples%thin()
+      end if
    end subroutine take
 
    !> Whether the last row and those before hide something; what is not needed is forgotten.
@@ -210,7 +216,9 @@ contains
       type(sample_type), intent(in) :: below, above
       integer, intent(in) :: i
 
-      turns_back = min(below%first(i), above%first(i)) > 0.0_wp .and. &
+      ! What is round-off beside the other quantities has no phase.
+      turns_back = min(below%first(i), above%first(i)) > &
+                   negligible*max(maxval(below%first), maxval(above%first)) .and. &
                    phase_step(below, above, i) < -turn
    end function turns_back
 
@@ -254,7 +262,7 @@ contains
 
       if (.not. self%is_active .or. case%contact%memory == memory_carried) return
       if (.not. self%in_order) call suspect_all(self)
-      budget = max(least_budget, self%n_rows/budget_share)
+      budget = min(max(least_budget, self%n_rows/budget_share), most_budget)
       do k = 1, size(self%suspects)
          call look_into(self, case, self%suspects(k), budget, error)
          if (allocated(error)) return

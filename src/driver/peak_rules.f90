@@ -9,10 +9,12 @@ module fw_peak_rules
    implicit none (type, external)
    private
 
-   public :: is_maximum, find_next, width_of, find_edge, lies_on_jump
+   public :: is_maximum, find_next, width_of, find_edge, lies_on_jump, negligible
 
    !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
    real(wp), parameter :: round_off = 1.0e-7_wp
+   !> The same of quantities that hardly move, as a part of the largest one.
+   real(wp), parameter :: negligible = 1.0e-11_wp
    !> A peak is known where the parabola promises no more than this, relative.
    real(wp), parameter :: small_gain = 1.0e-4_wp
    !> A neighbour of at least this part of the height belongs to the peak: what is left of the
@@ -36,7 +38,8 @@ contains
       associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
                  right => samples%item(k + 1)%at)
          a = middle%amplitude(i)
-         rise = round_off*swing_of(middle, i, middle%mean(i))
+         rise = max(round_off*swing_of(middle, i, middle%mean(i)), &
+                    negligible*maxval(middle%amplitude))
          is_maximum = a >= left%amplitude(i) .and. a > right%amplitude(i) + rise .or. &
                       a > left%amplitude(i) + rise .and. a >= right%amplitude(i)
       end associate

@@ -15,7 +15,6 @@ module fw_remarks
    use fw_text, only: string_type
    use fw_text, only: to_text
    use fw_text_list, only: append
-   use fw_values, only: number_text
    implicit none (type, external)
    private
 
@@ -70,8 +69,8 @@ contains
          'meant); a periodic response need not be the one that is seen')
       if (case%contact%n_pairs > 0) then
          if (maxval(case%contact%mu) > highest_friction) call remarks%add('high friction', &
-            'contact%mu is up to '//number_text(maxval(case%contact%mu))//': dry friction of '// &
-            'metals is below '//number_text(highest_friction))
+            'contact%mu is up to '//to_text(maxval(case%contact%mu))//': dry friction of '// &
+            'metals is below '//to_text(highest_friction))
       end if
       acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
              any(abs(case%model%load_sine) > 0.0_wp)
@@ -87,7 +86,7 @@ contains
 
       if (case%harmonics%is_chosen) call remarks%add('accuracy chosen', 'nothing was said of '// &
          'the harmonics: they are chosen for harmonics%accuracy = '// &
-         number_text(case%harmonics%accuracy)//'; give one of both')
+         to_text(case%harmonics%accuracy)//'; give one of both')
       if (case%harmonics%n_harmonics > 1) return
       if (case%contact%n_pairs + case%springs%n_springs == 0) return
       if (case%springs%n_springs > 0 .and. case%contact%n_pairs == 0) then
@@ -110,8 +109,8 @@ contains
       if (size(modes) > 0 .or. case%model%n_dof > most_dofs) return
       range = [min(case%sweep%start, case%sweep%end), max(case%sweep%start, case%sweep%end)]
       text = 'no natural frequency of the free or the stuck structure lies in the sweep, '// &
-             number_text(rounded(range(1)/(2.0_wp*pi)))//' to '// &
-             number_text(rounded(range(2)/(2.0_wp*pi)))//' Hz: is sweep%unit the one meant?'
+             to_text(rounded(range(1)/(2.0_wp*pi)))//' to '// &
+             to_text(rounded(range(2)/(2.0_wp*pi)))//' Hz: is sweep%unit the one meant?'
       call remarks%add('no mode', text)
    end subroutine remark_range
 

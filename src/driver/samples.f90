@@ -46,6 +46,7 @@ module fw_samples
       type(sample_pointer), allocatable :: item(:)
    contains
       procedure :: insert
+      procedure :: thin
       procedure :: clear
    end type sample_list
 
@@ -104,6 +105,30 @@ contains
       self%item(place)%at = sample
       self%n = self%n + 1
    end subroutine insert
+
+   !> Drop every second sample that no search needs. Those that are left enclose the same maxima:
+   !> what lies between them rises or falls all the way.
+   subroutine thin(self)
+      class(sample_list), intent(inout) :: self
+      !> Samples at both ends that stay.
+      integer, parameter :: at_ends = 4
+      integer :: k, n
+      logical :: dropped
+
+      n = 0
+      dropped = .false.
+      do k = 1, self%n
+         dropped = .not. (dropped .or. self%item(k)%at%is_needed .or. k <= at_ends .or. &
+                          k > self%n - at_ends)
+         if (dropped) then
+            deallocate (self%item(k)%at)
+         else
+            n = n + 1
+            self%item(n) = self%item(k)
+         end if
+      end do
+      self%n = n
+   end subroutine thin
 
    !> Drop what only a search needs, unless one may.
    subroutine forget(self)

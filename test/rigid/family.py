@@ -33,6 +33,8 @@ from sections import DOCUMENT, write_section
 N_HARMONICS = 9
 TAIL = 255
 FALSE = 0.5
+#: Section of docs/theory.md; those of docs/robustness.md are named where they are written.
+ORDERS = "rigid-orders"
 
 
 def measure(n_cases, laws):
@@ -112,7 +114,7 @@ def main():
     if options.orders:
         lines = orders(laws)
         if not options.print:
-            write_section("rigid-orders", ["", *lines, ""], DOCUMENT.with_name("theory.md"))
+            write_section(ORDERS, ["", *lines, ""], DOCUMENT.with_name("theory.md"))
             return
         print("\n".join(lines))
         return
