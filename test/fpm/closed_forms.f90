@@ -52,8 +52,8 @@ contains
       end if
       error = abs(abs(cmplx(1.0_wp + held(a, limit) - omega**2, &
                             damping*omega + lost(a, limit), wp))*a - load)/load
-      call report('one harmonic with an elastic slider, limit '//trim(number(limit)), maxval(error), &
-                  balance_tolerance)
+      call report('one harmonic with an elastic slider, limit '//trim(number(limit)), &
+                  maxval(error), balance_tolerance)
    end subroutine check_slider
 
    !> Stiffness in phase with the motion, of an amplitude a.

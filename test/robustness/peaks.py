@@ -10,10 +10,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 
-import peak_family  # noqa: E402
-from cases import run  # noqa: E402
-from project import PROGRAM  # noqa: E402
-from sections import write_section  # noqa: E402
+import peak_family
+from cases import run
+from project import PROGRAM
+from sections import write_section
 
 WORDS = ("right", "remark", "wrong without a word")
 
