@@ -108,7 +108,9 @@ contains
 
       self%hbm_system = system
       self%mu = mu
-      call self%fourier%renew_fft()
+      do i = 1, size(self%work)
+         call self%work(i)%renew_fft()
+      end do
       m = self%structure%n_coordinates
       n = self%n_pairs
       nc = self%fourier%n_coefficients
@@ -207,9 +209,11 @@ contains
          call zgemv('N', m, m, one, self%stiffness(1, 1, h), m, self%input, 1, zero, &
                     self%output, 1)
       end do
-      call self%fourier%to_time(n, self%work(self%forces%pairs)%prediction, self%values)
+      call self%fourier%to_time(n, self%work(self%forces%pairs)%prediction, self%values, &
+                                self%work(self%forces%pairs)%fft)
       call march(self)
-      call self%fourier%to_coefficients(n, self%work(self%forces%pairs)%force_time, self%force)
+      call self%fourier%to_coefficients(n, self%work(self%forces%pairs)%force_time, self%force, &
+                                        self%work(self%forces%pairs)%fft)
       call add(self, part_residual, start, middle)
    end subroutine residual
 

@@ -4,6 +4,7 @@
 program transforms
    use, intrinsic :: iso_fortran_env, only: int64, output_unit
    use fw_fourier, only: fft_pays
+   use fw_fft, only: fft_type
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
    use fw_kinds, only: wp
@@ -34,25 +35,28 @@ contains
    subroutine compare(n_harmonics, n_time, n_rows)
       integer, intent(in) :: n_harmonics, n_time, n_rows
       type(fourier_type) :: matrix, fft
+      type(fft_type), allocatable :: plans, none
       real(wp), allocatable :: coefficients(:, :), values(:, :), by_matrix(:, :), by_fft(:, :)
       real(wp) :: matrix_seconds, fft_seconds
 
       matrix = new_fourier(n_harmonics, n_time)
       fft = new_fourier(n_harmonics, n_time)
-      call fft%prepare_fft(n_rows)
+      fft%fft_rows = n_rows
+      call fft%plan_fft(n_rows, plans)
       allocate (coefficients(n_rows, matrix%n_coefficients), values(n_rows, n_time))
       allocate (by_matrix, by_fft, mold=coefficients)
       call random_number(coefficients)
-      call measure(matrix, coefficients, values, by_matrix, matrix_seconds)
-      call measure(fft, coefficients, values, by_fft, fft_seconds)
+      call measure(matrix, none, coefficients, values, by_matrix, matrix_seconds)
+      call measure(fft, plans, coefficients, values, by_fft, fft_seconds)
       write (output_unit, '(3(i0, ","), 3(es12.5, ","), a)') n_harmonics, n_time, n_rows, &
          matrix_seconds, fft_seconds, maxval(abs(by_matrix - by_fft)), &
          trim(merge('fft   ', 'matrix', fft_pays(matrix%n_coefficients)))
    end subroutine compare
 
    !> Median time of a pair of transforms [s].
-   subroutine measure(fourier, coefficients, values, back, seconds)
-      type(fourier_type), intent(inout) :: fourier
+   subroutine measure(fourier, fft, coefficients, values, back, seconds)
+      type(fourier_type), intent(in) :: fourier
+      type(fft_type), allocatable, intent(inout) :: fft
       real(wp), intent(in) :: coefficients(:, :)
       real(wp), intent(inout) :: values(:, :), back(:, :)
       real(wp), intent(out) :: seconds
@@ -61,19 +65,20 @@ contains
 
       n = 1
       do
-         samples(1) = sample(fourier, coefficients, values, back, n)
+         samples(1) = sample(fourier, fft, coefficients, values, back, n)
          if (samples(1) >= sample_seconds) exit
          n = 2*n
       end do
       do i = 1, n_samples
-         samples(i) = sample(fourier, coefficients, values, back, n)/real(n, wp)
+         samples(i) = sample(fourier, fft, coefficients, values, back, n)/real(n, wp)
       end do
       seconds = median(samples)
    end subroutine measure
 
    !> Time of n pairs of transforms [s].
-   real(wp) function sample(fourier, coefficients, values, back, n)
-      type(fourier_type), intent(inout) :: fourier
+   real(wp) function sample(fourier, fft, coefficients, values, back, n)
+      type(fourier_type), intent(in) :: fourier
+      type(fft_type), allocatable, intent(inout) :: fft
       real(wp), intent(in) :: coefficients(:, :)
       real(wp), intent(inout) :: values(:, :), back(:, :)
       integer, intent(in) :: n
@@ -82,8 +87,8 @@ contains
 
       call system_clock(start, rate)
       do i = 1, n
-         call fourier%to_time(size(values, 1), coefficients, values)
-         call fourier%to_coefficients(size(values, 1), values, back)
+         call fourier%to_time(size(values, 1), coefficients, values, fft)
+         call fourier%to_coefficients(size(values, 1), values, back, fft)
       end do
       call system_clock(finish)
       sample = real(finish - start, wp)/real(rate, wp)

@@ -5,6 +5,7 @@
 !> The paper prints T and T^-1 of H_r the wrong way round.
 module fw_hdhb
    use fw_kinds, only: wp
+   use fw_fft, only: fft_type
    use fw_hbm, only: hbm_system
    use fw_error, only: error_type
    use fw_parameter_system, only: parameter_system
@@ -18,6 +19,8 @@ module fw_hdhb
       type(hbm_system), pointer :: balance => null()
       !> Workspace (n).
       real(wp), allocatable :: coefficients(:), product(:)
+      !> Of all coordinates, where transforms are long.
+      type(fft_type), allocatable, private :: fft
    contains
       procedure :: residual
       procedure :: linearize
@@ -37,16 +40,17 @@ contains
 
    !> Wrap a balance; its number of instants must be that of its coefficients.
    !> Has no structure of its own: every call goes through the coefficients.
-   function new_hdhb(balance) result(self)
+   subroutine new_hdhb(balance, self)
       type(hbm_system), intent(inout), target :: balance
-      type(hdhb_system) :: self
+      type(hdhb_system), intent(out) :: self
 
       self%balance => balance
       self%interrupt => balance%interrupt
       self%n = balance%n
       self%reduced = balance%reduced
       allocate (self%coefficients(self%n), self%product(self%n), source=0.0_wp)
-   end function new_hdhb
+      call balance%fourier%plan_fft(balance%structure%n_coordinates, self%fft)
+   end subroutine new_hdhb
 
    !> Values at the instants from coefficients, n_rows rows each.
    subroutine to_values(self, n_rows, coefficients, values)
@@ -55,7 +59,7 @@ contains
       real(wp), intent(in), contiguous :: coefficients(:)
       real(wp), intent(inout), contiguous :: values(:)
 
-      call self%balance%fourier%to_time(n_rows, coefficients, values)
+      call self%balance%fourier%to_time(n_rows, coefficients, values, self%fft)
    end subroutine to_values
 
    !> The inverse of to_values.
@@ -65,7 +69,7 @@ contains
       real(wp), intent(in), contiguous :: values(:)
       real(wp), intent(inout), contiguous :: coefficients(:)
 
-      call self%balance%fourier%to_coefficients(n_rows, values, coefficients)
+      call self%balance%fourier%to_coefficients(n_rows, values, coefficients, self%fft)
    end subroutine to_coefficients
 
    !> The reference is scaled so that the tolerance is met by the coefficients as well: a row of

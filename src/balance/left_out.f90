@@ -42,7 +42,7 @@ contains
 
    !> Add the vibratory power of rows of values, and its part in the harmonics of `kept`.
    subroutine add_power(kept, n_rows, n_time, values, all_power, kept_power)
-      type(fourier_type), intent(inout) :: kept
+      type(fourier_type), intent(in) :: kept
       integer, intent(in) :: n_rows, n_time
       real(wp), intent(in) :: values(n_rows, n_time)
       real(wp), intent(inout) :: all_power, kept_power

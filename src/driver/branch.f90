@@ -162,7 +162,7 @@ contains
       end associate
       self%is_in_time = case%harmonics%method == method_hdhb
       if (self%is_in_time) then
-         self%in_time = new_hdhb(self%system)
+         call new_hdhb(self%system, self%in_time)
          allocate (values(self%system%n))
          call self%in_time%to_values(self%system%structure%n_coordinates, whole_x, values)
          call self%curve%begin(self%in_time, values, error)

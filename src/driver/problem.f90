@@ -74,6 +74,7 @@ contains
                       locates_events(case, harmonics, joint), harmonics%filter_harmonics, forces)
       call choose_harmonics(case, harmonics, joint, forces, fourier, error)
       if (allocated(error)) return
+      if (fft_pays(fourier%n_coefficients)) fourier%fft_rows = 3*case%contact%n_pairs
       range = case%sweep%start
       if (case%analysis == analysis_frf) range = case%sweep%range()
       if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
@@ -87,9 +88,6 @@ contains
       if (allocated(error)) return
       call new_hbm(joint, structure, state, fourier, forces, case%contact%depth, system)
       system%reduced = case%solver%skips
-      if (case%contact%n_pairs > 0 .and. fft_pays(fourier%n_coefficients)) then
-         call system%fourier%prepare_fft(3*case%contact%n_pairs)
-      end if
    end subroutine build_system
 
    !> Only odd harmonics where the symmetry is exact, and keeps so at the instants: their number

@@ -89,7 +89,7 @@ contains
 
       if (self%in_time) then
          ! Values at the instants as unknowns; outside of here only coefficients are known.
-         in_time = new_hdhb(system)
+         call new_hdhb(system, in_time)
          m = system%structure%n_coordinates
          allocate (values(system%n))
          call in_time%to_values(m, x, values)

@@ -10,6 +10,7 @@
 !>
 !> Nobody asks a law by its name: who needs to know something of it reads `facts` or `prediction`.
 module fw_force_law
+   use fw_fft, only: fft_type
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    implicit none (type, external)
@@ -121,8 +122,11 @@ module fw_force_law
       !> Angular frequency of the period: makes a derivative by tau one by t.
       real(wp) :: rate = 1.0_wp
       class(law_room), allocatable :: room
+      !> Plans and buffers of long transforms, where there are such.
+      type(fft_type), allocatable :: fft
    contains
       procedure :: reserve => reserve_workspace
+      procedure :: renew_fft
       procedure :: measure_slip
       procedure :: measure_scale
       procedure :: always_closed
@@ -163,7 +167,7 @@ module fw_force_law
          import :: force_law, force_workspace, fourier_type
          implicit none (type, external)
          class(force_law), intent(in) :: self
-         type(fourier_type), intent(inout) :: fourier
+         type(fourier_type), intent(in) :: fourier
          type(force_workspace), intent(inout) :: work
       end subroutine evaluate_interface
 
@@ -197,7 +201,15 @@ contains
       allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
       allocate (self%turns(n), source=0)
       allocate (self%state(n), self%linear_state(n), source=pair_stuck)
+      call fourier%plan_fft(n*n_components, self%fft)
    end subroutine reserve_workspace
+
+   !> Make a copy that is to live beside its original independent of it.
+   subroutine renew_fft(self)
+      class(force_workspace), intent(inout) :: self
+
+      if (allocated(self%fft)) call self%fft%renew()
+   end subroutine renew_fft
 
    !> Ask for `slip`, and for its derivative after `linearize`, from now on.
    pure subroutine measure_slip(self)
@@ -283,7 +295,7 @@ contains
       type(force_workspace), intent(inout) :: work
       !> Harmonics of the last evaluation, and those wanted.
       type(fourier_type), intent(in) :: computed
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: force(:, :, :)
 
       associate (unused => computed)
@@ -355,7 +367,7 @@ contains
    subroutine by_parameter(self, number, fourier, work, force)
       class(force_law), intent(in) :: self
       integer, intent(in) :: number
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(in) :: work
       real(wp), intent(inout) :: force(:, :, :)
 

@@ -141,7 +141,7 @@ contains
 
    subroutine evaluate(self, fourier, work)
       class(friction_law), intent(in) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
 
       if (self%n_elements == 0) return
@@ -153,12 +153,13 @@ contains
 
    subroutine evaluate_at_instants(self, fourier, work, room)
       class(friction_law), intent(in) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       type(friction_room), intent(inout) :: room
       integer :: first, n_blocks, block, k
 
-      call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time)
+      call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time, &
+                           work%fft)
       do k = 1, fourier%n_time
          ! Gap, wear and constant loads: means that are no part of the coefficients.
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
@@ -173,7 +174,7 @@ contains
                     min(first + block_size - 1, self%n_elements))
       end do
       !$omp end parallel do
-      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force)
+      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft)
       call classify(room, work)
       if (work%measures_slip) then
          ! The march has ended where it started, so one more turn over the same prediction is the

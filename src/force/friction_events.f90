@@ -65,7 +65,7 @@ contains
 
    subroutine evaluate(self, fourier, work)
       class(friction_by_events), intent(in) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
 
       if (self%n_elements == 0) return
@@ -135,7 +135,7 @@ contains
       type(force_workspace), intent(inout) :: work
       !> Harmonics of the last evaluation, and those that are wanted.
       type(fourier_type), intent(in) :: computed
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: force(:, :, :)
 
       if (self%n_elements == 0) return

@@ -57,7 +57,7 @@ contains
    !> Forces from the elongations.
    subroutine evaluate(self, fourier, work)
       class(polynomial_law), intent(in) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       integer :: i, k
 
@@ -65,14 +65,14 @@ contains
       ! Before the instants: products of what is filtered would fold back into the retained
       ! harmonics.
       call low_pass(self, fourier, work%prediction)
-      call fourier%to_time(self%n_elements, work%prediction, work%prediction_time)
+      call fourier%to_time(self%n_elements, work%prediction, work%prediction_time, work%fft)
       do k = 1, fourier%n_time
          do i = 1, self%n_elements
             work%force_time(i, 1, k) = self%coefficient(i)* &
                                        work%prediction_time(i, 1, k)**self%power(i)
          end do
       end do
-      call fourier%to_coefficients(self%n_elements, work%force_time, work%force)
+      call fourier%to_coefficients(self%n_elements, work%force_time, work%force, work%fft)
       ! Every spring has a block in the derivative.
       work%state = pair_mixed
    end subroutine evaluate
@@ -139,7 +139,7 @@ contains
    subroutine by_parameter(self, number, fourier, work, force)
       class(polynomial_law), intent(in) :: self
       integer, intent(in) :: number
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(in) :: work
       real(wp), intent(inout) :: force(:, :, :)
       real(wp) :: values(self%n_elements, fourier%n_time)

@@ -83,12 +83,13 @@ contains
 
    subroutine evaluate(self, fourier, work)
       class(regularised_law), intent(in) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       integer :: i, k
 
       if (self%n_elements == 0) return
-      call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time)
+      call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time, &
+                           work%fft)
       do k = 1, fourier%n_time
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
@@ -96,7 +97,7 @@ contains
                work%force_time, work%pressure)
       call work%measure_scale()
       work%turns = 1
-      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force)
+      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft)
       do i = 1, self%n_elements
          work%state(i) = pair_open
          do k = 1, fourier%n_time
@@ -211,7 +212,7 @@ contains
    subroutine by_parameter(self, number, fourier, work, force)
       class(regularised_law), intent(in) :: self
       integer, intent(in) :: number
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(in) :: work
       real(wp), intent(inout) :: force(:, :, :)
       real(wp) :: values(self%n_elements, 3, fourier%n_time)

@@ -111,7 +111,7 @@ contains
 
    subroutine evaluate(self, fourier, work)
       class(rigid_law), intent(in) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
 
       if (self%n_elements == 0) return
@@ -163,7 +163,7 @@ contains
 
    subroutine evaluate_massive(self, fourier, work, room)
       class(rigid_law), intent(in) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       type(rigid_room), intent(inout) :: room
       integer :: i, j
@@ -360,7 +360,7 @@ contains
       class(rigid_law), intent(in) :: self
       type(force_workspace), intent(inout) :: work
       type(fourier_type), intent(in) :: computed
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: force(:, :, :)
       real(wp) :: out(fourier%n_coefficients, 2)
       integer :: j, n

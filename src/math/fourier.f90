@@ -4,7 +4,7 @@
 !>
 !> Arrays are (row, coefficient) and (row, instant): rows (coordinates, pairs) lie innermost, so
 !> that both transforms are one matrix product over all rows, and kernels run along the rows.
-!> Long transforms of many harmonics go through FFTW instead (see `use_fft`).
+!> Long transforms of many harmonics go through FFTW instead (see `fft_rows`).
 module fw_fourier
    use fw_kinds, only: wp
    use fw_kinds, only: pi
@@ -29,17 +29,17 @@ module fw_fourier
       !> Values of the base functions at the instants, and the weights of the analysis
       !> (n_coefficients, n_time).
       real(wp), allocatable :: synthesis(:, :), analysis(:, :)
-      logical :: use_fft = .false.
+      !> Rows of the arrays that go through FFTW, 0 where none do: who transforms such arrays brings
+      !> the plans and buffers (`plan_fft`), for they belong to one thread.
+      integer :: fft_rows = 0
       !> The analysis is the projection, not a collocation.
       logical :: projects = .true.
-      type(fft_type), allocatable :: fft
    contains
       procedure :: to_time
       procedure :: to_coefficients
       procedure :: differentiate
       procedure :: has_constant
-      procedure :: prepare_fft
-      procedure :: renew_fft
+      procedure :: plan_fft
       procedure :: collocate
    end type fourier_type
 
@@ -101,23 +101,18 @@ contains
       if (self%n_retained > 0) has_constant = self%harmonic(1) == 0
    end function has_constant
 
-   !> Plan the transforms of arrays with n_rows rows through FFTW: work for the construction of
-   !> a system, outside of parallel regions.
-   subroutine prepare_fft(self, n_rows)
-      class(fourier_type), intent(inout) :: self
+   !> Plans and buffers for arrays of n_rows rows, where these go through FFTW: work for the
+   !> construction of a workspace, outside of parallel regions.
+   subroutine plan_fft(self, n_rows, fft)
+      class(fourier_type), intent(in) :: self
       integer, intent(in) :: n_rows
+      !> Not allocated where the matrices serve.
+      type(fft_type), allocatable, intent(out) :: fft
 
-      self%use_fft = .true.
-      allocate (self%fft)
-      call self%fft%plan(n_rows, self%n_time)
-   end subroutine prepare_fft
-
-   !> Make a copy that is to live beside its original independent of it.
-   subroutine renew_fft(self)
-      class(fourier_type), intent(inout) :: self
-
-      if (allocated(self%fft)) call self%fft%renew()
-   end subroutine renew_fft
+      if (self%fft_rows == 0 .or. self%fft_rows /= n_rows) return
+      allocate (fft)
+      call fft%plan(n_rows, self%n_time)
+   end subroutine plan_fft
 
    !> Replace the analysis by collocation: coefficients that fit the values at n_points of the
    !> instants, exactly where n_points = n_coefficients, else in the sense of least squares.
@@ -152,23 +147,24 @@ contains
    end function fft_pays
 
    !> Plans are made for one number of rows; others go through the matrix.
-   pure logical function fft_serves(self, n_rows)
-      type(fourier_type), intent(in) :: self
+   pure logical function fft_serves(n_rows, fft)
       integer, intent(in) :: n_rows
+      type(fft_type), intent(in), optional :: fft
 
       fft_serves = .false.
-      if (self%use_fft) fft_serves = self%fft%n_rows == n_rows
+      if (present(fft)) fft_serves = fft%n_rows == n_rows
    end function fft_serves
 
    !> Values (n_rows, n_time) at the instants from coefficients (n_rows, n_coefficients).
-   subroutine to_time(self, n_rows, coefficients, values)
-      class(fourier_type), intent(inout) :: self
+   subroutine to_time(self, n_rows, coefficients, values, fft)
+      class(fourier_type), intent(in) :: self
       integer, intent(in) :: n_rows
       real(wp), intent(in) :: coefficients(n_rows, *)
       real(wp), intent(inout) :: values(n_rows, *)
+      type(fft_type), intent(inout), optional :: fft
 
-      if (fft_serves(self, n_rows)) then
-         call self%fft%synthesise(self%harmonic, self%column, coefficients, values)
+      if (fft_serves(n_rows, fft)) then
+         call fft%synthesise(self%harmonic, self%column, coefficients, values)
       else
          call dgemm('N', 'N', n_rows, self%n_time, self%n_coefficients, 1.0_wp, coefficients, &
                     n_rows, self%synthesis, self%n_coefficients, 0.0_wp, values, n_rows)
@@ -176,14 +172,15 @@ contains
    end subroutine to_time
 
    !> Coefficients (n_rows, n_coefficients) of values (n_rows, n_time) at the instants.
-   subroutine to_coefficients(self, n_rows, values, coefficients)
-      class(fourier_type), intent(inout) :: self
+   subroutine to_coefficients(self, n_rows, values, coefficients, fft)
+      class(fourier_type), intent(in) :: self
       integer, intent(in) :: n_rows
       real(wp), intent(in) :: values(n_rows, *)
       real(wp), intent(inout) :: coefficients(n_rows, *)
+      type(fft_type), intent(inout), optional :: fft
 
-      if (self%projects .and. fft_serves(self, n_rows)) then
-         call self%fft%analyse(self%harmonic, self%column, values, coefficients)
+      if (self%projects .and. fft_serves(n_rows, fft)) then
+         call fft%analyse(self%harmonic, self%column, values, coefficients)
       else
          call dgemm('N', 'T', n_rows, self%n_coefficients, self%n_time, 1.0_wp, values, n_rows, &
                     self%analysis, self%n_coefficients, 0.0_wp, coefficients, n_rows)

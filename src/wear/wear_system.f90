@@ -78,9 +78,12 @@ contains
       logical, intent(in) :: by_energy
       type(wear_system), intent(out) :: self
       real(wp) :: tangential(contact%n_pairs)
+      integer :: k
 
       self%hbm_system = balance
-      call self%fourier%renew_fft()
+      do k = 1, size(self%work)
+         call self%work(k)%renew_fft()
+      end do
       call self%free_depths()
       call self%work(self%forces%pairs)%measure_slip()
       associate (p => self%forces%entry(self%forces%pairs)%law%prediction)

@@ -51,7 +51,7 @@ contains
 
    subroutine evaluate(self, fourier)
       class(forces_type), intent(inout) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
 
       call self%law%evaluate(fourier, self%force_workspace)
    end subroutine evaluate

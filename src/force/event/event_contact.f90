@@ -93,7 +93,7 @@ contains
    subroutine evaluate(self, fourier, prediction, offset, x_start, force, x)
       !> Also keeps the paths of the pairs, which all other procedures read: evaluate first.
       class(event_contact_type), intent(inout) :: self
-      type(fourier_type), intent(inout) :: fourier
+      type(fourier_type), intent(in) :: fourier
       !> Coefficients of the predicted forces (n_pairs, 3, n_coefficients), and what the normal ones
       !> have in the mean beside (n_pairs).
       real(wp), intent(in) :: prediction(:, :, :), offset(:)
