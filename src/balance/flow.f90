@@ -140,6 +140,7 @@ contains
       call self%factors(h)%reserve(m)
       self%factors(h)%matrix = self%p(:, :, h)
       call self%factors(h)%factor(singular)
+      ! A pivot of round-off counts as none: its direction has no mass.
       smallest = minval([(abs(self%factors(h)%matrix(i, i)), i=1, m)])
       if (.not. singular .and. smallest > 1.0e-12_wp*maxval(abs(self%p(:, :, h)))) return
       do i = 1, m
@@ -194,6 +195,7 @@ contains
 
       self%inverse_step = 1.0_wp/h
       self%start = x_old
+      ! The balance adds it to its derivative; the shift of the residual is added here.
       self%balance%shift = self%p/h
    end subroutine set_shift
 

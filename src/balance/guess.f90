@@ -54,6 +54,7 @@ contains
       held = .true.
       if (.not. system%fourier%has_constant()) return
       allocate (stiffness(system%structure%n_coordinates, system%structure%n_coordinates))
+      ! Harmonic 0 is the first of those retained.
       call system%structure%block(system%structure_state, 1, stiffness)
       held = is_positive_definite(real(stiffness, wp))
    end function held_without_contact
@@ -185,6 +186,7 @@ contains
       fixed = pack([(j, j=1, size(held))], held)
       if (size(free) == 0) return
       allocate (rhs(size(free), 1))
+      ! Held coordinates act as a load on the free ones.
       rhs(:, 1) = force(free) - matmul(stiffness(free, fixed), q(fixed))
       call lu%reserve(size(free))
       lu%matrix = stiffness(free, free)

@@ -183,6 +183,7 @@ contains
       real(wp) :: line(size(matrix, 1))
       integer :: j, n, rows
 
+      ! J_t = T^-1 J T with T from values to coefficients: columns first, then rows.
       rows = self%balance%n_active
       n = rows*self%balance%fourier%n_coefficients
       call self%balance%assemble(matrix)

@@ -108,6 +108,7 @@ contains
          do i = 1, size(rows)
             if (rows(i) == 0) cycle
             do e = self%first(rows(i)), self%first(rows(i) + 1) - 1
+               ! Added, not set: rows may share coordinates.
                q(self%coordinate(e), k) = q(self%coordinate(e), k) + &
                                           factor*self%weight(e)*values(i, k)
             end do
@@ -209,6 +210,7 @@ contains
    end subroutine add_block
 
    !> matrix = matrix + B_n^H k B_n with the rows of an output and of an input, both mapped.
+   !> In single precision: the matrix is that of the preconditioner.
    pure subroutine add_mapped_block(self, row_out, row_in, h, map, n_mapped, stiffness, matrix)
       class(incidence_type), intent(in) :: self
       integer, intent(in) :: row_out, row_in, h

@@ -54,6 +54,7 @@ contains
       n_rows = 0
       do i = 1, contact%n_pairs
          do c = 1, 3
+            ! Ground against ground: the component is absent.
             if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
             self%idle(c, i) = .not. (moving(abs(contact%side_1(c, i))) .or. &
                                      moving(abs(contact%side_2(c, i))))
@@ -93,6 +94,7 @@ contains
          if (contact%gap(i) < 0.0_wp) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) &
             = .true.
       end do
+      ! The ground passes no motion on.
       moving(0) = .false.
       do
          ! Until nothing more is reached: each round goes one element further at least.

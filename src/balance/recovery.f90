@@ -235,6 +235,7 @@ contains
       curvature = 0.0_wp
       do n = 1, (size(coefficients) - 1)/2
          angle = angle*turn
+         ! The wave n, and its slope over n.
          c = coefficients(2*n)*real(angle) + coefficients(2*n + 1)*aimag(angle)
          s = coefficients(2*n + 1)*real(angle) - coefficients(2*n)*aimag(angle)
          value = value + c

@@ -116,6 +116,7 @@ contains
 
       if (self%prediction%takes_balance) return
       do i = 1, self%n_elements
+         ! One stiffness for both tangential directions: friction prefers no direction either.
          if (any(self%present(1:2, i))) self%prediction%stiffness(i, 1:2) = &
             contact%tangential_stiffness(i)
          if (self%present(3, i)) self%prediction%stiffness(i, 3) = contact%normal_stiffness(i)
@@ -164,6 +165,7 @@ contains
          ! Gap, wear and constant loads: means that are no part of the coefficients.
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
+      ! Before the march: what counts as repeated is relative to the largest prediction.
       call work%measure_scale()
       n_blocks = (self%n_elements + block_size - 1)/block_size
       !$omp parallel do default(none) shared(self, work, room, n_blocks, fourier) &

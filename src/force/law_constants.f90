@@ -119,6 +119,7 @@ contains
 
       place = 0
       if (.not. allocated(self%constant)) return
+      ! A loop that runs through leaves place = 0, no such name.
       do place = size(self%constant), 1, -1
          if (self%constant(place)%name == name) return
       end do

@@ -93,12 +93,14 @@ contains
       do k = 1, fourier%n_time
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
+      ! One pass over the instants is the period: there is no memory to march.
       call rub(self%n_elements, fourier%n_time, self%mu, self%slip_speed, work%prediction_time, &
                work%force_time, work%pressure)
       call work%measure_scale()
       work%turns = 1
       call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft)
       do i = 1, self%n_elements
+         ! Never stuck: every pair that bears at some instant has a block in the derivative.
          work%state(i) = pair_open
          do k = 1, fourier%n_time
             if (work%force_time(i, 3, k) < 0.0_wp) work%state(i) = pair_mixed
@@ -118,6 +120,7 @@ contains
       do k = 1, n_time
          do i = 1, n_pairs
             p = max(-y(i, 3, k), 0.0_wp)
+            ! mu p tanh(s) v/|v| with s = |v|/v_0, written without the quotient v/|v|.
             factor = mu(i)*p/slip_speed(i)* &
                      tanh_over(sqrt(y(i, 1, k)**2 + y(i, 2, k)**2)/slip_speed(i))
             lambda(i, 1, k) = factor*y(i, 1, k)
@@ -156,6 +159,7 @@ contains
          do c_out = 1, 3
             do c_in = 1, 3
                do k = 1, fourier%n_time
+                  ! G = analysis diag(slope) synthesis, transposed: the first index is the input.
                   rows(:, k) = slope(c_in, c_out, k)*fourier%synthesis(:, k)
                end do
                call dgemm('N', 'T', nc, nc, fourier%n_time, 1.0_wp, rows, nc, fourier%analysis, &
@@ -179,6 +183,7 @@ contains
       s = speed/slip_speed
       e = 0.0_wp
       if (speed > 0.0_wp) e = y(1:2)/speed
+      ! y(3) = -p. The matrix is turning (1 - e e^T) + along e e^T (docs/theory.md, The balance).
       turning = -mu*y(3)/slip_speed*tanh_over(s)
       along = -mu*y(3)/slip_speed*(1.0_wp - tanh(s)**2)
       do b = 1, 2
@@ -223,6 +228,7 @@ contains
       do k = 1, fourier%n_time
          do i = 1, self%n_elements
             associate (v => work%prediction_time(i, 1:2, k), v_0 => self%slip_speed(i))
+               ! d lambda_t/d mu = lambda_t/mu, d lambda_t/d v_0 = -mu p/v_0**2 (1 - tanh(s)**2) v.
                p = -work%force_time(i, 3, k)
                s = norm2(v)/v_0
                factor = p/v_0*tanh_over(s)

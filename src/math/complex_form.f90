@@ -23,6 +23,7 @@ contains
 
       do h = 1, size(harmonic)
          k = column(h)
+         ! Re (U exp(i n tau)) = uc cos(n tau) + us sin(n tau), and a constant has no sine.
          if (harmonic(h) == 0) then
             amplitudes(:n_rows, h) = cmplx(coefficients(:, k), kind=wp)
          else

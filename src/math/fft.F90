@@ -50,6 +50,8 @@ contains
       allocate (self%values(n_rows, n_time), self%spectrum(n_rows, n_time/2 + 1))
       length = int(n_time, c_int)
       rows = int(n_rows, c_int)
+      ! A transform runs along the second index: its entries lie n_rows apart (the stride), and the
+      ! transforms of two rows one apart (the distance).
       !$omp critical (fretwear_fftw)
       self%forward = fftw_plan_many_dft_r2c(1_c_int, length, rows, self%values, length, rows, &
                                             1_c_int, self%spectrum, length/2 + 1, rows, 1_c_int, &

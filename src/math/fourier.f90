@@ -62,6 +62,7 @@ contains
 
       step = 1
       if (present(odd_only)) step = merge(2, 1, odd_only)
+      ! 0, 1, 2, .. or 1, 3, 5, ..: without even harmonics there is no constant either.
       self%harmonic = [(i, i=step - 1, n_harmonics, step)]
       self%n_retained = size(self%harmonic)
       self%n_time = n_time
@@ -90,6 +91,8 @@ contains
             if (n > 0) self%synthesis(column + 1, k) = sin(angle)
          end do
       end do
+      ! Discrete orthogonality: over the instants cos(n tau)**2 and sin(n tau)**2 add up to
+      ! n_time/2 for 0 < 2n < n_time, the constant to n_time. Hence analysis synthesis^T = 1.
       self%analysis = (2.0_wp/real(self%n_time, wp))*self%synthesis
       if (self%has_constant()) self%analysis(1, :) = 1.0_wp/real(self%n_time, wp)
    end subroutine fill_operators
@@ -127,6 +130,8 @@ contains
       ! As even as the instants allow; distinct, because n_points <= n_time.
       instant = [((j*self%n_time)/n_points + 1, j=0, n_points - 1)]
       self%projects = .false.
+      ! With S the columns of the synthesis at the chosen instants the coefficients a obey (S S^T)
+      ! a = S values, so that the analysis is (S S^T)^-1 S. The other instants get the weight zero.
       call normal%reserve(self%n_coefficients)
       normal%matrix = matmul(self%synthesis(:, instant), transpose(self%synthesis(:, instant)))
       call normal%factor(singular)
@@ -202,6 +207,7 @@ contains
          if (self%harmonic(i) == 0) then
             derivative(:, column) = 0.0_wp
          else
+            ! d/dtau (c cos n tau + s sin n tau) = n s cos n tau - n c sin n tau.
             derivative(:, column) = n*coefficients(:, column + 1)
             derivative(:, column + 1) = -n*coefficients(:, column)
          end if

@@ -144,6 +144,7 @@ contains
       integer :: i
 
       do i = 1, self%n
+         ! The swaps of the elimination in their order, then L with its unit diagonal, then U.
          entry = b(i)
          b(i) = b(self%pivot(i))
          b(self%pivot(i)) = entry
@@ -216,6 +217,7 @@ contains
       integer :: i, j, n
 
       n = size(a, 1)
+      ! A diagonal that is not positive refutes it at once, and would spoil the scaling.
       positive = all([(a(i, i) > 0.0_wp, i=1, n)])
       if (.not. positive .or. n == 0) return
       allocate (scaled(n, n))

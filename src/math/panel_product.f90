@@ -60,6 +60,7 @@ contains
       n = min(panel_height, n_rows - first)
       do g = 1, group_count(n_columns)
          call multiply_tile(n_inner, panel, right(1, 1, g), tile)
+         ! Whole tiles are computed, the zeros that fill them up included; what exists is copied.
          do k = 1, min(group_width, n_columns - (g - 1)*group_width)
             product(first + 1:first + n, (g - 1)*group_width + k) = tile(:n, k)
          end do

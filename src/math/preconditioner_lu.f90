@@ -71,10 +71,12 @@ contains
       if (.not. largest > 0.0_wp) return
       ! Not cgetrs, which packs the factors anew for a single right-hand side.
       ld = size(self%matrix, 1)
+      ! Single precision ends at 1e38: the entries are brought to the order of one before.
       self%rhs(:self%n) = cmplx(b/largest, kind=sp)
       call claswp(1, self%rhs, ld, 1, self%n, self%pivot, 1)
       call ctrsv('L', 'N', 'U', self%n, self%matrix, ld, self%rhs, 1)
       call ctrsv('U', 'N', 'N', self%n, self%matrix, ld, self%rhs, 1)
+      ! x = A^-1 b = scale largest (scale A)^-1 (b/largest).
       b = self%scale*largest*cmplx(self%rhs(:self%n), kind=wp)
    end subroutine solve
 

@@ -115,6 +115,7 @@ contains
       do j = 1, n_used
          call combine(n_i, basis%n_blocks, theta, s, basis%coupling(:, :, used(j)), z_iq(:, j))
       end do
+      ! The internal load is one more right-hand side of the same factors.
       solved(:, :n_active) = z_iq(:, :n_active)
       if (present(load)) solved(:, n_right) = internal_load
       call internal%solve(n_right, solved)
@@ -133,6 +134,7 @@ contains
       real(wp), intent(in) :: blocks(:, :)
       complex(wp), intent(out) :: z(n)
 
+      ! theta = (n omega)**2 + i n omega xi: the imaginary part is a damping -xi M, which excites.
       if (n_blocks == 3) then
          z = cmplx(blocks(:, 1) - real(theta, wp)*blocks(:, 2), &
                    s*blocks(:, 3) - aimag(theta)*blocks(:, 2), wp)
@@ -173,6 +175,7 @@ contains
       integer, intent(in) :: n
       complex(wp) :: load(size(parts, 1))
 
+      ! Loads act in harmonics 0 and 1 only; an amplitude is U = uc - i us.
       select case (n)
       case (0)
          load = cmplx(parts(:, 1), kind=wp)
@@ -221,6 +224,7 @@ contains
       !$omp if(m >= coordinates_for_threads)
       do h = 1, size(self%matrix, 3)
          do j = 1, n_active
+            ! One harmonic behind the other, each (n_used, n_active).
             place = ((h - 1)*n_active + j - 1)*n_used
             self%active(place + 1:place + n_used) = self%matrix(used(:n_used), used(j), h)
          end do

@@ -39,6 +39,7 @@ contains
          self%lu%matrix = cmplx(0.0_wp, s*basis%c_ii, wp)
          do j = 1, basis%n_internal
             self%lu%matrix(j, j) = self%lu%matrix(j, j) + self%inverse(j)
+            ! A free mode in harmonic 0: any pivot will do, since `solve` puts its row to zero.
             if (abs(self%inverse(j)) <= 0.0_wp .and. s <= 0.0_wp) self%lu%matrix(j, j) = 1.0_wp
          end do
          call self%lu%factor(failed)
@@ -51,6 +52,8 @@ contains
          if (abs(self%inverse(j)) > 0.0_wp) then
             self%inverse(j) = 1.0_wp/self%inverse(j)
          else if (s > 0.0_wp) then
+            ! Not zero, which `solve` takes for a free mode: coupled damping holds this one, and
+            ! where nothing does `failed` says so.
             self%inverse(j) = (1.0_wp, 0.0_wp)
          end if
       end do

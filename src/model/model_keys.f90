@@ -42,6 +42,7 @@ module fw_model_keys
 
 contains
 
+   !> Asked first: where the matrices are decides which of the keys below are needed.
    subroutine bind_source(self, keys)
       class(model_options), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
@@ -67,6 +68,7 @@ contains
 
       call keys%bind(key('n_dof', 'order of the matrices; with a file it may be left out', &
                          from_to(1, largest), absent='required inline'), n_dof, needed=is_inline)
+      ! Shapes of later keys name it.
       call keys%set_size('n_dof', n_dof)
    end subroutine bind_order
 
@@ -86,6 +88,7 @@ contains
                          shape=shape, repeats=.false., absent='0'), damping)
    end subroutine bind_matrices
 
+   !> What is added to the matrices once they are there, inline or from a file.
    subroutine bind_additions(self, keys)
       class(model_options), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
@@ -123,6 +126,7 @@ contains
 
    end subroutine bind_loads
 
+   !> Last of the group: they multiply what the file or the keys before gave.
    subroutine bind_scales(self, keys)
       class(model_options), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys

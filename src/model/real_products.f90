@@ -79,6 +79,7 @@ contains
       associate (m => basis%n_coordinates, n_i => basis%n_internal, nb => basis%n_blocks, &
                  nc => n_coefficients)
          allocate (self%internal(n_harmonics))
+         ! Columns are rounded up to whole groups, which are filled with zeros.
          allocate (self%multiples((m + n_i)*nb*group_count(nc)*group_width), source=0.0_wp)
          allocate (self%products((m + n_i)*nc), source=0.0_wp)
          allocate (self%modes(n_i, nc), self%mode_multiples(n_i*nb*nc), source=0.0_wp)
@@ -143,6 +144,8 @@ contains
       real(wp), intent(inout) :: panels(panel_height, n_inner, *)
       integer :: b, i, j, k, p
 
+      ! Row i stands in panel (i - 1)/panel_height + 1. The last panel may have rows to spare,
+      ! which stay zero.
       panels(:, :, panel_count(n_used)) = 0.0_wp
       do b = 1, basis%n_blocks
          do j = 1, n_active
@@ -153,6 +156,7 @@ contains
             end do
          end do
       end do
+      ! Behind K, M and C of the coordinates those of the internal modes, in the same order.
       k = n_active*basis%n_blocks
       do i = 1, n_used
          p = (i - 1)/panel_height
@@ -230,11 +234,14 @@ contains
       n_inner = n_short + n_i*basis%n_blocks
       threaded = n_used >= coordinates_for_threads
       if (n_i > 0) then
+         ! b of the header in self%modes, then y = D^-1 b in its place.
          call group_multiples(factors, n_active, basis%n_blocks, 1.0_wp, v, 0, n_short, &
                               self%multiples)
          call multiply_panels(n_i, n_short, nc, modes, self%multiples, threaded, n_i, self%modes)
          call self%solve_internal(factors)
       end if
+      ! Once more, since a group is longer by the modes now: multiples of v and, below, of -y, so
+      ! that one product gives both terms.
       call group_multiples(factors, n_active, basis%n_blocks, 1.0_wp, v, 0, n_inner, &
                            self%multiples)
       call group_multiples(factors, n_i, basis%n_blocks, -1.0_wp, self%modes, n_short, n_inner, &

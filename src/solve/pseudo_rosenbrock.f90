@@ -106,6 +106,8 @@ contains
       call system%set_shift(h*d, self%x_old)
       call self%linear%prepare(system, self%x_old, self%r0, done)
       if (.not. done) return
+      ! r0 is R(x_old): at the start of the step the shift adds nothing. All stages are those of
+      ! the header times P/(h d).
       self%k1 = -self%r0/(h*d)
       call solve_stage(self, system, self%k1, done)
       if (.not. done) return
@@ -125,6 +127,7 @@ contains
       self%k3 = -(self%r + e*(self%p2 + self%r1) + 2.0_wp*(self%p1 + self%r0))/(h*d)
       call solve_stage(self, system, self%k3, done)
       if (.not. done) return
+      ! The estimate h (k1 - 2 k2 + k3)/6, in the place of k3, which has served.
       self%k3 = h*(self%k1 - 2.0_wp*self%k2 + self%k3)/6.0_wp
       error = relative_norm(self, self%k3, x)
    end subroutine try_step

@@ -129,6 +129,7 @@ contains
       do i = 1, structure%n_pairs
          call project_pair(self, structure, i)
       end do
+      ! A spring knows no states: its force is a function of s, and the mismatch its residual.
       do i = 1, structure%n_springs
          r = structure%n_rows - structure%n_springs + i
          self%mismatch(r) = self%force(r) - &
@@ -195,6 +196,7 @@ contains
       integer :: i, c, d, r, q
 
       associate (jacobian => self%lu%matrix)
+         ! ds = -W dlambda, so that y = lambda + rate s has dy = (1 - rate W) dlambda.
          jacobian = 0.0_wp
          do r = 1, structure%n_rows
             jacobian(r, r) = 1.0_wp
@@ -212,6 +214,7 @@ contains
                end do
             end do
          end do
+         ! Of lambda - coefficient s**power = 0, again with ds = -W dlambda.
          do i = 1, structure%n_springs
             r = structure%n_rows - structure%n_springs + i
             tangent = structure%coefficient(i)*real(structure%power(i), wp)* &
@@ -251,6 +254,7 @@ contains
                self%relative = self%relative - w(:, r)*change
             end do
          end do
+         ! By Newton's method on the spring's own row: the others stand still meanwhile.
          do i = 1, structure%n_springs
             r = structure%n_rows - structure%n_springs + i
             tangent = structure%coefficient(i)*real(structure%power(i), wp)* &

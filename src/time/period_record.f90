@@ -120,6 +120,7 @@ contains
       ! A parabola that opens away from zero has no summit between the samples.
       largest = abs(mid)
       if (curvature*mid >= 0.0_wp) return
+      ! Summit of the parabola through the samples at -1, 0 and 1.
       largest = abs(mid - (right - left)**2/(8.0_wp*curvature))
    end function largest_sample
 

@@ -89,6 +89,8 @@ contains
       is_smooth = structure%n_pairs == 0 .and. .not. allocated(structure%massive)
       if (.not. is_smooth) return
       call divide_by_mass(structure, omega, acceleration)
+      ! The largest sum of a row bounds the eigenvalues of M^-1 K/omega**2, the squares of the
+      ! natural frequencies over that of the load.
       is_smooth = sqrt(maxval(sum(abs(acceleration%stiffness), dim=2))) <= moderate_ratio
    end function is_smooth
 
@@ -107,6 +109,7 @@ contains
       self%observe = observe
       self%record = new_period_record(size(observe, 1), 0, n_samples)
       allocate (self%weight(2*n))
+      ! Square roots of energies, in which positions and velocities compare.
       do i = 1, n
          self%weight(i) = sqrt(abs(structure%stiffness(i, i)) + omega**2*structure%mass(i, i))
          self%weight(n + i) = sqrt(structure%mass(i, i))
@@ -135,6 +138,8 @@ contains
       call solve_columns(mass, acceleration%damping)
       call solve_columns(mass, acceleration%load)
       call solve_columns(mass, acceleration%springs)
+      ! d2x/dtau2 is omega**-2 times d2x/dt2, and dx/dt = omega w leaves one omega with the
+      ! damping.
       acceleration%stiffness = acceleration%stiffness/omega**2
       acceleration%damping = acceleration%damping/omega
       acceleration%load = acceleration%load/omega**2
@@ -167,6 +172,7 @@ contains
       n = a%n
       slope(:n) = y(n + 1:2*n)
       slope(n + 1:2*n) = a%load(:, 1) + cos(t)*a%load(:, 2) + sin(t)*a%load(:, 3)
+      ! Column by column, as the matrices lie in memory.
       do i = 1, n
          slope(n + 1:2*n) = slope(n + 1:2*n) - y(i)*a%stiffness(:, i) - y(n + i)*a%damping(:, i)
       end do
@@ -195,11 +201,13 @@ contains
 
       acceleration = self%acceleration
       n = acceleration%n
+      ! Velocities by tau from here on: both halves of y are lengths.
       y = [start(:n), start(n + 1:)/self%omega]
       finish = start
       range = 0.0_wp
       done = fsuncontext_create(c_null_ptr, context) == 0
       if (.not. done) return
+      ! The vector has y for its storage: what CVODE writes is read there without a copy.
       y_vector => fn_vmake_serial(int(size(y), i8), y, context)
       matrix => fsundensematrix(int(size(y), i8), int(size(y), i8), context)
       solver => fsunlinsol_dense(y_vector, matrix, context)
@@ -212,6 +220,7 @@ contains
          ! A failure is reported to the caller, not on the terminal.
          status = fcvodeseterrfile(memory, c_null_ptr)
          status = fcvodesetuserdata(memory, c_loc(acceleration))
+         ! CVODE forms the Jacobian of its implicit steps by differences; n is small here.
          status = fcvodesetlinearsolver(memory, solver, matrix)
          status = fcvodesetmaxnumsteps(memory, max_steps)
          if (done) call march(self, memory, y_vector, start, y, range, done)
@@ -239,8 +248,11 @@ contains
 
       n = self%acceleration%n
       range = 0.0_wp
+      ! A step ends exactly there, so that the state that goes into the next period is not
+      ! interpolated as the samples are.
       done = fcvodesetstoptime(memory, 2.0_wp*pi) == 0
       do k = 1, self%record%n_steps
+         ! Before the step: the end of the period is the first sample of the next one.
          self%record%observed(:, k) = matmul(self%observe, y(:n))
          instant = 2.0_wp*pi*real(k, wp)/real(self%record%n_steps, wp)
          done = fcvode(memory, instant, y_vector, reached, cv_normal) >= 0

@@ -87,6 +87,7 @@ contains
          matrix = 2.0_wp/h*structure%damping
          return
       end if
+      ! With P the projection onto directions with mass: C (1 + P)/h.
       matrix = structure%damping
       call dgemm('N', 'N', n, n, n, 1.0_wp/h, structure%damping, n, structure%massive, n, &
                  1.0_wp/h, matrix, n)

@@ -95,6 +95,7 @@ contains
       call new_law(contact%law, law)
       call law%build(contact, present)
       self%mu = law%mu
+      ! Worn depth opens the contact further (docs/theory.md, Motion).
       self%gap = law%prediction%gap
       if (allocated(contact%depth)) self%gap = self%gap + contact%depth
       self%normal_load = law%prediction%load
@@ -121,6 +122,7 @@ contains
       integer :: i
 
       allocate (self%coefficient(0), self%power(0))
+      ! A spring is its own law: nothing yields in series with it.
       self%compliance = [self%compliance(:self%n_rows), (0.0_wp, i=1, springs%n_springs)]
       do i = 1, springs%n_springs
          self%n_rows = self%n_rows + 1
@@ -138,6 +140,7 @@ contains
       integer, intent(in) :: side
       real(wp), intent(in) :: sign
 
+      ! 0 is the ground; a negative number is the dof with its sign turned.
       if (side == 0) return
       self%rows(abs(side), self%n_rows) = self%rows(abs(side), self%n_rows) + &
                                           sign*real(merge(1, -1, side > 0), wp)
@@ -155,6 +158,7 @@ contains
       n = self%n_dof
       allocate (self%massless(self%n_rows), source=.false.)
       allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
+      ! A dof without mass keeps its row of zeros, whatever its scale.
       scale = [(merge(1.0_wp/sqrt(self%mass(i, i)), 1.0_wp, self%mass(i, i) > 0.0_wp), i=1, n)]
       vectors = self%mass
       do i = 1, n

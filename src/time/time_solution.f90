@@ -67,6 +67,8 @@ contains
          if (allocated(error)) return
          call fill_point(smooth%record, n_harmonics, point)
       else
+         ! Contact, massless directions and frequencies far above the load all go through midpoint
+         ! steps, which are stable for every step.
          call new_time_stepper(structure, observe, omega, options%steps_per_period, stepper, error)
          if (allocated(error)) return
          if (present(interrupt)) stepper%interrupt => interrupt
@@ -76,6 +78,8 @@ contains
          call stop_run(stepper%interrupt, error)
          if (allocated(error)) return
          call fill_point(stepper%record, n_harmonics, point)
+         ! A step whose contact problem was not solved does not obey the equations, even if the
+         ! period repeats.
          report%converged = report%converged .and. stepper%record%n_failed == 0
       end if
       point%omega = omega
@@ -108,6 +112,8 @@ contains
       n_observed = size(record%observed, 1)
       n_pairs = size(record%work)
       allocate (point%coefficients(2*n_harmonics + 1, n_observed), point%amplitude(n_observed))
+      ! Directions with mass are known at the starts of the steps, massless ones as means over
+      ! them; each observed quantity is the sum of both parts.
       point%history = transpose(record%observed + record%observed_mean)
       do i = 1, n_observed
          point%coefficients(:, i) = sampled_coefficients(record%observed(i, :), n_harmonics) + &

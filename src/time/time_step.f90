@@ -143,6 +143,8 @@ contains
          if (s%n_pairs > 0) call record_contact(self, share, sample)
          call s%project(self%increment, self%part)
          if (allocated(s%massive)) then
+            ! What the projection leaves of the mean is the massless part; the load of the step is
+            ! spent and its array serves.
             call s%project(self%mean, self%load)
             self%record%observed_mean(:, sample) = self%record%observed_mean(:, sample) + &
                share*matmul(self%observe, self%mean - self%load)
@@ -191,6 +193,7 @@ contains
                record%work(i) = record%work(i) + force*step_length
             end do
             if (s%row(3, i) == 0) record%force(3, i, sample) = -s%normal_load(i)
+            ! Shares are in the order stick (1), slip (2), open, which is state 0.
             place = merge(3, contact%state(i), contact%state(i) == state_open)
             record%share(place, i) = record%share(place, i) + period_share
          end do

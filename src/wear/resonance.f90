@@ -101,6 +101,7 @@ contains
       real(wp) :: spacing
       integer :: i
 
+      ! Both neighbours first, then on towards the higher side with growing strides.
       spacing = self%spacing
       call try(self, stepper, system, best, best%omega + spacing, high, iterations, error)
       if (.not. allocated(error)) then
@@ -138,10 +139,14 @@ contains
       width = huge(1.0_wp)
       do i = 1, max_refinements
          if (min(low%amplitude, high%amplitude) >= (1.0_wp - flat)*best%amplitude) exit
+         ! Closer, differences of the amplitude would be round-off and tolerance.
          if (high%omega - low%omega <= 2.0_wp*least_spacing*best%omega) exit
          omega = vertex(low, best, high)
          if (high%omega - low%omega > slow*width(1)) then
             if (high%omega - best%omega > best%omega - low%omega) then
+               ! A chord has the slope that the parabola has in the middle of its interval, and
+               ! that slope is linear: from the middle of the lower interval it falls by 2
+               ! curvature per frequency.
                omega = best%omega + golden*(high%omega - best%omega)
             else
                omega = best%omega - golden*(best%omega - low%omega)
@@ -243,6 +248,7 @@ contains
       curvature = ((high%amplitude - best%amplitude)/(high%omega - best%omega) - &
                    (best%amplitude - low%amplitude)/(best%omega - low%omega))/ &
                   (high%omega - low%omega)
+      ! Beside the vertex the amplitude is that of the vertex + curvature d**2.
       if (curvature < 0.0_wp) spacing = sqrt(next_drop*best%amplitude/(-curvature))
       spacing = min(max(spacing, least_spacing*best%omega), largest_spacing*best%omega)
    end function spacing_of

@@ -173,6 +173,7 @@ contains
          status(7) = set_linear_solver(memory, c_loc(self%spgmr), c_null_ptr)
          status(8) = fidasetpreconditioner(memory, c_funloc(set_up), c_funloc(precondition))
          status(9) = fidasetinitstep(memory, first_step)
+         ! The last step then ends at n_cycles, instead of passing it.
          if (n_cycles < huge(1.0_wp)) status(9) = max(status(9), fidasetstoptime(memory, n_cycles))
       end associate
       done = all(status == 0)
@@ -275,6 +276,7 @@ contains
       x => values(y, state%system%n)
       dx => values(slope, state%system%n)
       f => values(residual, state%system%n)
+      ! The rates of wear at x come with the residual of the vibration.
       call state%system%residual(x, f)
       ! In units of force, so that both parts of the residual have one scale.
       f(n + 1:) = state%system%force_of_depth(dx(n + 1:) - state%system%rate)

@@ -130,6 +130,7 @@ contains
          else
             call one_step(self, system, state, after, iterations)
          end if
+         ! Between steps: within one the frequency is held (docs/theory.md, Wear).
          if (self%options%follow_resonance .and. .not. (allocated(self%ending) .or. &
              system%is_interrupted())) then
             call self%resonance%follow(self%stepper, system, after, iterations, error)
@@ -192,6 +193,8 @@ contains
       depth = maxval(state%x(system%n_vibration() + 1:))
       if (allocated(self%checked_rate) .and. depth < 2.0_wp*self%checked_depth) return
       if (depth <= 0.0_wp) return
+      ! The first time there is nothing to compare with: the rates are noted, and looked at again
+      ! when the depth has doubled.
       changed = .true.
       if (allocated(self%checked_rate)) then
          changed = maxval(abs(state%rate - self%checked_rate)) > unchanged*maxval(state%rate)
@@ -201,6 +204,7 @@ contains
       if (changed) return
       if (depth < system%compression()) return
       pressure = system%mean_pressure()
+      ! Every pair wears, or bears nothing.
       found = all(state%rate >= wears*maxval(state%rate) .or. pressure <= bears*maxval(pressure))
    end function in_gross_slip
 
@@ -243,6 +247,7 @@ contains
          if (.not. self%options%controls_error()) exit
          error = maxval(abs(report%error))/ &
                  max(maxval(after%x(system%n_vibration() + 1:)), tiny(1.0_wp))
+         ! Whether the step is taken or refused, the next one has this length.
          call adapt(self, cycles, error)
          if (error <= self%options%tolerance()) exit
          n_inaccurate = n_inaccurate + 1
@@ -256,6 +261,7 @@ contains
          self%n_rejected = self%n_rejected + 1
          cycles = self%next_cycles
       end do
+      ! The growth of the depth then limits the next step alone (next_step).
       if (.not. self%options%controls_error()) self%next_cycles = largest_growth*cycles
       self%n_steps = self%n_steps + 1
    end subroutine one_step
@@ -370,6 +376,7 @@ contains
       real(wp) :: factor
       integer :: exponent
 
+      ! The power of the step that the estimate goes with; halve_steps counts on the same.
       exponent = max(2, self%stepper%order)
       if (self%options%scheme == wear_explicit) exponent = 2
       factor = largest_growth

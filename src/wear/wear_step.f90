@@ -151,6 +151,7 @@ contains
       integer :: n
 
       n = system%n_vibration()
+      ! With the depths held the system is the balance alone, as any solver takes it.
       call system%hold_depths(state%x(n + 1:))
       call self%newton%solve(system%hbm_system, state%x(:n), report)
       call system%free_depths()
@@ -204,8 +205,10 @@ contains
       rate(:, 0) = before%rate
       associate (t => self%tableau)
          do s = 1, t%n_stages
+            ! What the stages before give at this one; its own rate is the unknown.
             base = before%x(n + 1:) + cycles*matmul(rate(:, 1:s - 1), t%a(s, 1:s - 1))
             call system%begin_step(base, t%gamma*cycles)
+            ! A guess: the rate of the stage before, of the first one that at the start.
             after%x(n + 1:) = base + t%gamma*cycles*rate(:, s - 1)
             call self%newton%solve(system, after%x, solution)
             report%iterations = report%iterations + solution%iterations
@@ -214,6 +217,7 @@ contains
             rate(:, s) = system%rate
          end do
          report%error = cycles*matmul(rate, t%error)
+         ! Stiffly accurate: the last stage is the end of the step.
          after%rate = rate(:, t%n_stages)
       end associate
       after%residual = solution%residual

@@ -119,6 +119,8 @@ contains
             case default ! open: no force at all
             end select
          end if
+         ! A segment a..b of weight w has the moments w (sin(m b) - sin(m a))/m and w (cos(m a) -
+         ! cos(m b))/m: each breakpoint adds the fall of the weight times the waves there.
          before = before - behind
          call set_waves(self, j)
          associate (angle => self%path%angle(j), c => self%cosines, s => self%sines)
@@ -178,6 +180,7 @@ contains
       type(event_pair_type) :: wide
       integer :: harmonic(highest + 1), n
 
+      ! The same path with room for more moments; above their degree the curves are zero.
       harmonic = [(n, n=0, highest)]
       n = self%curves%degree
       call wide%reserve(max(highest, n), 1, 2*highest + 1)
@@ -285,6 +288,7 @@ contains
 
       tangential = 0.0_wp
       normal = 0.0_wp
+      ! Instants and segments both ascend: one pass through the segments serves all instants.
       j = 1
       do k = 1, n_time
          angle = 2.0_wp*pi*real(k - 1, wp)/real(n_time, wp)
@@ -421,6 +425,7 @@ contains
             call transpose_slope(n, harmonic, column, raw(:, 1))
             call transpose_slope(n, harmonic, column, raw(:, 4))
          end if
+         ! Of int slip N P' - mu int all N N', with dN = -dy_n.
          by_tangential = raw(:, 1)
          by_normal = -raw(:, 2) + c%mu*(raw(:, 3) + raw(:, 4))
       end associate
@@ -447,6 +452,7 @@ contains
 
       do h = 1, n_retained
          k = column(h)
+         ! The slope of cos(n tau) is -n sin(n tau), that of sin(n tau) is n cos(n tau).
          on_cosine = integral(k)
          if (harmonic(h) == 0) then
             integral(k) = 0.0_wp

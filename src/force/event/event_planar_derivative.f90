@@ -66,6 +66,7 @@ contains
 
       self%tangent = new_tangent(cells%n_coefficients)
       self%measures = measures
+      ! Outputs: the coefficients of both tangential components, then the friction path.
       n = 2*cells%n_coefficients + 1
       allocate (self%gradient(self%tangent%n_inputs, n), source=0.0_wp)
       allocate (self%row(self%tangent%n_inputs, buffer_size), self%projector(n, buffer_size))
@@ -143,6 +144,7 @@ contains
                ! Stick behind slip: its position is that of the last direction.
                call tangent%stop_slip(motion, cells, at, path%piece(i - 1)%v(:, 3))
             else if (.not. motion%remembers) then
+               ! At velocity level a stick holds no position that could depend on anything.
                tangent%dz = 0.0_wp
             end if
          else if (.not. piece%lands) then
@@ -205,6 +207,7 @@ contains
       real(wp), intent(in) :: row(:), projector(:), weight
 
       if (self%n_rows == buffer_size) call self%flush_rows()
+      ! Gathered, since one product of many rows is far faster than as many updates of rank one.
       self%n_rows = self%n_rows + 1
       self%row(:, self%n_rows) = row
       self%projector(:, self%n_rows) = projector
@@ -277,6 +280,7 @@ contains
              self%last_weight > 0.0_wp) then
             ! The end of the stretch before is the same node.
             associate (last => self%projector(:, self%n_rows))
+               ! Force and dphi are the same on both sides, so that only the weights add.
                last = (1.0_wp + weight/self%last_weight)*last
             end associate
             if (projects) call turn_node(self, cells, slide, k, weight)
@@ -311,6 +315,7 @@ contains
             else
                call waves_at(cells, at%angle, wave, slope)
             end if
+            ! The force turns by R n dphi; its coefficients are the quadrature against the waves.
             projector(:nc) = (-weight*at%radius*t(2))*cells%weight*wave
             projector(nc + 1:2*nc) = (weight*at%radius*t(1))*cells%weight*wave
             call turn_node(self, cells, slide, k, weight)
@@ -377,6 +382,8 @@ contains
       path = size(self%gradient, 2)
       associate (to => self%gradient(:, path), wave => self%tangent%wave, &
                  slope => self%tangent%slope)
+         ! d(N pull) = dN pull + N (t.dP' - dR'), with dN = -dy_n and dR' = -mu dy_n'; at velocity
+         ! level the pull is t.P - R.
          if (motion%remembers) then
             to(:nc) = to(:nc) + normal*t(1)*slope
             to(nc + 1:2*nc) = to(nc + 1:2*nc) + normal*t(2)*slope
@@ -432,6 +439,7 @@ contains
             ! Collocation may skip instants.
             if (.not. any(abs(weight) > 0.0_wp)) cycle
             if (piece%phase == phase_slip) then
+               ! Slip: dT = R n dphi + t dR, with dR = -mu dy_n.
                at = motion%at_node(cells, 2*k - 1)
                ! Instants are starts of cells, and a stretch of slip covers no more than a cell: its
                ! start.
@@ -445,6 +453,7 @@ contains
                end do
                cycle
             end if
+            ! Stick: dT = dP - dz.
             do c = 1, 2
                projector = 0.0_wp
                projector((c - 1)*nc + 1:c*nc) = -weight

@@ -94,6 +94,7 @@ contains
             end if
          end associate
       end do
+      ! Every node meets its waves once, whatever the number of stretches that have added to it.
       call add_contact(self, path)
       call dgemm('N', 'T', nc, 2, 2*cells%n_cells, 1.0_wp, cells%node, nc, self%node, 2, 1.0_wp, &
                  self%projected, nc)
@@ -228,6 +229,7 @@ contains
                   ! Starts of cells are starts of stretches of slip.
                   values(:, k) = at%radius*direction_of(piece%v(:, 1))
                else
+                  ! T = P - z.
                   values(:, k) = at%p - piece%z
                end if
             end do

@@ -234,6 +234,7 @@ contains
          first(:, 1) = n(1)*self%slope
          first(:, 2) = n(2)*self%slope
          first(:, 3) = dot_product(n, from%ddp)*dtheta
+         ! v is the vector of half the angle.
          phi = 2.0_wp*atan2(v(2), v(1))
       end associate
       change = 0.0_wp

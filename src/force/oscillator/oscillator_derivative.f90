@@ -74,6 +74,8 @@ contains
       self%one%sine = self%contact%sine - self%stick%sine
       raw = 0.0_wp
       associate (w => self%waves, normal => self%curves%normal, nr => n_retained)
+         ! Of the driven velocities in both directions of slip the half-sum answers to P, the
+         ! half-difference to -Q; -pi because dN = -dy_n.
          self%answer = 0.5_wp*(w%rate(1)%p + w%rate(-1)%p)
          call self%slip%project(-pi, self%answer, nr, harmonic, column, raw(:, 3))
          self%answer = 0.5_wp*(w%rate(1)%p - w%rate(-1)%p)
@@ -89,6 +91,8 @@ contains
          if (n == 0) cycle
          k = column(h)
          do c = 1, 2
+            ! The driven x' under cos(n tau) is the real part of i n e^(i n tau)/E_n, under sin(n
+            ! tau) the imaginary one.
             answer = cmplx(0.0_wp, n, wp)*cmplx(raw(k, c), raw(k + 1, c), wp) &
                      /self%waves%oscillator%impedance(n)
             slope(k, c) = slope(k, c) + real(answer, wp)
@@ -112,6 +116,7 @@ contains
          do h = 1, n_retained
             k = column(h)
             call integrate_wave(o, harmonic(h), a, b, phi, row)
+            ! x' of the free motion is linear in where it starts.
             integral = row(1)*self%turn%free(1, j) + row(2)*self%turn%free(2, j)
             slope(k) = slope(k) - side*real(integral, wp)
             if (harmonic(h) > 0) slope(k + 1) = slope(k + 1) - side*aimag(integral)

@@ -158,6 +158,7 @@ contains
          knot%x(1) = phi(1, 1)*motion%x(1) + phi(1, 2)*motion%x(2)
          knot%x(2) = phi(2, 1)*motion%x(1) + phi(2, 2)*motion%x(2)
          knot%value = knot%value + knot%x(2)
+         ! x'' = -(k x + c x')/m of a motion without load.
          knot%slope = knot%slope - (o%k*knot%x(1) + o%c*knot%x(2))/o%m
       end associate
    end subroutine add_motion
@@ -192,6 +193,7 @@ contains
 
       found = .false.
       root = right%angle
+      ! Parts of the cell wait on a stack, the leftmost on top: the root found first is the first.
       first = left
       n_waiting = 1
       waiting(1) = right
@@ -238,6 +240,7 @@ contains
       angle = low
       ! f is round-off there already.
       if (side*left%value <= 0.0_wp) return
+      ! Where the chord is zero.
       angle = low + (high - low)*(left%value/(left%value - right%value))
       do k = 1, newton_steps
          call look(wave, motion, angle, knot)
