@@ -39,6 +39,7 @@ module fw_floating_point
 
 contains
 
+   !> Save what the caller has set, clear the flags and switch the traps off.
    subroutine enter(self)
       class(floating_point_scope), intent(inout) :: self
       integer(c_int) :: ignored
@@ -46,6 +47,7 @@ contains
       ignored = c_feholdexcept(self%environment)
    end subroutine enter
 
+   !> Put it back; flags that were raised inside are forgotten.
    subroutine leave(self)
       class(floating_point_scope), intent(in) :: self
       integer(c_int) :: ignored

@@ -58,6 +58,7 @@ contains
       !$omp end critical (fretwear_threads)
    end subroutine enter
 
+   !> Take back what `enter` has set.
    subroutine leave(self)
       class(thread_scope), intent(in) :: self
 

@@ -37,6 +37,7 @@ contains
          call list_elements(entry%sections, dims, elements, message)
          if (allocated(message)) return
          n_values = value_count(entry)
+         ! One value stands for all elements where the key allows it, whatever the subscripts name.
          if (n_values /= size(elements) .and. .not. (repeats .and. n_values == 1)) then
             message = 'has '//to_text(n_values)//plural(' value', n_values)//': must be '// &
                       to_text(size(elements))//count_text(dims, size(entry%sections) > 0)
@@ -93,6 +94,8 @@ contains
                    ': must have '//to_text(size(dims))
          return
       end if
+      ! Element (i, j, ..) stands at 1 + (i - 1) + (j - 1) dims(1) + ..: dimension by dimension,
+      ! every offset is combined with what is there.
       elements = [1]
       stride = 1
       do i = 1, size(dims)

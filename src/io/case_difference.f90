@@ -34,6 +34,7 @@ contains
       if (allocated(error)) return
       call compare(a, b, ignored, in_first, in_second)
       if (len(in_first) > 0) return
+      ! Keys that only the second namelist has.
       call compare(b, a, ignored, in_second, in_first)
    end subroutine find_difference
 
@@ -66,6 +67,7 @@ contains
       type(value_type), allocatable :: values(:)
       integer :: i
 
+      ! So that 2*0.5 and 0.5, 0.5 are the same.
       call multiply_out(entry%values, values)
       text = ''
       do i = 1, size(values)

@@ -307,6 +307,7 @@ contains
       call self%append_flat(file, shape(values), values, error)
    end subroutine append_real_3
 
+   !> A row of any shape, its elements in their order in memory: h5py shows the dimensions reversed.
    subroutine append_flat(self, file, dims, values, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -365,6 +366,7 @@ contains
       if (.not. allocated(error)) call self%grow(file, 1, error)
       if (allocated(error) .or. product(self%row) == 0) return
       start = 0
+      ! HDF5 counts from 0, and `grow` has counted the row already.
       start(n) = self%n_rows - 1
       call h5dget_space_f(self%id, space, status)
       call h5sselect_hyperslab_f(space, h5s_select_set_f, start, self%row, status)

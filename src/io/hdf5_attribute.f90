@@ -180,6 +180,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer, target :: buffer
 
+      ! A target of its own, whose address can be taken.
       buffer = value
       call write_number(file, object, name, h5kind_to_type(kind(0), h5_integer_kind), &
                         c_loc(buffer), error)
@@ -215,6 +216,7 @@ contains
       end if
       call h5aopen_by_name_f(file%id, object, name, id, status)
       call h5aget_type_f(id, type_id, status)
+      ! The class alone: HDF5 converts every width and order of bytes.
       call h5tget_class_f(type_id, class, status)
       call h5tclose_f(type_id, status)
       call h5aget_space_f(id, space, status)
@@ -247,6 +249,7 @@ contains
       type(c_ptr) :: buffer
       integer :: status, ignored
 
+      ! The interface wants a variable, although the address stays.
       buffer = address
       call h5aread_f(id, type_id, buffer, status)
       call h5aclose_f(id, ignored)

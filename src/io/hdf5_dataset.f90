@@ -153,6 +153,7 @@ contains
       logical :: accepted
 
       call h5dget_type_f(dataset%id, type_id, status)
+      ! Any width and order of bytes is accepted, since HDF5 converts them.
       call h5tget_class_f(type_id, class, status)
       call h5tclose_f(type_id, status)
       select case (kind)

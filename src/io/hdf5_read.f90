@@ -70,6 +70,7 @@ contains
       call fill_real(file, name, dataset, size(values), values, error)
    end subroutine read_real_1
 
+   !> Ranks 2 to 4 as rank 1, with the dimensions in the order of Fortran.
    subroutine read_real_2(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -109,6 +110,7 @@ contains
       call fill_real(file, name, dataset, size(values), values, error)
    end subroutine read_real_4
 
+   !> Integers as reals, rank by rank; see fill_integer for their range.
    subroutine read_integer_0(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name

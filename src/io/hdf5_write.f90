@@ -109,6 +109,7 @@ contains
       if (status < 0) call dataset_failure(file, name, 'cannot be written (disk full?)', error)
    end subroutine write_dataset_raw
 
+   !> Every rank hands on its shape and its elements in their order in memory.
    subroutine write_real_0(file, name, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
@@ -211,6 +212,7 @@ contains
                              c_loc(values), error)
    end subroutine put_real
 
+   !> As put_real; 32 bits in the file too.
    subroutine put_integer(file, name, dims, values, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name

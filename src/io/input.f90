@@ -125,6 +125,7 @@ contains
       if (i_entry == 0) return
       associate (entry => self%namelist%entries(i_entry))
          if (allocated(entry%raw)) then
+            ! A comma at the end is in `raw` only: the values have lost it.
             is_alone = size(entry%values) == 1 .and. index(entry%raw, ',', .true.) < len(entry%raw)
             if (is_true(free_text)) is_alone = is_alone .or. .not. entry%values(1)%quoted
             if (is_alone) return
@@ -151,6 +152,7 @@ contains
       first = 0
       do i = 1, self%namelist%n_entries
          if (.not. is_entry(self%namelist%entries(i), group, key)) cycle
+         ! An override may repeat what the file gives; the file may not repeat itself.
          if (first > 0 .and. .not. allocated(self%namelist%entries(i)%option)) then
             call self%blame(i, '&'//group//' '//key//' is given twice (first in line '// &
                             to_text(self%namelist%entries(first)%line)//'): keep one')
@@ -278,6 +280,7 @@ contains
 
       place = self%namelist%source
       if (i_entry > 0) place = location(self%namelist%entries(i_entry), self%namelist%source)
+      ! The line of the value, where an assignment goes over several; an override has none.
       if (present(line)) then
          if (.not. allocated(self%namelist%entries(i_entry)%option)) then
             place = self%namelist%source//':'//to_text(line)
@@ -308,6 +311,7 @@ contains
       call fatal_error(error, message, status_input)
    end subroutine raise
 
+   !> A flag that may be absent: then it is false.
    pure logical function is_true(flag)
       logical, intent(in), optional :: flag
 

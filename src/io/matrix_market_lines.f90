@@ -220,6 +220,7 @@ contains
       n = 0
       start = 1
       do while (n < most .and. start <= len(text))
+         ! `verify` finds where the next word begins, `scan` the blank behind it.
          length = verify(text(start:), blanks)
          if (length == 0) exit
          n = n + 1

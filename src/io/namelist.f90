@@ -29,6 +29,7 @@ contains
       input%source = source
       allocate (input%groups(0), input%entries(16))
       cursor%text = text
+      ! The mark that some editors put first is three bytes long.
       if (index(text, byte_order_mark()) == 1) cursor%position = 4
       do
          call cursor%skip_blank()

@@ -53,6 +53,7 @@ contains
       type(entry_type), allocatable :: larger(:)
 
       if (namelist%n_entries == size(namelist%entries)) then
+         ! Doubled, so that the cost stays in proportion to the length of the file.
          allocate (larger(2*size(namelist%entries)))
          larger(:namelist%n_entries) = namelist%entries
          call move_alloc(larger, namelist%entries)
@@ -68,6 +69,7 @@ contains
 
       value_count = 0
       do i = 1, size(entry%values)
+         ! Repeat counts are whatever the file says: the sum must not overflow.
          if (entry%values(i)%repeat > huge(1) - value_count) then
             value_count = huge(1)
             return
@@ -121,6 +123,7 @@ contains
       type(namelist_type), intent(in) :: input
       character(*), intent(in) :: group, key
 
+      ! From the end: the later assignment holds, and overrides stand behind the file.
       do i = input%n_entries, 1, -1
          if (is_entry(input%entries(i), group, key)) return
       end do

@@ -65,6 +65,7 @@ contains
             ok = ok .and. section%last >= section%first
          end if
       end if
+      ! With one colon at most.
       ok = ok .and. status == 0 .and. section%first > 0 .and. index(text, ':', .true.) == colon
    end function to_section
 

@@ -34,6 +34,7 @@ contains
       end do
    end subroutine number_patches
 
+   !> How many volumes a row of a wear run has.
    pure integer function count_patches(contact) result(n)
       type(contact_type), intent(in) :: contact
       type(string_type), allocatable :: patches(:)

@@ -218,6 +218,7 @@ contains
       is_response = case%analysis == analysis_frf .or. case%analysis == analysis_point
    end function is_response
 
+   !> Only a branch turns back.
    pure logical function follows_branch(case)
       type(case_type), intent(in) :: case
 
@@ -244,6 +245,7 @@ contains
       asks_stability = case%sweep%stability
    end function asks_stability
 
+   !> Pairs that exist, and that the output has not been told to leave out.
    pure logical function shows_contact(case)
       type(case_type), intent(in) :: case
 
@@ -265,6 +267,7 @@ contains
       values = [point%omega]
    end subroutine omega
 
+   !> (2H+1, n_observed) in memory: h5py shows the observed quantity last, so that it runs fastest.
    subroutine coefficients(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -374,6 +377,7 @@ contains
       if (allocated(point%force)) values = reshape(point%force, [size(point%force)])
    end subroutine force
 
+   !> (3, n_pairs) in memory, as h5py shows it reversed.
    subroutine fraction(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -388,6 +392,7 @@ contains
       if (allocated(point%dissipation)) values = point%dissipation
    end subroutine dissipation
 
+   !> (n_time, n_observed) in memory: turned as the coefficients are.
    subroutine history(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -395,6 +400,7 @@ contains
       if (allocated(point%history)) values = by_rows(point%history)
    end subroutine history
 
+   !> (3, n_pairs, n_time) in memory, as h5py shows it reversed; displacements likewise.
    subroutine force_history(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
@@ -413,6 +419,7 @@ contains
       end if
    end subroutine slip_history
 
+   !> A point with depths is a step of wear; any other has no row in these quantities.
    subroutine cycles(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)

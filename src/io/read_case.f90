@@ -131,6 +131,7 @@ contains
       call reader%amend('harmonics', 'n_harmonics', to_text(most_for_accuracy))
    end subroutine choose_harmonics
 
+   !> Whether the response has harmonics that the load has not: a spring of power 1 is linear.
    pure logical function has_nonlinear(case)
       type(case_type), intent(in) :: case
 
@@ -163,6 +164,7 @@ contains
       type(file_model_type), intent(in), optional :: memory_model
       type(file_model_type) :: raw
 
+      ! Sizes (n_dof, n_pairs, n_springs) are told before the arrays whose shapes name them.
       call case%bind_keys(reader)
       call read_structure(reader, path, case, raw, error, memory_model)
       if (allocated(error)) return
@@ -187,6 +189,8 @@ contains
       type(error_type), allocatable :: ignored
 
       call new_reader(reader, '', '', none, ignored)
+      ! What an empty input lacks is an error that nobody asks for; the keys are on record all the
+      ! same.
       call read_keys(reader, '', case, ignored)
       keys = reader%records
    end subroutine list_keys

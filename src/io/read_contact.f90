@@ -173,6 +173,7 @@ contains
                             "', but law = '"//trim(law_words(contact%law))// &
                             "': remove it or change the law")
       end if
+      ! Components of their own beside the constants: results and restarts hold them.
       contact%tangential_stiffness = contact%constants%get('tangential_stiffness', contact%n_pairs)
       contact%normal_stiffness = contact%constants%get('normal_stiffness', contact%n_pairs)
       if (reader%failed()) return

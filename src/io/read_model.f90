@@ -114,6 +114,7 @@ contains
       if (allocated(error)) error%message = reader%place_of('model', 'file')//': '//error%message
    end subroutine read_file
 
+   !> What is read is forgotten: the trial only has to return from it.
    subroutine read_in_trial(self, path)
       class(model_trial), intent(in) :: self
       character(*), intent(in) :: path
@@ -148,6 +149,7 @@ contains
 
    contains
 
+      !> An inline matrix becomes the model's; beside a complete model it is refused.
       subroutine take(key, given, matrix)
          character(*), intent(in) :: key
          real(wp), allocatable, intent(inout) :: given(:, :), matrix(:, :)
@@ -188,6 +190,8 @@ contains
       model%load_static = raw%load_static
       model%load_cosine = options%harmonic_scale*raw%load_cosine
       model%load_sine = options%harmonic_scale*raw%load_sine
+      ! Rotation comes before damping, which takes the stiffness at speed, and before the static
+      ! scale, which multiplies the load of the rotation too.
       call add_rotation(reader, options%rotation_speed, raw, model)
       model%load_static = options%static_scale*model%load_static
       if (allocated(raw%damping)) then
@@ -198,6 +202,7 @@ contains
       model%damping = model%damping + options%rayleigh_mass*model%mass &
                       + options%rayleigh_stiffness*model%stiffness
       if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
+      ! Last: its modes are those of the rotating structure, contact open.
       if (options%modal_damping > 0.0_wp) then
          call add_modal_damping(model%mass, model%stiffness, options%modal_damping, model%damping, &
                                 error)
@@ -248,6 +253,7 @@ contains
 
    contains
 
+      !> What is wrong inline is blamed on the key, else on whoever holds the model.
       subroutine check_one(key, matrix)
          character(*), intent(in) :: key
          real(wp), intent(inout) :: matrix(:, :)
@@ -264,6 +270,7 @@ contains
 
    end subroutine check_parts
 
+   !> A relative file starts at the folder of the namelist, whose name ends in its slash.
    pure function in_directory(file, directory) result(path)
       character(*), intent(in) :: file, directory
       character(:), allocatable :: path

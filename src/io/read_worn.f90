@@ -108,6 +108,7 @@ contains
       call file%close(ignored)
    end subroutine load_depths
 
+   !> As that of model files: nothing is kept.
    subroutine read_in_trial(self, path)
       class(worn_trial), intent(in) :: self
       character(*), intent(in) :: path

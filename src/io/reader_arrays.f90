@@ -14,6 +14,7 @@ contains
       call take_numbers(self, key, real_kind, values, needed, default)
    end procedure bind_reals
 
+   !> By way of reals, in which every whole number of 32 bits is exact.
    module procedure bind_integers
       real(wp), allocatable :: numbers(:)
 
@@ -46,6 +47,7 @@ contains
       text = ''
       if (present(default)) text = kind_text(default, kind)
       call self%note(key, kind_name(kind), accepts, text)
+      ! What the model holds is checked even where the namelist replaces all of it.
       if (allocated(numbers)) call check_held(self, key, range, dims, accepts, numbers)
       is_given = self%given(self%group, trim(key%name))
       if (.not. is_given) call blame_missing(self, key, accepts, dims, needed)
@@ -58,6 +60,7 @@ contains
          ! Empty where it is refused: it was given.
          if (.not. allocated(source%entry)) allocate (numbers(0))
       else
+         ! Elements may be left out where they have a value already.
          call self%find_elements(self%group, trim(key%name), accepts, dims, key%repeats, &
                                  allocated(numbers), source)
       end if
@@ -143,6 +146,7 @@ contains
       bounded = range
       if (len_trim(range%within) == 0) return
       extent = self%extents(range%within)
+      ! A size that nobody has told bounds nothing.
       if (extent(1) == 0) return
       bounded%least = -real(extent(1), wp)
       bounded%most = real(extent(1), wp)

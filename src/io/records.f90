@@ -126,6 +126,7 @@ contains
       end do
    end function to_namelist
 
+   !> `key = value`, and what is accepted behind it where both fit a line.
    pure function record_text(record) result(text)
       type(record_type), intent(in) :: record
       character(:), allocatable :: text
@@ -138,6 +139,7 @@ contains
       text = text//new_line('a')
    end function record_text
 
+   !> In the order of the records: some hundred, each asked for a few times.
    pure integer function find(self, group, key) result(i)
       class(record_list), intent(in) :: self
       character(*), intent(in) :: group, key

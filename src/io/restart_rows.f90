@@ -37,6 +37,7 @@ module fw_restart_rows
    character(*), parameter :: pair_keys(*) = [character(20) :: 'mu', 'gap', 'area', &
       'normal_load', 'tangential_stiffness', 'normal_stiffness', 'worn']
 
+   !> Places of the datasets in `list`.
    integer, parameter :: d_vibration = 1, d_checked_rate = 2, d_control = 3
    integer, parameter :: n_datasets = 3
 
@@ -80,6 +81,7 @@ contains
       if (allocated(error)) return
       call self%list(d_control)%create(file, '/restart/control', growing_real, [n_controls], error)
       if (allocated(error)) return
+      ! Once, not step by step: they tell whether a later case has the same joint.
       call write_dataset(file, '/restart/pairs', pair_constants(contact), error)
       if (.not. allocated(error)) call write_attribute(file, '/restart/control', 'columns', &
                                                        strings_of(control_words), error)
@@ -129,6 +131,7 @@ contains
          if (allocated(march%checked_rate)) then
             call self%list(d_checked_rate)%append(file, march%checked_rate, error)
          else
+            ! Gross slip was not looked for yet: the row reads as NaN.
             call self%list(d_checked_rate)%skip(file, 1, error)
          end if
       end if

@@ -81,6 +81,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine open
 
+   !> Procedures without a critical section are called within one: such sections do not nest.
    subroutine create_file(self, case, error)
       class(result_writer), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -243,8 +244,10 @@ contains
          call write_attribute(self%file, '/', 'sampling', trim(sampling_words(sampling)), error)
       end if
       if (.not. allocated(error)) then
+         ! The last attribute: whoever finds it finds everything else too.
          call write_attribute(self%file, '/', 'status', trim(status), error)
       end if
+      ! Before the file: open datasets would keep it open.
       call self%rows%close()
       if (self%in_memory .and. .not. allocated(error)) call self%file%image(self%image, error)
       call self%file%close(close_error)
@@ -285,6 +288,7 @@ contains
       if (allocated(error)) return
       call write_attribute(file, '/', 'fretwear_version', version, error)
       if (allocated(error)) return
+      ! Until the run is over; a file that is cut short keeps it.
       call write_attribute(file, '/', 'status', 'incomplete', error)
       if (allocated(error)) return
       call write_attribute(file, '/', 'elapsed', 0.0_wp, error)

@@ -68,6 +68,7 @@ contains
                                         quantity%long_name), unit_system, error)
    end subroutine label_quantity
 
+   !> No attribute `units` where the unit is not known: a blank one would say that there is none.
    subroutine write_label(file, label, unit_system, error)
       type(hdf5_file), intent(in) :: file
       type(label_type), intent(in) :: label

@@ -138,6 +138,7 @@ contains
       call file%close(error)
    end function was_locked_here
 
+   !> `<target>.part`, then `<target>.part.2` and so on.
    pure function part_name(target, i) result(part)
       character(*), intent(in) :: target
       integer, intent(in) :: i

@@ -115,6 +115,7 @@ contains
       integer(c_int), parameter :: processor_time = 0, core_file = 4, standard_error = 2
       integer(c_int) :: status
 
+      ! No core file, an end to endless loops, and none of the library's words on the terminal.
       status = c_setrlimit(core_file, [0_c_long, 0_c_long])
       status = c_setrlimit(processor_time, [seconds, seconds + 1_c_long])
       status = c_close(standard_error)
