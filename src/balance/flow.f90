@@ -86,6 +86,7 @@ contains
    subroutine fill_flow(balance, flow, h, p)
       type(hbm_system), intent(in) :: balance
       integer, intent(in) :: flow, h
+      !> P of the harmonic (n_coordinates, n_coordinates), of the unit of a stiffness.
       complex(wp), intent(out), contiguous :: p(:, :)
       real(wp) :: omega, mean_mass, mass(size(p, 1), size(p, 2))
       integer :: i, n
@@ -113,6 +114,7 @@ contains
    subroutine add_closed_joint(balance, h, p)
       type(hbm_system), intent(in) :: balance
       integer, intent(in) :: h
+      !> Grows by B^T k B of every pair (n_coordinates, n_coordinates).
       complex(wp), intent(inout) :: p(:, :)
       integer :: i, c
 

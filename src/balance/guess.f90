@@ -92,6 +92,7 @@ contains
    !> Solve with closed pairs stuck; tension is their mean normal force (positive: it pulls).
    subroutine linear_solution(system, closed, x, tension)
       type(hbm_system), intent(in) :: system
+      !> Pairs that are taken for stuck (n_pairs).
       logical, intent(in) :: closed(:)
       real(wp), intent(out), contiguous :: x(:)
       !> Zero where there is no normal dof, and without a harmonic 0.
@@ -126,6 +127,7 @@ contains
       type(hbm_system), intent(in) :: system
       logical, intent(in) :: closed(:)
       integer, intent(in) :: h
+      !> Of one harmonic: (n_coordinates, n_coordinates) and (n_coordinates).
       complex(wp), intent(inout) :: stiffness(:, :), force(:), q(:)
       !> Coordinates of rigid closed pairs, whose values stand in q; with elastic pairs none is
       !> held.
@@ -173,8 +175,10 @@ contains
 
    !> Solve for the coordinates that are not held.
    subroutine solve_free(stiffness, force, held, q)
+      !> Of one harmonic (n_coordinates, n_coordinates) and (n_coordinates).
       complex(wp), intent(in) :: stiffness(:, :), force(:)
       logical, intent(in) :: held(:)
+      !> Held values on entry, all values on leaving (n_coordinates).
       complex(wp), intent(inout) :: q(:)
       type(complex_lu_type) :: lu
       complex(wp), allocatable :: rhs(:, :)
@@ -202,6 +206,7 @@ contains
       type(hbm_system), intent(in) :: system
       !> Of the structure, where the pairs take the balance.
       complex(wp), intent(in) :: stiffness(:, :)
+      !> Coordinates at rest (n_coordinates).
       complex(wp), intent(in) :: q(:)
       real(wp), intent(out) :: tension(:)
       real(wp) :: opening(size(tension))

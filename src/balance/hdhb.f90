@@ -56,6 +56,7 @@ contains
    subroutine to_values(self, n_rows, coefficients, values)
       class(hdhb_system), intent(inout) :: self
       integer, intent(in) :: n_rows
+      !> Both flat with the rows innermost: (n_rows, n_coefficients) and (n_rows, n_time).
       real(wp), intent(in), contiguous :: coefficients(:)
       real(wp), intent(inout), contiguous :: values(:)
 

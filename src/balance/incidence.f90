@@ -65,6 +65,7 @@ contains
    pure subroutine weights_of(self, row, weights)
       class(incidence_type), intent(in) :: self
       integer, intent(in) :: row
+      !> Weights of all coordinates (n_coordinates).
       real(wp), intent(out) :: weights(:)
       integer :: e
 
@@ -77,6 +78,7 @@ contains
    !> values = B q for rows in the order given; 0 where a row is 0.
    pure subroutine gather(self, rows, n_coordinates, n_columns, q, values)
       class(incidence_type), intent(in) :: self
+      !> Numbers of rows, 0 for none.
       integer, intent(in) :: rows(:)
       integer, intent(in) :: n_coordinates, n_columns
       real(wp), intent(in) :: q(n_coordinates, n_columns)
@@ -120,6 +122,7 @@ contains
    pure subroutine gather_row(self, row, map, n_mapped, factor, q, values)
       class(incidence_type), intent(in) :: self
       integer, intent(in) :: row
+      !> Place of each coordinate in q, see the module header (n_coordinates).
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: factor
@@ -165,6 +168,7 @@ contains
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       complex(wp), intent(in) :: factor
+      !> Complex amplitudes (n_mapped, any number of columns).
       complex(wp), intent(in) :: q(:, :)
       complex(wp), intent(out) :: values(:)
       integer :: e, place
@@ -196,6 +200,7 @@ contains
       class(incidence_type), intent(in) :: self
       integer, intent(in) :: row, h
       complex(wp), intent(in) :: stiffness
+      !> Block of the harmonic (n_coordinates, n_coordinates).
       complex(wp), intent(inout) :: matrix(:, :)
       integer :: e, f
 
@@ -217,6 +222,7 @@ contains
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       complex(wp), intent(in) :: stiffness
+      !> Block of the harmonic, n_mapped rows and columns of it.
       complex(sp), intent(inout) :: matrix(:, :)
       integer :: e, f, i, j
 

@@ -20,6 +20,7 @@ contains
    !> forces, states and dissipation.
    subroutine recover_point(system, x, n_harmonics, with_contact, point)
       type(hbm_system), intent(inout) :: system
+      !> Coordinates (n_coordinates, n_coefficients), flat.
       real(wp), intent(in), contiguous :: x(:)
       !> H of the result, whatever harmonics were computed.
       integer, intent(in) :: n_harmonics
@@ -54,6 +55,7 @@ contains
    !> only the target has start at zero.
    pure subroutine carry_solution(source, x, target, y)
       type(hbm_system), intent(in) :: source, target
+      !> Unknowns of either system, flat with the coordinates innermost.
       real(wp), intent(in) :: x(:)
       real(wp), intent(out) :: y(:)
       integer :: h, j, c
@@ -131,6 +133,7 @@ contains
    subroutine dissipated_energy(system, m, q, point)
       type(hbm_system), intent(in) :: system
       integer, intent(in) :: m
+      !> Coordinates of the last evaluation (m, n_coefficients).
       real(wp), intent(in) :: q(m, *)
       type(point_type), intent(inout) :: point
       real(wp) :: u(system%n_pairs, 3, system%fourier%n_coefficients)
@@ -186,6 +189,7 @@ contains
    !> Largest magnitude over the period of u(tau) given by (0, c1, s1, ...): a grid fine enough to
    !> bracket every extremum, then Newton's method on the slope.
    pure real(wp) function largest_magnitude(coefficients) result(largest)
+      !> Mean, then cosine and sine of each harmonic (2H+1).
       real(wp), intent(in) :: coefficients(:)
       integer, parameter :: points_per_wave = 16, newton_steps = 4
       real(wp) :: value, slope, curvature, tau, spacing, step, on_grid

@@ -294,6 +294,7 @@ contains
       status = int(call_run(id_of(handle)), c_int)
    end function c_run_case
 
+   !> From any thread, while a call is at work on the handle; status_usage where none is.
    integer(c_int) function c_stop(handle) bind(c, name='fw_stop') result(status)
       type(c_ptr), value :: handle
 

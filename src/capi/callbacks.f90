@@ -87,6 +87,7 @@ module fw_callbacks
 
 contains
 
+   !> Another thread may set the flag at any time: hence atomic.
    subroutine poll(self)
       class(callback_observer), intent(inout) :: self
       logical :: asked
@@ -127,6 +128,7 @@ contains
       end if
    end subroutine on_point
 
+   !> Lines of text go to C alone.
    subroutine on_message(self, text)
       class(callback_observer), intent(inout) :: self
       character(*), intent(in) :: text

@@ -47,6 +47,7 @@ contains
       if (problem /= 0) return
       handle%message = ''
       !$omp critical (fretwear_handles)
+      ! Numbers are never given twice, so that they may run out.
       if (last_id < huge(last_id)) then
          last_id = last_id + 1
          id = last_id
@@ -93,6 +94,7 @@ contains
       end if
       !$omp end critical (fretwear_handles)
       status = status_usage
+      ! Outside of the lock: to free a system takes its time.
       if (.not. associated(handle)) return
       deallocate (handle)
       status = status_ok
@@ -117,6 +119,7 @@ contains
       end if
       !$omp end critical (fretwear_handles)
       if (.not. associated(handle)) return
+      ! What the call before had to say is over.
       handle%message = ''
       call handle%floating_point%enter()
    end subroutine enter

@@ -215,6 +215,7 @@ contains
       seconds = seconds + point%seconds
    end subroutine check
 
+   !> A level that was solved at this very frequency last is not solved again.
    pure logical function is_solved(level, omega)
       type(level_type), intent(in) :: level
       real(wp), intent(in) :: omega
@@ -234,6 +235,7 @@ contains
       integer :: k
 
       errors = [unknown, 0.0_wp]
+      ! With the number two below; with that one below where the other has no solution.
       do k = max(1, self%current - 2), self%current - 1
          call check(self, case, omega, k, self%doublings, iterations, seconds, error)
          if (allocated(error)) return
@@ -244,6 +246,7 @@ contains
          exit
       end do
       if (self%factor_time <= 0.0_wp) return
+      ! The same harmonics with half of the instants.
       call check(self, case, omega, self%current, self%doublings - 1, iterations, seconds, error)
       if (allocated(error)) return
       errors(2) = unknown
@@ -303,6 +306,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical :: more(2), possible(2)
 
+      ! Either of both may take half of what is allowed.
       more = errors > 0.5_wp*case%harmonics%accuracy
       possible = [self%current < size(self%n_harmonics), self%doublings < most]
       finer = all(possible .or. .not. more)
@@ -318,6 +322,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical :: less(2)
 
+      ! Down to the second number, which still has one below to be compared with.
       less = errors <= with_margin*case%harmonics%accuracy .and. &
              [self%current > 2, self%doublings > 0]
       if (any(less)) call move(self, case, self%current - merge(1, 0, less(1)), &
@@ -354,6 +359,7 @@ contains
       if (point%error_estimate > case%harmonics%accuracy) self%n_short = self%n_short + 1
    end subroutine note
 
+   !> What the points took, and where they miss the accuracy that was asked for.
    subroutine describe(self, case, state, summary, message)
       class(accuracy_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
@@ -377,6 +383,7 @@ contains
       message = message//': raise harmonics%n_harmonics, or ask for less'
    end subroutine describe
 
+   !> The level in use and its last solution.
    subroutine remember(self, memory)
       class(accuracy_solver), intent(in) :: self
       type(solver_memory), intent(out) :: memory
@@ -389,6 +396,7 @@ contains
       end associate
    end subroutine remember
 
+   !> Go on with that level: a solution fits no other.
    subroutine recall(self, memory)
       class(accuracy_solver), intent(inout) :: self
       type(solver_memory), intent(in) :: memory

@@ -67,6 +67,7 @@ contains
       call sinks%add(to_summary)
       call sinks%add(to_observer)
       call observer%on_start(case%title, to_observer%n_points)
+      ! A branch tells its peaks by its points; a single frequency has none.
       select type (source)
       type is (frequency_source)
          if (case%analysis == analysis_frf .and. size(source%omega) > 1) then

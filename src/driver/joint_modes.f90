@@ -114,6 +114,8 @@ contains
                   call add_spring(contact%side_1(c, i), contact%side_2(c, i), &
                                   law%prediction%stiffness(i, c), stiffness)
                else
+                  ! A law of positions that takes the balance, or a law of velocities: held
+                  ! rigidly.
                   call add_spring(contact%side_1(c, i), contact%side_2(c, i), rigid, stiffness)
                end if
             end do
@@ -128,6 +130,7 @@ contains
       real(wp), intent(inout) :: stiffness(:, :)
       integer :: dof(2), turn(2), a, b
 
+      ! coefficient b b^T, where b is +-1 at both dofs and the ground has no row.
       dof = abs([side_1, side_2])
       turn = [sign(1, side_1), -sign(1, side_2)]
       do b = 1, 2

@@ -47,11 +47,11 @@ module fw_point_solver
    !> Points that fail in a row after which a sweep spends less on a point: it has gone where no
    !> solution exists, or where none is found in this way.
    integer, parameter :: max_point_failures = 2
-   !> First and smallest step of the load on the way to a first solution.
    !> Iterations spent on a point after which no other way to it is begun, over max_iterations, of
    !> which at least as many count. (Where a sector loses its hold, points take 470 at most, and
    !> none of those with a solution took more than 25.)
    integer, parameter :: most_work = 20, least_counted = 60
+   !> First and smallest step of the load on the way to a first solution.
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
    type :: point_solver

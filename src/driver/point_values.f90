@@ -45,6 +45,7 @@ contains
                        status_usage)
    end subroutine get_point_values
 
+   !> Say which names there are, in the order of the table.
    subroutine unknown_name(name, list, error)
       character(*), intent(in) :: name
       type(quantity_type), intent(in) :: list(:)

@@ -36,6 +36,7 @@ module fw_remarks
 
 contains
 
+   !> A name for programs and a text for people.
    subroutine add(self, name, text)
       class(remark_list), intent(inout) :: self
       character(*), intent(in) :: name, text
@@ -125,6 +126,7 @@ contains
 
       n_bound = 0
       do i = 1, size(names)
+         ! The highest maximum of each quantity, where it has any.
          best = 0
          do k = 1, size(peaks)
             if (peaks(k)%observed /= i) cycle
@@ -165,6 +167,8 @@ contains
          scale(i) = sqrt(maxval(abs(matrix(:, i))))
       end do
       where (scale <= 0.0_wp) scale = 1.0_wp
+      ! Cholesky's method on the scaled matrix with round_off added to its diagonal: it fails where
+      ! a direction is negative by more than that.
       do j = 1, n
          factor(:, j) = matrix(:, j)/(scale*scale(j))
          factor(j, j) = factor(j, j) + round_off

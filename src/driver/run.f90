@@ -119,6 +119,7 @@ contains
       outcome%summary = summary%lines(state, elapsed)
    end subroutine run_case
 
+   !> A flag that may be absent: then it is true.
    pure logical function is_wanted(flag)
       logical, intent(in), optional :: flag
 

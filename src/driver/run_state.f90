@@ -41,6 +41,7 @@ contains
       all_converged = self%n_converged == self%n_points
    end function all_converged
 
+   !> A stop that came too late to leave anything out is none: then the points decide.
    pure integer function status(self)
       class(run_state), intent(in) :: self
 

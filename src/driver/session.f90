@@ -399,6 +399,7 @@ contains
       end if
    end subroutine get
 
+   !> Parts of a model need one that was begun: its sizes tell theirs.
    subroutine require_model(self, error)
       class(session_type), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -416,6 +417,7 @@ contains
       call forget_system(self)
    end subroutine forget
 
+   !> The system of the steps goes, and with it the solutions that they start from.
    subroutine forget_system(self)
       class(session_type), intent(inout) :: self
 

@@ -63,6 +63,7 @@ contains
       self%n = 0
    end subroutine clear
 
+   !> The other observer knows who asks for the end.
    subroutine poll(self)
       class(point_recorder), intent(inout) :: self
 
@@ -75,6 +76,7 @@ contains
       character(*), intent(in) :: case_title
       integer, intent(in) :: n_points
 
+      ! What ended an earlier run does not end this one.
       self%observer%stop_requested = .false.
       call self%observer%on_start(case_title, n_points)
       self%stop_requested = self%observer%stop_requested

@@ -61,6 +61,7 @@ module fw_summary
 
 contains
 
+   !> Nothing is known yet but the names of the observed quantities.
    pure function new_summary(case) result(self)
       type(case_type), intent(in) :: case
       type(summary_type) :: self
@@ -192,6 +193,7 @@ contains
       end select
    end function note_of
 
+   !> Work that the case did not need: a line of the table, and an attribute of the result.
    subroutine skip(self, words)
       class(summary_type), intent(inout) :: self
       character(*), intent(in) :: words

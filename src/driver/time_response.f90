@@ -169,6 +169,8 @@ contains
          call recover_point(self%system, self%solver%x, n_harmonics, .false., balance)
       end if
       associate (c => balance%coefficients)
+         ! At t = 0 the cosines add up to the displacement, n omega times the sines to the
+         ! velocity.
          state%displacement = c(1, :)
          allocate (state%velocity(size(c, 2)), source=0.0_wp)
          do h = 1, n_harmonics

@@ -331,6 +331,7 @@ contains
                                         march%stepper%newton)
       halved%resonance = resonance_type(n_harmonics=march%resonance%n_harmonics, &
                                         first=march%resonance%first)
+      ! From where the run itself began, its frequency included.
       end_state = first
       call system%set_frequency(first_omega, error)
       if (allocated(error)) return
@@ -349,6 +350,7 @@ contains
                         recorder%case%model%unit_system, error)
    end subroutine compare_halved
 
+   !> Nothing is kept of the states on the way.
    subroutine pass_by(self, march, system, state, iterations, go_on, error)
       class(silent_observer), intent(inout) :: self
       class(wear_march), intent(in) :: march
@@ -379,6 +381,7 @@ contains
       if (case%wear%scheme == wear_pseudo_time) units = 'pseudo-time in cycles'
    end function cycles_units
 
+   !> Largest depth [length]; 0 of a run that came to no state.
    pure real(wp) function depth_of(system, state) result(depth)
       type(wear_system), intent(in) :: system
       type(wear_state), intent(in) :: state
@@ -477,6 +480,8 @@ contains
       real(wp), intent(in) :: depth(:)
       real(wp) :: energy(size(depth))
 
+      ! A w/k_w is the friction energy under the law of energy; under Archard's the energy is mu of
+      ! it.
       energy = case%contact%area*(depth - case%contact%depth)/case%wear%coefficient
       if (case%wear%law /= wear_energy) energy = case%contact%mu*energy
    end function friction_energy

@@ -81,6 +81,7 @@ contains
    pure subroutine low_pass(self, fourier, coefficients)
       type(polynomial_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
+      !> Elongations (n_elements, 1, n_coefficients).
       real(wp), intent(inout) :: coefficients(:, :, :)
       integer :: h
 

@@ -15,6 +15,7 @@ contains
       !> Harmonics and their columns (n_retained).
       integer, intent(in) :: harmonic(:), column(:)
       integer, intent(in) :: n_rows
+      !> Real coefficients, constant or cosine and sine (n_rows, n_coefficients).
       real(wp), intent(in) :: coefficients(n_rows, *)
       !> Rows that `amplitudes` has in memory, at least n_rows.
       integer, intent(in) :: n_stored
@@ -33,9 +34,11 @@ contains
    end subroutine amplitudes_of
 
    pure subroutine coefficients_of(harmonic, column, n_rows, n_stored, amplitudes, coefficients)
+      !> Harmonics and their columns (n_retained).
       integer, intent(in) :: harmonic(:), column(:)
       !> Rows that are wanted, and rows in memory of both.
       integer, intent(in) :: n_rows, n_stored
+      !> Complex amplitudes, and real coefficients (n_stored, n_coefficients).
       complex(wp), intent(in) :: amplitudes(n_stored, *)
       real(wp), intent(inout) :: coefficients(n_stored, *)
       integer :: h, k

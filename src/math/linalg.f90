@@ -184,6 +184,7 @@ contains
 
    !> Eigenvalues of a symmetric matrix in ascending order; the matrix becomes its eigenvectors.
    subroutine diagonalize(matrix, values, purpose, error)
+      !> Symmetric (n, n); its eigenvectors in columns on leaving.
       real(wp), contiguous, intent(inout) :: matrix(:, :)
       real(wp), allocatable, intent(out) :: values(:)
       ! The matrix has to be symmetric; its upper triangle alone is read.

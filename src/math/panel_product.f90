@@ -33,9 +33,11 @@ contains
    subroutine multiply_panels(n_rows, n_inner, n_columns, panels, right, threaded, n_stored, &
                               product)
       integer, intent(in) :: n_rows, n_inner, n_columns, n_stored
+      !> The matrix in panels and the right-hand sides in groups, see the module header.
       real(wp), intent(in) :: panels(panel_height, n_inner, *)
       real(wp), intent(in) :: right(group_width, n_inner, *)
       logical, intent(in) :: threaded
+      !> Rows 1..n_rows of it are set (n_stored, n_columns).
       real(wp), intent(inout) :: product(n_stored, *)
       integer :: p
 

@@ -43,10 +43,13 @@ contains
       if (n_free == size(values)) return
       call condense(scaled(stiffness, scale), vectors, n_free, condensed, error)
       if (allocated(error)) return
+      ! With A = M**(-1/2) K M**(-1/2) the sum over the modes is 2 zeta M**(1/2) sqrt(A) M**(1/2),
+      ! without any mode by itself. In the eigenvectors of M its powers are diagonal.
       call weigh_by_mass(condensed, 1.0_wp/sqrt(values(n_free + 1:)))
       call take_root(condensed, root, error)
       if (allocated(error)) return
       call weigh_by_mass(root, sqrt(values(n_free + 1:)))
+      ! Back from these vectors to the scaled dofs, and from there to the dofs.
       vectors = vectors(:, n_free + 1:)
       call multiply('N', root, 'T', vectors, half)
       call multiply('N', vectors, 'N', half, root)
@@ -112,6 +115,8 @@ contains
       call multiply('T', vectors, 'N', half, rotated)
       condensed = rotated(n_free + 1:, n_free + 1:)
       if (n_free == 0) return
+      ! K_mm - K_mf K_ff^-1 K_fm of massive (m) and free (f) directions, by the eigenvectors of
+      ! K_ff.
       free = rotated(:n_free, :n_free)
       call diagonalize(free, values, 'modal_damping', error)
       if (allocated(error)) return
@@ -122,6 +127,7 @@ contains
          if (abs(values(j)) > rank_tolerance*maxval(abs(values))) then
             followed(j, :) = coupling(j, :)/values(j)
          else
+            ! Held by nothing: it stays where it is.
             followed(j, :) = 0.0_wp
          end if
       end do

@@ -45,9 +45,11 @@ contains
    subroutine form(self, basis, harmonic, theta, s, load, n_failed)
       class(formed_stiffness), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
+      !> Harmonics, and theta = (n omega)**2 + .. and s = n omega of each (n_retained).
       integer, intent(in) :: harmonic(:)
       complex(wp), intent(in) :: theta(:)
       real(wp), intent(in) :: s(:)
+      !> Condensed loads (n_coordinates, n_retained).
       complex(wp), intent(inout) :: load(:, :)
       !> Harmonics that hit a mode without damping.
       integer, intent(out) :: n_failed
@@ -69,6 +71,7 @@ contains
       integer, intent(in) :: n
       complex(wp), intent(in) :: theta
       real(wp), intent(in) :: s
+      !> Z_r (n_coordinates, n_coordinates) and the condensed load (n_coordinates).
       complex(wp), intent(inout), contiguous :: matrix(:, :)
       complex(wp), intent(inout) :: load(:)
       integer, intent(inout) :: n_failed
@@ -97,6 +100,7 @@ contains
       integer, intent(in) :: used(:)
       !> (size(used), n_active)
       complex(wp), intent(inout), contiguous :: matrix(:, :)
+      !> Load of the internal modes (n_internal), and that of the rows in use (n_used).
       complex(wp), intent(in), optional :: internal_load(:)
       complex(wp), intent(inout), optional :: load(:)
       complex(wp), allocatable :: z_iq(:, :), solved(:, :), part(:)
@@ -131,6 +135,7 @@ contains
       integer, intent(in) :: n, n_blocks
       complex(wp), intent(in) :: theta
       real(wp), intent(in) :: s
+      !> K, M and, with damping, C in columns (n, n_blocks).
       real(wp), intent(in) :: blocks(:, :)
       complex(wp), intent(out) :: z(n)
 
@@ -147,6 +152,7 @@ contains
    !> and below the last column, the rest by its symmetry.
    subroutine subtract_product(n_used, n_active, n_i, z_iq, solved, z)
       integer, intent(in) :: n_used, n_active, n_i
+      !> Z_iq of the rows in use, and D^-1 of its first n_active columns.
       complex(wp), intent(in) :: z_iq(n_i, n_used), solved(n_i, *)
       complex(wp), intent(inout) :: z(n_used, n_active)
       !> Columns of a block: fewer leave the product no speed.
@@ -171,6 +177,7 @@ contains
 
    !> Complex load of a harmonic from the static, cosine and sine parts in columns.
    pure function harmonic_load(parts, n) result(load)
+      !> Static, cosine and sine part (n, 3).
       real(wp), intent(in) :: parts(:, :)
       integer, intent(in) :: n
       complex(wp) :: load(size(parts, 1))
@@ -189,8 +196,10 @@ contains
    !> product = Z q.
    subroutine multiply(self, harmonic, column, m, q, product)
       class(formed_stiffness), intent(inout) :: self
+      !> Retained harmonics and their columns (n_retained).
       integer, intent(in) :: harmonic(:), column(:)
       integer, intent(in) :: m
+      !> Coordinates and product (m, n_coefficients).
       real(wp), intent(in) :: q(m, *)
       real(wp), intent(inout) :: product(m, *)
       integer :: h
@@ -210,6 +219,7 @@ contains
    subroutine gather(self, n_active, n_used, used)
       class(formed_stiffness), intent(inout) :: self
       integer, intent(in) :: n_active, n_used
+      !> Coordinates in use, those of the columns first (n_used).
       integer, intent(in) :: used(:)
       integer :: h, j, m, n, place
 
@@ -237,6 +247,7 @@ contains
       class(formed_stiffness), intent(inout) :: self
       integer, intent(in) :: harmonic(:), column(:)
       integer, intent(in) :: n_active, n_used, m
+      !> Coordinates of the columns (n_active, n_coefficients).
       real(wp), intent(in) :: v(n_active, *)
       real(wp), intent(inout) :: product(m, *)
       integer :: h

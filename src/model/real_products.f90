@@ -140,6 +140,7 @@ contains
    pure subroutine fill_rows(basis, n_active, n_used, used, n_inner, panels)
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n_active, n_used, n_inner
+      !> Coordinates in use; the first n_active of them are columns.
       integer, intent(in) :: used(:)
       real(wp), intent(inout) :: panels(panel_height, n_inner, *)
       integer :: b, i, j, k, p
@@ -196,6 +197,7 @@ contains
       type(harmonic_factors), intent(in) :: factors
       type(packed_blocks), intent(in) :: packed
       integer, intent(in) :: n_stored
+      !> Coordinates of the packed columns (n_active, n_coefficients).
       real(wp), intent(in) :: v(*)
       real(wp), intent(inout) :: product(n_stored, *)
 
@@ -222,6 +224,7 @@ contains
       type(reduction_type), intent(in) :: basis
       type(harmonic_factors), intent(in) :: factors
       integer, intent(in) :: n_used, n_active, n_stored
+      !> Packed blocks, as packed_blocks has them.
       real(wp), intent(in) :: rows(*), modes(*)
       real(wp), intent(in) :: v(*)
       real(wp), intent(inout) :: product(n_stored, *)
@@ -255,6 +258,7 @@ contains
       type(harmonic_factors), intent(in) :: factors
       integer, intent(in) :: n, n_blocks
       real(wp), intent(in) :: sign
+      !> Coordinates, or internal modes (n, n_coefficients).
       real(wp), intent(in) :: v(n, *)
       integer, intent(in) :: first, n_inner
       real(wp), intent(inout) :: groups(group_width, n_inner, *)
@@ -305,6 +309,7 @@ contains
       class(real_products), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
       type(harmonic_factors), intent(in) :: factors
+      !> All coordinates (n_coordinates, n_coefficients).
       real(wp), intent(in) :: v(*)
       integer :: n_rows, n_inner
 
@@ -320,6 +325,7 @@ contains
    pure subroutine fill_multiples(factors, n, n_blocks, v, multiples)
       type(harmonic_factors), intent(in) :: factors
       integer, intent(in) :: n, n_blocks
+      !> Coefficients (n, n_coefficients), and their multiples.
       real(wp), intent(in) :: v(n, *)
       real(wp), intent(inout) :: multiples(n, n_blocks, *)
       real(wp) :: re, im, s
@@ -364,6 +370,7 @@ contains
       class(real_products), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
       type(harmonic_factors), intent(in) :: factors
+      !> Grows by - Z_qi y (n_coordinates, n_coefficients).
       real(wp), intent(inout) :: product(*)
       integer :: n
 

@@ -50,6 +50,7 @@ contains
          end do
          do j = 1, b%n_internal
             damping = b%c_i(j)
+            ! Of coupled damping the diagonal alone.
             if (allocated(b%c_ii)) damping = b%c_ii(j, j)
             coupling(:nb) = b%coupling(j, :, i)
             call take_mode(b%m_i(j), damping, b%k_i(j), coupling(2), coupling(3), coupling(1), &
@@ -60,6 +61,7 @@ contains
       c = max(c, 0.0_wp)
    end subroutine split_coordinate
 
+   !> The terms of the header: a mode below the limit follows by m_qj/m_j, one above by k_qj/k_j.
    pure subroutine take_mode(m_j, c_j, k_j, m_qj, c_qj, k_qj, limit, m, c, k)
       real(wp), intent(in) :: m_j, c_j, k_j, m_qj, c_qj, k_qj, limit
       real(wp), intent(inout) :: m, c, k

@@ -97,6 +97,7 @@ contains
    pure subroutine set_rates(self, structure, w)
       type(contact_problem), intent(inout) :: self
       type(time_structure), intent(in) :: structure
+      !> Delassus operator (n_rows, n_rows) [length/force].
       real(wp), intent(in) :: w(:, :)
       real(wp) :: mean
       integer :: i, r

@@ -71,6 +71,7 @@ contains
    !> The same of means over the steps k..k+1 by the implicit midpoint rule, where the mean of a
    !> harmonic n is cos(n pi/n_steps) times its value in the middle.
    pure function averaged_coefficients(means, n_harmonics) result(coefficients)
+      !> Means over the steps (n_steps).
       real(wp), intent(in) :: means(:)
       integer, intent(in) :: n_harmonics
       real(wp) :: coefficients(2*n_harmonics + 1)
@@ -85,6 +86,7 @@ contains
 
    !> Angles are reduced in integers, in units of half a step.
    pure function shifted_coefficients(samples, n_harmonics, half_steps) result(coefficients)
+      !> Values so many half steps behind the instants (n_steps).
       real(wp), intent(in) :: samples(:)
       integer, intent(in) :: n_harmonics, half_steps
       real(wp) :: coefficients(2*n_harmonics + 1)

@@ -117,6 +117,7 @@ contains
    !> Put the newest differences first.
    pure subroutine remember(n_history, d_image, d_change, new_image, new_change)
       integer, intent(inout) :: n_history
+      !> The newest differences first (n_state, max_history).
       real(wp), intent(inout) :: d_image(:, :), d_change(:, :)
       !> Image as integrated, change weighted.
       real(wp), intent(in) :: new_image(:), new_change(:)
@@ -136,6 +137,7 @@ contains
    !> Gram-Schmidt from the newest difference on, carrying the images along.
    pure subroutine accelerate(n_history, d_image, d_change, image, change, state)
       integer, intent(in) :: n_history
+      !> Differences, image as integrated, weighted change (n_state).
       real(wp), intent(in) :: d_image(:, :), d_change(:, :), image(:), change(:)
       real(wp), intent(out) :: state(:)
       real(wp) :: basis(size(image), n_history), carried(size(image), n_history)

@@ -97,6 +97,7 @@ contains
    !> Prepare; samples are taken at n_samples uniform instants of the period.
    subroutine new_smooth_integration(structure, observe, omega, n_samples, self)
       type(time_structure), intent(in) :: structure
+      !> Observed quantities (n_observed, n_dof).
       real(wp), intent(in) :: observe(:, :)
       real(wp), intent(in) :: omega
       integer, intent(in) :: n_samples
@@ -148,6 +149,7 @@ contains
 
    subroutine solve_columns(lu, columns)
       type(lu_type), intent(in) :: lu
+      !> Right-hand sides, then solutions, in columns.
       real(wp), intent(inout), contiguous :: columns(:, :)
       integer :: j
 
@@ -186,6 +188,7 @@ contains
    !> One period from a state (displacements, velocities); see period_map.
    subroutine integrate(self, start, finish, range, done)
       class(smooth_integration), intent(inout) :: self
+      !> Displacements and velocities by time (2 n_dof).
       real(wp), intent(in), contiguous :: start(:)
       real(wp), intent(out), contiguous :: finish(:)
       real(wp), intent(out) :: range
@@ -238,7 +241,9 @@ contains
       class(smooth_integration), intent(inout) :: self
       type(c_ptr), intent(inout) :: memory
       type(n_vector), intent(inout) :: y_vector
+      !> The start of the period, as in `integrate`.
       real(wp), intent(in) :: start(:)
+      !> The state of CVODE, velocities by tau (2 n_dof): it changes with every call.
       real(wp), intent(in) :: y(:)
       real(wp), intent(out) :: range
       logical, intent(out) :: done

@@ -79,6 +79,7 @@ contains
    subroutine fill_damping(structure, h, matrix)
       type(time_structure), intent(in) :: structure
       real(wp), intent(in) :: h
+      !> Overwritten (n_dof, n_dof).
       real(wp), intent(inout) :: matrix(:, :)
       integer :: n
 
@@ -112,6 +113,7 @@ contains
    subroutine free_increment(self, structure, displacement, velocity, load, increment)
       class(step_operator), intent(in) :: self
       type(time_structure), intent(in) :: structure
+      !> Displacement, velocity and mean force on the dofs (n_dof).
       real(wp), intent(in) :: displacement(:), velocity(:), load(:)
       real(wp), intent(out), contiguous :: increment(:)
       integer :: n
@@ -127,6 +129,7 @@ contains
    subroutine add_forces(self, structure, force, increment)
       class(step_operator), intent(in) :: self
       type(time_structure), intent(in) :: structure
+      !> Forces of the rows (n_rows).
       real(wp), intent(in) :: force(:)
       real(wp), intent(inout), contiguous :: increment(:)
 

@@ -91,6 +91,7 @@ contains
    !> Corrected positions by rows (n_rows).
    pure function row_memory(structure, corrected) result(memory)
       type(time_structure), intent(in) :: structure
+      !> Tangential positions of the pairs [length] (2, n_pairs).
       real(wp), intent(in) :: corrected(:, :)
       real(wp) :: memory(structure%n_rows)
       integer :: i, c

@@ -38,6 +38,7 @@ contains
    pure subroutine mean_load(self, instant, duration, load)
       class(time_stepper), intent(in) :: self
       real(wp), intent(in) :: instant, duration
+      !> Force on the dofs (n_dof).
       real(wp), intent(out) :: load(:)
       real(wp) :: middle, share
 
@@ -51,6 +52,7 @@ contains
    !> B x of a vector of dofs.
    subroutine take_rows(structure, vector, rows)
       type(time_structure), intent(in) :: structure
+      !> Of the dofs (n_dof), and of the rows (n_rows).
       real(wp), intent(in) :: vector(:)
       real(wp), intent(out) :: rows(:)
 

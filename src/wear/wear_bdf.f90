@@ -117,6 +117,7 @@ contains
       class(bdf_integrator), intent(inout) :: self
       type(wear_system), intent(in), target :: system
       type(linear_step_type), intent(in), target :: linear
+      !> Unknowns, vibration and depths, and rates of the pairs (n_pairs).
       real(wp), intent(in) :: x(:), rate(:)
       !> Cycles now, those of the first step, and where the integration has to end.
       real(wp), intent(in) :: cycles, first_step, n_cycles

@@ -211,6 +211,7 @@ contains
       class(event_contact_type), intent(inout) :: self
       integer, intent(in) :: i
       type(fourier_type), intent(in) :: fourier
+      !> As in `evaluate`, of this pair alone (3, n_coefficients).
       real(wp), intent(in) :: prediction(:, :), offset, x_start(2)
 
       associate (pair => self%planar(i))
@@ -258,6 +259,7 @@ contains
       logical, intent(in) :: wanted(:)
       !> As in the evaluation (n_pairs, 2).
       real(wp), intent(in) :: x_start(:, :)
+      !> Blocks of order 3 n_coefficients (input, output, n_pairs); those of other pairs stay.
       real(wp), intent(inout) :: jacobian(:, :, :)
       !> Derivatives of the friction paths (coefficient and component, pair), if they are wanted.
       real(wp), intent(inout), optional :: by_path(:, :)

@@ -198,6 +198,7 @@ contains
       type(moments_type), intent(in) :: moments
       real(wp), intent(in) :: factor
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> Grows by them (n_coefficients).
       real(wp), intent(inout) :: coefficient(:)
       integer :: h, k
 

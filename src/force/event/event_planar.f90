@@ -242,6 +242,7 @@ contains
       type(planar_pair_type), intent(in) :: self
       type(cells_type), intent(in) :: cells
       type(fourier_type), intent(in) :: fourier
+      !> Transposed, components as sections (3 n_coefficients, 3 n_coefficients).
       real(wp), intent(inout) :: jacobian(:, :)
       integer :: c, k, n, nc
 

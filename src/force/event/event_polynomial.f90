@@ -17,6 +17,7 @@ contains
    pure subroutine fill_waves(degree, angle, cosines, sines)
       integer, intent(in) :: degree
       real(wp), intent(in) :: angle
+      !> From the constant up to the degree.
       real(wp), intent(out) :: cosines(0:degree), sines(0:degree)
       real(wp) :: c, s
       integer :: m
@@ -38,6 +39,7 @@ contains
    !> p where its waves are known.
    pure real(wp) function value_of(degree, p, cosines, sines) result(value)
       integer, intent(in) :: degree
+      !> Cosine and sine coefficients (0:degree, 2), as everywhere here.
       real(wp), intent(in) :: p(0:degree, 2), cosines(0:degree), sines(0:degree)
       integer :: m
 

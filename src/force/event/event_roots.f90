@@ -46,6 +46,7 @@ contains
    !> from, which may be far larger than p.
    pure type(bounds_type) function new_bounds(n, degree, p, values, scale) result(self)
       integer, intent(in) :: n, degree
+      !> The polynomial, its values on the grid, and the sum of its amplitudes.
       real(wp), intent(in) :: p(0:degree, 2), values(n), scale
       real(wp) :: largest, amplitude, third, fourth
       integer :: m

@@ -65,6 +65,7 @@ contains
    pure subroutine add_driven_slip(self, n_retained, harmonic, column, slope)
       type(oscillator_pair_type), intent(inout) :: self
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
+      !> By P and by y_n (n_coefficients, 2).
       real(wp), intent(inout) :: slope(:, :)
       real(wp) :: raw(size(slope, 1), 3)
       complex(wp) :: answer
@@ -105,6 +106,7 @@ contains
    pure subroutine add_free_slip(self, j, n_retained, harmonic, column, slope)
       type(oscillator_pair_type), intent(in) :: self
       integer, intent(in) :: j, n_retained, harmonic(n_retained), column(n_retained)
+      !> By y_n (n_coefficients).
       real(wp), intent(inout) :: slope(:)
       real(wp) :: phi(2, 2)
       complex(wp) :: row(2), integral
@@ -128,6 +130,7 @@ contains
    pure subroutine repeat(monodromy, d)
       !> M of the turn; 1 - M is regular where the periodic motion stands alone.
       real(wp), intent(in) :: monodromy(2, 2)
+      !> Variations of x and x' (2, n_coefficients, by P and by y_n).
       real(wp), intent(inout) :: d(:, :, :)
       real(wp) :: x(2)
       logical :: singular
@@ -149,7 +152,9 @@ contains
       type(oscillator_pair_type), intent(in) :: self
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
       logical, intent(in) :: adds
+      !> Variations of x and x' (2, n_coefficients, by P and by y_n).
       real(wp), intent(inout) :: d(:, :, :)
+      !> Transposed, (input, output); (n_coefficients, 2) by slip.
       real(wp), intent(inout) :: by_tangential(:, :), by_normal(:, :), by_slip(:, :)
       real(wp) :: phi(2, 2), output(size(d, 2)), driven(2, size(d, 2)), x(2), friction, weight(2)
       integer :: j, k, i, side

@@ -188,6 +188,7 @@ contains
       end associate
    end subroutine fill_drive
 
+   !> Values and slopes of a wave on the grid, and the bounds that follow from them.
    pure subroutine sample(self, wave)
       type(oscillator_pair_type), intent(in) :: self
       type(wave_type), intent(inout) :: wave

@@ -155,6 +155,7 @@ contains
       end if
    end function phase_at
 
+   !> Begin a segment; its free part is what the motion has beyond the driven one there.
    pure subroutine append(self, waves, phase, angle, x, before, behind)
       type(turn_type), intent(inout) :: self
       type(waves_type), intent(in) :: waves
