@@ -37,6 +37,8 @@ contains
             p = max(-y(i, 3, k), 0.0_wp)
             limit = mu(i)*p
             d = y(i, 1, k) - x(i, 1)
+            ! Onto a disc of one dimension: a clamp, in which stick and open are no cases of their
+            ! own.
             force = max(-limit, min(limit, d))
             ! x stays to the last bit where the pair sticks, so that stick wears nothing.
             x(i, 1) = merge(x(i, 1), y(i, 1, k) - force, abs(d) <= limit)
@@ -69,6 +71,7 @@ contains
             d2 = y(i, 2, k) - x(i, 2)
             length = sqrt(d1**2 + d2**2)
             sticks = length <= limit
+            ! lambda_t = scale d: 1 in stick, mu p/|d| in slip, 0 where the pair is open.
             scale = merge(1.0_wp, limit/max(length, tiny(1.0_wp)), sticks)
             lambda(i, 1, k) = scale*d1
             lambda(i, 2, k) = scale*d2

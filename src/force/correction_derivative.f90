@@ -41,6 +41,7 @@ contains
       dx = 0.0_wp
       call march_derivative(n_time, n_coef, 1, base, y, mu, touch, present, .true., after, rows, &
                             dx)
+      ! (I - M)^-1 N, input by input.
       do c = 1, 3
          do k = 1, n_coef
             first = dx(k, c, 1)
@@ -112,6 +113,7 @@ contains
       end do
    end subroutine march_derivative
 
+   !> Rows of an instant of stick: d lambda_t = dy - dx, and dx stays.
    pure subroutine stick_rows(n_coef, base, present, dx, rows)
       integer, intent(in) :: n_coef
       real(wp), intent(in) :: base(n_coef), dx(n_coef, 3, 2)
@@ -139,6 +141,7 @@ contains
       ! Turning of the slip direction: the part of dy - dx across e.
       if (present(1) .and. present(2)) turning = (mu*p/length)*[-e(2), e(1)]
       do k = 1, 3*n
+         ! I - e e^T is n n^T in the plane, n = (-e_2, e_1).
          across = e(2)*dx(k, 1) - e(1)*dx(k, 2)
          rows(k, 1) = across*turning(1)
          rows(k, 2) = across*turning(2)
@@ -150,6 +153,7 @@ contains
          call add_input(dx(n + 1:2*n, :), rows(n + 1:2*n, :), e(1)*turning, [0.0_wp, 1.0_wp])
       end if
       if (present(3)) then
+         ! dp = -dy_n where the pair bears.
          call add_input(dx(2*n + 1:, :), rows(2*n + 1:, :), -mu*e, [0.0_wp, 0.0_wp])
       end if
 

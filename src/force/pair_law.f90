@@ -44,6 +44,7 @@ contains
       associate (p => self%prediction)
          p%scale = contact%penalty_scale
          p%gap = contact%gap
+         ! What presses a pair with a normal dof is the other side, not a load of its own.
          p%load = merge(contact%normal_load, 0.0_wp, contact%side_1(3, :) == 0 .and. &
                         contact%side_2(3, :) == 0)
       end associate

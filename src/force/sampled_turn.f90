@@ -40,6 +40,7 @@ contains
       call settle(map, scale, tolerance, x, done)
    end subroutine settle_samples
 
+   !> A turn of period_map, with the discs as they are (touch = 0).
    subroutine turn(self, x, after, m)
       class(sampled_map), intent(inout) :: self
       real(wp), intent(in) :: x(2)

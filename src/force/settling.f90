@@ -80,6 +80,7 @@ contains
       do
          call newton_step(m, after - x, step)
          done = maxval(abs(after - x)) <= round_off*scale .or. maxval(abs(step)) <= tolerance*scale
+         ! At rest to round-off, or as near to the limit as the next step tells.
          if (done) x = after
          if (done .or. turn >= max_turns) return
          better = .false.
@@ -98,6 +99,8 @@ contains
             m = trial_m
          else
             x = after
+            ! A plain turn, which never leads away from the limit, where no length of the step is
+            ! better.
             call map%turn(x, after, m)
             turn = turn + 1
          end if

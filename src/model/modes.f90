@@ -54,6 +54,8 @@ contains
          if (done) exit
       end do
       if (.not. done) return
+      ! theta = 1/(omega**2 + shift), ascending: from the end omega rises, and massless directions,
+      ! theta = 0, come last.
       do j = size(theta), 1, -1
          if (theta(j) <= massless*theta(size(theta))) exit
          square = 1.0_wp/theta(j) - shift
@@ -64,6 +66,7 @@ contains
       allocate (modes(size(in_range)))
       do i = 1, size(in_range)
          j = in_range(i)
+         ! x^T (K + shift M) x = 1, hence x^T M x = theta; over its root the modal mass is one.
          modes(i) = new_mode(sqrt(1.0_wp/theta(j) - shift), shapes(:, j)/sqrt(theta(j)), damping, &
                              load, observe)
       end do
@@ -78,6 +81,7 @@ contains
       mode%omega = omega
       mode%width = dot_product(shape_of, matmul(damping, shape_of))
       drive = norm2(matmul(shape_of, load))
+      ! U| = |o x| |x^T f|/(omega c) at resonance, with o the observed row and c the width.
       mode%amplitude = abs(matmul(observe, shape_of))*drive/ &
                        (omega*max(mode%width, least_width*omega))
    end function new_mode

@@ -156,6 +156,7 @@ contains
       call self%inner%build_preconditioner()
    end subroutine build_preconditioner
 
+   !> The system's own, of the point where it was built.
    subroutine precondition(self, vector)
       class(difference_system), intent(inout) :: self
       real(wp), intent(inout), contiguous :: vector(:)

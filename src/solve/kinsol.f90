@@ -139,6 +139,7 @@ contains
       report%interrupted = .not. report%converged .and. system%is_interrupted()
    end subroutine solve
 
+   !> KINSOL over arrays of this solution; what it finds stays in the state.
    subroutine run(self, state, iterations)
       class(kinsol_solver), intent(inout) :: self
       type(kinsol_state), intent(inout), target :: state

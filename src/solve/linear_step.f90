@@ -120,6 +120,7 @@ contains
       end if
    end subroutine prepare
 
+   !> The preconditioner anew, for the derivative that was prepared last.
    subroutine build(self, system)
       type(linear_step_type), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
@@ -193,6 +194,7 @@ contains
       call system%expand(r, self%solution, step)
    end subroutine solve_prepared
 
+   !> LU of the whole remaining matrix (n, n).
    subroutine factor(self, system, n, done)
       type(linear_step_type), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
@@ -208,6 +210,7 @@ contains
       self%factored = done
    end subroutine factor
 
+   !> The number of unknowns that remain changes with the states of the pairs.
    subroutine reserve(self, n)
       type(linear_step_type), intent(inout) :: self
       integer, intent(in) :: n

@@ -163,6 +163,7 @@ contains
       end if
    end subroutine evaluate
 
+   !> Task 1: the residual over its reference; its point is remembered where it is the best so far.
    subroutine evaluate_residual(state, x, f, task)
       type(powell_state), intent(inout) :: state
       real(wp), intent(in), contiguous :: x(:)
@@ -189,6 +190,7 @@ contains
       if (norm <= state%tolerance .or. state%system%is_interrupted()) task = -1
    end subroutine evaluate_residual
 
+   !> Task 2: the Jacobian over the same reference. One more than is allowed ends the run.
    subroutine evaluate_jacobian(state, x, jacobian, task)
       type(powell_state), intent(inout) :: state
       real(wp), intent(in), contiguous :: x(:)

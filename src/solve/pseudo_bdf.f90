@@ -146,6 +146,7 @@ contains
       if (done) call configure(self, done)
    end subroutine start
 
+   !> Each status is looked at once all are set.
    subroutine configure(self, done)
       class(bdf_scheme), intent(inout) :: self
       logical, intent(out) :: done
@@ -169,6 +170,7 @@ contains
       done = all(status == 0)
    end subroutine configure
 
+   !> One internal step of CVODE, of the length and the order that its error allows.
    subroutine advance(self, system, x, done)
       class(bdf_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system

@@ -35,6 +35,7 @@ module fw_pseudo_euler
 
 contains
 
+   !> Workspace, and the first step: that of the user, or one from the scale of pseudo-time.
    subroutine start(self, system, x, done)
       class(euler_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system
@@ -52,6 +53,8 @@ contains
       done = size(x) == system%n
    end subroutine start
 
+   !> One accepted step, shortened until Newton's method converges; self%r is the residual at its
+   !> end.
    subroutine advance(self, system, x, done)
       class(euler_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system

@@ -40,6 +40,7 @@ module fw_pseudo_rosenbrock
 
 contains
 
+   !> Workspace, and the first step as implicit Euler chooses it.
    subroutine start(self, system, x, done)
       class(rosenbrock_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system
@@ -56,6 +57,7 @@ contains
       allocate (self%p1(n), self%p2(n))
    end subroutine start
 
+   !> One accepted step: one whose error is too large is repeated with a shorter one.
    subroutine advance(self, system, x, done)
       class(rosenbrock_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system

@@ -45,6 +45,7 @@ module fw_pseudo_runge_kutta
 
 contains
 
+   !> Workspace alone: the steps follow from the derivative, when they are first needed.
    subroutine start(self, system, x, done)
       class(runge_kutta_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system
@@ -57,6 +58,7 @@ contains
       done = size(x) == system%n
    end subroutine start
 
+   !> One accepted step: one that proves unstable is repeated with half the Courant number.
    subroutine advance(self, system, x, done)
       class(runge_kutta_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout), target :: system

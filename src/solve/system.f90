@@ -62,6 +62,7 @@ module fw_system
          real(wp), intent(out), contiguous :: step(:)
       end subroutine expand_step
 
+      !> Something near the inverse of the derivative that was prepared last, for `precondition`.
       subroutine build(self)
          import :: nonlinear_system
          class(nonlinear_system), intent(inout) :: self

@@ -72,6 +72,7 @@ contains
       x_after = x + matmul(u, weight)
       ! Within its error a step may take a little wear back; a joint does not.
       x_after(n + 1:) = max(x_after(n + 1:), x(n + 1:))
+      ! The embedded method leaves the last stage out.
       error = u(n + 1:, n_stages)
       done = done .and. all(ieee_is_finite(x_after))
    end subroutine rosenbrock_step

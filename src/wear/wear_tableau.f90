@@ -58,6 +58,7 @@ contains
       end select
    end function new_tableau
 
+   !> Three stages of order 3 (Alexander 1977).
    pure subroutine fill_third_order(self)
       type(tableau_type), intent(inout) :: self
       ! The middle root of g**3 - 3 g**2 + 3/2 g - 1/6.

@@ -157,6 +157,7 @@ contains
       call set_normal(self, self%node(7:9, j), at)
    end function at_node
 
+   !> N and R = mu N with two derivatives each.
    pure subroutine set_normal(self, normal, at)
       type(motion_type), intent(in) :: self
       real(wp), intent(in) :: normal(3)
