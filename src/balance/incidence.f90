@@ -19,7 +19,9 @@ module fw_incidence
    public :: incidence_type, new_incidence
 
    type :: incidence_type
+      !> Rows of B, those of the pairs before those of the springs.
       integer :: n_rows = 0
+      !> The map of all coordinates: 1, 2, ..
       integer, allocatable :: identity(:)
       !> Row r is sum_e weight(e) q(coordinate(e)), e = first(r) .. first(r+1)-1.
       integer, allocatable, private :: first(:), coordinate(:)

@@ -20,6 +20,7 @@ module fw_joint
    public :: joint_type, new_joint
 
    type :: joint_type
+      !> Rows of pairs and springs, and the coordinates that they are combinations of.
       type(relative_type) :: relative
       !> Row of each component of each pair, 0 where it is absent or can never move (3, n_pairs).
       integer, allocatable :: row(:, :)

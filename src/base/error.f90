@@ -21,7 +21,9 @@ module fw_error
 
    !> What went wrong: where, which value, and the remedy, in one message.
    type :: error_type
+      !> What the program ends with; one of the constants above.
       integer :: status = status_failure
+      !> What, where, the value, and the remedy.
       character(:), allocatable :: message
    end type error_type
 

@@ -17,6 +17,7 @@ module fw_floating_point
 
    type :: floating_point_scope
       private
+      !> A fenv_t of C, whatever its layout.
       integer(c_int64_t) :: environment(environment_size) = 0_c_int64_t
    contains
       procedure :: enter

@@ -17,6 +17,7 @@ module fw_threads
 
    type :: thread_scope
       private
+      !> Threads of OpenMP before the scope.
       integer :: outer = 0
    contains
       procedure :: enter

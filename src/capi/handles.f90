@@ -16,6 +16,7 @@ module fw_handles
    public :: handle_type, new_handle, find_handle, delete_handle, enter, leave, ask_to_stop
 
    type :: handle_type
+      !> Number of the session, from 1.
       integer :: id = 0
       !> A call that may change the session is under way.
       logical :: busy = .false.
@@ -23,10 +24,12 @@ module fw_handles
       type(callback_observer) :: observer
       !> What the last call that failed had to say.
       character(:), allocatable :: message
+      !> What the caller has set of the floating-point unit.
       type(floating_point_scope), private :: floating_point
    end type handle_type
 
    type :: slot_type
+      !> Null where the slot is free.
       type(handle_type), pointer :: handle => null()
    end type slot_type
 

@@ -55,6 +55,7 @@ module fw_accuracy
       integer, allocatable :: n_harmonics(:)
       !> The level in use.
       integer :: current = 2, doublings = 0
+      !> Order of the error in 1/H that the estimate counts on.
       real(wp) :: order = order_elastic
       !> What half of the instants changes is multiplied by this (0: they leave no error).
       real(wp) :: factor_time = 0.0_wp

@@ -30,6 +30,7 @@ module fw_adaptive
       integer :: current = 1
       !> Points that would have needed more than the most.
       integer :: n_short = 0
+      !> One for each of these numbers, built when it is first needed.
       type(level_type), allocatable :: level(:)
    contains
       procedure :: start

@@ -18,6 +18,7 @@ module fw_joint_modes
    integer, parameter :: state_free = 1, state_sliding = 2, state_stuck = 3
 
    type, extends(mode_type) :: joint_mode_type
+      !> The state of the joint that it is a mode of.
       integer :: state = state_free
    end type joint_mode_type
 

@@ -55,6 +55,7 @@ module fw_point_solver
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
    type :: point_solver
+      !> The solver of the case, and pseudo-time where it fails.
       type(solution_method) :: method
       !> The present solution, and the last two converged ones with their frequencies.
       real(wp), allocatable :: x(:), last(:), before(:), r(:)

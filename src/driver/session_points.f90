@@ -14,6 +14,7 @@ module fw_session_points
 
    !> Points in the order of their arrival.
    type :: point_list
+      !> Points so far; the list has room for more.
       integer :: n = 0
       type(point_item), allocatable :: item(:)
    contains

@@ -28,6 +28,7 @@ module fw_summary
    integer, parameter :: max_shown = 6
 
    type :: summary_type
+      !> Of all points, those on the way included.
       integer :: iterations = 0
       !> Fewest and most harmonics of a point, where they adapt.
       integer :: harmonics(2) = [huge(0), 0]
@@ -40,6 +41,7 @@ module fw_summary
       type(string_type), allocatable :: peak_note(:)
       !> What is allowed and seldom meant.
       type(remark_list) :: remarks
+      !> Lines about the work that was done.
       type(string_type), allocatable :: work(:)
       !> What the case did not need, in words.
       type(string_type), allocatable :: skipped(:)

@@ -56,6 +56,7 @@ module fw_sweep
       real(wp), allocatable :: omega(:)
       !> Points given so far.
       integer :: n_given = 0
+      !> How each of them is solved.
       class(point_strategy), pointer :: strategy => null()
    contains
       procedure :: next => next_frequency

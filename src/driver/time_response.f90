@@ -43,6 +43,7 @@ module fw_time_response
       type(case_type) :: start_case
       type(hbm_system) :: system
       type(point_solver) :: solver
+      !> What is integrated.
       type(time_structure) :: structure
    contains
       procedure :: start

@@ -61,6 +61,7 @@ module fw_wear_response
       type(summary_type), pointer :: summary => null()
       type(run_state), pointer :: state => null()
       type(restart_row_set) :: restart_rows
+      !> Rows written so far, and the clock at the last of them.
       integer :: n_rows = 0
       integer(int64) :: clock = 0_int64
    contains
@@ -69,6 +70,7 @@ module fw_wear_response
 
    !> Everything between the start of a run and its end.
    type :: wear_run
+      !> The vibration at fixed depths, and vibration and depth as one system over it.
       type(hbm_system) :: balance
       type(wear_system) :: system
       type(point_solver) :: solver

@@ -11,6 +11,7 @@ module fw_sampled_turn
    public :: settle_samples, limit_is_unique
 
    type, extends(period_map) :: sampled_map
+      !> The pair in y, and its friction coefficient.
       integer :: pair = 0
       real(wp) :: mu = 0.0_wp
       !> Predicted forces (pair, component, instant).

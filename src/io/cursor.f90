@@ -15,6 +15,7 @@ module fw_cursor
 
    type :: cursor_type
       character(:), allocatable :: text
+      !> Place of the letter under the cursor, and its line, both from 1.
       integer :: position = 1
       integer :: line = 1
       !> `/` ends a group and `!` starts a comment: true in a file, false on a command line.

@@ -49,6 +49,7 @@ module fw_hdf5_file
 
    !> An open file. A copy shares the handle: pass it along, never store two.
    type :: hdf5_file
+      !> Negative where no file is open.
       integer(hid_t) :: id = -1_hid_t
       character(:), allocatable :: path
       !> Exit status of a failed access: what is read is input, what is written is output.

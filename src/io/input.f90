@@ -24,7 +24,9 @@ module fw_input
    integer, parameter :: most_problems = 12
 
    type, abstract, extends(key_visitor) :: input_type
+      !> The file, and behind it the overrides, which hold where both give a key.
       type(namelist_type) :: namelist
+      !> What was found wrong so far, in the words of the message.
       type(string_type), allocatable :: problems(:)
       !> The calling program holds the model: it is read from no file.
       logical :: in_memory = .false.

@@ -37,6 +37,7 @@ module fw_memory_model
 
    !> A model in the making; `parts` has the shape of one that was read from a file.
    type :: memory_model_type
+      !> Sizes that the parts must have.
       integer :: n_dof = 0
       integer :: n_pairs = 0
       type(file_model_type) :: parts

@@ -9,8 +9,10 @@ module fw_namelist_data
 
    !> One value, or `repeat` equal ones.
    type :: value_type
+      !> Without its quotes; whether it had any.
       character(:), allocatable :: text
       logical :: quoted = .false.
+      !> What stands before the star, 2 in 2*1.5, and the line in the file.
       integer :: repeat = 1
       integer :: line = 0
    end type value_type
@@ -23,9 +25,11 @@ module fw_namelist_data
 
    !> One assignment `key(subscripts) = values`.
    type :: entry_type
+      !> In lower case.
       character(:), allocatable :: group, key
       type(section_type), allocatable :: sections(:)
       type(value_type), allocatable :: values(:)
+      !> Where it begins; 0 of an override.
       integer :: line = 0
       !> Of an override: what messages call it, and its value as it was typed.
       character(:), allocatable :: option, raw

@@ -26,6 +26,7 @@ module fw_reader
 
    !> An extent of arrays.
    type :: size_type
+      !> As shapes have it: n_dof, n_pairs, ..
       character(12) :: name
       !> Number of elements along it.
       integer :: extent

@@ -44,8 +44,10 @@ module fw_result
    type :: result_writer
       !> The open file, for analyses that add groups of their own.
       type(hdf5_file) :: file
+      !> The name that the file takes at the end.
       character(:), allocatable, private :: path
       type(row_set), private :: rows
+      !> When the file was flushed last, and how long that took [counts of the clock].
       integer(int64), private :: last_flush = 0_int64, flush_duration = 0_int64
       !> The result stays in memory; once it is closed, its bytes are `image`.
       logical, private :: in_memory = .false.

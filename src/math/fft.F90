@@ -24,6 +24,7 @@ module fw_fft
       !> them.
       real(c_double), allocatable :: values(:, :)
       complex(c_double_complex), allocatable :: spectrum(:, :)
+      !> Plans of FFTW; null where there are none.
       type(c_ptr) :: forward = c_null_ptr
       type(c_ptr) :: backward = c_null_ptr
    contains

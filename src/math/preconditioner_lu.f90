@@ -22,6 +22,7 @@ module fw_preconditioner_lu
       real(wp) :: scale = 1.0_wp
       !> The caller fills matrix(1:n, 1:n) with `scale` times its entries.
       complex(sp), allocatable :: matrix(:, :)
+      !> A right-hand side in single precision, and the pivots (n).
       complex(sp), allocatable :: rhs(:)
       integer, allocatable :: pivot(:)
    contains

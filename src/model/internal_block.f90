@@ -11,7 +11,9 @@ module fw_internal_block
 
    type :: internal_block
       private
+      !> D^-1, of coupled modes that of the diagonal without damping; 0 of a free mode (n_internal).
       complex(wp), allocatable :: inverse(:)
+      !> Whether damping couples the modes; `lu` has the factors of D then.
       logical :: coupled = .false.
       type(complex_lu_type) :: lu
    contains

@@ -25,12 +25,14 @@ module fw_model_keys
    type :: model_options
       integer :: source = source_inline
       character(:), allocatable :: file
+      !> Factors of the mass [1/s] and of the stiffness [s] in the damping.
       real(wp) :: rayleigh_mass = 0.0_wp
       real(wp) :: rayleigh_stiffness = 0.0_wp
       !> Fraction of critical damping of every mode.
       real(wp) :: modal_damping = 0.0_wp
       !> [rad/s]
       real(wp) :: rotation_speed = 0.0_wp
+      !> Factors of the static and of the vibratory load.
       real(wp) :: static_scale = 1.0_wp
       real(wp) :: harmonic_scale = 1.0_wp
    contains

@@ -28,8 +28,10 @@ module fw_real_products
 
    !> What belongs to the harmonics at a frequency: Z_n = k K - theta_n M + i s_n C.
    type :: harmonic_factors
+      !> Retained harmonics and their columns (n_retained).
       integer, allocatable :: harmonic(:), column(:)
       real(wp) :: k = 1.0_wp
+      !> (n omega)**2 + i n omega xi of each harmonic (n_retained).
       complex(wp), allocatable :: theta(:)
       !> n omega.
       real(wp), allocatable :: s(:)
@@ -37,6 +39,7 @@ module fw_real_products
 
    !> K, M and C of rows and columns in use, packed.
    type :: packed_blocks
+      !> Rows, and those among them, the first, that are columns too.
       integer :: n_used = 0
       integer :: n_active = 0
       !> [K_qq M_qq C_qq K_qi M_qi C_qi] and [K_iq M_iq C_iq] in panels.

@@ -63,6 +63,7 @@ module fw_kinsol
    type :: kinsol_state
       class(nonlinear_system), pointer :: system => null()
       real(wp) :: tolerance = 0.0_wp
+      !> Smallest residual so far over the reference, and its point (n).
       real(wp) :: best = huge(1.0_wp)
       real(wp), allocatable :: best_x(:)
       !> The point that the system saw last, whether it is linearized there, and a residual to
@@ -73,6 +74,7 @@ module fw_kinsol
 
    !> The objects of SUNDIALS behind a solution.
    type :: kinsol_objects
+      !> Null where nothing was made, so that `free` serves after any failure.
       type(c_ptr) :: context = c_null_ptr
       type(c_ptr) :: memory = c_null_ptr
       type(n_vector), pointer :: x => null()

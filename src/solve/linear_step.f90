@@ -27,6 +27,7 @@ module fw_linear_step
    integer, parameter :: kept_excess = 4
 
    type :: linear_step_type
+      !> linear_auto, linear_lu or linear_krylov.
       integer :: kind = linear_auto
       type(lu_type) :: lu
       type(gmres_type) :: gmres

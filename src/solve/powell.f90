@@ -18,6 +18,7 @@ module fw_powell
    type :: powell_state
       class(nonlinear_system), pointer :: system => null()
       real(wp) :: tolerance = 0.0_wp
+      !> Jacobians that are allowed, and those so far.
       integer :: max_jacobians = 0
       integer :: n_jacobians = 0
       !> The smallest norm and its point (n).

@@ -88,6 +88,7 @@ module fw_pseudo_bdf
       !> Where positive, the integration ends exactly there.
       real(wp) :: stop_time = 0.0_wp
       type(bdf_state), pointer :: state => null()
+      !> Objects of SUNDIALS; null where there are none.
       type(c_ptr) :: context = c_null_ptr
       type(c_ptr) :: memory = c_null_ptr
       type(n_vector), pointer :: x => null()

@@ -19,6 +19,7 @@ module fw_pseudo_linear
    real(wp), parameter :: tolerance = 1.0e-6_wp
 
    type :: shifted_linear
+      !> linear_auto, linear_lu or linear_krylov.
       integer :: kind = linear_auto
       !> Factors, or GMRES with the preconditioner.
       logical :: direct = .true.

@@ -55,8 +55,10 @@ module fw_pseudo_time
 
    !> Where Newton's method has been tried, and what the flow started from.
    type :: progress_type
+      !> Residuals over the reference: at the start, and the smallest so far.
       real(wp) :: first = huge(1.0_wp)
       real(wp) :: best = huge(1.0_wp)
+      !> Residual and step where Newton's method was tried last, and what it has taken in all.
       real(wp) :: tried_norm = huge(1.0_wp)
       real(wp) :: tried_step = huge(1.0_wp)
       integer :: newton_iterations = 0

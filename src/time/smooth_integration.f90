@@ -64,6 +64,7 @@ module fw_smooth_integration
       integer :: n = 0
       !> Stiffness and damping (n, n), loads (n, 3) and rows of springs (n, n_springs).
       real(wp), allocatable :: stiffness(:, :), damping(:, :), load(:, :), springs(:, :)
+      !> Springs as they are: rows of B (n, n_springs), coefficients and powers.
       real(wp), allocatable :: rows(:, :), coefficient(:)
       integer, allocatable :: power(:)
    end type acceleration_type

@@ -31,6 +31,7 @@ module fw_step_operator
       !> Duration of the step, and the prewarped one [time].
       real(wp) :: duration = 0.0_wp
       real(wp) :: h = 0.0_wp
+      !> Factors of S.
       type(lu_type) :: lu
       !> S^-1 B^T (n_dof, n_rows) and B S^-1 B^T + compliance (n_rows, n_rows) [length/force].
       real(wp), allocatable :: response(:, :), delassus(:, :)

@@ -33,6 +33,7 @@ module fw_time_structure
       integer :: n_springs = 0
       !> Rows of B: components of pairs, then springs.
       integer :: n_rows = 0
+      !> Matrices (n_dof, n_dof); the stiffness is without springs and contact.
       real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :)
       !> Static, cosine and sine loads in columns (n_dof, 3) [force].
       real(wp), allocatable :: load(:, :)

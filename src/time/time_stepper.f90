@@ -43,6 +43,7 @@ module fw_time_stepper
       real(wp) :: omega = 0.0_wp
       !> Steps of every size: full ones, halves, quarters, .. (0:n_levels).
       type(step_operator), allocatable :: step(:)
+      !> Halvings of a step at most.
       integer :: n_levels = 0
       type(contact_problem) :: contact
       !> Observed quantities (n_observed, n_dof).

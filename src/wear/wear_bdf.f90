@@ -71,6 +71,7 @@ module fw_wear_bdf
 
    !> An integration from one state; not to be copied while it runs.
    type :: bdf_integrator
+      !> What the callbacks see, and the objects of SUNDIALS; null between two integrations.
       type(bdf_state), pointer, private :: state => null()
       type(c_ptr), private :: context = c_null_ptr, memory = c_null_ptr
       type(n_vector), pointer, private :: y => null(), slope => null(), kind_of => null()

@@ -58,6 +58,7 @@ module fw_wear_march
       type(resonance_type) :: resonance
       !> Outcome.
       integer :: steady = steady_not_reached
+      !> Steps taken, and tried in vain.
       integer :: n_steps = 0
       integer :: n_rejected = 0
       !> All that was asked for has been covered: a steady state, the cycles, or gross slip.
@@ -72,6 +73,7 @@ module fw_wear_march
       real(wp) :: largest_rate = 0.0_wp
       real(wp) :: checked_depth = 0.0_wp
       real(wp), allocatable :: checked_rate(:)
+      !> Steps of the scheme 'bdf', each of which builds on those before.
       type(bdf_integrator), private :: bdf
    contains
       procedure :: run

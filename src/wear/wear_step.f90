@@ -22,6 +22,7 @@ module fw_wear_step
 
    !> Where a wear run stands.
    type :: wear_state
+      !> Cycles of vibration so far.
       real(wp) :: cycles = 0.0_wp
       !> Vibration, then depths (n).
       real(wp), allocatable :: x(:)
@@ -39,6 +40,7 @@ module fw_wear_step
    end type wear_step_report
 
    type :: wear_stepper
+      !> wear_explicit, wear_implicit or wear_pseudo_time.
       integer :: scheme = wear_explicit
       !> Scheme of the pseudo-time.
       integer :: pseudo_scheme = scheme_rosenbrock
@@ -46,6 +48,7 @@ module fw_wear_step
       type(newton_solver) :: newton
       !> Largest depth that a step may add, which pseudo-time enforces [length].
       real(wp) :: max_depth_step = huge(1.0_wp)
+      !> Stages of the implicit scheme.
       type(tableau_type), private :: tableau
       !> Estimate the error; the explicit scheme then advances with the corrected depths.
       logical, private :: controls_error = .false.

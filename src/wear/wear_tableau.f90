@@ -14,8 +14,10 @@ module fw_wear_tableau
    integer, parameter :: highest_order = 4
 
    type :: tableau_type
+      !> Order in the step, and the number of stages.
       integer :: order = 1
       integer :: n_stages = 1
+      !> The diagonal, the same in all stages.
       real(wp) :: gamma = 1.0_wp
       !> Weights of earlier stages (stage, earlier stage); the last row ends the step.
       real(wp), allocatable :: a(:, :)

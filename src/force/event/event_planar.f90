@@ -33,6 +33,7 @@ module fw_event_planar
 
    !> A turn of one pair.
    type, extends(period_map) :: planar_map
+      !> Predicted forces of the pair, and its path through the last turn.
       type(motion_type) :: motion
       type(planar_path_type) :: path
       ! Set while a procedure of the pair runs, so that a turn needs no argument for it.
@@ -44,6 +45,7 @@ module fw_event_planar
    end type planar_map
 
    type :: planar_pair_type
+      !> The map of a turn, and the integrals along the last one.
       type(planar_map), private :: map
       type(planar_force_type), private :: integral
       !> Results: coefficients (n_coefficients, 3), z at the end, and its change over the last turn.

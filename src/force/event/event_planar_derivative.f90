@@ -36,6 +36,7 @@ module fw_event_planar_derivative
    integer, parameter :: buffer_size = 128
 
    type :: planar_derivative_type
+      !> Derivatives of z and phi on the way along the path.
       type(tangent_type) :: tangent
       !> Of the tangential coefficients and the friction path (input, coefficient and direction and
       !> then the path).

@@ -37,6 +37,7 @@ module fw_oscillator_search
 
    !> What is added to the polynomial.
    type :: motion_type
+      !> What is taken off the polynomial: k x of a pair that sticks.
       real(wp) :: level = 0.0_wp
       !> Where there is a free part: X at `start`.
       logical :: is_free = .false.
