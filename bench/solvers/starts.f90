@@ -18,7 +18,8 @@ program starts
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_guess, only: stuck_guess
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_newton, only: solver_report
    use fw_point, only: point_type
@@ -42,7 +43,8 @@ program starts
 
    type(starts_options) :: options
    type(case_type) :: input
-   type(hbm_system), target :: system
+   type(balance_problem), target :: problem
+   type(balance_state), target :: system
    type(solution_method) :: method
    type(error_type), allocatable :: error
    integer :: k
@@ -50,7 +52,7 @@ program starts
    call read_options(options)
    call read_case(trim(options%case), [string_type ::], input, error)
    call stop_on(error)
-   call build_system(input, system, error)
+   call build_system(input, problem, system, error)
    call stop_on(error)
    call method%start(input, input%harmonics)
    call seed_random(options%seed)

@@ -15,7 +15,8 @@ module floor_system
    use fw_correction_derivative, only: march_derivative
    use fw_error, only: error_type
    use fw_force_law, only: pair_mixed
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
+   use fw_balance_state, only: new_balance_state
    use fw_kinds, only: sp
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
@@ -56,7 +57,7 @@ module floor_system
    end interface
 
    !> A balance whose parts are timed.
-   type, extends(hbm_system) :: measured_system
+   type, extends(balance_state) :: measured_system
       integer :: calls(n_parts) = 0
       real(wp) :: seconds(n_parts) = 0.0_wp
       real(wp) :: floor(n_parts) = 0.0_wp
@@ -98,7 +99,7 @@ contains
 
    !> Take over a system that was built.
    subroutine new_measured_system(system, mu, self)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       !> Friction coefficient (n_pairs).
       real(wp), intent(in) :: mu(:)
       type(measured_system), intent(out) :: self
@@ -106,15 +107,12 @@ contains
       integer :: i, m, n, nc, nt
       real(wp) :: start
 
-      self%hbm_system = system
+      call new_balance_state(system%problem, self%balance_state)
       self%mu = mu
-      do i = 1, size(self%work)
-         call self%work(i)%renew_fft()
-      end do
-      m = self%structure%n_coordinates
-      n = self%n_pairs
-      nc = self%fourier%n_coefficients
-      nt = self%fourier%n_time
+      m = self%problem%structure%n_coordinates
+      n = self%problem%n_pairs
+      nc = self%problem%fourier%n_coefficients
+      nt = self%problem%fourier%n_time
       allocate (self%x(n, 2), self%margin(n), self%pressure(n), source=0.0_wp)
       allocate (self%values(n, 3, nt), self%force(n, 3, nc), source=0.0_wp)
       allocate (self%rows(nc, 3, 2, nt), self%dx(nc, 3, 2), self%y(3, nt), source=0.0_wp)
@@ -122,12 +120,12 @@ contains
       allocate (self%basis(m*nc, longest_basis), source=1.0e-3_wp)
       allocate (self%vector(m*nc), self%weights(longest_basis), source=1.0e-3_wp)
       allocate (self%input(m), self%output(m), source=one)
-      select type (structure => self%structure)
+      select type (structure => self%problem%structure)
       type is (plain_structure)
          self%n_internal = structure%basis%n_internal
          self%coupled = allocated(structure%basis%c_ii)
       end select
-      allocate (self%stiffness(m, m, self%fourier%n_retained), source=one)
+      allocate (self%stiffness(m, m, self%problem%fourier%n_retained), source=one)
       associate (n_internal => self%n_internal)
          allocate (self%coupling(m, n_internal), self%solved(n_internal, m), source=one)
          allocate (self%square(m, m), source=one)
@@ -162,12 +160,12 @@ contains
       integer :: h, m, n
 
       start = processor_time()
-      call self%hbm_system%set_frequency(parameter, error)
+      call self%balance_state%set_frequency(parameter, error)
       middle = processor_time()
       m = size(self%coupling, 1)
       n = size(self%coupling, 2)
       if (n > 0) then
-         do h = 1, self%fourier%n_retained
+         do h = 1, self%problem%fourier%n_retained
             if (self%coupled) call solve_internal(self, m, n)
             call zgemm('N', 'N', m, (m + 1)/2, n, -one, self%coupling, m, self%solved, n, one, &
                        self%square, m)
@@ -201,19 +199,21 @@ contains
       integer :: h, m, n
 
       start = processor_time()
-      call self%hbm_system%residual(x, r)
+      call self%balance_state%residual(x, r)
       middle = processor_time()
-      m = self%structure%n_coordinates
-      n = 3*self%n_pairs
-      do h = 1, self%fourier%n_retained
+      m = self%problem%structure%n_coordinates
+      n = 3*self%problem%n_pairs
+      do h = 1, self%problem%fourier%n_retained
          call zgemv('N', m, m, one, self%stiffness(1, 1, h), m, self%input, 1, zero, &
                     self%output, 1)
       end do
-      call self%fourier%to_time(n, self%work(self%forces%pairs)%prediction, self%values, &
-                                self%work(self%forces%pairs)%fft)
+      associate (work => self%work(self%problem%forces%pairs))
+         call self%problem%fourier%to_time(n, work%prediction, self%values, work%fft)
+      end associate
       call march(self)
-      call self%fourier%to_coefficients(n, self%work(self%forces%pairs)%force_time, self%force, &
-                                        self%work(self%forces%pairs)%fft)
+      associate (work => self%work(self%problem%forces%pairs))
+         call self%problem%fourier%to_coefficients(n, work%force_time, self%force, work%fft)
+      end associate
       call add(self, part_residual, start, middle)
    end subroutine residual
 
@@ -223,8 +223,9 @@ contains
       integer, parameter :: block_size = 8
       integer :: first, last, turn
 
-      associate (c => self%work(self%forces%pairs), n => self%n_pairs, nt => self%fourier%n_time, &
-                 planar => any(self%joint%row(2, :) > 0))
+      associate (c => self%work(self%problem%forces%pairs), n => self%problem%n_pairs, &
+                 nt => self%problem%fourier%n_time, &
+                 planar => any(self%problem%joint%row(2, :) > 0))
          self%x = c%x
          do first = 1, n, block_size
             last = min(first + block_size - 1, n)
@@ -249,11 +250,12 @@ contains
       integer :: i, nc
 
       start = processor_time()
-      call self%hbm_system%linearize(n_linear)
+      call self%balance_state%linearize(n_linear)
       middle = processor_time()
-      nc = self%fourier%n_coefficients
-      do i = 1, self%n_pairs
-         if (self%work(self%forces%pairs)%linear_state(i) == pair_mixed) call derive(self, i, nc)
+      nc = self%problem%fourier%n_coefficients
+      do i = 1, self%problem%n_pairs
+         if (self%work(self%problem%forces%pairs)%linear_state(i) == pair_mixed) &
+            call derive(self, i, nc)
       end do
       call add(self, part_linearize, start, middle)
       self%n_products = 0
@@ -265,12 +267,12 @@ contains
       real(wp) :: x(2)
       integer :: c
 
-      associate (f => self%fourier, contact => self%work(self%forces%pairs))
+      associate (f => self%problem%fourier, contact => self%work(self%problem%forces%pairs))
          self%y = contact%prediction_time(i, :, :)
          self%dx = 0.0_wp
          x = contact%x(i, :)
          call march_derivative(f%n_time, nc, 1, f%synthesis, self%y, self%mu(i), 0.0_wp, &
-                               self%joint%row(:, i) > 0, .true., x, self%rows, self%dx)
+                               self%problem%joint%row(:, i) > 0, .true., x, self%rows, self%dx)
          do c = 1, 2
             call dgemm('N', 'T', 3*nc, nc, f%n_time, 1.0_wp, self%rows(1, 1, c, 1), 6*nc, &
                        f%analysis, nc, 0.0_wp, self%jacobian(1, (c - 1)*nc + 1), 3*nc)
@@ -285,13 +287,14 @@ contains
       integer :: h, j
 
       start = processor_time()
-      call self%hbm_system%build_preconditioner()
+      call self%balance_state%build_preconditioner()
       middle = processor_time()
-      do h = 1, self%fourier%n_retained
-         call self%lu%reserve(self%n_active, 1.0_wp)
-         do j = 1, self%n_active
-            self%lu%matrix(:self%n_active, j) = cmplx(self%preconditioner(h)%scale* &
-               self%stiffness(:self%n_active, j, h), kind=sp)
+      do h = 1, self%problem%fourier%n_retained
+         call self%lu%reserve(self%active%n_active, 1.0_wp)
+         do j = 1, self%active%n_active
+            self%lu%matrix(:self%active%n_active, j) = &
+               cmplx(self%preconditioner%harmonic(h)%scale* &
+               self%stiffness(:self%active%n_active, j, h), kind=sp)
          end do
          call self%lu%factor()
       end do
@@ -308,17 +311,17 @@ contains
       integer :: h, i, m, n
 
       start = processor_time()
-      call self%hbm_system%apply(vector, product)
+      call self%balance_state%apply(vector, product)
       middle = processor_time()
-      m = self%structure%n_coordinates
-      do h = 1, self%fourier%n_retained
-         call zgemv('N', self%n_used, self%n_active, one, self%stiffness(1, 1, h), m, &
-                    self%input, 1, zero, self%output, 1)
+      m = self%problem%structure%n_coordinates
+      do h = 1, self%problem%fourier%n_retained
+         call zgemv('N', self%active%n_used, self%active%n_active, one, self%stiffness(1, 1, h), &
+                    m, self%input, 1, zero, self%output, 1)
       end do
-      n = 3*self%fourier%n_coefficients
-      do i = 1, self%n_pairs
-         if (self%work(self%forces%pairs)%linear_state(i) /= pair_mixed) cycle
-         associate (work => self%work(self%forces%pairs))
+      n = 3*self%problem%fourier%n_coefficients
+      do i = 1, self%problem%n_pairs
+         if (self%work(self%problem%forces%pairs)%linear_state(i) /= pair_mixed) cycle
+         associate (work => self%work(self%problem%forces%pairs))
             call dgemv('T', n, n, 1.0_wp, work%jacobian(1, 1, i), n, work%input(1, i), 1, 0.0_wp, &
                        self%vector, 1)
          end associate
@@ -326,7 +329,7 @@ contains
       call add(self, part_apply, start, middle)
       self%n_products = min(self%n_products + 1, size(self%basis, 2) - 1)
       start = processor_time()
-      n = self%n_linear
+      n = self%active%n_linear
       do i = 1, 2
          call dgemv('T', n, self%n_products, 1.0_wp, self%basis, size(self%basis, 1), &
                     self%vector, 1, 0.0_wp, self%weights, 1)
@@ -343,12 +346,12 @@ contains
       integer :: h
 
       start = processor_time()
-      call self%hbm_system%precondition(vector)
+      call self%balance_state%precondition(vector)
       middle = processor_time()
       self%square(:, 1) = one
-      do h = 1, self%fourier%n_retained
+      do h = 1, self%problem%fourier%n_retained
          ! Of the order of its own factors, which may be kept from other active coordinates.
-         call self%preconditioner(h)%solve(self%square(:self%n_preconditioned, 1))
+         call self%preconditioner%harmonic(h)%solve(self%square(:self%preconditioner%n, 1))
       end do
       call add(self, part_precondition, start, middle)
    end subroutine precondition
@@ -367,7 +370,8 @@ program floor
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_guess, only: stuck_guess
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
@@ -380,7 +384,8 @@ program floor
    implicit none (type, external)
 
    type(case_type) :: input
-   type(hbm_system), target :: balance
+   type(balance_problem), target :: problem
+   type(balance_state), target :: balance
    type(measured_system), target :: system
    type(newton_solver) :: newton
    type(error_type), allocatable :: error
@@ -392,7 +397,7 @@ program floor
    call read_case(trim(path), [string_type ::], input, error)
    call stop_on(error)
    building = processor_time()
-   call build_system(input, balance, error)
+   call build_system(input, problem, balance, error)
    call stop_on(error)
    call new_measured_system(balance, input%contact%mu, system)
    building = processor_time() - building
@@ -427,7 +432,7 @@ contains
          call stop_on(error)
          select case (k)
          case (1)
-            call stuck_guess(system%hbm_system, x)
+            call stuck_guess(system%balance_state, x)
          case (2)
             x = last
          case default
@@ -444,7 +449,7 @@ contains
          last = x
          start = processor_time()
          point = point_type()
-         call recover_point(system%hbm_system, x, input%harmonics%n_harmonics, &
+         call recover_point(system%balance_state, x, input%harmonics%n_harmonics, &
                             input%output%contact, point)
          recovery = recovery + processor_time() - start
       end do

@@ -13,9 +13,9 @@
 !> implicit Euler is one of the flow to the letter. All coordinates stay in the linear problem.
 module fw_flow
    use fw_kinds, only: wp
-   use fw_hbm, only: hbm_system
-   use fw_hbm, only: to_complex
-   use fw_hbm, only: to_real
+   use fw_balance_state, only: balance_state
+   use fw_fourier, only: to_complex
+   use fw_fourier, only: to_real
    use fw_lapack, only: zgemm
    use fw_linalg, only: complex_lu_type
    use fw_pseudo_system, only: pseudo_system
@@ -28,7 +28,7 @@ module fw_flow
 
    type, extends(pseudo_system) :: flow_system
       !> The balance, nothing condensed, at its frequency.
-      type(hbm_system), pointer :: balance => null()
+      type(balance_state), pointer :: balance => null()
       !> P of each harmonic (n_coordinates, n_coordinates, n_retained), and its factors.
       complex(wp), allocatable :: p(:, :, :)
       type(complex_lu_type), allocatable :: factors(:)
@@ -59,14 +59,14 @@ contains
 
    !> The flow of a balance at its present frequency; to be made anew when that changes.
    subroutine new_flow(balance, flow, self)
-      type(hbm_system), intent(inout), target :: balance
+      type(balance_state), intent(inout), target :: balance
       !> flow_rotated, flow_identity or flow_preconditioned.
       integer, intent(in) :: flow
       type(flow_system), intent(out) :: self
       integer :: h, m, nh
 
-      m = balance%structure%n_coordinates
-      nh = balance%fourier%n_retained
+      m = balance%problem%structure%n_coordinates
+      nh = balance%problem%fourier%n_retained
       self%balance => balance
       self%interrupt => balance%interrupt
       self%n = balance%n
@@ -84,7 +84,7 @@ contains
 
    !> P of one harmonic.
    subroutine fill_flow(balance, flow, h, p)
-      type(hbm_system), intent(in) :: balance
+      type(balance_state), intent(in) :: balance
       integer, intent(in) :: flow, h
       !> P of the harmonic (n_coordinates, n_coordinates), of the unit of a stiffness.
       complex(wp), intent(out), contiguous :: p(:, :)
@@ -92,8 +92,8 @@ contains
       integer :: i, n
 
       omega = balance%frequency()
-      n = balance%fourier%harmonic(h)
-      call balance%structure%mass(mass)
+      n = balance%problem%fourier%harmonic(h)
+      call balance%problem%structure%mass(mass)
       select case (flow)
       case (flow_identity)
          mean_mass = sum([(abs(mass(i, i)), i=1, size(p, 1))])/real(size(p, 1), wp)
@@ -102,7 +102,7 @@ contains
             p(i, i) = omega**2*mean_mass
          end do
       case (flow_preconditioned)
-         call balance%structure%block(balance%structure_state, h, p)
+         call balance%problem%structure%block(balance%structure_state, h, p)
          call add_closed_joint(balance, h, p)
       case default
          p = omega**2*mass
@@ -112,19 +112,19 @@ contains
 
    !> Prediction stiffness of every component of every pair, where that is one.
    subroutine add_closed_joint(balance, h, p)
-      type(hbm_system), intent(in) :: balance
+      type(balance_state), intent(in) :: balance
       integer, intent(in) :: h
       !> Grows by B^T k B of every pair (n_coordinates, n_coordinates).
       complex(wp), intent(inout) :: p(:, :)
       integer :: i, c
 
-      associate (prediction => balance%forces%entry(balance%forces%pairs)%law%prediction)
-         do i = 1, balance%n_pairs
+      associate (law => balance%problem%forces%entry(balance%problem%forces%pairs)%law)
+         do i = 1, balance%problem%n_pairs
             do c = 1, 3
-               if (balance%joint%row(c, i) == 0) cycle
-               if (prediction%by_time .and. prediction%order(c) > 0) cycle
-               call balance%incidence%add_block(balance%joint%row(c, i), h, &
-                                                cmplx(prediction%stiffness(i, c), kind=wp), p)
+               if (balance%problem%joint%row(c, i) == 0) cycle
+               if (law%prediction%by_time .and. law%prediction%order(c) > 0) cycle
+               call balance%problem%incidence%add_block(balance%problem%joint%row(c, i), h, &
+                  cmplx(law%prediction%stiffness(i, c), kind=wp), p)
             end do
          end do
       end associate
@@ -147,7 +147,7 @@ contains
       if (.not. singular .and. smallest > 1.0e-12_wp*maxval(abs(self%p(:, :, h)))) return
       do i = 1, m
          self%p(i, i, h) = self%p(i, i, h) + massless_share* &
-            abs(self%balance%structure%diagonal(self%balance%structure_state, h, i))
+            abs(self%balance%problem%structure%diagonal(self%balance%structure_state, h, i))
       end do
       self%factors(h)%matrix = self%p(:, :, h)
       call self%factors(h)%factor(singular)
@@ -169,12 +169,12 @@ contains
       complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
       integer :: h
 
-      call to_complex(self%balance%fourier, m, vector, self%input)
+      call to_complex(self%balance%problem%fourier, m, vector, self%input)
       do h = 1, size(self%p, 3)
          call zgemm('N', 'N', m, 1, m, one, self%p(1, 1, h), m, self%input(1, h), m, zero, &
                     self%output(1, h), m)
       end do
-      call to_real(self%balance%fourier, m, self%output, product)
+      call to_real(self%balance%problem%fourier, m, self%output, product)
    end subroutine multiply
 
    subroutine flow_solve(self, vector)
@@ -183,11 +183,11 @@ contains
       integer :: h, m
 
       m = size(self%p, 1)
-      call to_complex(self%balance%fourier, m, vector, self%input)
+      call to_complex(self%balance%problem%fourier, m, vector, self%input)
       do h = 1, size(self%p, 3)
          call self%factors(h)%solve(1, self%input(:, h:h))
       end do
-      call to_real(self%balance%fourier, m, self%input, vector)
+      call to_real(self%balance%problem%fourier, m, self%input, vector)
    end subroutine flow_solve
 
    subroutine set_shift(self, h, x_old)

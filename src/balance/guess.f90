@@ -3,8 +3,8 @@
 module fw_guess
    use fw_force_law, only: force_law
    use fw_kinds, only: wp
-   use fw_hbm, only: hbm_system
-   use fw_hbm, only: to_real
+   use fw_balance_state, only: balance_state
+   use fw_fourier, only: to_real
    use fw_linalg, only: complex_lu_type
    use fw_linalg, only: is_positive_definite
    implicit none (type, external)
@@ -19,10 +19,10 @@ contains
 
    !> The linear solution with pairs stuck where they bear (n_coordinates * n_coefficients).
    subroutine stuck_guess(system, x)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       real(wp), intent(out), contiguous :: x(:)
-      logical :: closed(system%n_pairs)
-      real(wp) :: tension(system%n_pairs)
+      logical :: closed(system%problem%n_pairs)
+      real(wp) :: tension(system%problem%n_pairs)
       integer :: round
 
       closed = .true.
@@ -36,10 +36,10 @@ contains
 
    !> The linear solution without any contact force.
    subroutine free_guess(system, x)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       real(wp), intent(out), contiguous :: x(:)
-      logical :: closed(system%n_pairs)
-      real(wp) :: tension(system%n_pairs)
+      logical :: closed(system%problem%n_pairs)
+      real(wp) :: tension(system%problem%n_pairs)
 
       closed = .false.
       call linear_solution(system, closed, x, tension)
@@ -48,39 +48,40 @@ contains
    !> Whether the structure holds a static load without its contact. (Without a static harmonic
    !> there is no static position to lose.)
    logical function held_without_contact(system) result(held)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       complex(wp), allocatable :: stiffness(:, :)
 
       held = .true.
-      if (.not. system%fourier%has_constant()) return
-      allocate (stiffness(system%structure%n_coordinates, system%structure%n_coordinates))
+      if (.not. system%problem%fourier%has_constant()) return
+      allocate (stiffness(system%problem%structure%n_coordinates, &
+                          system%problem%structure%n_coordinates))
       ! Harmonic 0 is the first of those retained.
-      call system%structure%block(system%structure_state, 1, stiffness)
+      call system%problem%structure%block(system%structure_state, 1, stiffness)
       held = is_positive_definite(real(stiffness, wp))
    end function held_without_contact
 
    !> Whether the structure holds a static load with its pairs closed but free of friction.
    logical function held_without_friction(system) result(held)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       complex(wp), allocatable :: stiffness(:, :)
-      logical :: free(system%structure%n_coordinates)
+      logical :: free(system%problem%structure%n_coordinates)
       integer, allocatable :: kept(:)
       integer :: i, j, row
 
       held = .true.
-      if (.not. system%fourier%has_constant()) return
+      if (.not. system%problem%fourier%has_constant()) return
       free = .true.
       allocate (stiffness(size(free), size(free)))
-      call system%structure%block(system%structure_state, 1, stiffness)
-      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+      call system%problem%structure%block(system%structure_state, 1, stiffness)
+      associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
          ! Closed without friction: rigid normal rows are held, elastic ones keep their stiffness.
-         do i = 1, system%n_pairs
-            row = system%joint%row(3, i)
+         do i = 1, system%problem%n_pairs
+            row = system%problem%joint%row(3, i)
             if (row == 0) cycle
             if (p%takes_balance) then
-               free(system%incidence%coordinate_of(row)) = .false.
+               free(system%problem%incidence%coordinate_of(row)) = .false.
             else
-               call system%incidence%add_block(row, 1, cmplx(p%stiffness(i, 3), kind=wp), &
+               call system%problem%incidence%add_block(row, 1, cmplx(p%stiffness(i, 3), kind=wp), &
                                                 stiffness)
             end if
          end do
@@ -91,7 +92,7 @@ contains
 
    !> Solve with closed pairs stuck; tension is their mean normal force (positive: it pulls).
    subroutine linear_solution(system, closed, x, tension)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       !> Pairs that are taken for stuck (n_pairs).
       logical, intent(in) :: closed(:)
       real(wp), intent(out), contiguous :: x(:)
@@ -99,32 +100,33 @@ contains
       real(wp), intent(out) :: tension(:)
       complex(wp), allocatable :: q(:, :), force(:)
       complex(wp), allocatable :: stiffness(:, :)
-      logical :: held(system%structure%n_coordinates)
+      logical :: held(system%problem%structure%n_coordinates)
       integer :: h, m
 
-      m = system%structure%n_coordinates
-      allocate (q(m, system%fourier%n_retained), source=(0.0_wp, 0.0_wp))
+      m = system%problem%structure%n_coordinates
+      allocate (q(m, system%problem%fourier%n_retained), source=(0.0_wp, 0.0_wp))
       allocate (stiffness(m, m))
       tension = 0.0_wp
-      do h = 1, system%fourier%n_retained
+      do h = 1, system%problem%fourier%n_retained
          ! A harmonic of many pairs takes tenths of a second; nobody looks at the rest then.
          if (system%is_interrupted()) exit
-         call system%structure%block(system%structure_state, h, stiffness)
+         call system%problem%structure%block(system%structure_state, h, stiffness)
          force = system%structure_state%load(:, h)
          ! Only the vibratory load is raised from zero; the static one acts throughout.
-         if (system%fourier%harmonic(h) > 0) force = system%load_share*force
+         if (system%problem%fourier%harmonic(h) > 0) force = system%load_share*force
          held = .false.
          call close_pairs(system, closed, h, stiffness, force, held, q(:, h))
          call solve_free(stiffness, force, held, q(:, h))
-         if (system%fourier%harmonic(h) == 0) call mean_tension(system, stiffness, q(:, h), &
-                                                                  tension)
+         if (system%problem%fourier%harmonic(h) == 0) then
+            call mean_tension(system, stiffness, q(:, h), tension)
+         end if
       end do
       call to_real_vector(system, q, x)
    end subroutine linear_solution
 
    !> Rigid pairs hold their coordinates (at minus the gap); elastic ones add their stiffness.
    subroutine close_pairs(system, closed, h, stiffness, force, held, q)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       logical, intent(in) :: closed(:)
       integer, intent(in) :: h
       !> Of one harmonic: (n_coordinates, n_coordinates) and (n_coordinates).
@@ -136,23 +138,24 @@ contains
       real(wp) :: gap
       complex(wp) :: slope
 
-      associate (law => system%forces%entry(system%forces%pairs)%law)
+      associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
          do i = 1, size(closed)
             if (.not. closed(i)) cycle
             do c = 1, 3
-               row = system%joint%row(c, i)
+               row = system%problem%joint%row(c, i)
                if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
                gap = 0.0_wp
-               if (c == 3 .and. system%fourier%harmonic(h) == 0) gap = law%prediction%gap(i) + &
-                  system%depth(i)
+               if (c == 3 .and. system%problem%fourier%harmonic(h) == 0) then
+                  gap = law%prediction%gap(i) + system%depth(i)
+               end if
                if (law%prediction%takes_balance) then
-                  j = system%incidence%coordinate_of(row)
+                  j = system%problem%incidence%coordinate_of(row)
                   held(j) = .true.
                   q(j) = -gap
                else
-                  slope = elastic_slope(system, law, i, c, system%fourier%harmonic(h))
-                  call system%incidence%scatter_harmonic(row, h, -slope*gap, force)
-                  call system%incidence%add_block(row, h, slope, stiffness)
+                  slope = elastic_slope(system, law, i, c, system%problem%fourier%harmonic(h))
+                  call system%problem%incidence%scatter_harmonic(row, h, -slope*gap, force)
+                  call system%problem%incidence%add_block(row, h, slope, stiffness)
                end if
             end do
          end do
@@ -162,7 +165,7 @@ contains
    !> Force of an elastic pair about its position at rest over the amplitude of its displacement in
    !> a harmonic n: each derivative by tau is a factor i n.
    complex(wp) function elastic_slope(system, law, pair, component, harmonic) result(slope)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       class(force_law), intent(in) :: law
       integer, intent(in) :: pair, component, harmonic
 
@@ -203,7 +206,7 @@ contains
 
    !> Mean normal force of every pair at a static position.
    subroutine mean_tension(system, stiffness, q, tension)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       !> Of the structure, where the pairs take the balance.
       complex(wp), intent(in) :: stiffness(:, :)
       !> Coordinates at rest (n_coordinates).
@@ -213,13 +216,14 @@ contains
       integer :: i, j, row
 
       tension = 0.0_wp
-      call system%incidence%gather(system%joint%row(3, :), size(q), 1, real(q, wp), opening)
-      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+      call system%problem%incidence%gather(system%problem%joint%row(3, :), size(q), 1, &
+                                           real(q, wp), opening)
+      associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
          do i = 1, size(tension)
-            row = system%joint%row(3, i)
+            row = system%problem%joint%row(3, i)
             if (row == 0) cycle
             if (p%takes_balance) then
-               j = system%incidence%coordinate_of(row)
+               j = system%problem%incidence%coordinate_of(row)
                ! What is left of the balance of a held row is the force that holds it.
                tension(i) = system%load(j, 1) - &
                             real(sum(stiffness(j, :)*q), wp)
@@ -231,11 +235,11 @@ contains
    end subroutine mean_tension
 
    subroutine to_real_vector(system, q, x)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       complex(wp), intent(in) :: q(:, :)
-      real(wp), intent(out) :: x(size(q, 1), system%fourier%n_coefficients)
+      real(wp), intent(out) :: x(size(q, 1), system%problem%fourier%n_coefficients)
 
-      call to_real(system%fourier, size(q, 1), q, x)
+      call to_real(system%problem%fourier, size(q, 1), q, x)
    end subroutine to_real_vector
 
 end module fw_guess

@@ -6,7 +6,7 @@
 module fw_hdhb
    use fw_kinds, only: wp
    use fw_fft, only: fft_type
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_error, only: error_type
    use fw_parameter_system, only: parameter_system
    implicit none (type, external)
@@ -16,7 +16,7 @@ module fw_hdhb
 
    type, extends(parameter_system) :: hdhb_system
       !> The same balance in coefficients.
-      type(hbm_system), pointer :: balance => null()
+      type(balance_state), pointer :: balance => null()
       !> Workspace (n).
       real(wp), allocatable :: coefficients(:), product(:)
       !> Of all coordinates, where transforms are long.
@@ -41,7 +41,7 @@ contains
    !> Wrap a balance; its number of instants must be that of its coefficients.
    !> Has no structure of its own: every call goes through the coefficients.
    subroutine new_hdhb(balance, self)
-      type(hbm_system), intent(inout), target :: balance
+      type(balance_state), intent(inout), target :: balance
       type(hdhb_system), intent(out) :: self
 
       self%balance => balance
@@ -49,7 +49,7 @@ contains
       self%n = balance%n
       self%reduced = balance%reduced
       allocate (self%coefficients(self%n), self%product(self%n), source=0.0_wp)
-      call balance%fourier%plan_fft(balance%structure%n_coordinates, self%fft)
+      call balance%problem%fourier%plan_fft(balance%problem%structure%n_coordinates, self%fft)
    end subroutine new_hdhb
 
    !> Values at the instants from coefficients, n_rows rows each.
@@ -60,7 +60,7 @@ contains
       real(wp), intent(in), contiguous :: coefficients(:)
       real(wp), intent(inout), contiguous :: values(:)
 
-      call self%balance%fourier%to_time(n_rows, coefficients, values, self%fft)
+      call self%balance%problem%fourier%to_time(n_rows, coefficients, values, self%fft)
    end subroutine to_values
 
    !> The inverse of to_values.
@@ -70,7 +70,7 @@ contains
       real(wp), intent(in), contiguous :: values(:)
       real(wp), intent(inout), contiguous :: coefficients(:)
 
-      call self%balance%fourier%to_coefficients(n_rows, values, coefficients, self%fft)
+      call self%balance%problem%fourier%to_coefficients(n_rows, values, coefficients, self%fft)
    end subroutine to_coefficients
 
    !> The reference is scaled so that the tolerance is met by the coefficients as well: a row of
@@ -81,9 +81,9 @@ contains
       real(wp), intent(out), contiguous :: r(:)
       integer :: m
 
-      m = self%balance%structure%n_coordinates
+      m = self%balance%problem%structure%n_coordinates
       self%balance%reduced = self%reduced
-      self%reference = sqrt(0.5_wp*self%balance%fourier%n_time)*self%balance%reference
+      self%reference = sqrt(0.5_wp*self%balance%problem%fourier%n_time)*self%balance%reference
       call self%to_coefficients(m, x, self%coefficients)
       call self%balance%residual(self%coefficients, self%product)
       call self%to_values(m, self%product, r)
@@ -105,7 +105,7 @@ contains
       real(wp), intent(out), contiguous :: dr(:)
       integer :: m
 
-      m = self%balance%structure%n_coordinates
+      m = self%balance%problem%structure%n_coordinates
       call self%to_coefficients(m, x, self%coefficients)
       call self%balance%parameter_derivative(self%coefficients, self%product)
       call self%to_values(m, self%product, dr)
@@ -126,9 +126,9 @@ contains
       real(wp), intent(in), contiguous :: r(:)
       real(wp), intent(out), contiguous :: rhs(:)
 
-      call self%to_coefficients(self%balance%structure%n_coordinates, r, self%coefficients)
+      call self%to_coefficients(self%balance%problem%structure%n_coordinates, r, self%coefficients)
       call self%balance%reduce(self%coefficients, self%product(:size(rhs)))
-      call self%to_values(self%balance%n_active, self%product(:size(rhs)), rhs)
+      call self%to_values(self%balance%active%n_active, self%product(:size(rhs)), rhs)
    end subroutine reduce
 
    !> Steps of all coordinates, at the instants.
@@ -138,8 +138,9 @@ contains
       real(wp), intent(out), contiguous :: step(:)
       integer :: m
 
-      m = self%balance%structure%n_coordinates
-      call self%to_coefficients(self%balance%n_active, solution, self%product(:size(solution)))
+      m = self%balance%problem%structure%n_coordinates
+      call self%to_coefficients(self%balance%active%n_active, solution, &
+                                self%product(:size(solution)))
       call self%to_coefficients(m, r, self%coefficients)
       call self%balance%expand(self%coefficients, self%product(:size(solution)), step)
       self%coefficients = step
@@ -154,9 +155,9 @@ contains
       integer :: n
 
       n = size(vector)
-      call self%to_coefficients(self%balance%n_active, vector, self%coefficients(:n))
+      call self%to_coefficients(self%balance%active%n_active, vector, self%coefficients(:n))
       call self%balance%apply(self%coefficients(:n), self%product(:n))
-      call self%to_values(self%balance%n_active, self%product(:n), product)
+      call self%to_values(self%balance%active%n_active, self%product(:n), product)
    end subroutine apply
 
    subroutine build_preconditioner(self)
@@ -172,9 +173,9 @@ contains
       integer :: n
 
       n = size(vector)
-      call self%to_coefficients(self%balance%n_active, vector, self%coefficients(:n))
+      call self%to_coefficients(self%balance%active%n_active, vector, self%coefficients(:n))
       call self%balance%precondition(self%coefficients(:n))
-      call self%to_values(self%balance%n_active, self%coefficients(:n), vector)
+      call self%to_values(self%balance%active%n_active, self%coefficients(:n), vector)
    end subroutine precondition
 
    !> Transform the columns of the matrix in coefficients, then its rows.
@@ -185,8 +186,8 @@ contains
       integer :: j, n, rows
 
       ! J_t = T^-1 J T with T from values to coefficients: columns first, then rows.
-      rows = self%balance%n_active
-      n = rows*self%balance%fourier%n_coefficients
+      rows = self%balance%active%n_active
+      n = rows*self%balance%problem%fourier%n_coefficients
       call self%balance%assemble(matrix)
       do j = 1, n
          line(:n) = matrix(:n, j)
@@ -203,10 +204,10 @@ contains
    function transposed_analysis(self, rows, line) result(values)
       type(hdhb_system), intent(in) :: self
       integer, intent(in) :: rows
-      real(wp), intent(in) :: line(rows, self%balance%fourier%n_coefficients)
-      real(wp) :: values(rows*self%balance%fourier%n_time)
+      real(wp), intent(in) :: line(rows, self%balance%problem%fourier%n_coefficients)
+      real(wp) :: values(rows*self%balance%problem%fourier%n_time)
 
-      values = reshape(matmul(line, self%balance%fourier%analysis), [size(values)])
+      values = reshape(matmul(line, self%balance%problem%fourier%analysis), [size(values)])
    end function transposed_analysis
 
 end module fw_hdhb

@@ -2,7 +2,7 @@
 module fw_left_out
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -15,19 +15,19 @@ contains
    !> that of their vibratory harmonics, or of the vibratory load where that is larger, at the point
    !> that was evaluated last.
    function force_left_out(system, n_harmonics) result(share)
-      type(hbm_system), intent(inout) :: system
+      type(balance_state), intent(inout) :: system
       integer, intent(in) :: n_harmonics
       real(wp) :: share
       type(fourier_type) :: kept
       real(wp) :: all_power, kept_power
       integer :: k, n_time
 
-      n_time = system%fourier%n_time
+      n_time = system%problem%fourier%n_time
       kept = new_fourier(min(n_harmonics, (n_time - 1)/2), n_time)
       all_power = 0.0_wp
       kept_power = 0.0_wp
-      do k = 1, system%forces%n_laws
-         associate (law => system%forces%entry(k)%law, work => system%work(k))
+      do k = 1, system%problem%forces%n_laws
+         associate (law => system%problem%forces%entry(k)%law, work => system%work(k))
             if (law%n_elements == 0) cycle
             call law%sample(work)
             call add_power(kept, law%n_elements*law%n_components, n_time, work%force_time, &

@@ -6,8 +6,8 @@ module fw_recovery
    use fw_fourier, only: coefficient_count
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
-   use fw_hbm, only: hbm_system
-   use fw_hbm, only: to_complex
+   use fw_balance_state, only: balance_state
+   use fw_fourier, only: to_complex
    use fw_point, only: point_type
    implicit none (type, external)
    private
@@ -19,7 +19,7 @@ contains
    !> Fill a point from the solution x, where the system was evaluated last; with_contact adds
    !> forces, states and dissipation.
    subroutine recover_point(system, x, n_harmonics, with_contact, point)
-      type(hbm_system), intent(inout) :: system
+      type(balance_state), intent(inout) :: system
       !> Coordinates (n_coordinates, n_coefficients), flat.
       real(wp), intent(in), contiguous :: x(:)
       !> H of the result, whatever harmonics were computed.
@@ -29,14 +29,15 @@ contains
       complex(wp), allocatable :: q(:, :), observed(:, :)
       integer :: m, h, n, n_observed, i
 
-      m = system%structure%n_coordinates
-      n_observed = system%structure%n_observed
-      allocate (q(m, system%fourier%n_retained), observed(n_observed, system%fourier%n_retained))
-      call to_complex(system%fourier, m, x, q)
-      call system%structure%recover(system%structure_state, q, observed)
+      m = system%problem%structure%n_coordinates
+      n_observed = system%problem%structure%n_observed
+      allocate (q(m, system%problem%fourier%n_retained))
+      allocate (observed(n_observed, system%problem%fourier%n_retained))
+      call to_complex(system%problem%fourier, m, x, q)
+      call system%problem%structure%recover(system%structure_state, q, observed)
       allocate (point%coefficients(2*n_harmonics + 1, n_observed), source=0.0_wp)
-      do h = 1, system%fourier%n_retained
-         n = system%fourier%harmonic(h)
+      do h = 1, system%problem%fourier%n_retained
+         n = system%problem%fourier%harmonic(h)
          if (n == 0) then
             point%coefficients(1, :) = real(observed(:, h), wp)
          else
@@ -46,7 +47,7 @@ contains
          end if
       end do
       point%amplitude = [(largest_magnitude(point%coefficients(:, i)), i=1, n_observed)]
-      if (with_contact .and. system%n_pairs > 0) call recover_contact(system, x, &
+      if (with_contact .and. system%problem%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
    end subroutine recover_point
 
@@ -54,39 +55,39 @@ contains
    !> harmonics: the relative coordinates are the first of all; harmonics and internal modes that
    !> only the target has start at zero.
    pure subroutine carry_solution(source, x, target, y)
-      type(hbm_system), intent(in) :: source, target
+      type(balance_state), intent(in) :: source, target
       !> Unknowns of either system, flat with the coordinates innermost.
       real(wp), intent(in) :: x(:)
       real(wp), intent(out) :: y(:)
       integer :: h, j, c
 
       y = 0.0_wp
-      do h = 1, target%fourier%n_retained
+      do h = 1, target%problem%fourier%n_retained
          ! By its number: retained harmonics of both may differ in their places.
-         j = findloc(source%fourier%harmonic, target%fourier%harmonic(h), dim=1)
+         j = findloc(source%problem%fourier%harmonic, target%problem%fourier%harmonic(h), dim=1)
          if (j == 0) cycle
-         do c = 0, merge(0, 1, target%fourier%harmonic(h) == 0)
-            call carry_coefficient(source, x, source%fourier%column(j) + c, target, &
-                                   target%fourier%column(h) + c, y)
+         do c = 0, merge(0, 1, target%problem%fourier%harmonic(h) == 0)
+            call carry_coefficient(source, x, source%problem%fourier%column(j) + c, target, &
+                                   target%problem%fourier%column(h) + c, y)
          end do
       end do
    end subroutine carry_solution
 
    !> The coordinates of one coefficient.
    pure subroutine carry_coefficient(source, x, from, target, to, y)
-      type(hbm_system), intent(in) :: source, target
+      type(balance_state), intent(in) :: source, target
       real(wp), intent(in) :: x(:)
       integer, intent(in) :: from, to
       real(wp), intent(inout) :: y(:)
       integer :: i, j, first_x, first_y, n_relative
 
-      n_relative = source%structure%n_relative
+      n_relative = source%problem%structure%n_relative
       ! All coordinates of a coefficient stand together: relative ones, then kept modes.
-      first_x = (from - 1)*source%structure%n_coordinates
-      first_y = (to - 1)*target%structure%n_coordinates
+      first_x = (from - 1)*source%problem%structure%n_coordinates
+      first_y = (to - 1)*target%problem%structure%n_coordinates
       y(first_y + 1:first_y + n_relative) = x(first_x + 1:first_x + n_relative)
-      do i = 1, size(source%structure%kept)
-         j = findloc(target%structure%kept, source%structure%kept(i), dim=1)
+      do i = 1, size(source%problem%structure%kept)
+         j = findloc(target%problem%structure%kept, source%problem%structure%kept(i), dim=1)
          if (j > 0) y(first_y + n_relative + j) = x(first_x + n_relative + i)
       end do
    end subroutine carry_coefficient
@@ -96,7 +97,7 @@ contains
    !> equations, which need not be the projection of their histories (collocation); even harmonics
    !> that are left out hold the normal load.
    subroutine recover_contact(system, x, n_harmonics, point)
-      type(hbm_system), intent(inout) :: system
+      type(balance_state), intent(inout) :: system
       real(wp), intent(in), contiguous :: x(:)
       integer, intent(in) :: n_harmonics
       type(point_type), intent(inout) :: point
@@ -104,20 +105,21 @@ contains
       real(wp), allocatable :: force(:, :, :)
       integer :: n_pairs, pairs, h, k, n
 
-      n_pairs = system%n_pairs
-      pairs = system%forces%pairs
+      n_pairs = system%problem%n_pairs
+      pairs = system%problem%forces%pairs
       allocate (force(n_pairs, 3, coefficient_count(n_harmonics)))
       ! Harmonics were left out: those come from the law, the retained ones follow below.
-      if (system%fourier%n_retained <= n_harmonics) then
-         all_harmonics = new_fourier(n_harmonics, system%fourier%n_time)
-         call system%forces%entry(pairs)%law%coefficients(system%work(pairs), system%fourier, &
+      if (system%problem%fourier%n_retained <= n_harmonics) then
+         all_harmonics = new_fourier(n_harmonics, system%problem%fourier%n_time)
+         call system%problem%forces%entry(pairs)%law%coefficients(system%work(pairs), &
+                                                                  system%problem%fourier, &
                                                           all_harmonics, force)
       end if
-      do h = 1, system%fourier%n_retained
-         n = system%fourier%harmonic(h)
+      do h = 1, system%problem%fourier%n_retained
+         n = system%problem%fourier%harmonic(h)
          do k = 0, merge(0, 1, n == 0)
             force(:, :, max(1, 2*n) + k) = &
-               system%work(pairs)%force(:, :, system%fourier%column(h) + k)
+               system%work(pairs)%force(:, :, system%problem%fourier%column(h) + k)
          end do
       end do
       allocate (point%force(3, n_pairs, size(force, 3)))
@@ -125,30 +127,31 @@ contains
          point%force(:, :, k) = transpose(force(:, :, k))
       end do
       allocate (point%fraction(3, n_pairs))
-      call system%forces%entry(pairs)%law%fractions(system%work(pairs), point%fraction)
+      call system%problem%forces%entry(pairs)%law%fractions(system%work(pairs), point%fraction)
       call dissipated_energy(system, size(system%balance, 1), x, point)
    end subroutine recover_contact
 
    !> Work of the contact forces over a cycle, sum_n pi n (lambda_c u_s - lambda_s u_c).
    subroutine dissipated_energy(system, m, q, point)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       integer, intent(in) :: m
       !> Coordinates of the last evaluation (m, n_coefficients).
       real(wp), intent(in) :: q(m, *)
       type(point_type), intent(inout) :: point
-      real(wp) :: u(system%n_pairs, 3, system%fourier%n_coefficients)
+      real(wp) :: u(system%problem%n_pairs, 3, system%problem%fourier%n_coefficients)
       integer :: i, h, k
 
-      allocate (point%dissipation(system%n_pairs), source=0.0_wp)
-      associate (f => system%work(system%forces%pairs)%force, &
-                 rows => system%forces%entry(system%forces%pairs)%rows)
-         call system%incidence%gather(rows, m, system%fourier%n_coefficients, q, u)
-         do h = 1, system%fourier%n_retained
-            if (system%fourier%harmonic(h) == 0) cycle
-            k = system%fourier%column(h)
-            do i = 1, system%n_pairs
+      allocate (point%dissipation(system%problem%n_pairs), source=0.0_wp)
+      associate (f => system%work(system%problem%forces%pairs)%force, &
+                 rows => system%problem%forces%entry(system%problem%forces%pairs)%rows)
+         call system%problem%incidence%gather(rows, m, system%problem%fourier%n_coefficients, q, u)
+         do h = 1, system%problem%fourier%n_retained
+            if (system%problem%fourier%harmonic(h) == 0) cycle
+            k = system%problem%fourier%column(h)
+            do i = 1, system%problem%n_pairs
                ! Harmonic 0 does no work over a cycle.
-               point%dissipation(i) = point%dissipation(i) + pi*system%fourier%harmonic(h)* &
+               point%dissipation(i) = point%dissipation(i) + pi* &
+                                      system%problem%fourier%harmonic(h)* &
                                       sum(f(i, :, k)*u(i, :, k + 1) - f(i, :, k + 1)*u(i, :, k))
             end do
          end do
@@ -157,7 +160,7 @@ contains
 
    !> One period of the observed quantities and of the contact forces and displacements.
    subroutine recover_histories(system, m, q, n_harmonics, point)
-      type(hbm_system), intent(inout) :: system
+      type(balance_state), intent(inout) :: system
       integer, intent(in) :: m
       real(wp), intent(in) :: q(m, *)
       integer, intent(in) :: n_harmonics
@@ -166,20 +169,20 @@ contains
       real(wp), allocatable :: slip(:, :), slip_time(:, :)
       integer :: k, n_pairs, n_time, pairs
 
-      n_pairs = system%n_pairs
-      n_time = system%fourier%n_time
+      n_pairs = system%problem%n_pairs
+      n_time = system%problem%fourier%n_time
       all_harmonics = new_fourier(n_harmonics, n_time)
       point%history = matmul(transpose(all_harmonics%synthesis), point%coefficients)
       if (n_pairs == 0) return
-      allocate (slip(3*n_pairs, system%fourier%n_coefficients))
+      allocate (slip(3*n_pairs, system%problem%fourier%n_coefficients))
       allocate (slip_time(3*n_pairs, n_time))
-      call system%incidence%gather(reshape(system%joint%row, [3*n_pairs]), m, &
-                                   system%fourier%n_coefficients, q, slip)
-      slip_time = matmul(slip, system%fourier%synthesis)
+      call system%problem%incidence%gather(reshape(system%problem%joint%row, [3*n_pairs]), m, &
+                                   system%problem%fourier%n_coefficients, q, slip)
+      slip_time = matmul(slip, system%problem%fourier%synthesis)
       ! Rows ran component by component of each pair, as (3, n_pairs) does.
       point%slip_history = reshape(slip_time, [3, n_pairs, n_time])
-      pairs = system%forces%pairs
-      call system%forces%entry(pairs)%law%sample(system%work(pairs))
+      pairs = system%problem%forces%pairs
+      call system%problem%forces%entry(pairs)%law%sample(system%work(pairs))
       allocate (point%force_history(3, n_pairs, n_time))
       do k = 1, n_time
          point%force_history(:, :, k) = transpose(system%work(pairs)%force_time(:, :, k))

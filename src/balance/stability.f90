@@ -21,7 +21,7 @@ module fw_stability
    use fw_error, only: fatal_error
    use fw_error, only: status_input
    use fw_fourier, only: coefficient_count
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_hill, only: hill_exponents
    use fw_kinds, only: pi
    use fw_kinds, only: wp
@@ -57,7 +57,7 @@ contains
    subroutine floquet_multipliers(system, model, x, multipliers, error)
       !> At the frequency of the solution; built without leaving out components that nothing moves,
       !> because perturbations move them.
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       !> The model that the system was built from.
       type(model_type), intent(in) :: model
       !> The solution (n_coordinates * n_coefficients).
@@ -73,11 +73,11 @@ contains
 
       call check_system(system, model%n_dof, error)
       if (allocated(error)) return
-      call new_perturbation_basis(model, system%joint%relative, basis, error)
+      call new_perturbation_basis(model, system%problem%joint%relative, basis, error)
       if (allocated(error)) return
       call new_history(system, x, history)
       n_harmonics = chosen_harmonics(system, basis)
-      if (n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%n_pairs)])) then
+      if (n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%problem%n_pairs)])) then
          call marched_multipliers(system, basis, history, multipliers, error)
          if (allocated(error)) return
       else
@@ -98,16 +98,17 @@ contains
    end function is_stable
 
    subroutine check_system(system, n_dof, error)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       integer, intent(in) :: n_dof
       type(error_type), allocatable, intent(out) :: error
 
-      if (system%n_pairs > 0 .and. &
-          .not. system%forces%entry(system%forces%pairs)%law%facts%has_multipliers) then
+      if (system%problem%n_pairs > 0 .and. &
+          .not. system%problem%forces%entry( &
+             system%problem%forces%pairs)%law%facts%has_multipliers) then
          call fatal_error(error, '&sweep stability needs law = ''penalty'' in &contact: forces '// &
                           'of rigid contact are no function of the displacements', status_input)
-      else if (system%joint%n_idle > 0) then
-         call fatal_error(error, '&sweep stability: '//to_text(system%joint%n_idle)// &
+      else if (system%problem%joint%n_idle > 0) then
+         call fatal_error(error, '&sweep stability: '//to_text(system%problem%joint%n_idle)// &
                           ' components of contact pairs that nothing moves were left out, but '// &
                           'perturbations move them; keep them in the system', status_input)
       else if (n_dof > most_dofs) then
@@ -120,12 +121,12 @@ contains
    !> Harmonics for Hill's method: those of the solution, and more where the eigenproblem stays
    !> small; 0 where it would be too large.
    pure integer function chosen_harmonics(system, basis) result(n_harmonics)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       type(perturbation_basis), intent(in) :: basis
       integer :: width
 
       width = max(1, 2*basis%n_massive + basis%n_damped)
-      n_harmonics = max(maxval(system%fourier%harmonic), &
+      n_harmonics = max(maxval(system%problem%fourier%harmonic), &
                         min(fewest_harmonics, (comfortable_order/width - 1)/2))
       if (width*coefficient_count(n_harmonics) > largest_hill_order) n_harmonics = 0
    end function chosen_harmonics

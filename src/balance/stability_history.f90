@@ -8,7 +8,7 @@ module fw_stability_history
    use fw_fourier, only: new_fourier
    use fw_friction, only: elastic_friction
    use fw_friction, only: friction_law
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
    use fw_stability_tangent, only: relative_displacements
@@ -44,24 +44,24 @@ contains
 
    !> Follow the solution x of a system through a period.
    subroutine new_history(system, x, self)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
       type(history_type), intent(out) :: self
       type(fourier_type) :: fourier
       real(wp), allocatable :: rows(:, :)
       integer :: i, c, h
 
-      h = maxval(system%fourier%harmonic)
-      self%n_time = max(fewest_steps, system%fourier%n_time, steps_per_harmonic*h)
+      h = maxval(system%problem%fourier%harmonic)
+      self%n_time = max(fewest_steps, system%problem%fourier%n_time, steps_per_harmonic*h)
       fourier = new_fourier(h, self%n_time)
-      call relative_displacements(system, system%structure%n_coordinates, x, h, rows)
-      self%row = system%joint%row
+      call relative_displacements(system, system%problem%structure%n_coordinates, x, h, rows)
+      self%row = system%problem%joint%row
       allocate (self%stiffness(size(rows, 2)), source=0.0_wp)
       allocate (self%remembers(size(rows, 2)), source=.false.)
-      call take_law(system%forces%entry(system%forces%pairs)%law, self%law)
+      call take_law(system%problem%forces%entry(system%problem%forces%pairs)%law, self%law)
       call self%law%reserve(fourier, self%forces)
       associate (p => self%law%prediction)
-         do i = 1, system%n_pairs
+         do i = 1, system%problem%n_pairs
             do c = 1, 3
                if (self%row(c, i) == 0) cycle
                self%stiffness(self%row(c, i)) = p%stiffness(i, c)
@@ -69,7 +69,7 @@ contains
             end do
          end do
       end associate
-      self%forces%x_start = system%work(system%forces%pairs)%x_start
+      self%forces%x_start = system%work(system%problem%forces%pairs)%x_start
       call self%law%set_offset(system%depth, self%forces)
       call self%law%evaluate(fourier, self%forces)
       call find_memory(self)
@@ -91,7 +91,7 @@ contains
 
    !> Slopes of the laws other than that of the pairs.
    subroutine take_slopes(system, rows, fourier, self)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       real(wp), intent(in) :: rows(:, :)
       type(fourier_type), intent(in) :: fourier
       type(history_type), intent(inout) :: self
@@ -99,18 +99,18 @@ contains
       integer :: i, k, n
 
       allocate (self%pointwise_row(0))
-      do k = 1, system%forces%n_laws
-         if (k == system%forces%pairs) cycle
-         self%pointwise_row = [self%pointwise_row, system%forces%entry(k)%row(1, :)]
+      do k = 1, system%problem%forces%n_laws
+         if (k == system%problem%forces%pairs) cycle
+         self%pointwise_row = [self%pointwise_row, system%problem%forces%entry(k)%row(1, :)]
       end do
       allocate (self%slope(size(self%pointwise_row), self%n_time))
       n = 0
-      do k = 1, system%forces%n_laws
-         if (k == system%forces%pairs) cycle
-         do i = 1, size(system%forces%entry(k)%row, 2)
+      do k = 1, system%problem%forces%n_laws
+         if (k == system%problem%forces%pairs) cycle
+         do i = 1, size(system%problem%forces%entry(k)%row, 2)
             n = n + 1
             elongation = matmul(rows(:, self%pointwise_row(n)), fourier%synthesis)
-            self%slope(n, :) = system%forces%entry(k)%law%slope_at(i, elongation)
+            self%slope(n, :) = system%problem%forces%entry(k)%law%slope_at(i, elongation)
          end do
       end do
    end subroutine take_slopes

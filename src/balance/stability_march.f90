@@ -15,7 +15,7 @@ module fw_stability_march
    use fw_error, only: fatal_error
    use fw_error, only: status_failure
    use fw_error, only: status_input
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dgeev
@@ -50,7 +50,7 @@ contains
    !> The multipliers of largest modulus (2 n_massive + n_damped); the others, of positions that a
    !> slip wipes out, are zero.
    subroutine marched_multipliers(system, basis, history, multipliers, error)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       type(perturbation_basis), intent(in) :: basis
       type(history_type), intent(in) :: history
       complex(wp), allocatable, intent(out) :: multipliers(:)
@@ -80,7 +80,7 @@ contains
 
    !> Unit perturbations of every coordinate with mass or damping, velocity and position.
    subroutine start(system, basis, history, memory, self, error)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       type(perturbation_basis), intent(in) :: basis
       type(history_type), intent(in) :: history
       integer, intent(in) :: memory(:)

@@ -12,7 +12,7 @@ module fw_stability_tangent
    use fw_fourier, only: coefficient_count
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    implicit none (type, external)
@@ -38,7 +38,7 @@ contains
 
    !> The derivative at the solution x of a system (penalty law and springs).
    subroutine new_tangent(system, x, state, n_harmonics, self)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
       !> What the pairs do (n_pairs); those with friction are stuck or open.
       integer, intent(in) :: state(:)
@@ -51,12 +51,13 @@ contains
       self%n_harmonics = n_harmonics
       self%n_coefficients = coefficient_count(n_harmonics)
       n_terms = 0
-      do k = 1, system%forces%n_laws
-         n_terms = n_terms + count(system%forces%entry(k)%row > 0)
+      do k = 1, system%problem%forces%n_laws
+         n_terms = n_terms + count(system%problem%forces%entry(k)%row > 0)
       end do
       allocate (self%row(n_terms))
       allocate (self%block(self%n_coefficients, self%n_coefficients, n_terms))
-      call relative_displacements(system, system%structure%n_coordinates, x, n_harmonics, rows)
+      call relative_displacements(system, system%problem%structure%n_coordinates, x, &
+                                  n_harmonics, rows)
       call add_pointwise(system, rows, self)
       call add_gaps(system, rows, self)
       call add_stuck(system, state, self)
@@ -64,14 +65,14 @@ contains
 
    !> Coefficients 0..H' of the relative displacement of every row (2H'+1, n_rows).
    pure subroutine relative_displacements(system, m, q, n_harmonics, rows)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       integer, intent(in) :: m, n_harmonics
       real(wp), intent(in) :: q(m, *)
       real(wp), allocatable, intent(out) :: rows(:, :)
-      real(wp) :: u(system%fourier%n_coefficients)
+      real(wp) :: u(system%problem%fourier%n_coefficients)
       integer :: row, h, n, k
 
-      associate (b => system%incidence, f => system%fourier)
+      associate (b => system%problem%incidence, f => system%problem%fourier)
          allocate (rows(coefficient_count(n_harmonics), b%n_rows), source=0.0_wp)
          do row = 1, b%n_rows
             call b%gather_row(row, b%identity, m, 1.0_wp, q, u)
@@ -87,21 +88,21 @@ contains
 
    !> Laws other than that of the pairs, whose force depends on the displacement at the instant.
    subroutine add_pointwise(system, rows, self)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       real(wp), intent(in) :: rows(:, :)
       type(tangent_type), intent(inout) :: self
       type(fourier_type) :: fourier
       real(wp), allocatable :: elongation(:)
       integer :: i, k, row
 
-      do k = 1, system%forces%n_laws
-         if (k == system%forces%pairs) cycle
-         associate (law => system%forces%entry(k)%law)
+      do k = 1, system%problem%forces%n_laws
+         if (k == system%problem%forces%pairs) cycle
+         associate (law => system%problem%forces%entry(k)%law)
             ! Exact: the slope has power - 1 times the harmonics, the block adds two times H'.
             fourier = new_fourier(self%n_harmonics, &
                                   max(4, law%facts%instants_per_harmonic)*self%n_harmonics + 2)
             do i = 1, law%n_elements
-               row = system%forces%entry(k)%row(1, i)
+               row = system%problem%forces%entry(k)%row(1, i)
                elongation = matmul(rows(:, row), fourier%synthesis)
                call add_multiplication(fourier, law%slope_at(i, elongation), row, self)
             end do
@@ -111,7 +112,7 @@ contains
 
    !> Pairs that bear without friction.
    subroutine add_gaps(system, rows, self)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       real(wp), intent(in) :: rows(:, :)
       type(tangent_type), intent(inout) :: self
       type(fourier_type) :: fourier, wide
@@ -120,9 +121,9 @@ contains
 
       fourier = new_fourier(self%n_harmonics, 4*self%n_harmonics + 2)
       wide = new_fourier(2*self%n_harmonics, 4*self%n_harmonics + 2)
-      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
-         do i = 1, system%n_pairs
-            row = system%joint%row(3, i)
+      associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
+         do i = 1, system%problem%n_pairs
+            row = system%problem%joint%row(3, i)
             if (row == 0 .or. has_friction(system, i)) cycle
             gap = rows(:, row)
             gap(1) = gap(1) + p%gap(i) + system%depth(i)
@@ -135,10 +136,10 @@ contains
    end subroutine add_gaps
 
    pure logical function has_friction(system, pair)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       integer, intent(in) :: pair
 
-      associate (law => system%forces%entry(system%forces%pairs)%law)
+      associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
          has_friction = law%slope_at_rest(pair, 1) > 0.0_wp .or. law%slope_at_rest(pair, 2) > 0.0_wp
       end associate
    end function has_friction
@@ -224,21 +225,22 @@ contains
 
    !> Pairs that stick through the period are springs in every direction.
    pure subroutine add_stuck(system, state, self)
-      class(hbm_system), intent(in) :: system
+      class(balance_state), intent(in) :: system
       integer, intent(in) :: state(:)
       type(tangent_type), intent(inout) :: self
       integer :: i, c, j
 
-      do i = 1, system%n_pairs
+      do i = 1, system%problem%n_pairs
          if (.not. has_friction(system, i) .or. state(i) /= pair_stuck) cycle
          do c = 1, 3
-            if (system%joint%row(c, i) == 0) cycle
+            if (system%problem%joint%row(c, i) == 0) cycle
             self%n_terms = self%n_terms + 1
-            self%row(self%n_terms) = system%joint%row(c, i)
+            self%row(self%n_terms) = system%problem%joint%row(c, i)
             self%block(:, :, self%n_terms) = 0.0_wp
             do j = 1, self%n_coefficients
                self%block(j, j, self%n_terms) = &
-                  system%forces%entry(system%forces%pairs)%law%prediction%stiffness(i, c)
+                  system%problem%forces%entry( &
+                     system%problem%forces%pairs)%law%prediction%stiffness(i, c)
             end do
          end do
       end do

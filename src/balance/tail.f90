@@ -8,7 +8,7 @@
 module fw_tail
    use fw_contact_data, only: contact_type
    use fw_fourier, only: coefficient_count
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_linalg, only: complex_lu_type
    use fw_model, only: model_type
@@ -24,7 +24,7 @@ contains
    !> Lengthen the coefficients of a point, and those of its contact forces, to n_tail harmonics,
    !> where the system was evaluated last.
    subroutine recover_tail(system, model, contact, omega, n_tail, point)
-      type(hbm_system), intent(inout) :: system
+      type(balance_state), intent(inout) :: system
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
       !> Angular frequency [rad/s].
@@ -37,9 +37,9 @@ contains
 
       n_first = (size(point%coefficients, 1) + 1)/2
       if (n_tail < n_first) return
-      allocate (force(system%n_pairs, 3, coefficient_count(n_tail)), source=0.0_wp)
-      associate (pairs => system%forces%pairs)
-         call system%forces%entry(pairs)%law%tail(system%work(pairs), n_tail, force)
+      allocate (force(system%problem%n_pairs, 3, coefficient_count(n_tail)), source=0.0_wp)
+      associate (pairs => system%problem%forces%pairs)
+         call system%problem%forces%entry(pairs)%law%tail(system%work(pairs), n_tail, force)
       end associate
       call lengthen(point%coefficients, coefficient_count(n_tail))
       do n = n_first, n_tail

@@ -2,7 +2,7 @@
 !> contact limits, linear algebra returns some huge amplitude, 1/epsilon, with a small residual.
 module fw_unbounded
    use fw_kinds, only: wp
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    implicit none (type, external)
    private
 
@@ -17,17 +17,17 @@ contains
    !> small beside the load. Modes that are condensed are no concern: those without damping stay
    !> among the coordinates.
    logical function is_lost_in_round_off(system, x) result(lost)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       !> Coordinates (n_coordinates * n_coefficients).
       real(wp), intent(in), contiguous :: x(:)
       real(wp) :: square
       integer :: h, k, m
 
-      m = system%structure%n_coordinates
+      m = system%problem%structure%n_coordinates
       square = 0.0_wp
-      do h = 1, system%fourier%n_retained
-         if (system%fourier%harmonic(h) == 0) cycle
-         k = (system%fourier%column(h) - 1)*m
+      do h = 1, system%problem%fourier%n_retained
+         if (system%problem%fourier%harmonic(h) == 0) cycle
+         k = (system%problem%fourier%column(h) - 1)*m
          square = square + cancelling(system, h, x(k + 1:k + m), x(k + m + 1:k + 2*m))
       end do
       lost = .not. epsilon(1.0_wp)*sqrt(square) <= limit*system%reference
@@ -35,13 +35,13 @@ contains
 
    !> Square of the norm of (|K| + (n omega)^2 |M|) |q| for one harmonic.
    pure real(wp) function cancelling(system, h, cosine, sine) result(square)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       integer, intent(in) :: h
       real(wp), intent(in) :: cosine(:), sine(:)
       real(wp) :: amplitude(size(cosine)), sums(size(cosine))
 
       amplitude = hypot(cosine, sine)
-      call system%structure%magnitudes(system%structure_state, h, amplitude, sums)
+      call system%problem%structure%magnitudes(system%structure_state, h, amplitude, sums)
       square = sum(sums**2)
    end function cancelling
 

@@ -78,7 +78,7 @@ contains
 
    !> The case gives the largest number of harmonics.
    subroutine start(self, case, error)
-      class(accuracy_solver), intent(inout) :: self
+      class(accuracy_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
@@ -93,8 +93,8 @@ contains
       call need(self, case, self%current, self%doublings, error)
       if (allocated(error)) return
       associate (system => self%level(self%current, self%doublings)%system)
-         if (system%forces%entry(system%forces%pairs)%law%facts%follows_events) then
-            self%factor_time = merge(factor_planar, 0.0_wp, any(system%joint%row(2, :) > 0))
+         if (system%problem%forces%entry(system%problem%forces%pairs)%law%facts%follows_events) then
+            self%factor_time = merge(factor_planar, 0.0_wp, any(system%problem%joint%row(2, :) > 0))
          end if
       end associate
    end subroutine start

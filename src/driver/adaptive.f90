@@ -44,7 +44,7 @@ contains
 
    !> The case gives the largest number of harmonics.
    subroutine start(self, case, error)
-      class(adaptive_solver), intent(inout) :: self
+      class(adaptive_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 

@@ -8,7 +8,8 @@ module fw_branch
    use fw_continuation, only: branch_point
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hdhb
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_hdhb, only: hdhb_system
    use fw_hdhb, only: new_hdhb
    use fw_newton, only: newton_solver
@@ -40,10 +41,11 @@ module fw_branch
    !> The points of a branch as points of a result, one after the other.
    type :: branch_type
       type(arclength_type) :: curve
-      type(hbm_system), pointer :: system => null()
+      type(balance_state), pointer :: system => null()
       !> The structure without condensation, where it is small: nothing of it is hidden from the
       !> step control then.
-      type(hbm_system), pointer :: whole => null()
+      type(balance_problem), pointer :: whole_problem => null()
+      type(balance_state), pointer :: whole => null()
       !> The balance with values at instants as unknowns, where `hdhb` is asked for.
       type(hdhb_system) :: in_time
       logical :: is_in_time = .false.
@@ -139,7 +141,7 @@ contains
    subroutine begin(self, case, system, x, error)
       class(branch_type), intent(inout) :: self
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in), contiguous :: x(:)
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: values(:), whole_x(:)
@@ -164,7 +166,7 @@ contains
       if (self%is_in_time) then
          call new_hdhb(self%system, self%in_time)
          allocate (values(self%system%n))
-         call self%in_time%to_values(self%system%structure%n_coordinates, whole_x, values)
+         call self%in_time%to_values(self%system%problem%structure%n_coordinates, whole_x, values)
          call self%curve%begin(self%in_time, values, error)
       else
          call self%curve%begin(self%system, whole_x, error)
@@ -176,7 +178,7 @@ contains
    subroutine build_whole(self, case, system, x, whole_x, error)
       class(branch_type), intent(inout) :: self
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
       real(wp), allocatable, intent(out) :: whole_x(:)
       type(error_type), allocatable, intent(out) :: error
@@ -184,17 +186,17 @@ contains
       type(solver_report) :: report
 
       whole_x = x
-      if (case%model%n_dof*system%fourier%n_coefficients > whole_up_to) return
-      allocate (self%whole)
-      call build_system(case, self%whole, error, keep_all=.true.)
+      if (case%model%n_dof*system%problem%fourier%n_coefficients > whole_up_to) return
+      allocate (self%whole, self%whole_problem)
+      ! One and the same law.
+      call build_system(case, self%whole_problem, self%whole, error, keep_all=.true., &
+                        forces=system%problem%forces)
       if (allocated(error)) return
       self%whole%interrupt => system%interrupt
       call self%whole%set_frequency(case%sweep%start, error)
       if (allocated(error)) return
-      ! One and the same law.
-      self%whole%forces = system%forces
       self%whole%depth = system%depth
-      associate (pairs => system%forces%pairs)
+      associate (pairs => system%problem%forces%pairs)
          self%whole%work(pairs)%x_start = system%work(pairs)%x_start
       end associate
       deallocate (whole_x)
@@ -214,12 +216,12 @@ contains
 
    !> While all of the contact sticks, the structure vibrates with its relative coordinates held.
    pure subroutine find_poles(system, curve)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       type(arclength_type), intent(inout) :: curve
       !> Half width of a mode without damping, over its frequency.
       real(wp), parameter :: least = 1.0e-4_wp
 
-      call system%structure%held_modes(curve%pole, curve%pole_width)
+      call system%problem%structure%held_modes(curve%pole, curve%pole_width)
       curve%pole_width = max(curve%pole_width, least*curve%pole)
    end subroutine find_poles
 
@@ -227,6 +229,7 @@ contains
       type(branch_type), intent(inout) :: self
 
       if (associated(self%whole)) deallocate (self%whole)
+      if (associated(self%whole_problem)) deallocate (self%whole_problem)
    end subroutine release
 
    !> The next point of the branch; `more` is false where there is none.
@@ -272,12 +275,12 @@ contains
    !> The size of displacements to expect, for a branch that may start fully stuck: what the load
    !> makes of the stiffness of the joint.
    pure real(wp) function displacement_scale(system) result(scale)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       real(wp) :: stiffness
       integer :: c
 
       stiffness = 0.0_wp
-      associate (p => system%forces%entry(system%forces%pairs)%law%prediction)
+      associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
          do c = 1, size(p%stiffness, 2)
             ! A velocity in time is no displacement.
             if (p%by_time .and. p%order(c) > 0) cycle
@@ -302,7 +305,7 @@ contains
       if (allocated(error)) return
       coefficients = found%x
       if (self%is_in_time) then
-         call self%in_time%to_coefficients(self%system%structure%n_coordinates, found%x, &
+         call self%in_time%to_coefficients(self%system%problem%structure%n_coordinates, found%x, &
                                            coefficients)
       end if
       call self%system%residual(coefficients, self%r)

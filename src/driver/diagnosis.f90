@@ -3,7 +3,7 @@ module fw_diagnosis
    use fw_error, only: error_type
    use fw_guess, only: held_without_friction
    use fw_guess, only: stuck_guess
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_newton, only: solver_report
    use fw_solution, only: solution_method
@@ -21,7 +21,7 @@ contains
    !> Solve the static position, then for the largest share of the vibratory load that has a
    !> periodic solution, at the frequency and depths of the system.
    subroutine explain_failure(system, method, reason)
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       type(solution_method), intent(inout) :: method
       character(:), allocatable, intent(out) :: reason
       real(wp) :: x(system%n)
@@ -49,7 +49,7 @@ contains
 
    !> The largest share of the vibratory load that has a solution, from the position at rest on.
    subroutine explain_vibration(system, method, x, reason)
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       type(solution_method), intent(inout) :: method
       !> Position at rest on entry.
       real(wp), intent(inout), contiguous :: x(:)
@@ -88,26 +88,27 @@ contains
 
    !> Whether the case accepts a penalty_scale: its pairs have a rigid law.
    pure logical function takes_scale(system)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
 
       takes_scale = size(system%depth) > 0 .and. &
-                    system%forces%entry(system%forces%pairs)%law%prediction%takes_balance
+                    system%problem%forces%entry( &
+                       system%problem%forces%pairs)%law%prediction%takes_balance
    end function takes_scale
 
    !> What resolves the contact better: located events do not depend on the instants.
    pure function finer(system) result(advice)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       character(16) :: advice
 
       advice = 'more n_time'
-      if (system%forces%entry(system%forces%pairs)%law%facts%follows_events) then
+      if (system%problem%forces%entry(system%problem%forces%pairs)%law%facts%follows_events) then
          advice = 'more n_harmonics'
       end if
    end function finer
 
    !> By halves of the interval between a share that has a solution and one that has none.
    subroutine find_largest_share(system, method, x, lower)
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       type(solution_method), intent(inout) :: method
       real(wp), intent(inout), contiguous :: x(:)
       real(wp), intent(out) :: lower
@@ -131,7 +132,7 @@ contains
 
    !> Solve under a share of the vibratory load, from x, which stays where that fails.
    subroutine solve_share(system, method, share, x, done, only_set)
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       type(solution_method), intent(inout) :: method
       real(wp), intent(in) :: share
       real(wp), intent(inout), contiguous :: x(:)

@@ -6,7 +6,8 @@ module fw_level
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_harmonics_options, only: harmonics_options
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
@@ -25,7 +26,9 @@ module fw_level
 
    type :: level_type
       type(harmonics_options) :: harmonics
-      type(hbm_system) :: system
+      type(balance_problem) :: problem
+      !> Of the problem: levels are not copied once they are built.
+      type(balance_state) :: system
       type(point_solver) :: solver
       !> The last frequency that was solved, and the observed coefficients there.
       real(wp) :: omega = -1.0_wp
@@ -78,7 +81,7 @@ contains
 
    !> Build the system, unless it is there.
    subroutine build(self, case, n_harmonics, error, doublings)
-      class(level_type), intent(inout) :: self
+      class(level_type), intent(inout), target :: self
       type(case_type), intent(in) :: case
       integer, intent(in) :: n_harmonics
       type(error_type), allocatable, intent(out) :: error
@@ -89,7 +92,7 @@ contains
       self%harmonics = case%harmonics
       self%harmonics%n_harmonics = n_harmonics
       if (present(doublings)) self%harmonics%doublings = doublings
-      call build_system(case, self%system, error, of_level=self%harmonics)
+      call build_system(case, self%problem, self%system, error, of_level=self%harmonics)
       if (allocated(error)) return
       call self%solver%start(case, self%harmonics, self%system%n)
       self%is_built = .true.
@@ -105,7 +108,7 @@ contains
 
       call self%solver%solve(case, self%system, request, point, error)
       point%n_harmonics = self%harmonics%n_harmonics
-      point%n_time = self%system%fourier%n_time
+      point%n_time = self%system%problem%fourier%n_time
       self%omega = -1.0_wp
       if (allocated(error) .or. .not. point%converged) return
       self%omega = request%omega
@@ -120,7 +123,7 @@ contains
 
       call carry_solution(source%system, source%solver%last, self%system, x)
       call self%solver%know(x, source%solver%omega_last)
-      associate (pairs => source%system%forces%pairs)
+      associate (pairs => source%system%problem%forces%pairs)
          self%system%work(pairs)%x_start = source%system%work(pairs)%x_start
       end associate
    end subroutine take_over

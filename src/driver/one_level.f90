@@ -32,7 +32,7 @@ contains
 
    !> Build the system; an error is a case that cannot be computed.
    subroutine start(self, case, error)
-      class(one_level), intent(inout) :: self
+      class(one_level), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 

@@ -10,7 +10,7 @@ module fw_point_solver
    use fw_guess, only: free_guess
    use fw_guess, only: stuck_guess
    use fw_harmonics_options, only: harmonics_options
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_newton, only: solver_report
    use fw_point, only: point_type
    use fw_point, only: served_by_free_guess
@@ -101,7 +101,7 @@ contains
    subroutine solve(self, case, system, request, point, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       type(point_request), intent(in) :: request
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
@@ -144,7 +144,7 @@ contains
          if (allocated(error)) return
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then
-         associate (contact => system%work(system%forces%pairs))
+         associate (contact => system%work(system%problem%forces%pairs))
             ! The march of the next point starts where that of this one ended.
             contact%x_start = contact%x
          end associate
@@ -171,7 +171,7 @@ contains
    subroutine reach(self, case, system, request, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       type(point_request), intent(in) :: request
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
@@ -205,7 +205,7 @@ contains
    subroutine by_other_ways(self, case, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
@@ -231,7 +231,7 @@ contains
    !> The last resort.
    subroutine from_free_guess(self, system, omega, report, iterations)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(inout) :: report
       integer, intent(inout) :: iterations
@@ -252,7 +252,7 @@ contains
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(pseudo_time_options), intent(in) :: pseudo
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
@@ -279,7 +279,7 @@ contains
    !> From the static position to the full vibratory load, by steps that adapt.
    subroutine raise_load(self, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
@@ -326,7 +326,7 @@ contains
    !> Newton from the guesses at a frequency.
    subroutine from_guesses(self, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
@@ -341,7 +341,7 @@ contains
    !> First half of the way from the last point, which may take halves of its own, then the rest.
    recursive subroutine approach(self, system, omega, depth, report, iterations, error)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in) :: omega
       !> Halvings on the way here, this one included.
       integer, intent(in) :: depth
@@ -373,7 +373,7 @@ contains
    !> Extrapolation along the sweep, the last solution, all stuck.
    subroutine try_guesses(self, system, omega, report, iterations)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(in) :: omega
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
@@ -421,7 +421,7 @@ contains
    !> One solution from the guess in x; the best that fails at the point itself is noted.
    subroutine attempt(self, system, report)
       class(point_solver), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       type(solver_report), intent(out) :: report
 
       call self%method%solve(system, self%x, report)

@@ -1,6 +1,10 @@
 !> From a case to the system that is solved: joint, harmonics, instants, condensation.
 module fw_problem
    use fw_kinds, only: wp
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_problem, only: new_balance_problem
+   use fw_balance_state, only: balance_state
+   use fw_balance_state, only: new_balance_state
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_point
@@ -22,8 +26,6 @@ module fw_problem
    use fw_harmonics_options, only: parity_odd
    use fw_harmonics_options, only: sampling_auto
    use fw_harmonics_options, only: sampling_events
-   use fw_hbm, only: hbm_system
-   use fw_hbm, only: new_hbm
    use fw_joint, only: joint_type
    use fw_joint, only: new_joint
    use fw_memory, only: require_memory
@@ -31,6 +33,7 @@ module fw_problem
    use fw_plain_structure, only: plain_structure
    use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_powell
+   use fw_structure_operator, only: structure_operator
    use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
    use fw_wear_options, only: follow_range
@@ -46,22 +49,42 @@ module fw_problem
 
 contains
 
-   !> Build the system of a case at the first frequency of its sweep.
-   subroutine build_system(case, system, error, keep_all, of_level)
+   !> Build the problem of a case, and a state of it at the first frequency of its sweep.
+   subroutine build_system(case, problem, system, error, keep_all, of_level, forces)
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(out) :: system
+      !> Has to stay where it is as long as the system lives.
+      type(balance_problem), intent(out), target :: problem
+      type(balance_state), intent(out) :: system
       type(error_type), allocatable, intent(out) :: error
       !> Condense nothing (pseudo-time flows live on the whole structure).
       logical, intent(in), optional :: keep_all
       !> Harmonics instead of those of the case.
       type(harmonics_options), intent(in), optional :: of_level
+      !> Laws of another problem of the case, with the stiffness that its structure gave them.
+      type(force_list), intent(in), optional :: forces
+      class(structure_state), allocatable :: stand
+
+      call build_problem(case, problem, stand, error, keep_all, of_level, forces)
+      if (allocated(error)) return
+      call new_balance_state(problem, system, stand)
+   end subroutine build_system
+
+   subroutine build_problem(case, problem, stand, error, keep_all, of_level, forces)
+      type(case_type), intent(in) :: case
+      type(balance_problem), intent(out) :: problem
+      !> Its structure at the first frequency.
+      class(structure_state), allocatable, intent(out) :: stand
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: keep_all
+      type(harmonics_options), intent(in), optional :: of_level
+      type(force_list), intent(in), optional :: forces
       type(harmonics_options) :: harmonics
       logical :: skip_idle
       type(joint_type) :: joint
       type(fourier_type) :: fourier
-      type(plain_structure) :: structure
-      class(structure_state), allocatable :: state
-      type(force_list) :: forces
+      type(plain_structure), allocatable :: plain
+      class(structure_operator), allocatable :: structure
+      type(force_list) :: laws
       real(wp) :: range(2)
 
       harmonics = case%harmonics
@@ -70,9 +93,13 @@ contains
       skip_idle = case%solver%skips .and. .not. case%sweep%stability
       call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
-      call new_forces(case%contact, case%springs, joint%row, joint%spring_row, &
-                      locates_events(case, harmonics, joint), harmonics%filter_harmonics, forces)
-      call choose_harmonics(case, harmonics, joint, forces, fourier, error)
+      if (present(forces)) then
+         laws = forces
+      else
+         call new_forces(case%contact, case%springs, joint%row, joint%spring_row, &
+                         locates_events(case, harmonics, joint), harmonics%filter_harmonics, laws)
+      end if
+      call choose_harmonics(case, harmonics, joint, laws, fourier, error)
       if (allocated(error)) return
       if (fft_pays(fourier%n_coefficients)) fourier%fft_rows = 3*case%contact%n_pairs
       range = case%sweep%start
@@ -80,15 +107,18 @@ contains
       if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
          range = follow_range*range
       end if
-      call new_plain_structure(case%model, joint%relative, fourier%harmonic, range, structure, &
+      allocate (plain)
+      call new_plain_structure(case%model, joint%relative, fourier%harmonic, range, plain, &
                                error, keep_all)
       if (allocated(error)) return
-      call structure%new_state(state)
-      call structure%at(state, case%sweep%start, 0.0_wp, error)
+      call move_alloc(plain, structure)
+      call structure%new_state(stand)
+      call structure%at(stand, case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
-      call new_hbm(joint, structure, state, fourier, forces, case%contact%depth, system)
-      system%reduced = case%solver%skips
-   end subroutine build_system
+      call new_balance_problem(joint, structure, fourier, laws, case%contact%depth, problem)
+      problem%reduced = case%solver%skips
+      if (.not. present(forces)) call problem%scale_forces(stand)
+   end subroutine build_problem
 
    !> Only odd harmonics where the symmetry is exact, and keeps so at the instants: their number
    !> must be even.

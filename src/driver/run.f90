@@ -8,7 +8,8 @@ module fw_run
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_frequency_response, only: run_frequency_response
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
    use fw_problem, only: build_system
@@ -33,7 +34,8 @@ contains
    subroutine check_case(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(hbm_system) :: system
+      type(balance_problem), target :: problem
+      type(balance_state) :: system
       type(thread_scope) :: threads
       type(restart_type) :: restart
 
@@ -42,7 +44,7 @@ contains
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
       call threads%enter(case%threads)
-      call build_system(case, system, error)
+      call build_system(case, problem, system, error)
       call threads%leave()
    end subroutine check_case
 

@@ -10,7 +10,8 @@ module fw_solution
    use fw_guess, only: held_without_contact
    use fw_harmonics_options, only: harmonics_options
    use fw_harmonics_options, only: method_hdhb
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_hdhb, only: hdhb_system
    use fw_hdhb, only: new_hdhb
    use fw_kinsol, only: kinsol_solver
@@ -47,7 +48,8 @@ module fw_solution
       !> Unknowns are values at the instants (hdhb).
       logical :: in_time = .false.
       !> The balance with nothing condensed, made when a flow is first needed.
-      type(hbm_system), allocatable :: whole
+      type(balance_problem), allocatable :: whole_problem
+      type(balance_state), allocatable :: whole
       !> A solution was refused because it grows without bound.
       logical :: unbounded = .false.
       !> Why the last pseudo-time solution failed.
@@ -80,7 +82,7 @@ contains
    !> structure that its contact alone holds, which is no equilibrium that lasts.
    subroutine solve(self, system, x, report)
       class(solution_method), intent(inout) :: self
-      type(hbm_system), intent(inout), target :: system
+      type(balance_state), intent(inout), target :: system
       real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(out) :: report
       type(hdhb_system) :: in_time
@@ -90,7 +92,7 @@ contains
       if (self%in_time) then
          ! Values at the instants as unknowns; outside of here only coefficients are known.
          call new_hdhb(system, in_time)
-         m = system%structure%n_coordinates
+         m = system%problem%structure%n_coordinates
          allocate (values(system%n))
          call in_time%to_values(m, x, values)
          call solve_system(self, in_time, values, report)
@@ -103,7 +105,7 @@ contains
 
    !> Floquet multipliers of the solution x at the frequency of the system.
    subroutine find_stability(system, model, x, point, error)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       type(model_type), intent(in) :: model
       real(wp), intent(in), contiguous :: x(:)
       type(point_type), intent(inout) :: point
@@ -117,16 +119,16 @@ contains
    !> Whether the point that was evaluated last can last: its forces repeat from period to period,
    !> and something holds the structure. (Linear springs count among what holds it.)
    logical function is_lasting(system)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
 
       integer :: k
 
-      associate (contact => system%work(system%forces%pairs))
+      associate (contact => system%work(system%problem%forces%pairs))
          is_lasting = contact%all_periodic()
-         if (system%n_pairs == 0) return
+         if (system%problem%n_pairs == 0) return
          ! A law that holds even what is unloaded, such as a linear spring, keeps the structure.
-         do k = 1, system%forces%n_laws
-            if (system%forces%entry(k)%law%facts%holds_unloaded) return
+         do k = 1, system%problem%forces%n_laws
+            if (system%problem%forces%entry(k)%law%facts%holds_unloaded) return
          end do
          if (is_lasting .and. contact%all_open()) is_lasting = held_without_contact(system)
       end associate
@@ -175,7 +177,7 @@ contains
       class(solution_method), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(pseudo_time_options), intent(in) :: pseudo
-      type(hbm_system), intent(inout) :: system
+      type(balance_state), intent(inout) :: system
       real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
@@ -187,16 +189,17 @@ contains
       report%interrupted = system%is_interrupted()
       if (report%interrupted) return
       if (.not. allocated(self%whole)) then
-         allocate (self%whole)
-         call build_system(case, self%whole, error, keep_all=.true., of_level=self%harmonics)
+         allocate (self%whole, self%whole_problem)
+         ! One and the same law: prediction stiffness of the condensed system.
+         call build_system(case, self%whole_problem, self%whole, error, keep_all=.true., &
+                           of_level=self%harmonics, forces=system%problem%forces)
          if (allocated(error)) return
       end if
       call self%whole%set_frequency(system%frequency(), error)
       if (allocated(error)) return
-      ! One and the same law: prediction stiffness, memory and reference of the condensed system.
-      self%whole%forces = system%forces
+      ! Memory and reference, too.
       self%whole%depth = system%depth
-      associate (pairs => system%forces%pairs)
+      associate (pairs => system%problem%forces%pairs)
          self%whole%work(pairs)%x_start = system%work(pairs)%x_start
       end associate
       self%whole%reference = system%reference
@@ -220,7 +223,7 @@ contains
    !> Take `converged` back from what solves the equations and is no vibration.
    subroutine refuse_unreal(self, system, x, report)
       class(solution_method), intent(inout) :: self
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
       type(solver_report), intent(inout) :: report
       logical :: lost

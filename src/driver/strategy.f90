@@ -53,7 +53,7 @@ module fw_strategy
       subroutine start_strategy(self, case, error)
          import :: point_strategy, case_type, error_type
          implicit none (type, external)
-         class(point_strategy), intent(inout) :: self
+         class(point_strategy), intent(inout), target :: self
          type(case_type), intent(in) :: case
          type(error_type), allocatable, intent(out) :: error
       end subroutine start_strategy

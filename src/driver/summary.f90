@@ -6,7 +6,7 @@ module fw_summary
    use fw_case, only: case_type
    use fw_harmonics_options, only: sampling_events
    use fw_harmonics_options, only: sampling_uniform
-   use fw_hbm, only: hbm_system
+   use fw_balance_state, only: balance_state
    use fw_linear_step, only: linear_step_type
    use fw_peak, only: found_bound
    use fw_peak, only: found_jump
@@ -102,7 +102,7 @@ contains
    !> What the linear solver did, and what the case did not need.
    subroutine describe_work(self, system, linear, kind, all_converged)
       class(summary_type), intent(inout) :: self
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       type(linear_step_type), intent(in) :: linear
       !> The solver of the case; the counts are those of Newton's method.
       integer, intent(in) :: kind
@@ -110,14 +110,15 @@ contains
       logical, intent(in) :: all_converged
       integer :: percent
 
-      self%sampling = merge(sampling_events, sampling_uniform, &
-                            system%forces%entry(system%forces%pairs)%law%facts%follows_events)
+      associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
+         self%sampling = merge(sampling_events, sampling_uniform, law%facts%follows_events)
+      end associate
       deallocate (self%work)
       allocate (self%work(0))
       call add_line(self%work, 'unknowns', to_text(system%n)//' ('// &
-                    to_text(system%structure%n_coordinates)//' coordinates, '// &
-                    to_text(system%fourier%n_coefficients)//' coefficients, '// &
-                    to_text(system%fourier%n_time)//' instants'// &
+                    to_text(system%problem%structure%n_coordinates)//' coordinates, '// &
+                    to_text(system%problem%fourier%n_coefficients)//' coefficients, '// &
+                    to_text(system%problem%fourier%n_time)//' instants'// &
                     trim(merge(', events located', repeat(' ', 16), &
                                self%sampling == sampling_events))//')')
       call add_line(self%work, 'linear solver', &
@@ -126,18 +127,19 @@ contains
                     to_text(linear%preconditioners)//' preconditioners'// &
                     trim(merge(repeat(' ', 32), ', where Newton''s method was used', &
                                kind == solver_newton)))
-      if (.not. system%fourier%has_constant()) then
+      if (.not. system%problem%fourier%has_constant()) then
          call skip(self, 'even harmonics (half-wave symmetry)')
       end if
-      if (system%joint%n_idle > 0) then
-         call skip(self, to_text(system%joint%n_idle)//' contact components that nothing moves')
+      if (system%problem%joint%n_idle > 0) then
+         call skip(self, to_text(system%problem%joint%n_idle)//' '// &
+                   'contact components that nothing moves')
       end if
       percent = nint(100.0_wp*linear%share_skipped/real(max(linear%n_problems, 1), wp))
       if (percent > 0) then
          call skip(self, 'stuck pairs, '//to_text(percent)// &
                    ' % of the unknowns of the linear problems')
       end if
-      if (linear%n_problems == 0 .and. system%n_pairs > 0 .and. &
+      if (linear%n_problems == 0 .and. system%problem%n_pairs > 0 .and. &
           kind == solver_newton .and. all_converged) then
          call skip(self, 'every linear problem: the joint stays stuck')
       else if (linear%n_empty > 0) then

@@ -14,7 +14,8 @@ module fw_time_response
    use fw_error, only: status_input
    use fw_guess, only: stuck_guess
    use fw_harmonics_options, only: method_hbm
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
@@ -41,7 +42,8 @@ module fw_time_response
    type, extends(point_strategy) :: time_strategy
       !> The case of which the harmonic balance gives the initial states, and its system.
       type(case_type) :: start_case
-      type(hbm_system) :: system
+      type(balance_problem) :: problem
+      type(balance_state) :: system
       type(point_solver) :: solver
       !> What is integrated.
       type(time_structure) :: structure
@@ -55,17 +57,18 @@ contains
 
    !> The harmonic balance that gives initial states, and the structure that is integrated.
    subroutine start(self, case, error)
-      class(time_strategy), intent(inout) :: self
+      class(time_strategy), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
       call check_steps(case, error)
       if (allocated(error)) return
       self%start_case = case_of_start(case)
-      call build_system(self%start_case, self%system, error)
+      call build_system(self%start_case, self%problem, self%system, error)
       if (allocated(error)) return
       call self%solver%start(self%start_case, self%start_case%harmonics, self%system%n)
-      call new_time_structure(case%model, case%contact, case%springs, self%system%joint%row > 0, &
+      call new_time_structure(case%model, case%contact, case%springs, &
+                              self%system%problem%joint%row > 0, &
                               self%structure, error)
    end subroutine start
 
@@ -185,7 +188,7 @@ contains
    !> Corrected positions: those of the march where there is one, the displacements themselves
    !> where the law is written in velocities, the unstrained assembly otherwise.
    subroutine take_corrected(system, structure, converged, state)
-      type(hbm_system), intent(in) :: system
+      type(balance_state), intent(in) :: system
       type(time_structure), intent(in) :: structure
       logical, intent(in) :: converged
       type(time_state), intent(inout) :: state
@@ -193,8 +196,8 @@ contains
 
       allocate (state%corrected(2, structure%n_pairs), source=0.0_wp)
       if (.not. converged) return
-      associate (p => system%forces%entry(system%forces%pairs)%law%prediction, &
-                 contact => system%work(system%forces%pairs))
+      associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction, &
+                 contact => system%work(system%problem%forces%pairs))
          do i = 1, structure%n_pairs
             do c = 1, 2
                r = structure%row(c, i)

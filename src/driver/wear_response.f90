@@ -6,7 +6,8 @@ module fw_wear_response
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
    use fw_error, only: status_stopped
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_patches, only: patch_volumes
@@ -71,7 +72,8 @@ module fw_wear_response
    !> Everything between the start of a run and its end.
    type :: wear_run
       !> The vibration at fixed depths, and vibration and depth as one system over it.
-      type(hbm_system) :: balance
+      type(balance_problem) :: problem
+      type(balance_state) :: balance
       type(wear_system) :: system
       type(point_solver) :: solver
       type(wear_recorder) :: recorder
@@ -97,7 +99,7 @@ contains
       type(wear_run), target :: run
       type(point_type) :: point
 
-      call build_system(case, run%balance, error)
+      call build_system(case, run%problem, run%balance, error)
       if (.not. allocated(error)) then
          call start_recorder(run%recorder, case, observer, writer, summary, state, error)
       end if
@@ -441,12 +443,12 @@ contains
       point%iterations = iterations
       point%residual = state%residual
       ! A state of the march is judged as any point is.
-      point%converged = is_lasting(system%hbm_system)
+      point%converged = is_lasting(system%balance_state)
       point%converged = point%converged .and. state%residual <= self%case%solver%tolerance
-      call recover_point(system%hbm_system, state%x(:n), self%case%harmonics%n_harmonics, &
+      call recover_point(system%balance_state, state%x(:n), self%case%harmonics%n_harmonics, &
                          self%case%output%contact, point)
       if (self%case%output%histories) then
-         call recover_histories(system%hbm_system, size(system%balance, 1), state%x(:n), &
+         call recover_histories(system%balance_state, size(system%balance, 1), state%x(:n), &
                                 self%case%harmonics%n_harmonics, point)
       end if
       call system_clock(clock, rate)

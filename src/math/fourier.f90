@@ -8,13 +8,15 @@
 module fw_fourier
    use fw_kinds, only: wp
    use fw_kinds, only: pi
+   use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
    use fw_lapack, only: dgemm
    use fw_linalg, only: lu_type
    use fw_fft, only: fft_type
    implicit none (type, external)
    private
 
-   public :: fourier_type, new_fourier, coefficient_count, fft_pays
+   public :: fourier_type, new_fourier, coefficient_count, fft_pays, to_complex, to_real
 
    type :: fourier_type
       !> Retained harmonics, ascending (n_retained); 0 is among them unless only odd ones are.
@@ -213,5 +215,26 @@ contains
          end if
       end do
    end subroutine differentiate
+
+   !> U_n = uc_n - i us_n of each retained harmonic (n_rows, n_retained).
+   pure subroutine to_complex(fourier, n_rows, coefficients, harmonics)
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: n_rows
+      real(wp), intent(in) :: coefficients(n_rows, *)
+      complex(wp), intent(inout) :: harmonics(n_rows, *)
+
+      call amplitudes_of(fourier%harmonic, fourier%column, n_rows, coefficients, n_rows, harmonics)
+   end subroutine to_complex
+
+   !> The inverse of to_complex.
+   pure subroutine to_real(fourier, n_rows, harmonics, coefficients)
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: n_rows
+      complex(wp), intent(in) :: harmonics(n_rows, *)
+      real(wp), intent(inout) :: coefficients(n_rows, *)
+
+      call coefficients_of(fourier%harmonic, fourier%column, n_rows, n_rows, harmonics, &
+                           coefficients)
+   end subroutine to_real
 
 end module fw_fourier

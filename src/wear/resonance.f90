@@ -232,7 +232,7 @@ contains
       type(wear_state), intent(in) :: state
       type(point_type) :: point
 
-      call recover_point(system%hbm_system, state%x(:system%n_vibration()), self%n_harmonics, &
+      call recover_point(system%balance_state, state%x(:system%n_vibration()), self%n_harmonics, &
                          .false., point)
       amplitude = point%amplitude(1)
    end function amplitude_of

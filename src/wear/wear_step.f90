@@ -156,7 +156,7 @@ contains
       n = system%n_vibration()
       ! With the depths held the system is the balance alone, as any solver takes it.
       call system%hold_depths(state%x(n + 1:))
-      call self%newton%solve(system%hbm_system, state%x(:n), report)
+      call self%newton%solve(system%balance_state, state%x(:n), report)
       call system%free_depths()
       call system%update_rate()
       state%rate = system%rate

@@ -14,8 +14,8 @@ module fw_wear_system
    use fw_contact_data, only: contact_type
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_stuck
-   use fw_hbm, only: hbm_system
-   use fw_hbm, only: to_complex
+   use fw_balance_state, only: balance_state
+   use fw_fourier, only: to_complex
    use fw_lapack, only: zgemm
    use fw_linalg, only: lu_type
    implicit none (type, external)
@@ -25,7 +25,7 @@ module fw_wear_system
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
-   type, extends(hbm_system) :: wear_system
+   type, extends(balance_state) :: wear_system
       !> Cycles of the step, and the depth that it starts from (n_pairs) [length].
       real(wp) :: cycles = 0.0_wp
       real(wp), allocatable :: base(:)
@@ -70,7 +70,7 @@ contains
 
    !> Add wear to a balance.
    subroutine new_wear_system(balance, contact, coefficient, by_energy, self)
-      type(hbm_system), intent(in) :: balance
+      type(balance_state), intent(in) :: balance
       type(contact_type), intent(in) :: contact
       !> Wear coefficient k_w [area/force].
       real(wp), intent(in) :: coefficient
@@ -80,13 +80,13 @@ contains
       real(wp) :: tangential(contact%n_pairs)
       integer :: k
 
-      self%hbm_system = balance
+      self%balance_state = balance
       do k = 1, size(self%work)
          call self%work(k)%renew_fft()
       end do
       call self%free_depths()
-      call self%work(self%forces%pairs)%measure_slip()
-      associate (p => self%forces%entry(self%forces%pairs)%law%prediction)
+      call self%work(self%problem%forces%pairs)%measure_slip()
+      associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)
          tangential = maxval(p%stiffness(:, 1:2), dim=2)
          self%normal = p%stiffness(:, 3)
       end associate
@@ -104,7 +104,7 @@ contains
    pure integer function n_vibration(self)
       class(wear_system), intent(in) :: self
 
-      n_vibration = self%structure%n_coordinates*self%fourier%n_coefficients
+      n_vibration = self%problem%structure%n_coordinates*self%problem%fourier%n_coefficients
    end function n_vibration
 
    !> Make the balance a system of its own, at given depths.
@@ -121,7 +121,7 @@ contains
    subroutine free_depths(self)
       class(wear_system), intent(inout) :: self
 
-      self%n = self%n_vibration() + self%n_pairs
+      self%n = self%n_vibration() + self%problem%n_pairs
       self%pins_normals = .false.
    end subroutine free_depths
 
@@ -138,7 +138,7 @@ contains
    subroutine update_rate(self)
       class(wear_system), intent(inout) :: self
 
-      self%rate = self%factor*self%work(self%forces%pairs)%slip
+      self%rate = self%factor*self%work(self%problem%forces%pairs)%slip
    end subroutine update_rate
 
    !> Depths in the units in which residuals count them [force].
@@ -153,27 +153,28 @@ contains
    !> Mean compressive force of every pair at the last point [force].
    pure function mean_pressure(self) result(pressure)
       class(wear_system), intent(in) :: self
-      real(wp) :: pressure(self%n_pairs)
+      real(wp) :: pressure(self%problem%n_pairs)
 
-      pressure = self%forces%entry(self%forces%pairs)%law%prediction%load
-      if (any(self%joint%row(3, :) > 0)) pressure = merge( &
-         -self%work(self%forces%pairs)%force(:, 3, 1), pressure, self%joint%row(3, :) > 0)
+      pressure = self%problem%forces%entry(self%problem%forces%pairs)%law%prediction%load
+      if (any(self%problem%joint%row(3, :) > 0)) pressure = merge( &
+         -self%work(self%problem%forces%pairs)%force(:, 3, 1), pressure, &
+            self%problem%joint%row(3, :) > 0)
    end function mean_pressure
 
    !> Largest elastic compression of a pair at the last point: the depth that would unload it
    !> alone [length]. Pairs pressed by dead loads do not count; zero where all are.
    pure real(wp) function compression(self)
       class(wear_system), intent(in) :: self
-      real(wp) :: pressure(self%n_pairs), stiffness
+      real(wp) :: pressure(self%problem%n_pairs), stiffness
       integer :: i
 
       compression = 0.0_wp
       pressure = self%mean_pressure()
-      do i = 1, self%n_pairs
-         if (self%joint%row(3, i) == 0) cycle
+      do i = 1, self%problem%n_pairs
+         if (self%problem%joint%row(3, i) == 0) cycle
          stiffness = self%normal(i)
-         if (self%forces%entry(self%forces%pairs)%law%prediction%takes_balance) then
-            stiffness = self%structure%static_stiffness(self%coordinate_of(3, i))
+         if (self%problem%forces%entry(self%problem%forces%pairs)%law%prediction%takes_balance) then
+            stiffness = self%problem%structure%static_stiffness(self%problem%coordinate_of(3, i))
          end if
          if (stiffness > 0.0_wp) compression = max(compression, pressure(i)/stiffness)
       end do
@@ -196,7 +197,7 @@ contains
 
       n = self%n_vibration()
       self%depth = x(n + 1:)
-      call self%hbm_system%residual(x(:n), r(:n))
+      call self%balance_state%residual(x(:n), r(:n))
       call self%update_rate()
       r(n + 1:) = self%weight*(x(n + 1:) - self%base - self%cycles*self%rate)
    end subroutine residual
@@ -206,15 +207,15 @@ contains
       integer, intent(out) :: n_linear
       integer :: i
 
-      call self%hbm_system%linearize(self%n_balance)
+      call self%balance_state%linearize(self%n_balance)
       self%n_wearing = 0
-      do i = 1, self%n_pairs
-         if (self%work(self%forces%pairs)%linear_state(i) /= pair_mixed) cycle
+      do i = 1, self%problem%n_pairs
+         if (self%work(self%problem%forces%pairs)%linear_state(i) /= pair_mixed) cycle
          self%n_wearing = self%n_wearing + 1
          self%wearing(self%n_wearing) = i
       end do
       n_linear = self%n_balance + self%n_wearing
-      self%n_linear = n_linear
+      self%active%n_linear = n_linear
    end subroutine linearize
 
    subroutine reduce(self, r, rhs)
@@ -224,10 +225,10 @@ contains
       integer :: n, j, i
 
       n = self%n_vibration()
-      self%work(self%forces%pairs)%input = 0.0_wp
+      self%work(self%problem%forces%pairs)%input = 0.0_wp
       call settle_depths(self, r)
-      call self%hbm_system%reduce(self%adjusted, rhs(:self%n_balance))
-      associate (work => self%work(self%forces%pairs))
+      call self%balance_state%reduce(self%adjusted, rhs(:self%n_balance))
+      associate (work => self%work(self%problem%forces%pairs))
          do j = 1, self%n_wearing
             i = self%wearing(j)
             ! The inputs hold what the coordinates that are solved at once do to the prediction.
@@ -243,14 +244,14 @@ contains
       real(wp), intent(in) :: r(:)
       integer :: i, m, n, row
 
-      m = self%structure%n_coordinates
+      m = self%problem%structure%n_coordinates
       n = self%n_vibration()
       self%adjusted = r(:n)
-      if (.not. self%fourier%has_constant()) return
-      do i = 1, self%n_pairs
-         row = self%joint%row(3, i)
-         if (row == 0 .or. self%work(self%forces%pairs)%linear_state(i) /= pair_stuck) cycle
-         call self%incidence%scatter_row(row, self%incidence%identity, m, m, &
+      if (.not. self%problem%fourier%has_constant()) return
+      do i = 1, self%problem%n_pairs
+         row = self%problem%joint%row(3, i)
+         if (row == 0 .or. self%work(self%problem%forces%pairs)%linear_state(i) /= pair_stuck) cycle
+         call self%problem%incidence%scatter_row(row, self%problem%incidence%identity, m, m, &
                                          -self%normal(i)/self%weight(i), r(n + i:n + i), &
                                          self%adjusted)
       end do
@@ -264,7 +265,7 @@ contains
 
       n = self%n_vibration()
       call settle_depths(self, r)
-      call self%hbm_system%expand(self%adjusted, solution(:self%n_balance), step(:n))
+      call self%balance_state%expand(self%adjusted, solution(:self%n_balance), step(:n))
       step(n + 1:) = -r(n + 1:)/self%weight
       do j = 1, self%n_wearing
          step(n + self%wearing(j)) = solution(self%n_balance + j)
@@ -278,8 +279,8 @@ contains
       integer :: i, j, n
 
       n = self%n_balance
-      call self%hbm_system%apply(vector(:n), product(:n))
-      associate (work => self%work(self%forces%pairs))
+      call self%balance_state%apply(vector(:n), product(:n))
+      associate (work => self%work(self%problem%forces%pairs))
          do j = 1, self%n_wearing
             i = self%wearing(j)
             call add_depth_column(self, i, vector(n + j), product)
@@ -296,9 +297,10 @@ contains
       integer, intent(in) :: pair
 
       slope = 0.0_wp
-      if (self%joint%row(3, pair) == 0) return
+      if (self%problem%joint%row(3, pair) == 0) return
       slope = self%normal(pair)* &
-              self%work(self%forces%pairs)%slip_derivative(2*self%fourier%n_coefficients + 1, pair)
+              self%work(self%problem%forces%pairs)%slip_derivative(2* &
+                 self%problem%fourier%n_coefficients + 1, pair)
    end function depth_slope
 
    !> product = product + B^T G eps e_0 of one pair, times its depth.
@@ -309,14 +311,16 @@ contains
       real(wp), intent(inout) :: product(:)
       integer :: c, nc
 
-      if (self%joint%row(3, pair) == 0) return
-      nc = self%fourier%n_coefficients
+      if (self%problem%joint%row(3, pair) == 0) return
+      nc = self%problem%fourier%n_coefficients
       do c = 1, 3
-         if (self%joint%row(c, pair) == 0) cycle
-         call self%incidence%scatter_row( &
-            self%joint%row(c, pair), self%place, self%n_active, self%n_active, &
+         if (self%problem%joint%row(c, pair) == 0) cycle
+         call self%problem%incidence%scatter_row( &
+            self%problem%joint%row(c, pair), self%active%place, self%active%n_active, &
+               self%active%n_active, &
             self%normal(pair)*depth, &
-            self%work(self%forces%pairs)%jacobian(2*nc + 1, (c - 1)*nc + 1:c*nc, pair), product)
+            self%work(self%problem%forces%pairs)%jacobian(2*nc + 1, (c - 1)*nc + 1:c*nc, pair), &
+               product)
       end do
    end subroutine add_depth_column
 
@@ -326,9 +330,9 @@ contains
       integer :: h, i, j, na
       logical :: singular
 
-      call self%hbm_system%build_preconditioner()
+      call self%balance_state%build_preconditioner()
       if (self%n_wearing == 0) return
-      na = self%n_active
+      na = self%active%n_active
       call reserve(self)
       allocate (column(self%n_balance))
       call self%complement%reserve(self%n_wearing)
@@ -341,9 +345,9 @@ contains
             call harmonics_of(self, na, column, self%columns(:, j, :))
             s(j, j) = self%weight(i)*(1.0_wp - self%cycles*self%factor(i)*depth_slope(self, i))
          end do
-         do h = 1, self%fourier%n_retained
+         do h = 1, self%problem%fourier%n_retained
             do j = 1, self%n_wearing
-               call self%preconditioner(h)%solve(self%columns(:na, j, h))
+               call self%preconditioner%harmonic(h)%solve(self%columns(:na, j, h))
             end do
             if (takes_balance(self)) call multiply_columns(self, h)
             call subtract_rows(self, h, self%n_wearing, self%columns(:, :, h), s)
@@ -357,20 +361,20 @@ contains
       class(wear_system), intent(in) :: self
 
       preconditioner_fits = self%n_wearing == 0
-      if (preconditioner_fits) preconditioner_fits = self%hbm_system%preconditioner_fits()
+      if (preconditioner_fits) preconditioner_fits = self%balance_state%preconditioner_fits()
    end function preconditioner_fits
 
    subroutine reserve(self)
       type(wear_system), intent(inout) :: self
       integer :: m, n
 
-      m = self%structure%n_coordinates
+      m = self%problem%structure%n_coordinates
       n = self%n_wearing
       if (allocated(self%columns)) then
          if (size(self%columns, 2) == n) return
          deallocate (self%columns, self%stiff)
       end if
-      allocate (self%columns(m, n, self%fourier%n_retained), self%stiff(m, max(n, 1)))
+      allocate (self%columns(m, n, self%problem%fourier%n_retained), self%stiff(m, max(n, 1)))
    end subroutine reserve
 
    !> Harmonics of active coordinates as complex rows.
@@ -381,9 +385,9 @@ contains
       complex(wp), intent(inout) :: harmonics(:, :)
       integer :: h, k
 
-      do h = 1, self%fourier%n_retained
-         k = self%fourier%column(h)
-         if (self%fourier%harmonic(h) == 0) then
+      do h = 1, self%problem%fourier%n_retained
+         k = self%problem%fourier%column(h)
+         if (self%problem%fourier%harmonic(h) == 0) then
             harmonics(:na, h) = cmplx(vector(:, k), kind=wp)
          else
             harmonics(:na, h) = cmplx(vector(:, k), -vector(:, k + 1), wp)
@@ -395,7 +399,8 @@ contains
    pure logical function takes_balance(self)
       type(wear_system), intent(in) :: self
 
-      takes_balance = self%forces%entry(self%forces%pairs)%law%prediction%takes_balance
+      takes_balance = self%problem%forces%entry( &
+         self%problem%forces%pairs)%law%prediction%takes_balance
    end function takes_balance
 
    !> stiff = Z_n columns of one harmonic, rows in use.
@@ -404,10 +409,12 @@ contains
       integer, intent(in) :: h
       complex(wp), allocatable :: stiffness(:, :)
 
-      allocate (stiffness(self%n_used, self%n_active))
-      call self%structure%active_block(self%structure_state, h, stiffness)
-      call zgemm('N', 'N', self%n_used, self%n_wearing, self%n_active, one, stiffness, &
-                 self%n_used, self%columns(1, 1, h), size(self%columns, 1), zero, self%stiff, &
+      allocate (stiffness(self%active%n_used, self%active%n_active))
+      call self%problem%structure%active_block(self%structure_state, h, stiffness)
+      call zgemm('N', 'N', self%active%n_used, self%n_wearing, self%active%n_active, one, &
+                 stiffness, &
+                 self%active%n_used, self%columns(1, 1, h), size(self%columns, 1), zero, &
+                    self%stiff, &
                  size(self%stiff, 1))
    end subroutine multiply_columns
 
@@ -421,24 +428,25 @@ contains
       complex(wp) :: input(n_right), turn
       integer :: c, i, j, k, n, nc, place, row
 
-      nc = self%fourier%n_coefficients
-      n = self%fourier%harmonic(h)
-      associate (p => self%forces%entry(self%forces%pairs)%law%prediction, &
-                 work => self%work(self%forces%pairs))
+      nc = self%problem%fourier%n_coefficients
+      n = self%problem%fourier%harmonic(h)
+      associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction, &
+                 work => self%work(self%problem%forces%pairs))
          do j = 1, self%n_wearing
             i = self%wearing(j)
             do c = 1, 3
-               row = self%joint%row(c, i)
+               row = self%problem%joint%row(c, i)
                if (row == 0) cycle
                ! d/dtau is a factor i n of the complex coefficient.
                turn = one
                if (p%order(c) > 0) turn = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
                turn = turn*p%impedance_ratio(i, c, n, self%frequency())
-               call self%incidence%gather_harmonic(row, h, self%place, self%n_active, &
+               call self%problem%incidence%gather_harmonic(row, h, self%active%place, &
+                                                           self%active%n_active, &
                                                    turn*p%stiffness(i, c), z, input)
-               place = self%place(self%incidence%coordinate_of(row))
+               place = self%active%place(self%problem%incidence%coordinate_of(row))
                if (p%takes_balance .and. place > 0) input = input - self%stiff(place, :n_right)
-               k = (c - 1)*nc + self%fourier%column(h)
+               k = (c - 1)*nc + self%problem%fourier%column(h)
                associate (g => work%slip_derivative(:, i), &
                           scale => self%weight(i)*self%cycles*self%factor(i))
                   rows(j, :n_right) = rows(j, :n_right) + scale*g(k)*real(input, wp)
@@ -457,27 +465,29 @@ contains
       integer :: h, k, na, n
 
       n = self%n_balance
-      call self%hbm_system%precondition(vector(:n))
+      call self%balance_state%precondition(vector(:n))
       if (self%n_wearing == 0) return
-      na = self%n_active
-      allocate (z(self%structure%n_coordinates, 1, self%fourier%n_retained))
+      na = self%active%n_active
+      allocate (z(self%problem%structure%n_coordinates, 1, self%problem%fourier%n_retained))
       call harmonics_of(self, na, vector, z(:, 1, :))
       depth(:, 1) = vector(n + 1:)
       if (takes_balance(self)) then
-         call self%structure%multiply_active(self%structure_state, vector, self%active_out)
-         call to_complex(self%fourier, size(self%active_out, 1), self%active_out, self%complex_out)
+         call self%problem%structure%multiply_active(self%structure_state, vector, &
+                                                     self%scratch%active_out)
+         call to_complex(self%problem%fourier, size(self%scratch%active_out, 1), &
+                         self%scratch%active_out, self%scratch%complex_out)
       end if
-      do h = 1, self%fourier%n_retained
-         self%stiff(:, 1) = self%complex_out(:, h)
+      do h = 1, self%problem%fourier%n_retained
+         self%stiff(:, 1) = self%scratch%complex_out(:, h)
          call subtract_rows(self, h, 1, z(:, :, h), depth)
       end do
       call self%complement%solve(depth(:, 1))
       vector(n + 1:) = depth(:, 1)
-      do h = 1, self%fourier%n_retained
+      do h = 1, self%problem%fourier%n_retained
          z(:na, 1, h) = matmul(self%columns(:na, :, h), depth(:, 1))
-         k = self%fourier%column(h)
+         k = self%problem%fourier%column(h)
          vector((k - 1)*na + 1:k*na) = vector((k - 1)*na + 1:k*na) - real(z(:na, 1, h), wp)
-         if (self%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
+         if (self%problem%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
             = vector(k*na + 1:(k + 1)*na) + aimag(z(:na, 1, h))
       end do
    end subroutine precondition

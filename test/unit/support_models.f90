@@ -9,7 +9,8 @@ module support_models
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: spring_type
    use fw_error, only: error_type
-   use fw_hbm, only: hbm_system
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
    use fw_model, only: model_type
    use fw_problem, only: build_system
    implicit none (type, external)
@@ -30,6 +31,15 @@ module support_models
       procedure :: vector
       procedure :: matrix
    end type random_type
+
+   !> Problems of the systems that tests have made: they live to the end of the program, so that a
+   !> test need not hold them.
+   type :: kept_problem
+      type(balance_problem) :: problem
+      type(kept_problem), pointer :: before => null()
+   end type kept_problem
+
+   type(kept_problem), pointer, save :: problems => null()
 
    !> Laws by their words.
    integer, parameter :: law_dlft = findloc(law_words, 'dlft', dim=1)
@@ -186,10 +196,14 @@ contains
    !> The system of a case, at its frequency.
    subroutine new_system(case, system)
       type(case_type), intent(in) :: case
-      type(hbm_system), intent(out) :: system
+      type(balance_state), intent(out) :: system
       type(error_type), allocatable :: error
+      type(kept_problem), pointer :: kept
 
-      call build_system(case, system, error)
+      allocate (kept)
+      kept%before => problems
+      problems => kept
+      call build_system(case, kept%problem, system, error)
       if (allocated(error)) error stop error%message
       call system%set_frequency(case%sweep%start, error)
       if (allocated(error)) error stop error%message

@@ -1,6 +1,6 @@
 !> The preconditioner of the linear problem of a Newton step: per harmonic, in single precision, for
 !> the coordinates that were active when it was built.
-submodule(fw_hbm) fw_hbm_preconditioner
+submodule(fw_balance_state) fw_balance_preconditioner
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_open
    use fw_kinds, only: sp
@@ -17,38 +17,41 @@ contains
       integer :: h
 
       !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
-      !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
-      do h = 1, self%fourier%n_retained
+      !$omp if(self%problem%structure%n_coordinates >= coordinates_for_threads)
+      do h = 1, self%problem%fourier%n_retained
          call build_harmonic(self, h)
       end do
       !$omp end parallel do
-      self%n_preconditioned = self%n_active
-      self%preconditioned(:self%n_active) = self%used(:self%n_active)
-      self%kept_place(:self%n_active) = [(h, h=1, self%n_active)]
-      self%preconditioned_shift = allocated(self%shift)
+      self%preconditioner%n = self%active%n_active
+      self%preconditioner%coordinate(:self%active%n_active) = &
+         self%active%used(:self%active%n_active)
+      self%preconditioner%place(:self%active%n_active) = [(h, h=1, self%active%n_active)]
+      self%preconditioner%shifted = allocated(self%shift)
    end procedure build_preconditioner
 
    subroutine build_harmonic(self, h)
-      type(hbm_system), intent(inout) :: self
+      type(balance_state), intent(inout) :: self
       integer, intent(in) :: h
       !> Z_n of rows and columns in use; of one harmonic at a time, so that memory holds no more.
       complex(wp), allocatable :: stiffness(:, :)
       integer :: k
 
-      allocate (stiffness(self%n_used, self%n_active))
-      call self%structure%active_block(self%structure_state, h, stiffness)
-      call self%preconditioner(h)%reserve(self%n_active, largest_diagonal(stiffness))
-      associate (m => self%preconditioner(h)%matrix, na => self%n_active, &
-                 scale => self%preconditioner(h)%scale)
+      allocate (stiffness(self%active%n_used, self%active%n_active))
+      call self%problem%structure%active_block(self%structure_state, h, stiffness)
+      call self%preconditioner%harmonic(h)%reserve(self%active%n_active, &
+                                                   largest_diagonal(stiffness))
+      associate (m => self%preconditioner%harmonic(h)%matrix, na => self%active%n_active, &
+                 scale => self%preconditioner%harmonic(h)%scale)
          m(:na, :na) = cmplx(scale*stiffness(:na, :), kind=sp)
-         do k = 1, self%forces%n_laws
-            call add_mean_forces(self, self%forces%entry(k), self%work(k), h, scale, stiffness, m)
+         do k = 1, self%problem%forces%n_laws
+            call add_mean_forces(self, self%problem%forces%entry(k), self%work(k), h, scale, &
+                                 stiffness, m)
          end do
          if (allocated(self%shift)) then
             m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
          end if
       end associate
-      call self%preconditioner(h)%factor()
+      call self%preconditioner%harmonic(h)%factor()
    end subroutine build_harmonic
 
    !> Largest diagonal entry of the stiffness in absolute value.
@@ -65,20 +68,21 @@ contains
    module procedure place_kept
       integer :: i, c, k, place
 
-      self%kept_place(:self%n_active) = 0
-      do k = 1, self%n_preconditioned
-         place = self%place(self%preconditioned(k))
-         if (place > 0 .and. place <= self%n_active) self%kept_place(place) = k
+      self%preconditioner%place(:self%active%n_active) = 0
+      do k = 1, self%preconditioner%n
+         place = self%active%place(self%preconditioner%coordinate(k))
+         if (place > 0 .and. place <= self%active%n_active) self%preconditioner%place(place) = k
       end do
       ! Only where a law takes the balance do coordinates join and leave; no others share them.
-      do k = 1, self%forces%n_laws
-         associate (p => self%forces%entry(k)%law%prediction, row => self%forces%entry(k)%row)
+      do k = 1, self%problem%forces%n_laws
+         associate (p => self%problem%forces%entry(k)%law%prediction, &
+                    row => self%problem%forces%entry(k)%row)
             if (.not. p%takes_balance) cycle
             do i = 1, size(row, 2)
                do c = 1, size(row, 1)
                   if (row(c, i) == 0) cycle
-                  place = self%place(self%incidence%coordinate_of(row(c, i)))
-                  if (place > 0) self%unknown_stiffness(place) = p%stiffness(i, c)
+                  place = self%active%place(self%problem%incidence%coordinate_of(row(c, i)))
+                  if (place > 0) self%preconditioner%unknown_stiffness(place) = p%stiffness(i, c)
                end do
             end do
          end associate
@@ -90,12 +94,12 @@ contains
       integer :: n_known
 
       ! A shift belongs to one step of pseudo-time.
-      preconditioner_fits = self%n_preconditioned > 0 .and. .not. &
-                            (allocated(self%shift) .or. self%preconditioned_shift)
+      preconditioner_fits = self%preconditioner%n > 0 .and. .not. &
+                            (allocated(self%shift) .or. self%preconditioner%shifted)
       if (.not. preconditioner_fits) return
-      n_known = count(self%kept_place(:self%n_active) > 0)
-      preconditioner_fits = self%n_active + self%n_preconditioned - 2*n_known &
-                            <= most_changed*self%n_active
+      n_known = count(self%preconditioner%place(:self%active%n_active) > 0)
+      preconditioner_fits = self%active%n_active + self%preconditioner%n - 2*n_known &
+                            <= most_changed*self%active%n_active
    end procedure preconditioner_fits
 
    !> Mean over cosine and sine of a block of a transposed derivative, as a complex factor.
@@ -114,7 +118,7 @@ contains
    end function mean_block
 
    subroutine add_mean_forces(self, entry, work, h, scale, stiffness, m)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       type(force_workspace), intent(in) :: work
       integer, intent(in) :: h
@@ -124,8 +128,8 @@ contains
       integer :: i, c_out, c_in, k, nc
       complex(wp) :: mean
 
-      k = self%fourier%column(h)
-      nc = self%fourier%n_coefficients
+      k = self%problem%fourier%column(h)
+      nc = self%problem%fourier%n_coefficients
       do i = 1, size(entry%row, 2)
          if (work%linear_state(i) == pair_open) cycle
          do c_out = 1, size(entry%row, 1)
@@ -133,7 +137,7 @@ contains
             do c_in = 1, size(entry%row, 1)
                if (entry%row(c_in, i) == 0) cycle
                if (work%linear_state(i) == pair_mixed) then
-                  mean = mean_block(work%jacobian(:, :, i), self%fourier%harmonic(h), &
+                  mean = mean_block(work%jacobian(:, :, i), self%problem%fourier%harmonic(h), &
                                     (c_in - 1)*nc + k, (c_out - 1)*nc + k)
                else
                   mean = merge(one, zero, c_in == c_out)
@@ -147,7 +151,7 @@ contains
 
    !> m(out, :) = m(out, :) + mean (k d e_in - A(in, :)), without A where the balance is not taken.
    subroutine add_rows(self, entry, h, element, c_out, c_in, is_stuck, mean, stiffness, m)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: h, element, c_out, c_in
       logical, intent(in) :: is_stuck
@@ -157,9 +161,10 @@ contains
       integer :: p_out, p_in, n
       complex(wp) :: factor
 
-      associate (p => entry%law%prediction, row => entry%row(:, element), na => self%n_active)
+      associate (p => entry%law%prediction, row => entry%row(:, element), &
+                 na => self%active%n_active)
          ! d/dtau is a factor i n of the complex coefficient uc - i us.
-         n = self%fourier%harmonic(h)
+         n = self%problem%fourier%harmonic(h)
          factor = one
          if (p%order(c_in) > 0) factor = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
          if (n == 0 .and. is_stuck) factor = one
@@ -167,13 +172,14 @@ contains
             factor = factor*p%impedance_ratio(element, c_in, n, self%frequency())
          end if
          if (p%takes_balance) then
-            p_out = self%place(self%incidence%coordinate_of(row(c_out)))
-            p_in = self%place(self%incidence%coordinate_of(row(c_in)))
+            p_out = self%active%place(self%problem%incidence%coordinate_of(row(c_out)))
+            p_in = self%active%place(self%problem%incidence%coordinate_of(row(c_in)))
             if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then
                call subtract_row(na, mean, stiffness(p_in, :), m(p_out, :))
             end if
          end if
-         call self%incidence%add_mapped_block(row(c_out), row(c_in), h, self%place, na, &
+         call self%problem%incidence%add_mapped_block(row(c_out), row(c_in), h, &
+                                                      self%active%place, na, &
                                               p%stiffness(element, c_in)*factor*mean, m)
       end associate
    end subroutine add_rows
@@ -190,42 +196,43 @@ contains
    module procedure precondition
       integer :: h, k, na
 
-      na = self%n_active
+      na = self%active%n_active
       call active_to_complex(self, na, vector)
       !$omp parallel do default(none) shared(self) private(h) &
-      !$omp if(self%structure%n_coordinates >= coordinates_for_threads)
-      do h = 1, self%fourier%n_retained
+      !$omp if(self%problem%structure%n_coordinates >= coordinates_for_threads)
+      do h = 1, self%problem%fourier%n_retained
          call solve_kept(self, h)
       end do
       !$omp end parallel do
-      do h = 1, self%fourier%n_retained
-         k = self%fourier%column(h)
-         vector((k - 1)*na + 1:k*na) = real(self%complex_in(:na, h), wp)
-         if (self%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
-            = -aimag(self%complex_in(:na, h))
+      do h = 1, self%problem%fourier%n_retained
+         k = self%problem%fourier%column(h)
+         vector((k - 1)*na + 1:k*na) = real(self%scratch%complex_in(:na, h), wp)
+         if (self%problem%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
+            = -aimag(self%scratch%complex_in(:na, h))
       end do
    end procedure precondition
 
    !> With the factors of one harmonic; coordinates that they do not know are taken as stuck.
    subroutine solve_kept(self, h)
-      type(hbm_system), intent(inout) :: self
+      type(balance_state), intent(inout) :: self
       integer, intent(in) :: h
       integer :: k
 
-      associate (in => self%complex_in(:, h), z => self%complex_out(:self%n_preconditioned, h))
+      associate (in => self%scratch%complex_in(:, h), &
+                 z => self%scratch%complex_out(:self%preconditioner%n, h))
          z = zero
-         do k = 1, self%n_active
-            if (self%kept_place(k) > 0) then
-               z(self%kept_place(k)) = in(k)
+         do k = 1, self%active%n_active
+            if (self%preconditioner%place(k) > 0) then
+               z(self%preconditioner%place(k)) = in(k)
             else
-               in(k) = in(k)/self%unknown_stiffness(k)
+               in(k) = in(k)/self%preconditioner%unknown_stiffness(k)
             end if
          end do
-         call self%preconditioner(h)%solve(z)
-         do k = 1, self%n_active
-            if (self%kept_place(k) > 0) in(k) = z(self%kept_place(k))
+         call self%preconditioner%harmonic(h)%solve(z)
+         do k = 1, self%active%n_active
+            if (self%preconditioner%place(k) > 0) in(k) = z(self%preconditioner%place(k))
          end do
       end associate
    end subroutine solve_kept
 
-end submodule fw_hbm_preconditioner
+end submodule fw_balance_preconditioner

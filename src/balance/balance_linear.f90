@@ -7,7 +7,7 @@
 !> Rows of components that stick (or stay closed) through the period read eps v = -r: their
 !> coordinates are solved at once. The others are `active`; behind them in `used` stand the
 !> coordinates whose rows of A the active pairs need still (normal forces of slipping pairs).
-submodule(fw_hbm) fw_hbm_linear
+submodule(fw_balance_state) fw_balance_linear
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_open
    use fw_lapack, only: dgemv
@@ -26,52 +26,53 @@ contains
    module procedure linearize
       integer :: k
 
-      do k = 1, self%forces%n_laws
+      do k = 1, self%problem%forces%n_laws
          if (size(self%work(k)%state) == 0) cycle
-         call self%forces%entry(k)%law%linearize(self%fourier, self%work(k))
+         call self%problem%forces%entry(k)%law%linearize(self%problem%fourier, self%work(k))
       end do
       call choose_active(self)
-      call self%structure%restrict(self%structure_state, self%n_active, self%n_used, self%used)
-      n_linear = self%n_active*self%fourier%n_coefficients
-      self%n_linear = n_linear
+      call self%problem%structure%restrict(self%structure_state, self%active%n_active, &
+                                           self%active%n_used, self%active%used)
+      n_linear = self%active%n_active*self%problem%fourier%n_coefficients
+      self%active%n_linear = n_linear
    end procedure linearize
 
    !> Sort the coordinates into active, used and solved at once.
    subroutine choose_active(self)
-      type(hbm_system), intent(inout) :: self
-      logical :: held(self%structure%n_coordinates), wanted(self%structure%n_coordinates)
+      type(balance_state), intent(inout) :: self
+      logical :: held(size(self%active%place)), wanted(size(self%active%place))
       integer :: j, k
 
       held = .false.
       wanted = .false.
       if (self%reduced) then
-         do k = 1, self%forces%n_laws
-            if (.not. self%forces%entry(k)%law%prediction%takes_balance) cycle
-            call find_held(self, self%forces%entry(k), self%work(k), held, wanted)
+         do k = 1, self%problem%forces%n_laws
+            if (.not. self%problem%forces%entry(k)%law%prediction%takes_balance) cycle
+            call find_held(self, self%problem%forces%entry(k), self%work(k), held, wanted)
          end do
       end if
-      self%place = 0
+      self%active%place = 0
       k = 0
-      do j = 1, self%structure%n_coordinates
+      do j = 1, self%problem%structure%n_coordinates
          if (held(j)) cycle
          k = k + 1
-         self%used(k) = j
-         self%place(j) = k
+         self%active%used(k) = j
+         self%active%place(j) = k
       end do
-      self%n_active = k
-      do j = 1, self%structure%n_coordinates
+      self%active%n_active = k
+      do j = 1, self%problem%structure%n_coordinates
          if (.not. (held(j) .and. wanted(j))) cycle
          k = k + 1
-         self%used(k) = j
-         self%place(j) = k
+         self%active%used(k) = j
+         self%active%place(j) = k
       end do
-      self%n_used = k
+      self%active%n_used = k
       call place_kept(self)
    end subroutine choose_active
 
    !> Coordinates whose rows elements hold, and those of them whose rows of A are needed still.
    subroutine find_held(self, entry, work, held, wanted)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       type(force_workspace), intent(in) :: work
       logical, intent(inout) :: held(:), wanted(:)
@@ -83,7 +84,7 @@ contains
             if (entry%row(c, i) == 0 .or. work%linear_state(i) == pair_open) cycle
             ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
             if (entry%law%prediction%order(c) > 0) cycle
-            j = self%incidence%coordinate_of(entry%row(c, i))
+            j = self%problem%incidence%coordinate_of(entry%row(c, i))
             held(j) = work%linear_state(i) == pair_stuck .or. &
                       (c == last .and. self%pins_normals .and. work%always_closed(i))
             wanted(j) = work%linear_state(i) == pair_mixed
@@ -94,32 +95,33 @@ contains
    module procedure reduce
       integer :: m, nc
 
-      m = self%structure%n_coordinates
-      nc = self%fourier%n_coefficients
+      m = self%problem%structure%n_coordinates
+      nc = self%problem%fourier%n_coefficients
       call pinned_step(self, m, nc, r, self%balance)
       call reduce_shaped(self, m, nc, r, rhs)
    end procedure reduce
 
    !> Steps of the coordinates that are solved at once; zero for the active ones.
    subroutine pinned_step(self, m, nc, r, step)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: r(m, nc)
       real(wp), intent(inout) :: step(m, nc)
       integer :: i, c, j, k, place
 
       step = 0.0_wp
-      if (self%n_active == m) return
-      do k = 1, self%forces%n_laws
-         associate (p => self%forces%entry(k)%law%prediction, row => self%forces%entry(k)%row)
+      if (self%active%n_active == m) return
+      do k = 1, self%problem%forces%n_laws
+         associate (p => self%problem%forces%entry(k)%law%prediction, &
+                    row => self%problem%forces%entry(k)%row)
             if (.not. p%takes_balance) cycle
             do i = 1, size(row, 2)
                do c = 1, size(row, 1)
                   if (row(c, i) == 0) cycle
-                  j = self%incidence%coordinate_of(row(c, i))
-                  place = self%place(j)
+                  j = self%problem%incidence%coordinate_of(row(c, i))
+                  place = self%active%place(j)
                   ! Active: its step comes of the linear problem.
-                  if (place > 0 .and. place <= self%n_active) cycle
+                  if (place > 0 .and. place <= self%active%n_active) cycle
                   step(j, :) = -r(j, :)/p%stiffness(i, c)
                   ! eps is an impedance there, another one in each harmonic.
                   if (p%has_inertia) call turn_row(self, p, i, c, .true., step(j, :))
@@ -131,29 +133,30 @@ contains
 
    !> rhs = -r of the active rows, less the product of the pinned steps (in self%balance).
    subroutine reduce_shaped(self, m, nc, r, rhs)
-      type(hbm_system), intent(inout) :: self
+      type(balance_state), intent(inout) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: r(m, nc)
-      real(wp), intent(out) :: rhs(self%n_active, nc)
+      real(wp), intent(out) :: rhs(self%active%n_active, nc)
       integer :: k
 
       do k = 1, nc
-         rhs(:, k) = -r(self%used(:self%n_active), k)
+         rhs(:, k) = -r(self%active%used(:self%active%n_active), k)
       end do
-      if (self%n_active == m .or. self%n_active == 0) return
+      if (self%active%n_active == m .or. self%active%n_active == 0) return
       if (pinned_are_solved(self, m, nc, r)) return
-      call self%structure%multiply(self%structure_state, self%balance, self%product)
+      call self%problem%structure%multiply(self%structure_state, self%balance, self%scratch%product)
       do k = 1, nc
-         self%active_out(:self%n_used, k) = self%product(self%used(:self%n_used), k)
+         self%scratch%active_out(:self%active%n_used, k) = &
+            self%scratch%product(self%active%used(:self%active%n_used), k)
       end do
-      call add_forces(self, self%incidence%identity, m, self%balance)
-      rhs = rhs - self%active_out(:self%n_active, :)
+      call add_forces(self, self%problem%incidence%identity, m, self%balance)
+      rhs = rhs - self%scratch%active_out(:self%active%n_active, :)
    end subroutine reduce_shaped
 
    !> Whether what is left of the pinned rows is nothing to the others: so it is from the second
    !> step on.
    pure logical function pinned_are_solved(self, m, nc, r)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: r(m, nc)
       real(wp) :: largest_pinned, largest
@@ -163,7 +166,7 @@ contains
       largest = 0.0_wp
       do k = 1, nc
          do j = 1, m
-            if (self%place(j) > 0 .and. self%place(j) <= self%n_active) then
+            if (self%active%place(j) > 0 .and. self%active%place(j) <= self%active%n_active) then
                largest = max(largest, abs(r(j, k)))
             else
                largest_pinned = max(largest_pinned, abs(r(j, k)))
@@ -176,47 +179,49 @@ contains
    module procedure expand
       integer :: m, nc
 
-      m = self%structure%n_coordinates
-      nc = self%fourier%n_coefficients
+      m = self%problem%structure%n_coordinates
+      nc = self%problem%fourier%n_coefficients
       call pinned_step(self, m, nc, r, step)
       call scatter(self, m, nc, solution, step)
    end procedure expand
 
    subroutine scatter(self, m, nc, solution, step)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       integer, intent(in) :: m, nc
-      real(wp), intent(in) :: solution(self%n_active, nc)
+      real(wp), intent(in) :: solution(self%active%n_active, nc)
       real(wp), intent(inout) :: step(m, nc)
 
-      step(self%used(:self%n_active), :) = solution
+      step(self%active%used(:self%active%n_active), :) = solution
    end subroutine scatter
 
    !> dR/d omega = Z' q - F', with what the forces add to it.
    module procedure parameter_derivative
 
-      call self%structure%derivative(self%structure_state, by_frequency, x, dr)
-      call derivative_with_forces(self, self%structure%n_coordinates, &
-                                  self%fourier%n_coefficients, x, dr)
+      call self%problem%structure%derivative(self%structure_state, by_frequency, x, dr)
+      call derivative_with_forces(self, self%problem%structure%n_coordinates, &
+                                  self%problem%fourier%n_coefficients, x, dr)
    end procedure parameter_derivative
 
    !> dr from the slopes of all coordinates: the inputs of a law change by the
    !> balance that it takes, and by the unit of time of its rates.
    subroutine derivative_with_forces(self, m, nc, q, dr)
-      type(hbm_system), intent(inout) :: self
+      type(balance_state), intent(inout) :: self
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
       real(wp), intent(inout) :: dr(m, nc)
       integer :: k
 
-      do k = 1, self%forces%n_laws
-         associate (p => self%forces%entry(k)%law%prediction)
+      do k = 1, self%problem%forces%n_laws
+         associate (p => self%problem%forces%entry(k)%law%prediction)
             if (.not. (p%takes_balance .or. p%by_time)) cycle
-            call inputs_by_frequency(self, self%forces%entry(k), m, nc, q, dr, self%work(k)%input)
+            call inputs_by_frequency(self, self%problem%forces%entry(k), m, nc, q, dr, &
+                                     self%work(k)%input)
          end associate
          call multiply_derivative(self%work(k))
-         call add_outputs(self, self%forces%entry(k), self%work(k), self%incidence%identity, m, dr)
-         if (self%forces%entry(k)%law%prediction%has_inertia) then
-            call add_law_by_frequency(self, self%forces%entry(k), self%work(k), m, nc, dr)
+         call add_outputs(self, self%problem%forces%entry(k), self%work(k), &
+                          self%problem%incidence%identity, m, dr)
+         if (self%problem%forces%entry(k)%law%prediction%has_inertia) then
+            call add_law_by_frequency(self, self%problem%forces%entry(k), self%work(k), m, nc, dr)
          end if
       end do
    end subroutine derivative_with_forces
@@ -224,7 +229,7 @@ contains
    !> A law with inertia in units of time depends on the frequency by itself: a central difference,
    !> its inputs being held.
    subroutine add_law_by_frequency(self, entry, work, m, nc, dr)
-      type(hbm_system), intent(inout) :: self
+      type(balance_state), intent(inout) :: self
       type(force_entry), intent(in) :: entry
       type(force_workspace), intent(inout) :: work
       integer, intent(in) :: m, nc
@@ -237,16 +242,16 @@ contains
       step = relative_step*self%frequency()
       do side = -1, 1, 2
          work%rate = self%frequency() + side*step
-         call entry%law%evaluate(self%fourier, work)
-         call self%incidence%scatter(entry%rows, m, nc, 0.5_wp*side/step, work%force, dr)
+         call entry%law%evaluate(self%problem%fourier, work)
+         call self%problem%incidence%scatter(entry%rows, m, nc, 0.5_wp*side/step, work%force, dr)
       end do
       work%rate = self%frequency()
-      call entry%law%evaluate(self%fourier, work)
+      call entry%law%evaluate(self%problem%fourier, work)
    end subroutine add_law_by_frequency
 
    !> Derivatives of the inputs by the frequency.
    subroutine inputs_by_frequency(self, entry, m, nc, q, dr, input)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc), dr(m, nc)
@@ -260,14 +265,16 @@ contains
                if (row(c, i) == 0) cycle
                associate (y => input((c - 1)*nc + 1:c*nc, i))
                   if (p%by_time .and. p%order(c) > 0) then
-                     call self%incidence%gather_row(row(c, i), self%incidence%identity, m, &
+                     call self%problem%incidence%gather_row(row(c, i), &
+                                                            self%problem%incidence%identity, m, &
                                                     p%stiffness(i, c), q, y)
                      call take_rate(self, .false., 1.0_wp, y)
                   end if
                   if (p%has_inertia) then
                      call add_inertia_by_frequency(self, p, row(c, i), i, c, m, q, y)
                   end if
-                  if (p%takes_balance) y = y - dr(self%incidence%coordinate_of(row(c, i)), :)
+                  if (p%takes_balance) y = y - &
+                     dr(self%problem%incidence%coordinate_of(row(c, i)), :)
                end associate
             end do
          end do
@@ -276,7 +283,7 @@ contains
 
    !> Add dE_n/d omega times the displacement of a row.
    subroutine add_inertia_by_frequency(self, prediction, row, element, component, m, q, y)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(prediction_type), intent(in) :: prediction
       integer, intent(in) :: row, element, component, m
       real(wp), intent(in) :: q(m, *)
@@ -286,11 +293,11 @@ contains
       integer :: h, k, n
 
       if (.not. prediction%inertia(element, component) > 0.0_wp) return
-      call self%incidence%gather_row(row, self%incidence%identity, m, 1.0_wp, q, u)
-      do h = 1, self%fourier%n_retained
-         n = self%fourier%harmonic(h)
+      call self%problem%incidence%gather_row(row, self%problem%incidence%identity, m, 1.0_wp, q, u)
+      do h = 1, self%problem%fourier%n_retained
+         n = self%problem%fourier%harmonic(h)
          if (n == 0) cycle
-         k = self%fourier%column(h)
+         k = self%problem%fourier%column(h)
          ! E_n = k - (n omega)**2 m + i n omega c.
          slope = cmplx(-2.0_wp*n**2*self%frequency()*prediction%inertia(element, component), &
                        n*prediction%damping(element, component), wp)* &
@@ -303,67 +310,72 @@ contains
    module procedure apply
       integer :: k, na
 
-      na = self%n_active
-      call self%structure%multiply_active(self%structure_state, vector, self%active_out)
-      call add_forces(self, self%place, na, vector)
+      na = self%active%n_active
+      call self%problem%structure%multiply_active(self%structure_state, vector, &
+                                                  self%scratch%active_out)
+      call add_forces(self, self%active%place, na, vector)
       if (allocated(self%shift)) call add_shift(self, na, vector)
-      do k = 1, self%fourier%n_coefficients
-         product((k - 1)*na + 1:k*na) = self%active_out(:na, k)
+      do k = 1, self%problem%fourier%n_coefficients
+         product((k - 1)*na + 1:k*na) = self%scratch%active_out(:na, k)
       end do
    end procedure apply
 
    !> active_out = active_out + P/h v, all coordinates being active.
    subroutine add_shift(self, m, vector)
-      class(hbm_system), intent(inout) :: self
+      class(balance_state), intent(inout) :: self
       integer, intent(in) :: m
       real(wp), intent(in) :: vector(m, *)
       integer :: h, k
 
       call active_to_complex(self, m, vector)
-      do h = 1, self%fourier%n_retained
-         call zgemv('N', m, m, one, self%shift(1, 1, h), m, self%complex_in(1, h), 1, zero, &
-                    self%complex_out(1, h), 1)
-         k = self%fourier%column(h)
-         self%active_out(:m, k) = self%active_out(:m, k) + real(self%complex_out(:m, h), wp)
-         if (self%fourier%harmonic(h) == 0) cycle
-         self%active_out(:m, k + 1) = self%active_out(:m, k + 1) - aimag(self%complex_out(:m, h))
+      do h = 1, self%problem%fourier%n_retained
+         call zgemv('N', m, m, one, self%shift(1, 1, h), m, self%scratch%complex_in(1, h), 1, &
+                    zero, self%scratch%complex_out(1, h), 1)
+         k = self%problem%fourier%column(h)
+         self%scratch%active_out(:m, k) = self%scratch%active_out(:m, k) + &
+                                          real(self%scratch%complex_out(:m, h), wp)
+         if (self%problem%fourier%harmonic(h) == 0) cycle
+         self%scratch%active_out(:m, k + 1) = self%scratch%active_out(:m, k + 1) - &
+            aimag(self%scratch%complex_out(:m, h))
       end do
    end subroutine add_shift
 
    module procedure active_to_complex
 
-      call amplitudes_of(self%fourier%harmonic, self%fourier%column, na, vector, &
-                         size(self%complex_in, 1), self%complex_in)
+      call amplitudes_of(self%problem%fourier%harmonic, self%problem%fourier%column, na, vector, &
+                         size(self%scratch%complex_in, 1), self%scratch%complex_in)
    end procedure active_to_complex
 
    !> active_out = active_out + what the forces add to the product, Z_r v being in active_out. Laws
    !> that take the balance take that of the others, but not of one another.
    subroutine add_forces(self, map, n_mapped, vector)
-      type(hbm_system), intent(inout) :: self
+      type(balance_state), intent(inout) :: self
       !> Places of the coordinates in the vector, and its rows.
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
       integer :: k
 
-      do k = 1, self%forces%n_laws
-         associate (entry => self%forces%entry(k), work => self%work(k))
+      do k = 1, self%problem%forces%n_laws
+         associate (entry => self%problem%forces%entry(k), work => self%work(k))
             call multiply_element(self, entry, map, n_mapped, vector, work)
             if (entry%law%prediction%takes_balance) cycle
-            call add_outputs(self, entry, work, self%place, self%n_used, self%active_out)
+            call add_outputs(self, entry, work, self%active%place, self%active%n_used, &
+                             self%scratch%active_out)
          end associate
       end do
-      do k = 1, self%forces%n_laws
-         associate (entry => self%forces%entry(k), work => self%work(k))
+      do k = 1, self%problem%forces%n_laws
+         associate (entry => self%problem%forces%entry(k), work => self%work(k))
             if (.not. entry%law%prediction%takes_balance) cycle
-            call add_outputs(self, entry, work, self%place, self%n_active, self%active_out)
+            call add_outputs(self, entry, work, self%active%place, self%active%n_active, &
+                             self%scratch%active_out)
          end associate
       end do
    end subroutine add_forces
 
    !> Outputs of the derivative of a law for a vector.
    subroutine multiply_element(self, entry, map, n_mapped, vector, work)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
@@ -409,14 +421,14 @@ contains
 
    !> Derivative of the prediction of an element: k B d v, and - B A v where it takes the balance.
    subroutine gather_inputs(self, entry, element, map, n_mapped, vector, is_stuck, inputs)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: element
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
       logical, intent(in) :: is_stuck
-      real(wp), intent(out) :: inputs(self%fourier%n_coefficients, size(entry%row, 1))
+      real(wp), intent(out) :: inputs(self%problem%fourier%n_coefficients, size(entry%row, 1))
       integer :: c, row, place
 
       associate (p => entry%law%prediction)
@@ -426,20 +438,21 @@ contains
                inputs(:, c) = 0.0_wp
                cycle
             end if
-            call self%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), vector, &
+            call self%problem%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), &
+                                                   vector, &
                                            inputs(:, c))
             if (p%order(c) > 0) call take_rate(self, is_stuck, self%rate_unit(p), inputs(:, c))
             if (p%has_inertia) call turn_row(self, p, element, c, .false., inputs(:, c))
             if (.not. p%takes_balance) cycle
-            place = self%place(self%incidence%coordinate_of(row))
-            if (place > 0) inputs(:, c) = inputs(:, c) - self%active_out(place, :)
+            place = self%active%place(self%problem%incidence%coordinate_of(row))
+            if (place > 0) inputs(:, c) = inputs(:, c) - self%scratch%active_out(place, :)
          end do
       end associate
    end subroutine gather_inputs
 
    !> Coefficients of one row times E_n over the stiffness, or divided by it.
    pure subroutine turn_row(self, prediction, element, component, divides, row)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(prediction_type), intent(in) :: prediction
       integer, intent(in) :: element, component
       logical, intent(in) :: divides
@@ -447,10 +460,10 @@ contains
       complex(wp) :: ratio, turned
       integer :: h, k
 
-      do h = 1, self%fourier%n_retained
-         if (self%fourier%harmonic(h) == 0) cycle
-         k = self%fourier%column(h)
-         ratio = prediction%impedance_ratio(element, component, self%fourier%harmonic(h), &
+      do h = 1, self%problem%fourier%n_retained
+         if (self%problem%fourier%harmonic(h) == 0) cycle
+         k = self%problem%fourier%column(h)
+         ratio = prediction%impedance_ratio(element, component, self%problem%fourier%harmonic(h), &
                                             self%frequency())
          if (divides) ratio = one/ratio
          turned = ratio*cmplx(row(k), -row(k + 1), wp)
@@ -462,17 +475,17 @@ contains
    !> Derivative in place, unit times that by tau; the mean of a stuck pair stays, see
    !> hold_stuck_means.
    subroutine take_rate(self, keep_mean, unit, inputs)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       logical, intent(in) :: keep_mean
       real(wp), intent(in) :: unit
       real(wp), intent(inout) :: inputs(:)
       real(wp) :: cosine, n
       integer :: h, k
 
-      do h = 1, self%fourier%n_retained
-         k = self%fourier%column(h)
-         n = unit*real(self%fourier%harmonic(h), wp)
-         if (self%fourier%harmonic(h) == 0) then
+      do h = 1, self%problem%fourier%n_retained
+         k = self%problem%fourier%column(h)
+         n = unit*real(self%problem%fourier%harmonic(h), wp)
+         if (self%problem%fourier%harmonic(h) == 0) then
             if (.not. keep_mean) inputs(k) = 0.0_wp
             cycle
          end if
@@ -485,7 +498,7 @@ contains
    !> rows = rows + B^T outputs of a law. Elements may share coordinates, so that this stays in one
    !> thread.
    subroutine add_outputs(self, entry, work, map, n_mapped, rows)
-      type(hbm_system), intent(in) :: self
+      type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       type(force_workspace), intent(in) :: work
       integer, intent(in) :: map(:)
@@ -493,12 +506,13 @@ contains
       real(wp), intent(inout) :: rows(:, :)
       integer :: i, c, nc
 
-      nc = self%fourier%n_coefficients
+      nc = self%problem%fourier%n_coefficients
       do i = 1, size(entry%row, 2)
          if (work%linear_state(i) == pair_open) cycle
          do c = 1, size(entry%row, 1)
             if (entry%row(c, i) == 0) cycle
-            call self%incidence%scatter_row(entry%row(c, i), map, n_mapped, size(rows, 1), 1.0_wp, &
+            call self%problem%incidence%scatter_row(entry%row(c, i), map, n_mapped, &
+                                                    size(rows, 1), 1.0_wp, &
                                             work%output((c - 1)*nc + 1:c*nc, i), rows)
          end do
       end do
@@ -509,7 +523,7 @@ contains
       real(wp) :: unit(size(matrix, 2))
       integer :: j, n
 
-      n = self%n_linear
+      n = self%active%n_linear
       do j = 1, n
          unit(:n) = 0.0_wp
          unit(j) = 1.0_wp
@@ -517,4 +531,4 @@ contains
       end do
    end procedure assemble
 
-end submodule fw_hbm_linear
+end submodule fw_balance_linear

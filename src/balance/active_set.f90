@@ -1,0 +1,31 @@
+!> Which coordinates are left in the linear problem of a Newton step.
+module fw_active_set
+   implicit none (type, external)
+   private
+
+   public :: active_set
+
+   type :: active_set
+      !> Unknowns of the linear problem.
+      integer :: n_linear = 0
+      !> Coordinates that stay (the first n_active entries of `used`), and those whose rows of the
+      !> structure are needed still (up to n_used).
+      integer :: n_active = 0
+      integer :: n_used = 0
+      integer, allocatable :: used(:)
+      !> Place of each coordinate in `used`, 0 where it has none (n_coordinates).
+      integer, allocatable :: place(:)
+   contains
+      procedure :: reserve
+   end type active_set
+
+contains
+
+   pure subroutine reserve(self, n_coordinates)
+      class(active_set), intent(inout) :: self
+      integer, intent(in) :: n_coordinates
+
+      allocate (self%used(n_coordinates), self%place(n_coordinates), source=0)
+   end subroutine reserve
+
+end module fw_active_set

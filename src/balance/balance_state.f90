@@ -1,0 +1,403 @@
+!> Harmonic balance with alternating frequency/time:
+!>
+!>   R(q) = Z_r q + sum over laws of B^T lambda(y) - F_r,
+!>
+!> with the prediction of each law, of the order that it declares,
+!>
+!>   y = k (B (d/dtau)**order q + gap),
+!>   y = k (B (d/dtau)**order q + gap) + F_r - Z_r q - sum over those above   (takes the balance).
+!>
+!> Unknowns are (coordinate, coefficient), coordinates innermost.
+module fw_balance_state
+   use fw_kinds, only: wp
+   use fw_error, only: error_type
+   use fw_active_set, only: active_set
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_scratch, only: balance_scratch
+   use fw_complex_form, only: amplitudes_of
+   use fw_force_law, only: force_workspace
+   use fw_force_law, only: pair_stuck
+   use fw_force_law, only: prediction_type
+   use fw_force_list, only: force_entry
+   use fw_fourier, only: fourier_type
+   use fw_fourier, only: to_real
+   use fw_kept_factors, only: kept_factors
+   use fw_parameter_system, only: parameter_system
+   use fw_structure_operator, only: structure_state
+   use fw_threads, only: coordinates_for_threads
+   implicit none (type, external)
+   private
+
+   public :: balance_state, new_balance_state
+
+   !> A problem where one worker stands.
+   type, extends(parameter_system) :: balance_state
+      !> Only read; it has to live as long as the state.
+      type(balance_problem), pointer :: problem => null()
+      class(structure_state), allocatable :: structure_state
+      !> What evaluations of the laws leave (n_laws).
+      type(force_workspace), allocatable :: work(:)
+      !> Wear depth of the pairs (n_pairs) [length].
+      real(wp), allocatable :: depth(:)
+      !> F - Z q less the forces that do not take the balance, and the loads (n_coordinates,
+      !> n_coefficients).
+      real(wp), allocatable :: balance(:, :), load(:, :)
+      !> Share of the vibratory load that acts; below 1 only on the way to a first solution.
+      real(wp) :: load_share = 1.0_wp
+      !> What a step of pseudo-time adds to the derivative, P/h, outside of the contact laws
+      !> (n_coordinates, n_coordinates, n_retained); only allocated during such a step.
+      complex(wp), allocatable :: shift(:, :, :)
+      !> Let normal components that always bear leave the linear problem.
+      logical :: pins_normals = .true.
+      !> The linear problem of a step, see fw_balance_linear.
+      type(active_set) :: active
+      type(kept_factors) :: preconditioner
+      type(balance_scratch) :: scratch
+   contains
+      procedure :: set_parameter => set_frequency
+      procedure :: set_frequency
+      procedure :: frequency
+      procedure :: parameter_derivative
+      procedure :: rate_unit
+      procedure :: residual
+      procedure :: linearize
+      procedure :: reduce
+      procedure :: expand
+      procedure :: apply
+      procedure :: build_preconditioner
+      procedure :: preconditioner_fits
+      procedure :: precondition
+      procedure :: assemble
+   end type balance_state
+
+   ! The linear problem of a Newton step (fw_balance_linear).
+   interface
+      module subroutine linearize(self, n_linear)
+         class(balance_state), intent(inout) :: self
+         integer, intent(out) :: n_linear
+      end subroutine linearize
+
+      module subroutine reduce(self, r, rhs)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(in), contiguous :: r(:)
+         real(wp), intent(out), contiguous :: rhs(:)
+      end subroutine reduce
+
+      module subroutine expand(self, r, solution, step)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(in), contiguous :: r(:), solution(:)
+         real(wp), intent(out), contiguous :: step(:)
+      end subroutine expand
+
+      module subroutine parameter_derivative(self, x, dr)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(in), contiguous :: x(:)
+         real(wp), intent(out), contiguous :: dr(:)
+      end subroutine parameter_derivative
+
+      module subroutine apply(self, vector, product)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(in), contiguous :: vector(:)
+         real(wp), intent(out), contiguous :: product(:)
+      end subroutine apply
+
+      module subroutine assemble(self, matrix)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(inout), contiguous :: matrix(:, :)
+      end subroutine assemble
+
+      !> complex_in = complex form of a vector of the active coordinates.
+      module subroutine active_to_complex(self, na, vector)
+         type(balance_state), intent(inout) :: self
+         integer, intent(in) :: na
+         real(wp), intent(in) :: vector(na, *)
+      end subroutine active_to_complex
+   end interface
+
+   ! Its preconditioner (fw_balance_preconditioner).
+   interface
+      module subroutine build_preconditioner(self)
+         class(balance_state), intent(inout) :: self
+      end subroutine build_preconditioner
+
+      !> Find the active coordinates in the preconditioner from before.
+      module subroutine place_kept(self)
+         type(balance_state), intent(inout) :: self
+      end subroutine place_kept
+
+      pure module logical function preconditioner_fits(self)
+         class(balance_state), intent(in) :: self
+      end function preconditioner_fits
+
+      module subroutine precondition(self, vector)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(inout), contiguous :: vector(:)
+      end subroutine precondition
+   end interface
+
+contains
+
+   !> A state of a problem; set_frequency comes before the first residual.
+   subroutine new_balance_state(problem, self, stand)
+      !> Not to be moved from now on.
+      type(balance_problem), intent(in), target :: problem
+      type(balance_state), intent(out) :: self
+      !> Where the structure stands; moved into the state, made anew where it is not given.
+      class(structure_state), allocatable, intent(inout), optional :: stand
+      integer :: m, nc
+
+      self%problem => problem
+      if (present(stand)) then
+         call move_alloc(stand, self%structure_state)
+      else
+         call problem%structure%new_state(self%structure_state)
+      end if
+      m = problem%structure%n_coordinates
+      nc = problem%fourier%n_coefficients
+      self%n = problem%n
+      self%reduced = problem%reduced
+      self%depth = problem%depth
+      call problem%forces%reserve(problem%fourier, self%work)
+      allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
+      call self%active%reserve(m)
+      call self%preconditioner%reserve(m, problem%fourier%n_retained)
+      call self%scratch%reserve(m, problem%fourier%n_retained, nc)
+   end subroutine new_balance_state
+
+   !> Bring matrices and loads to a frequency.
+   subroutine set_frequency(self, parameter, error)
+      class(balance_state), intent(inout) :: self
+      !> Angular frequency [rad/s].
+      real(wp), intent(in) :: parameter
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%problem%structure%at(self%structure_state, parameter, 0.0_wp, error)
+      if (allocated(error)) return
+      call to_real(self%problem%fourier, self%problem%structure%n_coordinates, &
+                   self%structure_state%load, &
+                   self%load)
+      self%reference = load_norm(self)
+      if (self%problem%fourier%has_constant()) then
+         self%load(:, 2:) = self%load_share*self%load(:, 2:)
+      else
+         self%load = self%load_share*self%load
+      end if
+   end subroutine set_frequency
+
+   !> Present angular frequency [rad/s].
+   pure real(wp) function frequency(self)
+      class(balance_state), intent(in) :: self
+
+      frequency = self%structure_state%omega
+   end function frequency
+
+   !> The norm to which residuals are compared: that of the vibratory load. A large static load
+   !> must not hide the vibration, but its round-off must not forbid convergence either.
+   real(wp) function load_norm(self)
+      type(balance_state), intent(in) :: self
+      real(wp), parameter :: static_share = 1.0e-5_wp
+      real(wp) :: static
+
+      static = 0.0_wp
+      load_norm = norm2(self%load)
+      if (self%problem%fourier%has_constant()) then
+         load_norm = norm2(self%load(:, 2:))
+         ! What a fit presses together acts like a static load, even where no load moves the joint.
+         static = norm2(self%load(:, 1)) + press_of(self)
+      end if
+      load_norm = max(load_norm, static_share*static)
+      if (load_norm <= 0.0_wp) then
+         associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)
+            load_norm = norm2(p%load) + norm2(p%stiffness(:, 3)*p%gap)
+         end associate
+      end if
+      if (load_norm <= 0.0_wp) load_norm = 1.0_wp
+   end function load_norm
+
+   !> Forces that interferences would have where nothing gave way.
+   real(wp) function press_of(self)
+      type(balance_state), intent(in) :: self
+
+      press_of = 0.0_wp
+      if (size(self%depth) == 0) return
+      associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)
+         press_of = norm2(p%stiffness(:, 3)*min(p%gap, 0.0_wp))
+      end associate
+   end function press_of
+
+   !> R(x); see the module header.
+   subroutine residual(self, x, r)
+      class(balance_state), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: r(:)
+      integer :: k, m, nc
+
+      m = self%problem%structure%n_coordinates
+      nc = self%problem%fourier%n_coefficients
+      if (m == 0) return
+      call multiply_stiffness(self, m, nc, x)
+      do k = 1, self%problem%forces%n_laws
+         associate (entry => self%problem%forces%entry(k), work => self%work(k))
+            work%rate = self%frequency()
+            call predict(self, entry, m, nc, x, work)
+            if (k == self%problem%forces%pairs) call entry%law%set_offset(self%depth, work)
+            call entry%law%evaluate(self%problem%fourier, work)
+            if (entry%law%prediction%takes_balance) then
+               call hold_stuck_means(self, entry, m, nc, x, work)
+            else
+               call self%problem%incidence%scatter(entry%rows, m, nc, -1.0_wp, work%force, &
+                                                   self%balance)
+            end if
+         end associate
+      end do
+      call collect(self, m, nc, r)
+   end subroutine residual
+
+   !> balance = F - Z q.
+   subroutine multiply_stiffness(self, m, nc, q)
+      class(balance_state), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
+
+      call self%problem%structure%multiply(self%structure_state, q, self%balance)
+      self%balance = self%load - self%balance
+   end subroutine multiply_stiffness
+
+   !> Predicted inputs of a law.
+   subroutine predict(self, entry, m, nc, q, work)
+      type(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
+      type(force_workspace), intent(inout) :: work
+      integer :: j
+
+      associate (p => entry%law%prediction, y => work%prediction)
+         call self%problem%incidence%gather(entry%rows, m, nc, q, y)
+         do j = 1, nc
+            y(:, :, j) = p%stiffness*y(:, :, j)
+         end do
+         if (any(p%order > 0)) call take_rates(self%problem%fourier, self%rate_unit(p), p%order, y)
+         if (p%has_inertia) call take_inertias(self%problem%fourier, self%frequency(), p, y)
+         if (p%takes_balance) call add_balance(self, entry%row, y)
+      end associate
+   end subroutine predict
+
+   !> What makes a derivative by tau one by what a law takes: omega where that is the time.
+   pure real(wp) function rate_unit(self, prediction)
+      class(balance_state), intent(in) :: self
+      type(prediction_type), intent(in) :: prediction
+
+      rate_unit = merge(self%frequency(), 1.0_wp, prediction%by_time)
+   end function rate_unit
+
+   !> Replace inputs from displacements by inputs from velocities, where the law takes these.
+   subroutine take_rates(fourier, unit, order, y)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: unit
+      integer, intent(in) :: order(:)
+      real(wp), intent(inout) :: y(:, :, :)
+      real(wp) :: cosine, n
+      integer :: i, c, h, k
+
+      do h = 1, fourier%n_retained
+         k = fourier%column(h)
+         n = unit*real(fourier%harmonic(h), wp)
+         do c = 1, size(y, 2)
+            if (order(c) == 0) cycle
+            if (fourier%harmonic(h) == 0) then
+               y(:, c, k) = 0.0_wp
+               cycle
+            end if
+            do i = 1, size(y, 1)
+               cosine = y(i, c, k)
+               y(i, c, k) = n*y(i, c, k + 1)
+               y(i, c, k + 1) = -n*cosine
+            end do
+         end do
+      end do
+   end subroutine take_rates
+
+   !> Bring inputs from displacements times a stiffness to those times E_n.
+   subroutine take_inertias(fourier, omega, prediction, y)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(in) :: omega
+      type(prediction_type), intent(in) :: prediction
+      real(wp), intent(inout) :: y(:, :, :)
+      complex(wp) :: turned
+      integer :: i, c, h, k
+
+      do h = 1, fourier%n_retained
+         k = fourier%column(h)
+         if (fourier%harmonic(h) == 0) cycle
+         do c = 1, size(y, 2)
+            do i = 1, size(y, 1)
+               turned = prediction%impedance_ratio(i, c, fourier%harmonic(h), omega)* &
+                        cmplx(y(i, c, k), -y(i, c, k + 1), wp)
+               y(i, c, k) = real(turned, wp)
+               y(i, c, k + 1) = -aimag(turned)
+            end do
+         end do
+      end do
+   end subroutine take_inertias
+
+   !> What elements must transmit for equilibrium.
+   subroutine add_balance(self, row, y)
+      type(balance_state), intent(in) :: self
+      integer, intent(in) :: row(:, :)
+      real(wp), intent(inout) :: y(:, :, :)
+      integer :: i, c, j
+
+      do j = 1, size(y, 3)
+         do c = 1, size(y, 2)
+            do i = 1, size(y, 1)
+               if (row(c, i) == 0) cycle
+               y(i, c, j) = y(i, c, j) + &
+                  self%balance(self%problem%incidence%coordinate_of(row(c, i)), j)
+            end do
+         end do
+      end do
+   end subroutine add_balance
+
+   !> Velocities say nothing of the mean position of an element that sticks through the period: it
+   !> stays where it was assembled.
+   subroutine hold_stuck_means(self, entry, m, nc, q, work)
+      type(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: q(m, nc)
+      type(force_workspace), intent(inout) :: work
+      integer :: i, c
+
+      if (.not. self%problem%fourier%has_constant()) return
+      associate (p => entry%law%prediction, row => entry%row)
+         if (all(p%order == 0)) return
+         do i = 1, size(row, 2)
+            if (work%state(i) /= pair_stuck) cycle
+            do c = 1, size(row, 1)
+               if (row(c, i) == 0 .or. p%order(c) == 0) cycle
+               work%force(i, c, 1) = work%force(i, c, 1) + &
+                                     p%stiffness(i, c)* &
+                                     q(self%problem%incidence%coordinate_of(row(c, i)), 1)
+            end do
+         end do
+      end associate
+   end subroutine hold_stuck_means
+
+   !> r = -balance + B^T lambda of the laws that take the balance; those of the others it holds.
+   subroutine collect(self, m, nc, r)
+      class(balance_state), intent(in) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(out) :: r(m, nc)
+      integer :: k
+
+      r = -self%balance
+      do k = 1, self%problem%forces%n_laws
+         associate (entry => self%problem%forces%entry(k))
+            if (.not. entry%law%prediction%takes_balance) cycle
+            call self%problem%incidence%scatter(entry%rows, m, nc, 1.0_wp, self%work(k)%force, r)
+         end associate
+      end do
+   end subroutine collect
+
+end module fw_balance_state

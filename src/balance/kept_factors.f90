@@ -1,0 +1,37 @@
+!> Factors of the preconditioner of the balance, one matrix a harmonic, and the coordinates that
+!> they were built for: they serve while few coordinates have joined the active ones or left them.
+module fw_kept_factors
+   use fw_kinds, only: wp
+   use fw_preconditioner_lu, only: preconditioner_lu_type
+   implicit none (type, external)
+   private
+
+   public :: kept_factors
+
+   type :: kept_factors
+      type(preconditioner_lu_type), allocatable :: harmonic(:)
+      !> Coordinates for which they were built (first n entries).
+      integer :: n = 0
+      integer, allocatable :: coordinate(:)
+      !> Whether they were built with a shift.
+      logical :: shifted = .false.
+      !> Place there of each active coordinate, 0 for one that has become active since; prediction
+      !> stiffness of those.
+      integer, allocatable :: place(:)
+      real(wp), allocatable :: unknown_stiffness(:)
+   contains
+      procedure :: reserve
+   end type kept_factors
+
+contains
+
+   pure subroutine reserve(self, n_coordinates, n_harmonics)
+      class(kept_factors), intent(inout) :: self
+      integer, intent(in) :: n_coordinates, n_harmonics
+
+      allocate (self%harmonic(n_harmonics))
+      allocate (self%coordinate(n_coordinates), self%place(n_coordinates), source=0)
+      allocate (self%unknown_stiffness(n_coordinates), source=0.0_wp)
+   end subroutine reserve
+
+end module fw_kept_factors
