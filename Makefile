@@ -94,7 +94,7 @@ stress: build ## every case to its extremes, written to docs/robustness.md
 long: build ## memory and time of long runs, written to docs/robustness.md
 	$(OVERVIEW) $(PYTHON) test/stress/long_runs.py -o docs/robustness.md
 
-verify: build/deps.stamp ## tests in PARTS (all) of the builds in docs/robustness.md
+verify: build ## tests in PARTS (all) of the builds in docs/robustness.md
 	$(PYTHON) test/verify/verify.py --python $(PYTHON) $(PARTS)
 
 bench: build ## times of points and sweeps, written to docs/benchmarks.md
