@@ -10,6 +10,7 @@
 submodule(fw_balance_state) fw_balance_linear
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_open
+   use fw_force_law, only: pair_stuck
    use fw_lapack, only: dgemv
    use fw_lapack, only: zgemv
    use fw_structure_operator, only: by_frequency
@@ -388,7 +389,7 @@ contains
       do i = 1, size(work%state)
          if (work%linear_state(i) == pair_open) cycle
          call gather_inputs(self, entry, i, map, n_mapped, vector, &
-                            work%linear_state(i) == pair_stuck, work%input(:, i))
+                            work%linear_rests(i), work%input(:, i))
          call multiply_derivative_of(work, i)
       end do
       !$omp end parallel do
@@ -420,14 +421,14 @@ contains
    end subroutine multiply_derivative_of
 
    !> Derivative of the prediction of an element: k B d v, and - B A v where it takes the balance.
-   subroutine gather_inputs(self, entry, element, map, n_mapped, vector, is_stuck, inputs)
+   subroutine gather_inputs(self, entry, element, map, n_mapped, vector, rests, inputs)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: element
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
-      logical, intent(in) :: is_stuck
+      logical, intent(in) :: rests
       real(wp), intent(out) :: inputs(self%problem%fourier%n_coefficients, size(entry%row, 1))
       integer :: c, row, place
 
@@ -441,7 +442,7 @@ contains
             call self%problem%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), &
                                                    vector, &
                                            inputs(:, c))
-            if (p%order(c) > 0) call take_rate(self, is_stuck, self%rate_unit(p), inputs(:, c))
+            if (p%order(c) > 0) call take_rate(self, rests, self%rate_unit(p), inputs(:, c))
             if (p%has_inertia) call turn_row(self, p, element, c, .false., inputs(:, c))
             if (.not. p%takes_balance) cycle
             place = self%active%place(self%problem%incidence%coordinate_of(row))
@@ -472,8 +473,8 @@ contains
       end do
    end subroutine turn_row
 
-   !> Derivative in place, unit times that by tau; the mean of a stuck pair stays, see
-   !> hold_stuck_means.
+   !> Derivative in place, unit times that by tau; the mean of a pair at rest stays, see
+   !> take_means.
    subroutine take_rate(self, keep_mean, unit, inputs)
       type(balance_state), intent(in) :: self
       logical, intent(in) :: keep_mean

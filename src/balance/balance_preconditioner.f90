@@ -142,7 +142,7 @@ contains
                else
                   mean = merge(one, zero, c_in == c_out)
                end if
-               call add_rows(self, entry, h, i, c_out, c_in, work%linear_state(i) == pair_stuck, &
+               call add_rows(self, entry, h, i, c_out, c_in, work%linear_rests(i), &
                              scale*mean, stiffness, m)
             end do
          end do
@@ -150,11 +150,11 @@ contains
    end subroutine add_mean_forces
 
    !> m(out, :) = m(out, :) + mean (k d e_in - A(in, :)), without A where the balance is not taken.
-   subroutine add_rows(self, entry, h, element, c_out, c_in, is_stuck, mean, stiffness, m)
+   subroutine add_rows(self, entry, h, element, c_out, c_in, rests, mean, stiffness, m)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: h, element, c_out, c_in
-      logical, intent(in) :: is_stuck
+      logical, intent(in) :: rests
       complex(wp), intent(in) :: mean
       complex(wp), intent(in) :: stiffness(:, :)
       complex(sp), intent(inout) :: m(:, :)
@@ -167,7 +167,7 @@ contains
          n = self%problem%fourier%harmonic(h)
          factor = one
          if (p%order(c_in) > 0) factor = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
-         if (n == 0 .and. is_stuck) factor = one
+         if (n == 0 .and. rests) factor = one
          if (p%has_inertia) then
             factor = factor*p%impedance_ratio(element, c_in, n, self%frequency())
          end if

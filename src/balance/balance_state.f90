@@ -16,7 +16,6 @@ module fw_balance_state
    use fw_balance_scratch, only: balance_scratch
    use fw_complex_form, only: amplitudes_of
    use fw_force_law, only: force_workspace
-   use fw_force_law, only: pair_stuck
    use fw_force_law, only: prediction_type
    use fw_force_list, only: force_entry
    use fw_fourier, only: fourier_type
@@ -242,9 +241,7 @@ contains
             call predict(self, entry, m, nc, x, work)
             if (k == self%problem%forces%pairs) call entry%law%set_offset(self%depth, work)
             call entry%law%evaluate(self%problem%fourier, work)
-            if (entry%law%prediction%takes_balance) then
-               call hold_stuck_means(self, entry, m, nc, x, work)
-            else
+            if (.not. entry%law%prediction%takes_balance) then
                call self%problem%incidence%scatter(entry%rows, m, nc, -1.0_wp, work%force, &
                                                    self%balance)
             end if
@@ -277,6 +274,7 @@ contains
          do j = 1, nc
             y(:, :, j) = p%stiffness*y(:, :, j)
          end do
+         if (any(p%order > 0)) call take_means(self%problem%fourier, p%order, y, work%mean)
          if (any(p%order > 0)) call take_rates(self%problem%fourier, self%rate_unit(p), p%order, y)
          if (p%has_inertia) call take_inertias(self%problem%fourier, self%frequency(), p, y)
          if (p%takes_balance) call add_balance(self, entry%row, y)
@@ -290,6 +288,22 @@ contains
 
       rate_unit = merge(self%frequency(), 1.0_wp, prediction%by_time)
    end function rate_unit
+
+   !> Rates say nothing of mean positions: an element that comes to rest takes them beside.
+   subroutine take_means(fourier, order, y, mean)
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: order(:)
+      real(wp), intent(in) :: y(:, :, :)
+      !> (element, tangential component).
+      real(wp), intent(inout) :: mean(:, :)
+      integer :: c
+
+      mean = 0.0_wp
+      if (.not. fourier%has_constant()) return
+      do c = 1, min(size(mean, 2), size(y, 2))
+         if (order(c) > 0) mean(:, c) = y(:, c, 1)
+      end do
+   end subroutine take_means
 
    !> Replace inputs from displacements by inputs from velocities, where the law takes these.
    subroutine take_rates(fourier, unit, order, y)
@@ -358,31 +372,6 @@ contains
          end do
       end do
    end subroutine add_balance
-
-   !> Velocities say nothing of the mean position of an element that sticks through the period: it
-   !> stays where it was assembled.
-   subroutine hold_stuck_means(self, entry, m, nc, q, work)
-      type(balance_state), intent(in) :: self
-      type(force_entry), intent(in) :: entry
-      integer, intent(in) :: m, nc
-      real(wp), intent(in) :: q(m, nc)
-      type(force_workspace), intent(inout) :: work
-      integer :: i, c
-
-      if (.not. self%problem%fourier%has_constant()) return
-      associate (p => entry%law%prediction, row => entry%row)
-         if (all(p%order == 0)) return
-         do i = 1, size(row, 2)
-            if (work%state(i) /= pair_stuck) cycle
-            do c = 1, size(row, 1)
-               if (row(c, i) == 0 .or. p%order(c) == 0) cycle
-               work%force(i, c, 1) = work%force(i, c, 1) + &
-                                     p%stiffness(i, c)* &
-                                     q(self%problem%incidence%coordinate_of(row(c, i)), 1)
-            end do
-         end do
-      end associate
-   end subroutine hold_stuck_means
 
    !> r = -balance + B^T lambda of the laws that take the balance; those of the others it holds.
    subroutine collect(self, m, nc, r)

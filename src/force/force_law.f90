@@ -100,6 +100,12 @@ module fw_force_law
       !> Constant part of the input of the last component: stiffness times gap with the wear depth,
       !> or minus the dead load (n_elements).
       real(wp), allocatable :: offset(:)
+      !> Of a law of rates: what the mean position adds to the tangential inputs of an element that
+      !> comes to rest, stiffness times the mean (n_elements, 2); a rate says nothing of it.
+      real(wp), allocatable :: mean(:, :)
+      !> Whether an element of a law of rates comes to rest, so that its mean counts (n_elements),
+      !> and the same at which `linearize` was called last.
+      logical, allocatable :: rests(:), linear_rests(:)
       !> Size of the tangential inputs, change of x over the last turn, smallest pressure, turns
       !> of the march (n_elements).
       real(wp), allocatable :: scale(:), drift(:), pressure(:)
@@ -198,7 +204,8 @@ contains
       allocate (self%input(n_components*fourier%n_coefficients, n), source=0.0_wp)
       allocate (self%output, source=self%input)
       allocate (self%offset(n), self%scale(n), self%drift(n), self%pressure(n), source=0.0_wp)
-      allocate (self%x_start(n, 2), self%x(n, 2), source=0.0_wp)
+      allocate (self%x_start(n, 2), self%x(n, 2), self%mean(n, 2), source=0.0_wp)
+      allocate (self%rests(n), self%linear_rests(n), source=.false.)
       allocate (self%turns(n), source=0)
       allocate (self%state(n), self%linear_state(n), source=pair_stuck)
       call fourier%plan_fft(n*n_components, self%fft)

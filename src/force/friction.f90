@@ -4,6 +4,8 @@
 !> One correction serves three laws, which differ in their prediction alone: 'dlft' and
 !> 'dlft_velocity' predict from the balance, and are rigid; 'penalty' predicts from stiffnesses.
 module fw_friction
+   use fw_coming_to_rest, only: come_to_rest
+   use fw_coming_to_rest, only: rest_type
    use fw_correction, only: march_turn_1d
    use fw_correction, only: march_turn_2d
    use fw_correction, only: project_turn
@@ -57,6 +59,8 @@ module fw_friction
       real(wp), allocatable :: margin(:)
       !> Whether the march ends at the limit that `settle` found (n_pairs).
       logical, allocatable :: settled(:)
+      !> Whether a pair that rests was moved on the way to its rest (n_pairs).
+      logical, allocatable :: moved(:)
    end type friction_room
 
    interface
@@ -137,7 +141,7 @@ contains
       integer, intent(in) :: n_pairs
 
       allocate (room%margin(n_pairs), source=0.0_wp)
-      allocate (room%settled(n_pairs), source=.false.)
+      allocate (room%settled(n_pairs), room%moved(n_pairs), source=.false.)
    end function new_room
 
    subroutine evaluate(self, fourier, work)
@@ -157,7 +161,7 @@ contains
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       type(friction_room), intent(inout) :: room
-      integer :: first, n_blocks, block, k
+      integer :: first, n_blocks, block, k, pair
 
       call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time, &
                            work%fft)
@@ -169,11 +173,15 @@ contains
       call work%measure_scale()
       n_blocks = (self%n_elements + block_size - 1)/block_size
       !$omp parallel do default(none) shared(self, work, room, n_blocks, fourier) &
-      !$omp private(first, block) schedule(static) if(self%n_elements >= pairs_for_threads)
+      !$omp private(first, block, pair) schedule(static) if(self%n_elements >= pairs_for_threads)
       do block = 1, n_blocks
          first = (block - 1)*block_size + 1
          call march(self, work, room, fourier%n_time, first, &
                     min(first + block_size - 1, self%n_elements))
+         if (self%facts%remembers .or. .not. fourier%has_constant()) cycle
+         do pair = first, min(first + block_size - 1, self%n_elements)
+            call lead_to_rest(self, work, room, fourier%n_time, pair)
+         end do
       end do
       !$omp end parallel do
       call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft)
@@ -183,6 +191,7 @@ contains
          ! period.
          call slip_work(self%n_elements, fourier%n_time, self%mu, work%prediction_time, &
                         self%facts%remembers, work%x, work%slip)
+         where (work%rests) work%slip = 0.0_wp
       end if
    end subroutine evaluate_at_instants
 
@@ -193,6 +202,10 @@ contains
       integer :: i, k
 
       do i = 1, size(work%state)
+         if (work%rests(i)) then
+            work%state(i) = merge(pair_mixed, pair_stuck, room%moved(i))
+            cycle
+         end if
          ! Margin and pressure are the smallest over all turns, warm-up included.
          if (room%margin(i) >= 0.0_wp .and. work%pressure(i) > 0.0_wp) then
             work%state(i) = pair_stuck
@@ -207,6 +220,38 @@ contains
          end do
       end do
    end subroutine classify
+
+   !> A pair of a law of rates that slips in no period: forces of where it comes to rest.
+   subroutine lead_to_rest(self, work, room, n_time, pair)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      integer, intent(in) :: n_time, pair
+      type(rest_type) :: rest
+      real(wp) :: start(2)
+      integer :: c, k
+
+      start = work%x_start(pair, :) - work%mean(pair, :)
+      call come_to_rest(self%n_elements, n_time, pair, work%prediction_time, self%mu(pair), &
+                        work%scale(pair) + sum(abs(start)), start, rest)
+      work%rests(pair) = rest%found
+      if (.not. rest%found) then
+         if (room%margin(pair) < 0.0_wp .or. work%pressure(pair) <= 0.0_wp) return
+         ! It never slips, though the march to its rest has not ended: it rests where it starts.
+         work%rests(pair) = .true.
+         rest = rest_type(found=.true., z=start)
+      end if
+      room%margin(pair) = max(room%margin(pair), 0.0_wp)
+      room%moved(pair) = rest%moved
+      room%settled(pair) = rest%settled
+      work%turns(pair) = rest%turns
+      work%x(pair, :) = rest%z + work%mean(pair, :)
+      do k = 1, n_time
+         do c = 1, 2
+            work%force_time(pair, c, k) = work%prediction_time(pair, c, k) - rest%z(c)
+         end do
+      end do
+   end subroutine lead_to_rest
 
    !> March pairs first..last until their state repeats after a period.
    subroutine march(self, work, room, n_time, first, last)

@@ -21,6 +21,7 @@ contains
       integer :: nc
 
       work%linear_state = work%state
+      work%linear_rests = work%rests
       if (.not. any(work%state == pair_mixed)) return
       nc = fourier%n_coefficients
       if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
@@ -38,12 +39,12 @@ contains
       real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :)
       real(wp), allocatable :: by_start(:, :, :), weight(:, :, :)
       real(wp) :: x(2)
-      integer :: i, nc
+      integer :: c, i, nc
       logical :: unique
 
       nc = fourier%n_coefficients
       !$omp parallel default(none) shared(self, fourier, room, work, nc) &
-      !$omp private(rows, dx, y, by_start, weight, x, i, unique) &
+      !$omp private(rows, dx, y, by_start, weight, x, c, i, unique) &
       !$omp if(self%n_elements >= pairs_for_threads)
       ! Of one pair at a time, for each thread: of all pairs it would be the largest array of the
       ! program.
@@ -53,10 +54,20 @@ contains
       do i = 1, self%n_elements
          if (work%state(i) /= pair_mixed) cycle
          y = work%prediction_time(i, :, :)
+         if (work%rests(i)) then
+            ! As of a law with memory, of the prediction with its mean.
+            do c = 1, 2
+               y(c, :) = y(c, :) + work%mean(i, c)
+            end do
+         end if
          call derive(self, fourier, room%settled(i), work, i, y, x, rows, dx, unique, by_start)
          call project(work%jacobian(:, :, i), fourier, rows, y(3, :), self%present(3, i))
          if (unique) call project_start(work%jacobian(:, :, i), fourier, dx, by_start, weight)
          if (.not. work%measures_slip) cycle
+         if (work%rests(i)) then
+            work%slip_derivative(:, i) = 0.0_wp
+            cycle
+         end if
          ! The path of slip needs the rows themselves, not only their projections.
          if (unique) call add_start(3*nc, fourier%n_time, by_start, dx, rows)
          call slip_gradient(fourier%n_time, nc, fourier%synthesis, y, self%mu(i), &
@@ -87,13 +98,15 @@ contains
       logical, intent(out) :: unique
       !> Of a unique limit: derivative of the position at the instants by that at the start.
       real(wp), intent(inout) :: by_start(2, 2, fourier%n_time)
-      real(wp) :: inverse(2, 2)
+      real(wp) :: inverse(2, 2), z(2)
 
       unique = .false.
       x = work%x(pair, :)
       if (settled) then
+         z = x
+         if (work%rests(pair)) z = x - work%mean(pair, :)
          call limit_is_unique(self%n_elements, fourier%n_time, pair, work%prediction_time, &
-                              self%mu(pair), touch*work%scale(pair), x, unique, inverse, by_start)
+                              self%mu(pair), touch*work%scale(pair), z, unique, inverse, by_start)
       end if
       if (unique) then
          call limit_derivative(fourier%n_time, fourier%n_coefficients, fourier%synthesis, y, &
@@ -105,7 +118,7 @@ contains
          dx = 0.0_wp
          call march_derivative(fourier%n_time, fourier%n_coefficients, work%turns(pair), &
                                fourier%synthesis, y, self%mu(pair), 0.0_wp, self%present(:, pair), &
-                               self%facts%remembers, x, rows, dx)
+                               self%facts%remembers .or. work%rests(pair), x, rows, dx)
       end if
    end subroutine derive
 

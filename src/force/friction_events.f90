@@ -71,8 +71,15 @@ contains
       if (self%n_elements == 0) return
       select type (room => work%room)
       type is (event_room)
-         call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
-                                  work%force, work%x)
+         if (any(self%prediction%order > 0) .and. fourier%has_constant()) then
+            call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
+                                     work%force, work%x, work%mean)
+            work%rests = room%paths%rests
+            call hold_stuck_means(room%paths, work)
+         else
+            call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
+                                     work%force, work%x)
+         end if
          ! One turn settles and one is recorded, whatever the load: there is nothing to count.
          work%turns = 1
          work%drift = room%paths%drift
@@ -81,6 +88,20 @@ contains
          if (work%measures_slip) call room%paths%friction_path(work%slip)
       end select
    end subroutine evaluate
+
+   !> Pairs that never slip at velocity level rest where they start, should the march to their rest
+   !> not have ended.
+   pure subroutine hold_stuck_means(paths, work)
+      type(event_contact_type), intent(in) :: paths
+      type(force_workspace), intent(inout) :: work
+      integer :: i
+
+      do i = 1, size(work%rests)
+         if (work%rests(i) .or. paths%moved(i) .or. .not. paths%closed(i)) cycle
+         work%rests(i) = .true.
+         work%force(i, 1:2, 1) = work%force(i, 1:2, 1) + work%mean(i, :) - work%x_start(i, :)
+      end do
+   end subroutine hold_stuck_means
 
    !> Of the pressure, only whether it ever vanishes is known.
    pure subroutine classify_paths(paths, work)
@@ -106,6 +127,7 @@ contains
       integer :: nc
 
       work%linear_state = work%state
+      work%linear_rests = work%rests
       if (.not. any(work%state == pair_mixed)) return
       nc = fourier%n_coefficients
       if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))

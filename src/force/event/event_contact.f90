@@ -5,6 +5,7 @@
 module fw_event_contact
    use fw_event_cells, only: cells_type
    use fw_event_cells, only: new_cells
+   use fw_event_curves, only: curves_type
    use fw_event_pair, only: event_pair_type
    use fw_event_planar, only: planar_pair_type
    use fw_fourier, only: fourier_type
@@ -31,6 +32,9 @@ module fw_event_contact
       !> Whether a pair bears throughout, or never; whether it ever slips or opens; change of the
       !> position over the last turn (n_pairs).
       logical, allocatable :: closed(:), open(:), moved(:)
+      !> Whether a pair without memory comes to rest: it is led to a position that none of its
+      !> instants moves it from (n_pairs).
+      logical, allocatable :: rests(:)
       real(wp), allocatable :: drift(:)
       !> Whether a normal dof exists (n_pairs).
       logical, allocatable :: has_normal(:)
@@ -68,7 +72,7 @@ contains
       self%n_pairs = size(mu)
       allocate (self%pair(self%n_pairs), self%planar(self%n_pairs))
       allocate (self%closed(self%n_pairs), self%open(self%n_pairs), self%moved(self%n_pairs), &
-                source=.false.)
+                self%rests(self%n_pairs), source=.false.)
       allocate (self%drift(self%n_pairs), source=0.0_wp)
       self%is_planar = present(1, :) .and. present(2, :)
       self%direction = findloc(present(1:2, :), .true., dim=1)
@@ -90,7 +94,7 @@ contains
    end subroutine new_event_contact
 
    !> Contact forces and the position at the end of the period.
-   subroutine evaluate(self, fourier, prediction, offset, x_start, force, x)
+   subroutine evaluate(self, fourier, prediction, offset, x_start, force, x, mean)
       !> Also keeps the paths of the pairs, which all other procedures read: evaluate first.
       class(event_contact_type), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
@@ -102,9 +106,14 @@ contains
       real(wp), intent(inout) :: x(:, :)
       !> Coefficients of the contact forces (n_pairs, 3, n_coefficients).
       real(wp), intent(inout) :: force(:, :, :)
-      real(wp) :: start(2)
+      !> At velocity level: what the mean position adds to P of a pair that comes to rest
+      !> (n_pairs, 2); without it none is looked at.
+      real(wp), intent(in), optional :: mean(:, :)
+      real(wp) :: start(2), at_rest(2)
       integer :: c, i
+      logical :: may_rest
 
+      may_rest = present(mean)
       ! Values and slopes of all pairs at the instants in one product; planar pairs, which look at
       ! nodes and Gauss points of their own instead, take part for the sake of one call.
       if (.not. all(self%is_planar)) then
@@ -115,13 +124,16 @@ contains
       end if
       ! Pairs differ widely in the number of their events, hence dynamic; each is summed by one
       ! thread, so that the number of threads changes no bit.
-      !$omp parallel do default(none) private(c, i, start) schedule(dynamic) &
-      !$omp shared(self, fourier, prediction, offset, x_start, force, x) &
+      !$omp parallel do default(none) private(c, i, start, at_rest) schedule(dynamic) &
+      !$omp shared(self, fourier, prediction, offset, x_start, force, x, mean, may_rest) &
       !$omp if(self%n_pairs >= pairs_for_threads)
       do i = 1, self%n_pairs
+         at_rest = 0.0_wp
+         if (may_rest) at_rest = mean(i, :)
          if (self%is_planar(i)) then
             start = x_start(i, :)
-            call evaluate_planar(self, i, fourier, prediction(i, :, :), offset(i), start)
+            call evaluate_planar(self, i, fourier, prediction(i, :, :), offset(i), start, &
+                                 may_rest, at_rest)
             do c = 1, 3
                force(i, c, :) = self%planar(i)%force(:, c)
             end do
@@ -129,7 +141,8 @@ contains
             cycle
          end if
          call evaluate_pair(self%pair(i), fourier, self%batch(:, :, i), self%samples(:, :, i), &
-                            offset(i), x_start(i, max(1, self%direction(i))))
+                            offset(i), x_start(i, max(1, self%direction(i))), &
+                            may_rest, at_rest(max(1, self%direction(i))), self%rests(i))
          self%closed(i) = self%pair(i)%path%closed
          self%open(i) = self%pair(i)%path%open
          self%moved(i) = self%pair(i)%path%moved
@@ -178,15 +191,40 @@ contains
       call fourier%differentiate(1, p, derivative)
    end subroutine differentiate
 
-   pure subroutine evaluate_pair(pair, fourier, coefficients, samples, offset, x_start)
+   !> A pair with at most one tangential direction.
+   pure subroutine evaluate_pair(pair, fourier, coefficients, samples, offset, x_start, may_rest, &
+                                 mean, rests)
       type(event_pair_type), intent(inout) :: pair
       type(fourier_type), intent(in) :: fourier
       !> Coefficients and samples as in `batch`, without the offset (of y_n, hence taken off N); the
       !> position at tau = 0 in units of force.
       real(wp), intent(in) :: coefficients(:, :), samples(:, :), offset, x_start
+      !> Whether a pair without memory may come to rest, what its mean position adds to P then, and
+      !> whether it does.
+      logical, intent(in) :: may_rest
+      real(wp), intent(in) :: mean
+      logical, intent(out) :: rests
+
+      rests = .false.
+      call fill_curves(pair%curves, fourier, coefficients, samples, offset, 0.0_wp)
+      if (may_rest .and. pair%can_rest()) then
+         call fill_curves(pair%curves, fourier, coefficients, samples, offset, mean)
+         call pair%follow_to_rest(x_start, rests)
+         if (rests) return
+         call fill_curves(pair%curves, fourier, coefficients, samples, offset, 0.0_wp)
+      end if
+      call pair%follow(x_start)
+   end subroutine evaluate_pair
+
+   !> P and N of a pair, and what follows from them.
+   pure subroutine fill_curves(curves, fourier, coefficients, samples, offset, mean)
+      type(curves_type), intent(inout) :: curves
+      type(fourier_type), intent(in) :: fourier
+      !> As evaluate_pair.
+      real(wp), intent(in) :: coefficients(:, :), samples(:, :), offset, mean
       integer :: h, k, n
 
-      associate (c => pair%curves)
+      associate (c => curves)
          do h = 1, fourier%n_retained
             n = fourier%harmonic(h)
             k = fourier%column(h)
@@ -201,21 +239,30 @@ contains
          c%normal(0, 1) = c%normal(0, 1) - offset
          c%samples = samples
          c%samples(:, 4) = samples(:, 4) - offset
+         if (abs(mean) > 0.0_wp) then
+            c%tangential(0, 1) = c%tangential(0, 1) + mean
+            c%samples(:, 1) = c%samples(:, 1) + mean
+         end if
          call c%combine(c%mu)
       end associate
-      call pair%follow(x_start)
-   end subroutine evaluate_pair
+   end subroutine fill_curves
 
    !> A pair with two tangential directions.
-   subroutine evaluate_planar(self, i, fourier, prediction, offset, x_start)
+   subroutine evaluate_planar(self, i, fourier, prediction, offset, x_start, may_rest, mean)
       class(event_contact_type), intent(inout) :: self
       integer, intent(in) :: i
       type(fourier_type), intent(in) :: fourier
       !> As in `evaluate`, of this pair alone (3, n_coefficients).
       real(wp), intent(in) :: prediction(:, :), offset, x_start(2)
+      !> As evaluate_pair.
+      logical, intent(in) :: may_rest
+      real(wp), intent(in) :: mean(2)
 
       associate (pair => self%planar(i))
-         call pair%follow(self%cells, fourier, prediction, offset, x_start)
+         self%rests(i) = .false.
+         if (may_rest) call pair%follow_to_rest(self%cells, fourier, prediction, offset, x_start, &
+                                                mean, self%rests(i))
+         if (.not. self%rests(i)) call pair%follow(self%cells, fourier, prediction, offset, x_start)
          self%closed(i) = pair%closed
          self%open(i) = pair%open
          self%moved(i) = pair%moved

@@ -59,6 +59,7 @@ module fw_event_motion
    contains
       procedure :: reserve
       procedure :: fill
+      procedure :: can_rest
       procedure :: at_node
       procedure :: look
       procedure :: half_cell
@@ -86,11 +87,13 @@ contains
    !> State the predicted forces.
    !> Costs two products for all nodes; the rotations follow on demand, because pairs that stick
    !> need none.
-   subroutine fill(self, cells, prediction, offset)
+   subroutine fill(self, cells, prediction, offset, mean)
       class(motion_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
       !> Coefficients (3, n_coefficients), and what y_n has in the mean beside.
       real(wp), intent(in) :: prediction(:, :), offset
+      !> What P has in the mean beside, where harmonic 0 is retained.
+      real(wp), intent(in), optional :: mean(2)
       integer :: c, h, j, k, n, nc
 
       nc = cells%n_coefficients
@@ -100,6 +103,7 @@ contains
             self%series(k, merge(7, c, c == 3)) = merge(-1.0_wp, 1.0_wp, c == 3)*prediction(c, k)
          end do
       end do
+      if (present(mean)) self%series(1, 1:2) = self%series(1, 1:2) + mean
       do h = 1, cells%n_retained
          n = cells%harmonic(h)
          k = cells%column(h)
@@ -119,6 +123,7 @@ contains
          end do
          self%series(k:k + 1, 9) = -real(n, wp)**2*self%series(k:k + 1, 7)
       end do
+      if (present(mean)) self%tangential(0, 1, :) = self%tangential(0, 1, :) + mean
       ! Parity carries no constant; the offset is all that there is then.
       if (cells%harmonic(1) > 0) self%normal(0, 1) = 0.0_wp
       self%normal(0, 1) = self%normal(0, 1) - offset
@@ -140,6 +145,32 @@ contains
       self%gauss(3, :, :) = self%gauss(3, :, :) - offset
       self%known = .false.
    end subroutine fill
+
+   !> Whether a position may exist that bears all instants without slip: in each of four directions
+   !> the discs at the nodes share a value.
+   pure logical function can_rest(self)
+      class(motion_type), intent(in) :: self
+      real(wp), parameter :: half = sqrt(0.5_wp)
+      real(wp), parameter :: along(2, 4) = reshape([1.0_wp, 0.0_wp, half, half, 0.0_wp, 1.0_wp, &
+                                                    -half, half], [2, 4])
+      real(wp) :: lower, upper, p, radius
+      integer :: d, k
+
+      can_rest = .false.
+      if (any(self%node(7, :) <= 0.0_wp)) return
+      do d = 1, size(along, 2)
+         lower = -huge(1.0_wp)
+         upper = huge(1.0_wp)
+         do k = 1, size(self%node, 2)
+            p = along(1, d)*self%node(1, k) + along(2, d)*self%node(2, k)
+            radius = self%mu*self%node(7, k)
+            lower = max(lower, p - radius)
+            upper = min(upper, p + radius)
+         end do
+         if (lower > upper) return
+      end do
+      can_rest = .true.
+   end function can_rest
 
    !> A node of the cells; the one behind the last is the first, at 2 pi.
    pure type(instant_type) function at_node(self, cells, node) result(at)

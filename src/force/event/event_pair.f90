@@ -45,6 +45,8 @@ module fw_event_pair
    contains
       procedure :: reserve
       procedure :: follow
+      procedure :: can_rest
+      procedure :: follow_to_rest
       procedure :: fill_moments
       procedure :: force
       procedure :: force_to
@@ -91,6 +93,34 @@ contains
       end if
       call self%fill_moments()
    end subroutine follow
+
+   !> Whether a position may exist that bears all instants without slip, as far as the grid tells;
+   !> of a pair without memory, which follows no position.
+   pure logical function can_rest(self)
+      class(event_pair_type), intent(in) :: self
+
+      can_rest = .false.
+      if (self%remembers .or. .not. self%rubs) return
+      associate (c => self%curves)
+         if (minval(c%samples(:, 4)) <= 0.0_wp) return
+         can_rest = maxval(c%samples(:, 1) - c%mu*c%samples(:, 4)) <= &
+                    minval(c%samples(:, 1) + c%mu*c%samples(:, 4))
+      end associate
+   end function can_rest
+
+   !> As `follow` with memory; `rests` tells whether the path comes to rest. Where it does not,
+   !> nothing of it counts.
+   pure subroutine follow_to_rest(self, x_start, rests)
+      class(event_pair_type), intent(inout) :: self
+      real(wp), intent(in) :: x_start
+      logical, intent(out) :: rests
+
+      call self%path%trace(self%curves, x_start)
+      associate (path => self%path)
+         rests = path%closed .and. all(path%phase(:path%n_segments) == phase_stick)
+      end associate
+      if (rests) call self%fill_moments()
+   end subroutine follow_to_rest
 
    !> The moments of the sets of the path.
    pure subroutine fill_moments(self)

@@ -53,11 +53,16 @@ module fw_event_planar
       real(wp) :: z_end(2) = 0.0_wp, drift = 0.0_wp
       !> Whether it bears throughout, or never; whether it ever slipped or opened.
       logical :: closed = .true., open = .false., moved = .false.
+      !> Of a pair without memory: whether it has come to rest.
+      logical, private :: rests = .false.
+      !> Whether the law of the pair has memory.
+      logical, private :: remembers = .true.
       !> Turns that count in the derivative.
       integer, private :: turns = 0
    contains
       procedure :: reserve
       procedure :: follow
+      procedure :: follow_to_rest
       procedure :: derivative
       procedure :: coefficients
       procedure :: sample
@@ -79,6 +84,7 @@ contains
       call self%integral%reserve(cells)
       self%map%motion%mu = mu
       self%map%motion%remembers = remembers
+      self%remembers = remembers
       allocate (self%force(cells%n_coefficients, 3), source=0.0_wp)
    end subroutine reserve
 
@@ -103,6 +109,8 @@ contains
       real(wp), intent(in) :: prediction(:, :), offset
       real(wp), intent(in) :: x_start(2)
 
+      self%rests = .false.
+      self%map%motion%remembers = self%remembers
       self%map%cells => cells
       ! Knots and rotations depend on the prediction alone: made once, they serve all turns.
       call self%map%motion%fill(cells, prediction, offset)
@@ -115,6 +123,38 @@ contains
       if (.not. fourier%projects) call fit(self, cells, fourier)
       nullify (self%map%cells)
    end subroutine follow
+
+   !> As `follow` of a pair without memory, which is led to where it comes to rest as if it had
+   !> one; `rests` is false, and nothing has been followed, where it slips in every period.
+   subroutine follow_to_rest(self, cells, fourier, prediction, offset, x_start, mean, rests)
+      class(planar_pair_type), intent(inout) :: self
+      type(cells_type), intent(in), target :: cells
+      type(fourier_type), intent(in) :: fourier
+      !> As follow, and what the mean position adds to P.
+      real(wp), intent(in) :: prediction(:, :), offset, x_start(2), mean(2)
+      logical, intent(out) :: rests
+
+      rests = .false.
+      call self%map%motion%fill(cells, prediction, offset)
+      if (.not. self%map%motion%can_rest()) return
+      self%map%cells => cells
+      self%map%motion%remembers = .true.
+      call self%map%motion%fill(cells, prediction, offset, mean)
+      call self%map%path%find_knots(self%map%motion, cells)
+      self%closed = self%map%path%closed
+      self%open = self%map%path%open
+      if (self%closed) then
+         call march(self, x_start)
+         rests = self%map%path%slip_angle() <= brief
+      end if
+      self%rests = rests
+      if (rests) then
+         call self%integral%integrate(self%map%path, self%map%motion, cells)
+         self%force = self%integral%projected
+         if (.not. fourier%projects) call fit(self, cells, fourier)
+      end if
+      nullify (self%map%cells)
+   end subroutine follow_to_rest
 
    !> March to the limit; the last turn counts. Newton's method comes first: a limit that does not
    !> depend on the start is the same whatever the way to it. Where there is none such, plain turns
@@ -235,6 +275,8 @@ contains
                                 gradient(n + 1:, :), 2, 1.0_wp, gradient, n + 2)
          jacobian(:, :2*nc) = gradient(:n, :2*nc)
          if (measures) by_path = gradient(:n, 2*nc + 1)
+         ! What the tolerance of the march leaves of slip wears nothing.
+         if (measures .and. self%rests) by_path = 0.0_wp
       end associate
       call add_sets(self, cells, fourier, jacobian)
    end subroutine derivative
@@ -313,7 +355,7 @@ contains
    pure real(wp) function friction_path(self)
       class(planar_pair_type), intent(in) :: self
 
-      friction_path = self%integral%friction_path
+      friction_path = merge(0.0_wp, self%integral%friction_path, self%rests)
    end function friction_path
 
 end module fw_event_planar
