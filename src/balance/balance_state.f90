@@ -58,6 +58,9 @@ module fw_balance_state
       procedure :: frequency
       procedure :: parameter_derivative
       procedure :: rate_unit
+      procedure :: pair_states
+      procedure :: pair_shares
+      procedure :: n_turns
       procedure :: residual
       procedure :: linearize
       procedure :: reduce
@@ -189,6 +192,31 @@ contains
 
       frequency = self%structure_state%omega
    end function frequency
+
+   !> States of the pairs at the last point: pair_stuck, pair_open or pair_mixed.
+   pure function pair_states(self) result(states)
+      class(balance_state), intent(in) :: self
+      integer :: states(self%problem%n_pairs)
+
+      states = self%work(self%problem%forces%pairs)%state
+   end function pair_states
+
+   !> Shares of the period in stick, slip and open at the last point (3, n_pairs).
+   pure subroutine pair_shares(self, share)
+      class(balance_state), intent(in) :: self
+      real(wp), intent(out) :: share(:, :)
+
+      associate (pairs => self%problem%forces%pairs)
+         call self%problem%forces%entry(pairs)%law%fractions(self%work(pairs), share)
+      end associate
+   end subroutine pair_shares
+
+   !> Turns of the march that all pairs took together at the last point.
+   pure integer function n_turns(self)
+      class(balance_state), intent(in) :: self
+
+      n_turns = sum(self%work(self%problem%forces%pairs)%turns)
+   end function n_turns
 
    !> The norm to which residuals are compared: that of the vibratory load. A large static load
    !> must not hide the vibration, but its round-off must not forbid convergence either.
