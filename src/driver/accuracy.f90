@@ -3,22 +3,37 @@
 !>
 !> The error is that of the Fourier coefficients of an observed quantity, in the root mean square
 !> over the period and relative to its vibration; the largest of all observed quantities counts.
-!> It is estimated by solving again with less than half of the harmonics: where the error falls at
-!> least like H**(-p), the finer solution is off by no more than
+!> What the harmonics leave out is estimated from the tail, which the forces of the solution tell
+!> (fw_known_tail): once the motion above H is known, the answer moves from u to u2, and would move
+!> on to u3. u2 is the answer; its error is about |u3 - u2|, which, or a part of |u2 - u|, is taken
+!> three times. Nothing is claimed where the first change is so large, or the second so little
+!> smaller, that the linearization says nothing. For slip in two directions, and where a law cannot
+!> tell its tail, a solution with less than half of the harmonics is compared with: if errors fall
+!> at least like H**(-p),
 !>
-!>    |u_fine - u_coarse| / ((H_fine/H_coarse)**p - 1),
+!>    error <= |u_fine - u_coarse| / ((H_fine/H_coarse)**p - 1).
 !>
-!> and likewise with half of the instants, where these leave an error. The finer solution is the
-!> answer. Orders p are below those seen on exact references, so that the estimate is a bound.
+!> What instants leave out is estimated by solving again with half of them.
+!>
+!> Rigid friction with one tangential direction is solved by the oscillator law whatever its word
+!> is: it is the same friction, and its tail is the right one.
 module fw_accuracy
+   use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
+   use fw_harmonics_options, only: sampling_uniform
+   use fw_known_tail, only: is_like_structure
+   use fw_known_tail, only: known_tail
+   use fw_known_tail, only: relative_distance
+   use fw_known_tail, only: unknown
    use fw_laws, only: is_rigid
+   use fw_laws, only: law_number
    use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
    use fw_level, only: level_type
+   use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
@@ -31,32 +46,36 @@ module fw_accuracy
 
    public :: accuracy_solver
 
-   !> Order of the error in 1/H: elastic contact and springs; rigid contact without and with mass.
+   !> Factor of the changes that bounds the error, and the part of |u2 - u| that counts at least.
+   real(wp), parameter :: factor_of_tail = 3.0_wp, least_part = 0.2_wp
+   !> |u2 - u| above which nothing is claimed, and from which on u2 is no better than u.
+   real(wp), parameter :: linear_up_to = 0.1_wp, better_below = 0.03_wp
+   !> Part of |u2 - u| that the next change may be, unless both are round-off.
+   real(wp), parameter :: contraction = 0.5_wp, round_off = 1.0e-9_wp
+   !> Order of the error in 1/H, where the tail does not tell: elastic contact and springs; rigid
+   !> contact on nodes that answer as if they had no mass, and on others.
    real(wp), parameter :: order_elastic = 1.5_wp, order_massless = 1.25_wp, order_rigid = 0.3_wp
-   !> Factors that the order must not go below: with few harmonics no order shows yet.
-   integer, parameter :: few_harmonics = 5
+   !> Factors that the order must not go below: with few harmonics no order shows yet; and the
+   !> fewest that a solution is compared with where friction acts on mass.
+   integer, parameter :: few_for_order = 5, fewest_on_mass = 3
    real(wp), parameter :: least_factor = 1.0_wp/3.0_wp, least_factor_of_few = 1.0_wp
-   !> The same for half of the instants: first order and fluctuating where they decide, and below
-   !> the fourth order of slip in two directions between events.
+   !> What half of the instants changes is multiplied by this: first order, and fluctuating, where
+   !> they decide, and below the fourth order of slip in two directions between events.
    real(wp), parameter :: factor_instants = 2.0_wp, factor_planar = 1.0_wp/3.0_wp
+   !> How much more instants may leave out at one point than at others.
+   real(wp), parameter :: safety = 8.0_wp
    !> Halvings and doublings of the instants that are tried.
    integer, parameter :: fewest = -1, most = 5
    !> Levels at which a point may fail before it is given up.
    integer, parameter :: most_failures = 1
    !> Harmonics or instants are given up where the error is this part of the accuracy.
    real(wp), parameter :: with_margin = 1.0_wp/8.0_wp
-   !> Quantities that vibrate less than this part of the largest are measured against that part.
-   real(wp), parameter :: least_vibration = 1.0e-3_wp
-   !> Where no coarser solution was found.
-   real(wp), parameter :: unknown = huge(1.0_wp)
 
    type, extends(point_strategy) :: accuracy_solver
       !> Numbers of harmonics to choose from, ascending.
       integer, allocatable :: n_harmonics(:)
       !> The level in use.
       integer :: current = 2, doublings = 0
-      !> Order of the error in 1/H that the estimate counts on.
-      real(wp) :: order = order_elastic
       !> What half of the instants changes is multiplied by this (0: they leave no error).
       real(wp) :: factor_time = 0.0_wp
       !> Points that miss the accuracy, the largest estimate, and where it is [rad/s].
@@ -64,6 +83,12 @@ module fw_accuracy
       real(wp) :: worst = 0.0_wp, worst_omega = 0.0_wp
       !> (numbers of harmonics, doublings of the instants)
       type(level_type), allocatable :: level(:, :)
+      type(known_tail), allocatable, private :: tail(:, :)
+      !> What instants were last found to leave out.
+      real(wp), allocatable, private :: by_instants(:, :)
+      !> The case with the law that is solved; whether a pair has two tangential directions.
+      type(case_type), private :: case
+      logical, private :: planar = .false.
       !> What may end the work on the present point.
       class(interrupt_type), pointer, private :: interrupt => null()
    contains
@@ -84,55 +109,46 @@ contains
 
       self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics)
       allocate (self%level(size(self%n_harmonics), fewest:most))
-      if (case%contact%n_pairs > 0) then
-         if (is_rigid(case%contact%law)) then
-            self%order = merge(order_massless, order_rigid, without_mass(case))
-         end if
-         self%factor_time = factor_instants
-      end if
-      call need(self, case, self%current, self%doublings, error)
+      allocate (self%tail(size(self%n_harmonics), fewest:most))
+      allocate (self%by_instants(size(self%n_harmonics), fewest:most), source=unknown/safety)
+      if (case%contact%n_pairs > 0) self%factor_time = factor_instants
+      self%case = case
+      call take_oscillator(self%case)
+      call need(self, self%current, self%doublings, error)
       if (allocated(error)) return
       associate (system => self%level(self%current, self%doublings)%system)
+         associate (row => system%problem%joint%row)
+            self%planar = any(row(1, :) > 0 .and. row(2, :) > 0)
+         end associate
          if (system%problem%forces%entry(system%problem%forces%pairs)%law%facts%follows_events) then
-            self%factor_time = merge(factor_planar, 0.0_wp, any(system%problem%joint%row(2, :) > 0))
+            self%factor_time = merge(factor_planar, 0.0_wp, self%planar)
          end if
       end associate
    end subroutine start
 
-   !> Whether one side of every contact component carries no mass.
-   pure logical function without_mass(case)
-      type(case_type), intent(in) :: case
-      integer :: i, c, dof(2)
+   !> Friction of dofs, each in one direction, by the law that knows its tail.
+   subroutine take_oscillator(case)
+      type(case_type), intent(inout) :: case
+      logical :: planar(case%contact%n_pairs)
 
-      without_mass = .true.
-      do i = 1, case%contact%n_pairs
-         do c = 1, 3
-            dof = abs([case%contact%side_1(c, i), case%contact%side_2(c, i)])
-            if (all(dof == 0)) cycle
-            without_mass = without_mass .and. (lacks_mass(dof(1)) .or. lacks_mass(dof(2)))
-         end do
-      end do
-
-   contains
-
-      !> The ground, dof 0, does not move.
-      pure logical function lacks_mass(k)
-         integer, intent(in) :: k
-
-         lacks_mass = .false.
-         if (k > 0) lacks_mass = abs(case%model%mass(k, k)) <= 0.0_wp
-      end function lacks_mass
-
-   end function without_mass
+      if (case%contact%n_pairs == 0) return
+      if (.not. is_rigid(case%contact%law)) return
+      associate (c => case%contact)
+         planar = (c%side_1(1, :) /= 0 .or. c%side_2(1, :) /= 0) .and. &
+                  (c%side_1(2, :) /= 0 .or. c%side_2(2, :) /= 0)
+      end associate
+      ! It follows events, and two directions by the displacement law only.
+      if (any(planar) .or. case%harmonics%sampling == sampling_uniform) return
+      case%contact%law = law_number('rigid')
+   end subroutine take_oscillator
 
    !> Build a level if it is not there.
-   subroutine need(self, case, k, doublings, error)
+   subroutine need(self, k, doublings, error)
       class(accuracy_solver), intent(inout) :: self
-      type(case_type), intent(in) :: case
       integer, intent(in) :: k, doublings
       type(error_type), allocatable, intent(out) :: error
 
-      call self%level(k, doublings)%build(case, self%n_harmonics(k), error, doublings)
+      call self%level(k, doublings)%build(self%case, self%n_harmonics(k), error, doublings)
    end subroutine need
 
    !> Solve at a frequency; the point says at which level, and how accurately.
@@ -144,26 +160,25 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: best
       !> Estimated errors of truncation and sampling.
-      real(wp) :: errors(2), seconds
+      real(wp) :: errors(2)
       integer :: iterations, failures, at_best(2)
+      integer(int64) :: clock, clock_end, rate
       logical :: finer
 
       self%interrupt => request%interrupt
       iterations = 0
       failures = 0
       at_best = [self%current, self%doublings]
-      seconds = 0.0_wp
+      call system_clock(clock, rate)
       do
          associate (level => self%level(self%current, self%doublings))
-            call level%solve(case, request, point, error)
+            call level%solve(self%case, request, point, error)
          end associate
          if (allocated(error)) return
          iterations = iterations + point%iterations
-         seconds = seconds + point%seconds
-         errors = [unknown, 0.0_wp]
+            errors = [unknown, 0.0_wp]
          if (point%converged) then
-            call estimate(self, case, request%omega, point%coefficients, errors, iterations, &
-                          seconds, error)
+            call estimate(self, point, errors, iterations, error)
             if (allocated(error)) return
             point%error_estimate = total(errors)
             best = point
@@ -173,7 +188,7 @@ contains
             failures = failures + 1
             if (best%converged .or. failures > most_failures) exit
          end if
-         call refine(self, case, errors, finer, error)
+         call refine(self, errors, finer, error)
          if (allocated(error)) return
          if (.not. finer) exit
       end do
@@ -183,37 +198,154 @@ contains
          self%doublings = at_best(2)
          if (best%converged) point = best
       end if
+      if (point%converged) call improve(self, case, request, at_best, point)
       point%iterations = iterations
-      point%seconds = seconds
+      call system_clock(clock_end)
+      point%seconds = real(clock_end - clock, wp)/real(rate, wp)
       call note(self, case, point)
       if (.not. point%converged) return
-      call coarsen(self, case, errors, error)
+      call coarsen(self, errors, error)
    end subroutine solve
+
+   !> Bounds of what the harmonics and the instants of the present solution leave out.
+   subroutine estimate(self, point, errors, iterations, error)
+      class(accuracy_solver), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      real(wp), intent(out) :: errors(2)
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      logical :: told
+
+      errors = [unknown, 0.0_wp]
+      call bound_by_tail(self, point, errors(1), iterations, told, error)
+      if (allocated(error)) return
+      if (.not. told) call bound_by_order(self, point, errors(1), iterations, error)
+      if (allocated(error) .or. self%factor_time <= 0.0_wp) return
+      call bound_by_instants(self, point, errors(2), iterations, error)
+   end subroutine estimate
+
+   !> How far the solution with half of the instants is, times a factor. Between events this is of
+   !> fourth order: where it was nothing at points before, it is not looked at again.
+   subroutine bound_by_instants(self, point, bound, iterations, error)
+      class(accuracy_solver), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      real(wp), intent(out) :: bound
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (known => self%by_instants(self%current, self%doublings))
+         bound = safety*known
+         if (self%factor_time < 1.0_wp .and. &
+             bound <= with_margin*self%case%harmonics%accuracy) return
+         call check(self, point%omega, self%current, self%doublings - 1, iterations, error)
+         if (allocated(error)) return
+         bound = unknown
+         associate (level => self%level(self%current, self%doublings - 1))
+            if (is_solved(level, point%omega)) bound = self%factor_time* &
+               relative_distance(point%coefficients, level%coefficients)
+         end associate
+         known = min(bound, unknown/safety)
+      end associate
+   end subroutine bound_by_instants
+
+   !> What the known tail changes, times a factor, and what is left above it; told is false where it
+   !> does not tell.
+   subroutine bound_by_tail(self, point, bound, iterations, told, error)
+      class(accuracy_solver), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      real(wp), intent(out) :: bound
+      integer, intent(inout) :: iterations
+      logical, intent(out) :: told
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: change, next
+
+      bound = unknown
+      associate (level => self%level(self%current, self%doublings), &
+                 tail => self%tail(self%current, self%doublings))
+         tail%is_better = .false.
+         told = .not. self%planar .and. is_like_structure(level%system)
+         if (.not. told) return
+         call tail%start(self%case, level%harmonics, level%system, level%solver%x, told, error)
+         if (allocated(error) .or. .not. told) return
+         ! The derivative at the solution: as much work as another iteration.
+         iterations = iterations + 1
+         call tail%correct(level%system, change)
+         if (.not. change <= linear_up_to) return
+         call tail%next_change(level%system, next)
+         told = next <= max(contraction*change, round_off)
+         if (.not. told) return
+         tail%is_better = change <= better_below
+         if (tail%is_better) then
+            bound = factor_of_tail*max(next, least_part*change) &
+                    + tail%left_above(self%case%harmonics%n_harmonics)
+         else
+            bound = factor_of_tail*tail%distance_from(point%coefficients)
+         end if
+      end associate
+   end subroutine bound_by_tail
+
+   !> How far a solution with less than half of the harmonics is, times what the order allows.
+   subroutine bound_by_order(self, point, bound, iterations, error)
+      class(accuracy_solver), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      real(wp), intent(out) :: bound
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: order
+      integer :: k
+
+      bound = unknown
+      order = order_elastic
+      if (is_rigid(self%case%contact%law)) then
+         order = order_rigid
+         if (is_like_structure(self%level(self%current, self%doublings)%system)) then
+            order = order_massless
+         end if
+      end if
+      do k = max(1, self%current - 2), self%current - 1
+         if (order <= order_rigid .and. self%n_harmonics(k) < fewest_on_mass) cycle
+         call check(self, point%omega, k, self%doublings, iterations, error)
+         if (allocated(error)) return
+         if (.not. is_solved(self%level(k, self%doublings), point%omega)) cycle
+         bound = factor_harmonics(self%n_harmonics(self%current), self%n_harmonics(k), order)* &
+                 relative_distance(point%coefficients, self%level(k, self%doublings)%coefficients)
+         return
+      end do
+   end subroutine bound_by_order
+
+   !> The answer with its tail, where that is the better one.
+   subroutine improve(self, case, request, at, point)
+      class(accuracy_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
+      integer, intent(in) :: at(2)
+      type(point_type), intent(inout) :: point
+
+      if (.not. self%tail(at(1), at(2))%is_better) return
+      call self%tail(at(1), at(2))%take(case%harmonics%n_harmonics, request%contact, point)
+   end subroutine improve
 
    !> A coarser solution to compare with, from the present one: nothing is asked of it but its
    !> observed coefficients, and fallbacks would look too far away.
-   subroutine check(self, case, omega, k, doublings, iterations, seconds, error)
+   subroutine check(self, omega, k, doublings, iterations, error)
       class(accuracy_solver), intent(inout) :: self
-      type(case_type), intent(in) :: case
       real(wp), intent(in) :: omega
       integer, intent(in) :: k, doublings
       integer, intent(inout) :: iterations
-      real(wp), intent(inout) :: seconds
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
 
       if (is_solved(self%level(k, doublings), omega)) return
-      call need(self, case, k, doublings, error)
+      call need(self, k, doublings, error)
       if (allocated(error)) return
       associate (level => self%level(k, doublings))
          call level%take_over(self%level(self%current, self%doublings))
-         call level%solve(case, point_request(omega=omega, interrupt=self%interrupt, &
+         call level%solve(self%case, point_request(omega=omega, interrupt=self%interrupt, &
                                               fallback=.false., &
-                                              histories=case%output%histories), point, error)
+                                              histories=self%case%output%histories), point, error)
       end associate
       if (allocated(error)) return
       iterations = iterations + point%iterations
-      seconds = seconds + point%seconds
    end subroutine check
 
    !> A level that was solved at this very frequency last is not solved again.
@@ -224,39 +356,6 @@ contains
       is_solved = abs(level%omega - omega) <= 0.0_wp
    end function is_solved
 
-   !> Bounds of what the harmonics and the instants of the present solution leave out.
-   subroutine estimate(self, case, omega, coefficients, errors, iterations, seconds, error)
-      class(accuracy_solver), intent(inout) :: self
-      type(case_type), intent(in) :: case
-      real(wp), intent(in) :: omega, coefficients(:, :)
-      real(wp), intent(out) :: errors(2)
-      integer, intent(inout) :: iterations
-      real(wp), intent(inout) :: seconds
-      type(error_type), allocatable, intent(out) :: error
-      integer :: k
-
-      errors = [unknown, 0.0_wp]
-      ! With the number two below; with that one below where the other has no solution.
-      do k = max(1, self%current - 2), self%current - 1
-         call check(self, case, omega, k, self%doublings, iterations, seconds, error)
-         if (allocated(error)) return
-         if (.not. is_solved(self%level(k, self%doublings), omega)) cycle
-         errors(1) = factor_harmonics(self%n_harmonics(self%current), self%n_harmonics(k), &
-                                      self%order)* &
-                     distance(coefficients, self%level(k, self%doublings)%coefficients)
-         exit
-      end do
-      if (self%factor_time <= 0.0_wp) return
-      ! The same harmonics with half of the instants.
-      call check(self, case, omega, self%current, self%doublings - 1, iterations, seconds, error)
-      if (allocated(error)) return
-      errors(2) = unknown
-      associate (level => self%level(self%current, self%doublings - 1))
-         if (is_solved(level, omega)) errors(2) = self%factor_time* &
-                                                  distance(coefficients, level%coefficients)
-      end associate
-   end subroutine estimate
-
    !> What the distance of two solutions is multiplied by to bound the error of the finer.
    pure real(wp) function factor_harmonics(fine, coarse, order) result(factor)
       !> Numbers of harmonics.
@@ -264,31 +363,8 @@ contains
       real(wp), intent(in) :: order
 
       factor = 1.0_wp/((real(fine, wp)/real(coarse, wp))**order - 1.0_wp)
-      factor = max(factor, merge(least_factor_of_few, least_factor, fine <= few_harmonics))
+      factor = max(factor, merge(least_factor_of_few, least_factor, fine <= few_for_order))
    end function factor_harmonics
-
-   !> Largest relative distance of the quantities in two sets of coefficients (2H+1, n_observed),
-   !> of which the second may hold fewer harmonics.
-   pure real(wp) function distance(fine, coarse)
-      real(wp), intent(in) :: fine(:, :), coarse(:, :)
-      real(wp) :: vibration(size(fine, 2)), change(size(fine, 1))
-      integer :: i, n
-
-      distance = 0.0_wp
-      n = size(coarse, 1)
-      do i = 1, size(fine, 2)
-         vibration(i) = norm2(fine(2:, i))
-      end do
-      if (maxval([vibration, 0.0_wp]) <= 0.0_wp) return
-      vibration = max(vibration, least_vibration*maxval(vibration))
-      do i = 1, size(fine, 2)
-         change(:n) = fine(:n, i) - coarse(:, i)
-         change(n + 1:) = fine(n + 1:, i)
-         ! The mean square of a constant is twice that of a harmonic of its size.
-         change(1) = sqrt(2.0_wp)*change(1)
-         distance = max(distance, norm2(change)/vibration(i))
-      end do
-   end function distance
 
    !> Sum of estimates, of which one may be unknown.
    pure real(wp) function total(errors)
@@ -299,45 +375,42 @@ contains
    end function total
 
    !> More of what the error comes from.
-   subroutine refine(self, case, errors, finer, error)
+   subroutine refine(self, errors, finer, error)
       class(accuracy_solver), intent(inout) :: self
-      type(case_type), intent(in) :: case
       real(wp), intent(in) :: errors(2)
       logical, intent(out) :: finer
       type(error_type), allocatable, intent(out) :: error
       logical :: more(2), possible(2)
 
       ! Either of both may take half of what is allowed.
-      more = errors > 0.5_wp*case%harmonics%accuracy
+      more = errors > 0.5_wp*self%case%harmonics%accuracy
       possible = [self%current < size(self%n_harmonics), self%doublings < most]
       finer = all(possible .or. .not. more)
-      if (finer) call move(self, case, self%current + merge(1, 0, more(1)), &
+      if (finer) call move(self, self%current + merge(1, 0, more(1)), &
                            self%doublings + merge(1, 0, more(2)), error)
    end subroutine refine
 
    !> Less of what the next point will hardly need.
-   subroutine coarsen(self, case, errors, error)
+   subroutine coarsen(self, errors, error)
       class(accuracy_solver), intent(inout) :: self
-      type(case_type), intent(in) :: case
       real(wp), intent(in) :: errors(2)
       type(error_type), allocatable, intent(out) :: error
       logical :: less(2)
 
       ! Down to the second number, which still has one below to be compared with.
-      less = errors <= with_margin*case%harmonics%accuracy .and. &
+      less = errors <= with_margin*self%case%harmonics%accuracy .and. &
              [self%current > 2, self%doublings > 0]
-      if (any(less)) call move(self, case, self%current - merge(1, 0, less(1)), &
+      if (any(less)) call move(self, self%current - merge(1, 0, less(1)), &
                                self%doublings - merge(1, 0, less(2)), error)
    end subroutine coarsen
 
    !> Go over to another level, with the present solution as the last known one.
-   subroutine move(self, case, k, doublings, error)
+   subroutine move(self, k, doublings, error)
       class(accuracy_solver), intent(inout) :: self
-      type(case_type), intent(in) :: case
       integer, intent(in) :: k, doublings
       type(error_type), allocatable, intent(out) :: error
 
-      call need(self, case, k, doublings, error)
+      call need(self, k, doublings, error)
       if (allocated(error)) return
       if (self%level(self%current, self%doublings)%solver%n_converged > 0) then
          call self%level(k, doublings)%take_over(self%level(self%current, self%doublings))
@@ -367,10 +440,17 @@ contains
       type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
+      type(linear_step_type) :: work
+      integer :: j, k
       character(12) :: wanted, reached, where
 
+      do j = fewest, most
+         do k = 1, size(self%n_harmonics)
+            call work%add_work(self%tail(k, j)%linear)
+         end do
+      end do
       call describe_levels(size(self%level), self%level, case%solver%kind, &
-                           state%all_converged(), summary)
+                           state%all_converged(), summary, work)
       call summary%describe_accuracy(self%worst, case%harmonics%accuracy)
       message = ''
       if (self%n_short == 0) return

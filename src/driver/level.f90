@@ -58,7 +58,7 @@ contains
    end function harmonic_levels
 
    !> The work of all levels, with the unknowns of the largest that was needed.
-   subroutine describe_levels(n, levels, kind, all_converged, summary)
+   subroutine describe_levels(n, levels, kind, all_converged, summary, further)
       integer, intent(in) :: n
       type(level_type), intent(in) :: levels(n)
       !> The solver of the case.
@@ -66,9 +66,12 @@ contains
       !> Whether every point converged.
       logical, intent(in) :: all_converged
       type(summary_type), intent(inout) :: summary
+      !> Work beside that of the levels.
+      type(linear_step_type), intent(in), optional :: further
       type(linear_step_type) :: work
       integer :: k, largest
 
+      if (present(further)) call work%add_work(further)
       largest = 0
       do k = 1, n
          if (.not. levels(k)%is_built) cycle
