@@ -1,6 +1,7 @@
 !> What is known of one solution point; results leave the library as a list of these.
 module fw_point
    use fw_kinds, only: wp
+   use fw_stability_verdict, only: verdict_undecided
    implicit none (type, external)
    private
 
@@ -40,10 +41,11 @@ module fw_point
       real(wp) :: error_estimate = 0.0_wp
       !> The branch turns here.
       logical :: fold = .false.
-      !> Floquet multipliers, only when asked for (n_multipliers), and whether all lie in the unit
-      !> circle.
+      !> Floquet multipliers, only when asked for, how far each may be off, huge(1.0_wp) where that
+      !> is not known (n_multipliers), and whether all lie in the unit circle.
       complex(wp), allocatable :: multipliers(:)
-      logical :: stable = .false.
+      real(wp), allocatable :: multiplier_error(:)
+      integer :: verdict = verdict_undecided
       integer :: iterations = 0
       !> norm(R)/norm(F) at the end.
       real(wp) :: residual = 0.0_wp

@@ -37,7 +37,7 @@ module fw_stability
    implicit none (type, external)
    private
 
-   public :: floquet_multipliers, is_stable, most_dofs
+   public :: floquet_multipliers, most_dofs
 
    !> Order of Hill's eigenproblem beyond which the march is faster by far: the time grows with
    !> the cube of the order (measured on two cores: 0.6 s at 1000, 10 s or more at 2000; the march
@@ -47,14 +47,11 @@ module fw_stability
    integer, parameter :: most_dofs = 400
    !> Harmonics of the perturbation where the solution has fewer and the order stays below this.
    integer, parameter :: fewest_harmonics = 12, comfortable_order = 500
-   !> A modulus above 1 by less than this is round-off or truncation of Hill's problem: undamped
-   !> structures lie on the circle.
-   real(wp), parameter :: round_off = 1.0e-8_wp
 
 contains
 
    !> Floquet multipliers at a solution, by descending modulus.
-   subroutine floquet_multipliers(system, model, x, multipliers, error)
+   subroutine floquet_multipliers(system, model, x, multipliers, error, halved, marched)
       !> At the frequency of the solution; built without leaving out components that nothing moves,
       !> because perturbations move them.
       class(balance_state), intent(in) :: system
@@ -65,19 +62,27 @@ contains
       !> Two for each direction with mass and one for each with damping alone.
       complex(wp), allocatable, intent(out) :: multipliers(:)
       type(error_type), allocatable, intent(out) :: error
+      !> March with half the steps that a solution of half the harmonics would take, so that a
+      !> comparison shows what steps leave (default: no).
+      logical, intent(in), optional :: halved
+      !> Whether they come from a march.
+      logical, intent(out), optional :: marched
       type(perturbation_basis) :: basis
       type(tangent_type) :: tangent
       type(history_type) :: history
       complex(wp), allocatable :: exponents(:)
       integer :: i, n_harmonics
+      logical :: marches
 
       call check_system(system, model%n_dof, error)
       if (allocated(error)) return
       call new_perturbation_basis(model, system%problem%joint%relative, basis, error)
       if (allocated(error)) return
-      call new_history(system, x, history)
+      call new_history(system, x, history, halved)
       n_harmonics = chosen_harmonics(system, basis)
-      if (n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%problem%n_pairs)])) then
+      marches = n_harmonics == 0 .or. any([(history%rubs(i), i=1, system%problem%n_pairs)])
+      if (present(marched)) marched = marches
+      if (marches) then
          call marched_multipliers(system, basis, history, multipliers, error)
          if (allocated(error)) return
       else
@@ -89,13 +94,6 @@ contains
       call pair_conjugates(multipliers)
       call sort_descending(multipliers)
    end subroutine floquet_multipliers
-
-   !> Whether no perturbation grows; a multiplier on the unit circle counts as stable.
-   pure logical function is_stable(multipliers)
-      complex(wp), intent(in) :: multipliers(:)
-
-      is_stable = all(abs(multipliers) <= 1.0_wp + round_off)
-   end function is_stable
 
    subroutine check_system(system, n_dof, error)
       class(balance_state), intent(in) :: system

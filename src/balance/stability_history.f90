@@ -4,6 +4,7 @@ module fw_stability_history
    use fw_force_law, only: force_law
    use fw_force_law, only: force_workspace
    use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_stuck
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
    use fw_friction, only: elastic_friction
@@ -43,16 +44,21 @@ module fw_stability_history
 contains
 
    !> Follow the solution x of a system through a period.
-   subroutine new_history(system, x, self)
+   subroutine new_history(system, x, self, halved)
       class(balance_state), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
       type(history_type), intent(out) :: self
+      !> Half the steps that half the harmonics would take (default: no).
+      logical, intent(in), optional :: halved
       type(fourier_type) :: fourier
       real(wp), allocatable :: rows(:, :)
       integer :: i, c, h
 
       h = maxval(system%problem%fourier%harmonic)
       self%n_time = max(fewest_steps, system%problem%fourier%n_time, steps_per_harmonic*h)
+      if (present(halved)) then
+         if (halved) self%n_time = max(fewest_steps, steps_per_harmonic*h/2)/2
+      end if
       fourier = new_fourier(h, self%n_time)
       call relative_displacements(system, system%problem%structure%n_coordinates, x, h, rows)
       self%row = system%problem%joint%row
@@ -72,6 +78,7 @@ contains
       self%forces%x_start = system%work(system%problem%forces%pairs)%x_start
       call self%law%set_offset(system%depth, self%forces)
       call self%law%evaluate(fourier, self%forces)
+      call find_settled(self)
       call find_memory(self)
       call take_slopes(system, rows, fourier, self)
    end subroutine new_history
@@ -114,6 +121,33 @@ contains
          end do
       end do
    end subroutine take_slopes
+
+   !> Pairs that slipped on the way to their period and stick in all of it (shakedown) stick: where
+   !> they rest is no vibration.
+   pure subroutine find_settled(self)
+      class(history_type), intent(inout) :: self
+      ! At the ends of its path such a pair touches the cone, to round-off.
+      real(wp), parameter :: round_off = 1.0e-9_wp
+      real(wp) :: d(2), p
+      integer :: i, k, before
+      logical :: sticks
+
+      do i = 1, size(self%row, 2)
+         if (.not. self%rubs(i)) cycle
+         sticks = .true.
+         do k = 1, self%n_time
+            before = modulo(k - 2, self%n_time) + 1
+            p = -self%forces%prediction_time(i, 3, k)
+            associate (y => self%forces%prediction_time(i, 1:2, :), &
+                       force => self%forces%force_time(i, 1:2, :))
+               d = y(:, k) - (y(:, before) - force(:, before))
+            end associate
+            sticks = p > 0.0_wp .and. norm2(d) <= self%law%mu(i)*p*(1.0_wp + round_off)
+            if (.not. sticks) exit
+         end do
+         if (sticks) self%forces%state(i) = pair_stuck
+      end do
+   end subroutine find_settled
 
    !> Positions that slip or open pairs set anew. That of a pair that sticks throughout stays
    !> where it was put: a multiplier of exactly 1, which says nothing and is left out.

@@ -23,8 +23,8 @@ module fw_branch
    use fw_recovery, only: carry_solution
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
-   use fw_solution, only: find_stability
    use fw_solution, only: is_lasting
+   use fw_stability_solver, only: stability_solver
    use fw_strategy, only: new_request
    use fw_strategy, only: note_time_limit
    use fw_sweep, only: point_source
@@ -48,6 +48,7 @@ module fw_branch
       type(balance_state), pointer :: whole => null()
       !> The balance with values at instants as unknowns, where `hdhb` is asked for.
       type(hdhb_system) :: in_time
+      type(stability_solver) :: stability
       logical :: is_in_time = .false.
       integer(int64) :: clock = 0
       real(wp), allocatable :: r(:)
@@ -323,7 +324,7 @@ contains
                                 case%harmonics%n_harmonics, point)
       end if
       if (point%converged .and. case%sweep%stability) then
-         call find_stability(self%system, case%model, coefficients, point, error)
+         call self%stability%find(case, self%system, coefficients, point, error)
       end if
    end subroutine describe
 

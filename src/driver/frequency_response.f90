@@ -16,6 +16,7 @@ module fw_frequency_response
    use fw_peak_finder, only: peak_finder
    use fw_remarks, only: remark_peaks
    use fw_remarks, only: remark_range
+   use fw_remarks, only: remark_stability
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
    use fw_sinks, only: observer_sink
@@ -23,6 +24,7 @@ module fw_frequency_response
    use fw_sinks, only: summary_sink
    use fw_sinks, only: writer_sink
    use fw_solver_options, only: continuation_arclength
+   use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: point_strategy
    use fw_summary, only: summary_type
    use fw_sweep, only: frequency_source
@@ -78,6 +80,8 @@ contains
       end select
       call run_sweep(case, source, sinks, observer, state, error)
       call observer%on_end()
+      call remark_stability(summary%verdicts(verdict_undecided), sum(summary%verdicts), &
+                            summary%remarks)
       call strategy%describe(case, state, summary, message)
       if (len(message) > 0 .and. .not. allocated(error)) call observer%on_message(message)
       ! A run that was stopped is not made longer by a search.

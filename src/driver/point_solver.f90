@@ -25,8 +25,8 @@ module fw_point_solver
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_tail, only: recover_tail
-   use fw_solution, only: find_stability
    use fw_solution, only: solution_method
+   use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request
    use fw_solver_options, only: pseudo_time_options
    use fw_solver_options, only: solver_kinsol
@@ -57,6 +57,7 @@ module fw_point_solver
    type :: point_solver
       !> The solver of the case, and pseudo-time where it fails.
       type(solution_method) :: method
+      type(stability_solver) :: stability
       !> The present solution, and the last two converged ones with their frequencies.
       real(wp), allocatable :: x(:), last(:), before(:), r(:)
       !> The point to be solved, and the best that was found of it where nothing converged.
@@ -140,7 +141,7 @@ contains
             self%method%harmonics%n_harmonics, point)
       end if
       if (report%converged .and. request%stability) then
-         call find_stability(system, case%model, self%x, point, error)
+         call self%stability%find(case, system, self%x, point, error)
          if (allocated(error)) return
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then

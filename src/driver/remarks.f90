@@ -18,7 +18,7 @@ module fw_remarks
    implicit none (type, external)
    private
 
-   public :: remark_list, remark_input, remark_range, remark_peaks
+   public :: remark_list, remark_input, remark_range, remark_peaks, remark_stability
 
    !> Friction coefficients above it are no dry friction of metals.
    real(wp), parameter :: highest_friction = 2.0_wp
@@ -145,6 +145,18 @@ contains
          ' of '//to_text(size(peaks))//' maxima are not resolved: take more points around them '// &
          '(/peak/omega), or continuation = ''arclength''')
    end subroutine remark_peaks
+
+   !> Of verdicts on stability that nothing stands behind.
+   subroutine remark_stability(n_undecided, n_points, remarks)
+      integer, intent(in) :: n_undecided
+      !> Points with multipliers.
+      integer, intent(in) :: n_points
+      type(remark_list), intent(inout) :: remarks
+
+      if (n_undecided > 0) call remarks%add('stability undecided', 'at '//to_text(n_undecided)// &
+         ' of '//to_text(n_points)//' points a multiplier is as near to the unit circle as its '// &
+         'error (/floquet/error): more harmonics%n_harmonics make it certain')
+   end subroutine remark_stability
 
    pure function others(n) result(words)
       integer, intent(in) :: n

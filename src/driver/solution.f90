@@ -15,11 +15,9 @@ module fw_solution
    use fw_hdhb, only: hdhb_system
    use fw_hdhb, only: new_hdhb
    use fw_kinsol, only: kinsol_solver
-   use fw_model, only: model_type
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
    use fw_parameter_system, only: parameter_system
-   use fw_point, only: point_type
    use fw_powell, only: powell_solver
    use fw_problem, only: build_system
    use fw_pseudo_time, only: pseudo_report
@@ -27,15 +25,13 @@ module fw_solution
    use fw_recovery, only: carry_solution
    use fw_unbounded, only: is_lost_in_round_off
    use fw_solver_options, only: pseudo_time_options
-   use fw_stability, only: floquet_multipliers
-   use fw_stability, only: is_stable
    use fw_solver_options, only: jacobian_difference
    use fw_solver_options, only: solver_kinsol
    use fw_solver_options, only: solver_powell
    implicit none (type, external)
    private
 
-   public :: solution_method, is_lasting, find_stability
+   public :: solution_method, is_lasting
 
    type :: solution_method
       type(newton_solver) :: newton
@@ -102,19 +98,6 @@ contains
       end if
       if (report%converged) call refuse_unreal(self, system, x, report)
    end subroutine solve
-
-   !> Floquet multipliers of the solution x at the frequency of the system.
-   subroutine find_stability(system, model, x, point, error)
-      type(balance_state), intent(in) :: system
-      type(model_type), intent(in) :: model
-      real(wp), intent(in), contiguous :: x(:)
-      type(point_type), intent(inout) :: point
-      type(error_type), allocatable, intent(out) :: error
-
-      call floquet_multipliers(system, model, x, point%multipliers, error)
-      if (allocated(error)) return
-      point%stable = is_stable(point%multipliers)
-   end subroutine find_stability
 
    !> Whether the point that was evaluated last can last: its forces repeat from period to period,
    !> and something holds the structure. (Linear springs count among what holds it.)

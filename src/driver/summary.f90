@@ -16,6 +16,9 @@ module fw_summary
    use fw_remarks, only: remark_list
    use fw_run_state, only: run_state
    use fw_solver_options, only: solver_newton
+   use fw_stability_verdict, only: verdict_stable
+   use fw_stability_verdict, only: verdict_undecided
+   use fw_stability_verdict, only: verdict_unstable
    use fw_text, only: string_type
    use fw_text, only: to_text
    use fw_text_list, only: append
@@ -34,6 +37,8 @@ module fw_summary
       integer :: harmonics(2) = [huge(0), 0]
       !> Fewest and most instants of a point, where they are chosen.
       integer :: instants(2) = [huge(0), 0]
+      !> Points by their verdict on stability (undecided, unstable, stable).
+      integer :: verdicts(verdict_undecided:verdict_stable) = 0
       type(string_type), allocatable :: name(:)
       !> Largest amplitude of each observed quantity among converged points, and where [rad/s].
       real(wp), allocatable :: peak(:), peak_omega(:)
@@ -84,6 +89,9 @@ contains
                         max(self%harmonics(2), point%n_harmonics)]
       self%instants = [min(self%instants(1), point%n_time), max(self%instants(2), point%n_time)]
       if (.not. point%converged) return
+      if (allocated(point%multipliers)) then
+         self%verdicts(point%verdict) = self%verdicts(point%verdict) + 1
+      end if
       do i = 1, size(self%peak)
          if (point%amplitude(i) < self%peak(i)) cycle
          self%peak(i) = point%amplitude(i)
@@ -314,6 +322,11 @@ contains
       if (size(self%name) > max_shown) then
          call add_line(table, '...', to_text(size(self%name) - max_shown)// &
                        ' more in the result file')
+      end if
+      if (any(self%verdicts > 0)) then
+         call add_line(table, 'stability', to_text(self%verdicts(verdict_stable))//' stable, '// &
+                       to_text(self%verdicts(verdict_unstable))//' unstable, '// &
+                       to_text(self%verdicts(verdict_undecided))//' undecided')
       end if
       do i = 1, size(self%work)
          call append(table, self%work(i)%text)

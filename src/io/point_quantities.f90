@@ -4,6 +4,8 @@
 !>
 !> A new quantity is one line in `point_quantities`, naming the procedure that gives its numbers.
 module fw_point_quantities
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_point
    use fw_case, only: analysis_wear
@@ -93,11 +95,13 @@ contains
       call add('instants', i, '1', 'point', 'instants of the period', instants, is_accurate)
       call add('error_estimate', r, '1', 'point', 'bound of the relative error of the response', &
                error_estimate, is_accurate)
-      call add('floquet/stable', i, '', 'point', '1 stable, 0 unstable, -1 not known', stable, &
-               asks_stability)
+      call add('floquet/stable', i, '', 'point', '1 stable, 0 unstable, -1 undecided or not known', &
+               stable, asks_stability)
       list(size(list))%missing = -1
       call add('floquet/multipliers', r, '1', 'point multiplier part', &
                'Floquet multipliers, real and imaginary part', multipliers, asks_stability)
+      call add('floquet/error', r, '1', 'point multiplier', &
+               'estimated error of each multiplier', multiplier_error, asks_stability)
       call add('contact/force', r, '<force>', 'point coefficient pair direction', &
                'Fourier coefficients of the contact forces t1, t2, n', force, shows_contact)
       call add('contact/fraction', r, '1', 'point pair state', &
@@ -348,12 +352,12 @@ contains
       end if
    end subroutine error_estimate
 
-   !> Unknown where the multipliers are: -1 in the file.
+   !> Unknown where the multipliers are: -1 in the file, as where they leave it open.
    subroutine stable(point, values)
       type(point_type), intent(in) :: point
       real(wp), allocatable, intent(out) :: values(:)
 
-      if (allocated(point%multipliers)) values = [flag(point%stable)]
+      if (allocated(point%multipliers)) values = [real(point%verdict, wp)]
    end subroutine stable
 
    !> Real and imaginary part of each, side by side.
@@ -368,6 +372,16 @@ contains
       values(1::2) = real(point%multipliers, wp)
       values(2::2) = aimag(point%multipliers)
    end subroutine multipliers
+
+   !> NaN where no estimate was possible.
+   subroutine multiplier_error(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (.not. allocated(point%multiplier_error)) return
+      values = point%multiplier_error
+      where (.not. values < huge(1.0_wp)) values = ieee_value(1.0_wp, ieee_quiet_nan)
+   end subroutine multiplier_error
 
    !> Its order in memory (direction, pair, coefficient) is that of h5py reversed already.
    subroutine force(point, values)
