@@ -11,8 +11,8 @@ fretwear.analyses
     Runs of the library in this process.
 fretwear.steps
     A case frequency by frequency.
-fretwear.result
-    Results.
+fretwear.result, fretwear.bifurcation
+    Results, and where their stability changes.
 fretwear.importer
     Models of other programs.
 fretwear.reduction
@@ -41,6 +41,7 @@ __path__ = extend_path(__path__, __name__)
 __version__: str = "0.1.0"
 
 from .analyses import frf, run, wear
+from .bifurcation import Bifurcation
 from .case import Case
 from .errors import (
     AbsentError,
@@ -54,8 +55,8 @@ from .model import ContactPairs, Model, Spring
 from .result import Result
 from .steps import Point, Steps
 
-__all__ = ["AbsentError", "Case", "ContactPairs", "ConvergenceError", "FretwearError", "InputError",
-           "Model", "OutputError", "Point", "Result", "RunInterrupted", "Spring", "Steps",
+__all__ = ["AbsentError", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
+           "FretwearError", "InputError", "Model", "OutputError", "Point", "Result", "RunInterrupted", "Spring", "Steps",
            "__version__", "frf", "run", "wear"]
 
 

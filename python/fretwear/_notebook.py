@@ -85,6 +85,10 @@ def result_html(result: Result) -> str:
                 omega, height = result.maximum(name)
                 value = f"{height:.6g} {units}".strip()
                 rows.append((f"largest {name}", f"{value} at {omega / (2.0 * np.pi):.6g} Hz"))
+    if result.bifurcations:
+        shown = [str(place) for place in result.bifurcations[:_MOST_REMARKS]]
+        more = len(result.bifurcations) - len(shown)
+        rows.append(("bifurcations", ", ".join(shown) + (f" and {more} more" if more else "")))
     if "wear/depth" in result and len(result.depth):
         depth = f"{result.depth[-1].max():.4g} {result.units('wear/depth')}".strip()
         rows.append(("wear", f"{depth} deep after {result.cycles[-1]:.4g} cycles"))

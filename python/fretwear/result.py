@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ._arguments import text, whole
 from ._native import namelist_values
 from ._notebook import result_dataset, result_html
+from .bifurcation import Bifurcation, read_bifurcations
 from .case import Case
 from .cycle import Cycle, read_cycle
 from .errors import AbsentError, InputError, OutputError
@@ -48,6 +49,7 @@ _REMEDIES = {
     "harmonics": "run with harmonics%accuracy or harmonics%adaptive = .true.",
     "fold": "run with sweep%continuation = 'arclength'",
     "served_by": "run with case%analysis = 'frf' or 'point'",
+    "bifurcation/": "run a sweep with sweep%stability = .true., or a branch that turns",
     "peak/": "run a sweep (case%analysis = 'frf') with this version of fretwear",
     "observed/": "name what to observe in output%observe",
 }
@@ -475,8 +477,19 @@ class Result:
 
     @property
     def stable(self) -> NDArray[np.int_]:
-        """1 stable, 0 unstable, -1 not known (n_points)."""
+        """1 stable, 0 unstable, -1 undecided or not known (n_points).
+
+        Undecided: a multiplier is as near to the unit circle as its error (`"floquet/error"`).
+        """
         return self["floquet/stable"].astype(int)
+
+    @cached_property
+    def bifurcations(self) -> list[Bifurcation]:
+        """Where the response turns or its stability changes, in the order along it.
+
+        Folds of branches, and with `stability` in `&sweep` all else; empty where there are none.
+        """
+        return read_bifurcations(self)
 
     # ------------------------------------------------------------------ wear
 

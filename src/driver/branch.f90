@@ -3,9 +3,16 @@ module fw_branch
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
+   use fw_bifurcation, only: bifurcation_list
+   use fw_bifurcation, only: bifurcation_type
+   use fw_bifurcation, only: kind_fold
+   use fw_bifurcation, only: way_turn
+   use fw_branch_step, only: interpolate
    use fw_case, only: case_type
    use fw_continuation, only: arclength_type
    use fw_continuation, only: branch_point
+   use fw_crossing_search, only: probe_type
+   use fw_crossing_search, only: search_crossings
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hdhb
    use fw_balance_problem, only: balance_problem
@@ -24,7 +31,14 @@ module fw_branch
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_solution, only: is_lasting
+   use fw_stability_crossing, only: critical_multiplier
+   use fw_stability_crossing, only: crossing_between
+   use fw_stability_crossing, only: crossing_none
+   use fw_stability_crossing, only: crossing_plus
+   use fw_stability_crossing, only: multiplier_track
+   use fw_stability_crossing, only: signature_of
    use fw_stability_solver, only: stability_solver
+   use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: new_request
    use fw_strategy, only: note_time_limit
    use fw_sweep, only: point_source
@@ -52,12 +66,30 @@ module fw_branch
       logical :: is_in_time = .false.
       integer(int64) :: clock = 0
       real(wp), allocatable :: r(:)
+      !> Where it turns and where its stability changes, and the solutions made to find out.
+      type(bifurcation_list) :: bifurcations
+      integer :: n_solved = 0, iterations = 0
+      type(multiplier_track), private :: track
+      !> The last point with multipliers, and whether a fold lies behind it.
+      type(branch_point), private :: last
+      type(point_type), private :: last_point
+      logical, private :: has_fold = .false.
    contains
       procedure :: begin
       procedure :: next
+      procedure :: note
       procedure :: closing_words
       final :: release
    end type branch_type
+
+   !> Solutions between two points of a branch.
+   type, extends(probe_type) :: branch_probe
+      type(branch_type), pointer :: branch => null()
+      type(case_type), pointer :: case => null()
+      type(branch_point) :: first, second
+   contains
+      procedure :: at
+   end type branch_probe
 
    !> The same as a source of a sweep.
    type, extends(point_source) :: branch_source
@@ -112,6 +144,8 @@ contains
       if (point%converged) then
          self%level%system%interrupt => observer
          call self%branch%begin(case, self%level%system, self%level%solver%x, error)
+         if (.not. allocated(error)) call self%branch%note(case, self%branch%curve%first, point, &
+                                                           error)
       else
          call observer%on_message('the first point did not converge: no branch to follow')
       end if
@@ -133,6 +167,7 @@ contains
 
       if (.not. self%has_begun .or. self%has_no_start) return
       call self%level%solver%method%newton%linear%add_work(self%branch%curve%corrector%linear)
+      call self%branch%bifurcations%doubt(self%branch%track)
       call self%branch%closing_words(case, words)
       call observer%on_message(words)
    end subroutine finish
@@ -250,10 +285,99 @@ contains
       end if
       if (allocated(error) .or. .not. more) return
       call describe(self, case, found, point, error)
+      if (.not. allocated(error)) call self%note(case, found, point, error)
+      if (allocated(error)) return
       call system_clock(clock, rate)
       point%seconds = real(clock - self%clock, wp)/real(rate, wp)
       self%clock = clock
    end subroutine next
+
+   !> A point has been reached: what lies between it and the last.
+   subroutine note(self, case, found, point, error)
+      class(branch_type), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(branch_point), intent(in) :: found
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      integer :: signature(3)
+
+      if (point%fold) then
+         call add_fold(self, point)
+         return
+      end if
+      if (.not. allocated(point%multipliers)) return
+      signature = signature_of(point%multipliers)
+      call self%track%add(signature, point%verdict /= verdict_undecided)
+      if (self%track%n > 1) call look_between(self, case, found, point, error)
+      self%last = found
+      self%last_point = point
+      self%has_fold = .false.
+   end subroutine note
+
+   subroutine add_fold(self, point)
+      type(branch_type), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      type(bifurcation_type) :: fold
+
+      self%has_fold = .true.
+      fold%kind = kind_fold
+      fold%found_by = way_turn
+      fold%omega = point%omega
+      fold%amplitude = point%amplitude
+      fold%coefficients = point%coefficients
+      if (allocated(point%multipliers)) then
+         fold%multiplier = critical_multiplier(point%multipliers, crossing_plus)
+      end if
+      call self%bifurcations%add(fold)
+   end subroutine add_fold
+
+   !> Locate the changes of stability since the last point, the fold left out.
+   subroutine look_between(self, case, found, point, error)
+      type(branch_type), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(branch_point), intent(in) :: found
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_probe) :: probe
+      integer :: before(3), after(3)
+
+      before = signature_of(self%last_point%multipliers)
+      after = signature_of(point%multipliers)
+      if (crossing_between(before, after) == crossing_none) return
+      probe%branch => self
+      probe%case => case
+      probe%first = self%last
+      probe%second = found
+      probe%has_fold = self%has_fold
+      call search_crossings(probe, self%last_point, point, self%track%n - 1, .true., &
+                            self%bifurcations, error)
+      self%n_solved = self%n_solved + probe%n_solved
+      self%iterations = self%iterations + probe%iterations
+   end subroutine look_between
+
+   !> The point of the branch at a share of the way between two.
+   subroutine at(self, share, point, error)
+      class(branch_probe), intent(inout) :: self
+      real(wp), intent(in) :: share
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: found
+      real(wp) :: ds
+
+      associate (curve => self%branch%curve)
+         ds = curve%corrector%metric%chord(self%first, self%second)
+         call interpolate(curve%corrector%metric, self%first, self%second, share, found)
+         if (self%branch%is_in_time) then
+            call curve%corrector%correct(self%branch%in_time, self%first, ds, found, error)
+         else
+            call curve%corrector%correct(self%branch%system, self%first, ds, found, error)
+         end if
+      end associate
+      self%n_solved = self%n_solved + 1
+      self%iterations = self%iterations + found%report%iterations
+      if (allocated(error) .or. .not. found%report%converged) return
+      call describe(self%branch, self%case, found, point, error)
+   end subroutine at
 
    !> Why the branch ended, once it has.
    subroutine closing_words(self, case, words)

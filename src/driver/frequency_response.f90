@@ -4,6 +4,7 @@ module fw_frequency_response
    use fw_accuracy, only: accuracy_solver
    use fw_adaptive, only: adaptive_solver
    use fw_branch, only: branch_source
+   use fw_bifurcation, only: bifurcation_list
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_time
    use fw_case, only: case_type
@@ -30,6 +31,7 @@ module fw_frequency_response
    use fw_sweep, only: frequency_source
    use fw_sweep, only: point_source
    use fw_sweep, only: run_sweep
+   use fw_sweep_bifurcations, only: sweep_bifurcations
    use fw_sweep, only: sweep_frequencies
    use fw_time_response, only: time_strategy
    implicit none (type, external)
@@ -53,6 +55,7 @@ contains
       type(summary_sink), target :: to_summary
       type(observer_sink), target :: to_observer
       type(peak_finder), target :: finder
+      type(sweep_bifurcations), target :: changes
       type(sink_list) :: sinks
       character(:), allocatable :: message
 
@@ -76,6 +79,10 @@ contains
             call finder%start(case, source%omega, source, strategy, observer)
             call sinks%add(finder)
             call remark_range(case, finder%modes, summary%remarks)
+            if (case%sweep%stability .and. finder%in_order) then
+               call changes%start(source, strategy, observer)
+               call sinks%add(changes)
+            end if
          end if
       end select
       call run_sweep(case, source, sinks, observer, state, error)
@@ -87,11 +94,44 @@ contains
       ! A run that was stopped is not made longer by a search.
       if (.not. (allocated(error) .or. state%was_stopped)) then
          call find_peaks(case, finder, writer, summary, error)
+         if (.not. allocated(error)) call changes%search(case, error)
          if (.not. allocated(error)) call add_rows(case, finder, sinks, writer, state, error)
          call note_stop(observer, state, error)
       end if
+      if (.not. allocated(error)) call keep_bifurcations(case, source, changes, writer, summary, &
+                                                         error)
       call finder%clear()
    end subroutine run_frequency_response
+
+   !> Where the response turns or its stability changes goes to the result and the summary; of a
+   !> run that was stopped, what was found by then.
+   subroutine keep_bifurcations(case, source, changes, writer, summary, error)
+      type(case_type), intent(in) :: case
+      class(point_source), intent(in) :: source
+      type(sweep_bifurcations), intent(in) :: changes
+      type(result_writer), intent(inout) :: writer
+      type(summary_type), intent(inout) :: summary
+      type(error_type), allocatable, intent(out) :: error
+
+      select type (source)
+      type is (branch_source)
+         call keep(source%branch%bifurcations, source%branch%n_solved, source%branch%iterations)
+      class default
+         call keep(changes%found, changes%n_solved, changes%iterations)
+      end select
+
+   contains
+
+      subroutine keep(list, n_solved, iterations)
+         type(bifurcation_list), intent(in) :: list
+         integer, intent(in) :: n_solved, iterations
+
+         call summary%describe_bifurcations(list, n_solved, iterations)
+         call writer%add_bifurcations(list, case%harmonics%n_harmonics, case%model%unit_system, &
+                                      error)
+      end subroutine keep
+
+   end subroutine keep_bifurcations
 
    !> Points of the search become rows, in the order of the sweep, where the case wants it.
    subroutine add_rows(case, finder, sinks, writer, state, error)

@@ -89,7 +89,8 @@ module fw_peak_finder
       !> Rows taken, and those of them since the last that failed.
       integer, private :: n_rows = 0, n_following = 0
       !> Whether rows are taken at all, and whether their frequencies only rise or only fall.
-      logical, private :: is_active = .false., in_order = .false.
+      logical, private :: is_active = .false.
+      logical :: in_order = .false.
    contains
       procedure :: start
       procedure :: take

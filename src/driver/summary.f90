@@ -3,6 +3,8 @@
 module fw_summary
    use fw_kinds, only: wp
    use fw_kinds, only: pi
+   use fw_bifurcation, only: bifurcation_list
+   use fw_bifurcation, only: kind_words
    use fw_case, only: case_type
    use fw_harmonics_options, only: sampling_events
    use fw_harmonics_options, only: sampling_uniform
@@ -29,6 +31,8 @@ module fw_summary
 
    !> Observed quantities that the table shows.
    integer, parameter :: max_shown = 6
+   !> Bifurcations that it shows.
+   integer, parameter :: most_places = 12
 
    type :: summary_type
       !> Of all points, those on the way included.
@@ -47,6 +51,8 @@ module fw_summary
       !> What is allowed and seldom meant.
       type(remark_list) :: remarks
       !> Lines about the work that was done.
+      !> Places where stability changes, in words.
+      type(string_type), allocatable :: bifurcation(:)
       type(string_type), allocatable :: work(:)
       !> What the case did not need, in words.
       type(string_type), allocatable :: skipped(:)
@@ -57,6 +63,7 @@ module fw_summary
       procedure :: add_transient
       procedure :: describe_work
       procedure :: describe_peaks
+      procedure :: describe_bifurcations
       procedure :: note_fallback
       procedure :: describe_harmonics
       procedure :: describe_accuracy
@@ -187,6 +194,29 @@ contains
       if (n_solved > 0) call add_line(self%work, 'peaks', to_text(n_solved)//' more points, '// &
                                       to_text(iterations)//' iterations')
    end subroutine describe_peaks
+
+   !> Where the response turns or its stability changes.
+   subroutine describe_bifurcations(self, list, n_solved, iterations)
+      class(summary_type), intent(inout) :: self
+      type(bifurcation_list), intent(in) :: list
+      !> Solutions made to find them, and their iterations.
+      integer, intent(in) :: n_solved, iterations
+      character(14) :: text
+      integer :: k
+
+      allocate (self%bifurcation(0))
+      do k = 1, min(list%n, most_places)
+         write (text, '(es13.6)') list%item(k)%omega
+         call add_line(self%bifurcation, trim(merge('bifurcations', '            ', k == 1)), &
+                       trim(kind_words(list%item(k)%kind))//' at '//trim(adjustl(text))//' rad/s')
+      end do
+      if (list%n > most_places) then
+         call add_line(self%bifurcation, '', to_text(list%n - most_places)// &
+                       ' more in the result file')
+      end if
+      if (n_solved > 0) call add_line(self%work, 'located by', to_text(n_solved)// &
+                                      ' more points, '//to_text(iterations)//' iterations')
+   end subroutine describe_bifurcations
 
    !> What a reader should know of a peak.
    pure function note_of(peak) result(words)
@@ -327,6 +357,11 @@ contains
          call add_line(table, 'stability', to_text(self%verdicts(verdict_stable))//' stable, '// &
                        to_text(self%verdicts(verdict_unstable))//' unstable, '// &
                        to_text(self%verdicts(verdict_undecided))//' undecided')
+      end if
+      if (allocated(self%bifurcation)) then
+         do i = 1, size(self%bifurcation)
+            call append(table, self%bifurcation(i)%text)
+         end do
       end if
       do i = 1, size(self%work)
          call append(table, self%work(i)%text)

@@ -95,8 +95,8 @@ contains
       call add('instants', i, '1', 'point', 'instants of the period', instants, is_accurate)
       call add('error_estimate', r, '1', 'point', 'bound of the relative error of the response', &
                error_estimate, is_accurate)
-      call add('floquet/stable', i, '', 'point', '1 stable, 0 unstable, -1 undecided or not known', &
-               stable, asks_stability)
+      call add('floquet/stable', i, '', 'point', &
+               '1 stable, 0 unstable, -1 undecided or not known', stable, asks_stability)
       list(size(list))%missing = -1
       call add('floquet/multipliers', r, '1', 'point multiplier part', &
                'Floquet multipliers, real and imaginary part', multipliers, asks_stability)

@@ -7,6 +7,8 @@
 module fw_result
    use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
+   use fw_bifurcation, only: bifurcation_list
+   use fw_bifurcation_group, only: write_bifurcations
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -57,6 +59,7 @@ module fw_result
       procedure :: add_point
       procedure :: copy_points
       procedure :: add_peaks
+      procedure :: add_bifurcations
       procedure :: add_remarks
       procedure :: sort_points
       procedure :: flush
@@ -147,6 +150,22 @@ contains
       call write_peaks(self%file, peaks, n_harmonics, unit_system, error)
       !$omp end critical (fretwear_io)
    end subroutine add_peaks
+
+   !> Where the response turns or its stability changes.
+   subroutine add_bifurcations(self, list, n_harmonics, unit_system, error)
+      class(result_writer), intent(inout) :: self
+      type(bifurcation_list), intent(in) :: list
+      !> Of the case.
+      integer, intent(in) :: n_harmonics
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call write_bifurcations(self%file, list, n_harmonics, unit_system, error)
+      !$omp end critical (fretwear_io)
+   end subroutine add_bifurcations
 
    !> Bring the rows into the order of their frequencies.
    subroutine sort_points(self, descending, error)

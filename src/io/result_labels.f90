@@ -37,6 +37,19 @@ module fw_result_labels
                  'Fourier coefficients 0, c1, s1, ... of the quantity'), &
       label_type('/peak/observed', '', 'peak', 'observed quantity, its column from 0'), &
       label_type('/peak/found_by', '', 'peak', 'how it was found, an index into names'), &
+      label_type('/bifurcation/omega', 'rad/s', 'bifurcation', 'angular frequency of the place'), &
+      label_type('/bifurcation/error', 'rad/s', 'bifurcation', &
+                 'estimated error of the frequency'), &
+      label_type('/bifurcation/amplitude', '<length>', 'bifurcation observed', &
+                 'largest magnitude over the period'), &
+      label_type('/bifurcation/coefficients', '<length>', 'bifurcation coefficient observed', &
+                 'Fourier coefficients 0, c1, s1, ... of observed quantities'), &
+      label_type('/bifurcation/multiplier', '1', 'bifurcation part', &
+                 'the multiplier on the unit circle, real and imaginary'), &
+      label_type('/bifurcation/kind', '', 'bifurcation', &
+                 'what happens there, an index into names'), &
+      label_type('/bifurcation/found_by', '', 'bifurcation', &
+                 'how it was found, an index into names'), &
       label_type('/wear/depth_halved', '<length>', 'pair', &
                  'final wear depth with steps of half the size')]
 

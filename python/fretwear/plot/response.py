@@ -14,7 +14,9 @@ from ..result import STATES, Result
 from .style import (
     CURVE,
     FAILED,
+    PALETTE,
     STATE_COLOURS,
+    UNDECIDED,
     UNSTABLE,
     Floats,
     Source,
@@ -29,6 +31,10 @@ from .style import (
 
 __all__ = ["Response", "friction_damping", "half_power_damping", "plot_response",
            "read_response"]
+
+
+_MARKERS = {"fold": "D", "period doubling": "s", "Neimark-Sacker": "^",
+            "symmetry breaking": "v", "branch point": "P", "nonsmooth": "*", "undecided": "X"}
 
 
 @dataclass(frozen=True)
@@ -50,11 +56,13 @@ class Response:
     dissipation : (n_points,) or None
         Friction loss per cycle summed over the pairs.
     stable : (n_points,) int or None
-        1 stable, 0 unstable, -1 not known.
+        1 stable, 0 unstable, -1 undecided or not known.
     units : str
         Of the amplitude; "" where they are not known.
     maximum : (float, float) or None
         Where the curve is highest [Hz], and how high, between the points too.
+    bifurcations : tuple of (str, float, float)
+        Kind, frequency [Hz] and amplitude of every place where it turns or its stability changes.
     """
 
     name: str
@@ -66,6 +74,7 @@ class Response:
     stable: NDArray[np.int_] | None = None
     units: str = ""
     maximum: tuple[float, float] | None = None
+    bifurcations: tuple[tuple[str, float, float], ...] = ()
 
     @property
     def is_branch(self) -> bool:
@@ -105,7 +114,8 @@ def read_response(source: Source, observe: str | None = None) -> Response:
         None if fraction is None else fraction.mean(axis=1),
         None if loss is None else loss.sum(axis=1),
         result.stable if "floquet/stable" in result else None, units_of(result, "amplitude"),
-        _maximum(result, column))
+        _maximum(result, column),
+        tuple((b.kind, b.frequency, float(b.amplitude[column])) for b in result.bifurcations))
 
 
 def _maximum(result: Result, column: int) -> tuple[float, float] | None:
@@ -183,8 +193,9 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
     The peak is annotated with its shift from the stuck peak and the equivalent damping ratio of
     friction as ``friction_damping`` defines it (the half-power width of the peak where that cannot
     be evaluated). Points that did not converge are crosses, unstable ones are drawn thin
-    and dashed on shaded ground. The lower panel shows stick, slip and open fractions, averaged
-    over the pairs; along a branch that folds, against the number of the point.
+    and dashed on shaded ground, those whose stability is undecided are ringed. Folds, period
+    doublings and other bifurcations have markers. The lower panel shows stick, slip and open
+    fractions, averaged over the pairs; along a branch that folds, against the number of the point.
 
     Parameters
     ----------
@@ -228,6 +239,9 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
               markersize=3.5, color=CURVE, linewidth=1.6, label=f"amplitude of {response.name}")
     if unstable.any():
         _draw_unstable(axes, response, good, unstable)
+    if response.stable is not None:
+        _draw_undecided(axes, response, good)
+    _draw_bifurcations(axes, response)
     bad = ~response.converged
     largest = float(np.nanmax(good, initial=response.maximum[1] if response.maximum else 0.0))
     if stuck is not None:
@@ -257,6 +271,24 @@ def _draw_unstable(axes: Axes, response: Response, good: Floats,
         axes.plot(response.frequency[near], good[near], "--", color=UNSTABLE, linewidth=1.1,
                   label="unstable" if k == 0 else None)
         axes.axvspan(f.min(), f.max(), color=UNSTABLE, alpha=0.08, linewidth=0)
+
+
+def _draw_undecided(axes: Axes, response: Response, good: Floats) -> None:
+    """Points whose multipliers are as near to the unit circle as their error."""
+    open_ones = response.converged & (response.stable == -1)
+    if open_ones.any():
+        axes.plot(response.frequency[open_ones], good[open_ones], "o", color=UNDECIDED,
+                  markersize=6, markerfacecolor="none", markeredgewidth=1.0,
+                  label="stability undecided")
+
+
+def _draw_bifurcations(axes: Axes, response: Response) -> None:
+    """A marker of its own for every kind, in the order of the response."""
+    for kind in dict.fromkeys(kind for kind, _, _ in response.bifurcations):
+        f, a = np.array([(f, a) for k, f, a in response.bifurcations if k == kind]).T
+        axes.plot(f, a, linestyle="none", marker=_MARKERS.get(kind, "X"), color=PALETTE[1],
+                  markersize=8, markeredgecolor="white", markeredgewidth=0.8, zorder=4,
+                  label=kind if len(f) == 1 else f"{kind} ({len(f)})")
 
 
 def _annotate_peak(axes: Axes, response: Response, stuck: Response | None,

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from ..result import Result
 
-__all__ = ["CURVE", "FAILED", "PALETTE", "STATE_COLOURS", "UNSTABLE", "Floats", "Picture",
-           "ScaledFormatter",
-           "Source", "as_result", "label", "label_y", "largest_of", "new_figure", "pair_name",
+__all__ = ["CURVE", "FAILED", "PALETTE", "STATE_COLOURS", "UNDECIDED", "UNSTABLE", "Floats",
+           "Picture", "ScaledFormatter", "Source", "as_result", "label", "label_y", "largest_of", "new_figure", "pair_name",
            "scale", "scale_axis", "tidy", "units_of"]
 
 Floats = NDArray[np.float64]
@@ -26,6 +25,7 @@ Floats = NDArray[np.float64]
 Source = Union[Result, str, Path]
 
 CURVE, FAILED, UNSTABLE = "#1f4e79", "#c0392b", "#c0392b"
+UNDECIDED = "#8a6d00"
 #: Stick, slip, open.
 STATE_COLOURS = ("#4c78a8", "#f58518", "#b8b8b8")
 #: Told apart by colour-blind readers too (Okabe and Ito 2008).

@@ -1,0 +1,105 @@
+!> Group /bifurcation of a result file: one row for every place where the response turns or its
+!> stability changes.
+module fw_bifurcation_group
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use fw_bifurcation, only: bifurcation_list
+   use fw_bifurcation, only: kind_words
+   use fw_bifurcation, only: way_words
+   use fw_error, only: error_type
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: write_dataset
+   use fw_kinds, only: wp
+   use fw_result_labels, only: label_dataset
+   use fw_text, only: string_type
+   implicit none (type, external)
+   private
+
+   public :: write_bifurcations
+
+contains
+
+   !> Write the group; nothing where there is none.
+   subroutine write_bifurcations(file, list, n_harmonics, unit_system, error)
+      type(hdf5_file), intent(in) :: file
+      type(bifurcation_list), intent(in) :: list
+      !> Of the case: those that a solution does not carry read as zero.
+      integer, intent(in) :: n_harmonics
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: coefficients(:, :, :), multiplier(:, :), amplitude(:, :), width(:)
+      integer :: k, n, n_observed
+
+      if (list%n == 0) return
+      n_observed = size(list%item(1)%amplitude)
+      n = 2*n_harmonics + 1
+      do k = 1, list%n
+         n = max(n, size(list%item(k)%coefficients, 1))
+      end do
+      ! Shapes are those of h5py reversed.
+      allocate (coefficients(n_observed, n, list%n), source=0.0_wp)
+      allocate (multiplier(2, list%n), amplitude(n_observed, list%n), width(list%n))
+      do k = 1, list%n
+         associate (item => list%item(k))
+            amplitude(:, k) = item%amplitude
+            coefficients(:, :size(item%coefficients, 1), k) = transpose(item%coefficients)
+            multiplier(:, k) = [real(item%multiplier, wp), aimag(item%multiplier)]
+            width(k) = item%error
+            if (item%error < 0.0_wp) width(k) = ieee_value(1.0_wp, ieee_quiet_nan)
+            if (abs(item%multiplier) <= 0.0_wp) multiplier(:, k) = ieee_value(1.0_wp, &
+               ieee_quiet_nan)
+         end associate
+      end do
+      call write_dataset(file, '/bifurcation/omega', list%item(:list%n)%omega, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/bifurcation/error', width, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/bifurcation/amplitude', amplitude, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/bifurcation/coefficients', coefficients, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/bifurcation/multiplier', multiplier, error)
+      if (allocated(error)) return
+      call write_words(file, '/bifurcation/kind', list%item(:list%n)%kind, kind_words, error)
+      if (allocated(error)) return
+      call write_words(file, '/bifurcation/found_by', list%item(:list%n)%found_by, way_words, &
+                       error)
+      if (allocated(error)) return
+      call label_all(file, unit_system, error)
+   end subroutine write_bifurcations
+
+   !> Places in words, from 0.
+   subroutine write_words(file, name, places, words, error)
+      type(hdf5_file), intent(in) :: file
+      character(*), intent(in) :: name
+      integer, intent(in) :: places(:)
+      character(*), intent(in) :: words(0:)
+      type(error_type), allocatable, intent(out) :: error
+      type(string_type) :: names(size(words))
+      integer :: k
+
+      call write_dataset(file, name, places, error)
+      if (allocated(error)) return
+      do k = 1, size(names)
+         names(k)%text = trim(words(k - 1))
+      end do
+      call write_attribute(file, name, 'names', names, error)
+   end subroutine write_words
+
+   subroutine label_all(file, unit_system, error)
+      type(hdf5_file), intent(in) :: file
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: names(7) = [character(12) :: 'omega', 'error', 'amplitude', &
+                                             'coefficients', 'multiplier', 'kind', 'found_by']
+      integer :: k
+
+      do k = 1, size(names)
+         call label_dataset(file, '/bifurcation/'//trim(names(k)), unit_system, error)
+         if (allocated(error)) return
+      end do
+   end subroutine label_all
+
+end module fw_bifurcation_group
