@@ -56,8 +56,8 @@ from .result import Result
 from .steps import Point, Steps
 
 __all__ = ["AbsentError", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "FretwearError", "InputError", "Model", "OutputError", "Point", "Result", "RunInterrupted", "Spring", "Steps",
-           "__version__", "frf", "run", "wear"]
+           "FretwearError", "InputError", "Model", "OutputError", "Point",
+           "Result", "RunInterrupted", "Spring", "Steps", "__version__", "frf", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

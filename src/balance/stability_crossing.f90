@@ -92,8 +92,8 @@ contains
 
       best = 1
       do k = 2, size(multipliers)
-         if (distance_to(multipliers(k), crossing) < distance_to(multipliers(best), crossing)) &
-            best = k
+         if (distance_to(multipliers(k), crossing) < &
+             distance_to(multipliers(best), crossing)) best = k
       end do
    end function nearest_to
 

@@ -67,8 +67,8 @@ module fw_crossing_search
    real(wp), parameter :: on_circle = 1.0e-8_wp
    !> Share of the way below which a bracket is a place.
    real(wp), parameter :: narrow = 1.0e-7_wp
-   !> Distance that a multiplier keeps from the circle where it jumps over it; next to a fold it comes
-   !> as near as the root of the share, 3e-4.
+   !> Distance that a multiplier keeps from the circle where it jumps over it; next to a fold it
+   !> comes as near as the root of the share, 3e-4.
    real(wp), parameter :: jump = 1.0e-2_wp
    !> Parts of the response: even harmonics of a symmetric one, and what it changes by where it does
    !> not jump.
@@ -194,11 +194,11 @@ contains
       logical, intent(in) :: on_branch
       type(bifurcation_type) :: found
       real(wp) :: distance(2), error
-      integer :: class
+      integer :: passed
 
-      class = crossing
-      if (crossing == crossing_several) class = crossing_plus
-      distance = [distance_of(low%point, class), distance_of(high%point, class)]
+      passed = crossing
+      if (crossing == crossing_several) passed = crossing_plus
+      distance = [distance_of(low%point, passed), distance_of(high%point, passed)]
       associate (nearest => merge(1, 2, distance(1) <= distance(2)))
          if (nearest == 1) then
             call take(low%point)
@@ -222,7 +222,7 @@ contains
          found%omega = point%omega
          found%amplitude = point%amplitude
          found%coefficients = point%coefficients
-         found%multiplier = critical_multiplier(point%multipliers, class)
+         found%multiplier = critical_multiplier(point%multipliers, passed)
          error = maxval(point%multiplier_error, &
                         mask=abs(point%multipliers - found%multiplier) <= 0.0_wp)
          if (slope > 0.0_wp .and. error < huge(1.0_wp)) found%error = error/slope

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ..result import Result
 
 __all__ = ["CURVE", "FAILED", "PALETTE", "STATE_COLOURS", "UNDECIDED", "UNSTABLE", "Floats",
-           "Picture", "ScaledFormatter", "Source", "as_result", "label", "label_y", "largest_of", "new_figure", "pair_name",
-           "scale", "scale_axis", "tidy", "units_of"]
+           "Picture", "ScaledFormatter", "Source", "as_result", "label", "label_y", "largest_of",
+           "new_figure", "pair_name", "scale", "scale_axis", "tidy", "units_of"]
 
 Floats = NDArray[np.float64]
 #: What every plot takes: a result, or the path of its file.
