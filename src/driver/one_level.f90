@@ -79,6 +79,11 @@ contains
          message = message//' or '//trim(finer(system))//' for the points above'
          ! Costs solutions of its own: worth it only where the run gave nothing at all.
          if (state%n_converged == 0) call explain_failure(system, solver%method, message)
+         if (solver%method%rippled) then
+            message = message//"; some were solved with friction that is ripple, not slip "// &
+                      "(dissipation short of mu N |v| by more than 1/H): take "// &
+                      "contact%law = 'rigid' where friction acts on mass"
+         end if
          message = 'not converged: '//message
       end associate
    end subroutine describe

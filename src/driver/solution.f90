@@ -24,6 +24,7 @@ module fw_solution
    use fw_pseudo_time, only: pseudo_time_solver
    use fw_recovery, only: carry_solution
    use fw_unbounded, only: is_lost_in_round_off
+   use fw_slip_gap, only: lacks_friction
    use fw_solver_options, only: pseudo_time_options
    use fw_solver_options, only: jacobian_difference
    use fw_solver_options, only: solver_kinsol
@@ -48,6 +49,8 @@ module fw_solution
       type(balance_state), allocatable :: whole
       !> A solution was refused because it grows without bound.
       logical :: unbounded = .false.
+      !> A solution was refused because its friction is ripple.
+      logical :: rippled = .false.
       !> Why the last pseudo-time solution failed.
       character(:), allocatable :: message
    contains
@@ -209,11 +212,15 @@ contains
       type(balance_state), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:)
       type(solver_report), intent(inout) :: report
-      logical :: lost
+      logical :: lost, rippled
 
       lost = is_lost_in_round_off(system, x)
       self%unbounded = self%unbounded .or. lost
       report%converged = is_lasting(system) .and. .not. lost
+      if (.not. report%converged) return
+      rippled = lacks_friction(system, x)
+      self%rippled = self%rippled .or. rippled
+      report%converged = .not. rippled
    end subroutine refuse_unreal
 
 end module fw_solution
