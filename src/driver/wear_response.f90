@@ -174,6 +174,7 @@ contains
 
       call new_wear_system(run%balance, case%contact, case%wear%coefficient, &
                            case%wear%law == wear_energy, run%system)
+      run%balance%interrupt => run%recorder%observer
       run%system%interrupt => run%recorder%observer
       call first_state(run%system, run%solver%x, point, run%state)
       associate (march => run%march)
@@ -193,7 +194,7 @@ contains
       end associate
       ! Where check_steps starts once more.
       run%first = run%state
-      run%first_omega = run%system%frequency()
+      run%first_omega = run%system%vibration%frequency()
    end subroutine start_march
 
    !> The march to its end, and why it ended.
@@ -280,7 +281,7 @@ contains
       recorder%n_rows = restart%n_rows
       call restart%give_control(march)
       state = restart%state
-      call system%set_frequency(restart%omega, error)
+      call system%set_parameter(restart%omega, error)
       if (allocated(error)) return
       call stand_at(system, state%x)
    end subroutine resume
@@ -337,7 +338,7 @@ contains
                                         first=march%resonance%first)
       ! From where the run itself began, its frequency included.
       end_state = first
-      call system%set_frequency(first_omega, error)
+      call system%set_parameter(first_omega, error)
       if (allocated(error)) return
       call stand_at(system, end_state%x)
       call halved%run(system, end_state, silent, error)
@@ -402,7 +403,7 @@ contains
       type(wear_state), intent(out) :: state
 
       ! Vibration, then depths: the unknowns of the coupled system.
-      state%x = [x, system%depth]
+      state%x = [x, system%vibration%depth]
       call stand_at(system, state%x)
       state%rate = system%rate
       state%residual = point%residual
@@ -434,7 +435,7 @@ contains
 
       go_on = .false.
       n = system%n_vibration()
-      point%omega = system%frequency()
+      point%omega = system%vibration%frequency()
       point%cycles = state%cycles
       point%depth = state%x(n + 1:)
       point%wear_rate = state%rate
@@ -443,12 +444,12 @@ contains
       point%iterations = iterations
       point%residual = state%residual
       ! A state of the march is judged as any point is.
-      point%converged = is_lasting(system%balance_state)
+      point%converged = is_lasting(system%vibration)
       point%converged = point%converged .and. state%residual <= self%case%solver%tolerance
-      call recover_point(system%balance_state, state%x(:n), self%case%harmonics%n_harmonics, &
+      call recover_point(system%vibration, state%x(:n), self%case%harmonics%n_harmonics, &
                          self%case%output%contact, point)
       if (self%case%output%histories) then
-         call recover_histories(system%balance_state, size(system%balance, 1), state%x(:n), &
+         call recover_histories(system%vibration, size(system%vibration%balance, 1), state%x(:n), &
                                 self%case%harmonics%n_harmonics, point)
       end if
       call system_clock(clock, rate)

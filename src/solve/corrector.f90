@@ -18,6 +18,7 @@ module fw_corrector
    use fw_linear_step, only: linear_step_type
    use fw_newton, only: solver_report
    use fw_parameter_system, only: parameter_system
+   use fw_plane_system, only: plane_system
    use fw_solver_options, only: linear_auto
    use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_options
@@ -31,6 +32,7 @@ module fw_corrector
       type(linear_step_type) :: linear
       !> What it takes where the derivative by x alone is close to singular.
       type(bordered_type) :: bordered
+      type(plane_system) :: plane
       type(metric_type) :: metric
       !> Take no risk, whatever it costs: direct solutions of the bordered matrix, and corrections
       !> cut short where the residual does not decrease. For corners.
@@ -220,14 +222,22 @@ contains
       real(wp), intent(out), contiguous :: step(:)
       real(wp), intent(out) :: dp
       logical, intent(out) :: done
+      real(wp) :: residuals(system%n + 1), steps(system%n + 1)
       logical :: singular
 
       dp = 0.0_wp
-      call self%bordered%prepare(system, next%x, here%t, &
-                                 here%t_p*(self%metric%x_scale/self%metric%p_scale)**2, singular)
+      ! Through the point where the correction stands: its condition is met.
+      call self%plane%cut(system, next%x, next%p, here%t, &
+                          here%t_p*(self%metric%x_scale/self%metric%p_scale)**2)
+      call self%bordered%prepare(self%plane, singular)
       self%linear%factorizations = self%linear%factorizations + 1
       done = .not. singular
-      if (done) call self%bordered%solve(system, r, 0.0_wp, step, dp)
+      if (.not. done) return
+      residuals(:system%n) = r
+      residuals(system%n + 1) = 0.0_wp
+      call self%bordered%solve(self%plane, residuals, steps)
+      step = steps(:system%n)
+      dp = steps(system%n + 1)
    end subroutine bordered_step
 
    !> Unit tangent at a point of the branch where the system stands, in the direction of another

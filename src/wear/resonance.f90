@@ -68,7 +68,7 @@ contains
       type(trial_type) :: low, best, high
       type(solver_report) :: report
 
-      best%omega = system%frequency()
+      best%omega = system%vibration%frequency()
       best%state = state
       ! The system stands at the state already.
       best%amplitude = amplitude_of(self, system, state)
@@ -81,7 +81,7 @@ contains
       if (allocated(error)) return
       self%spacing = spacing_of(low, best, high, self%spacing)
       call take_vertex(self, stepper, system, low, best, high, iterations, error)
-      if (.not. allocated(error)) call system%set_frequency(best%omega, error)
+      if (.not. allocated(error)) call system%set_parameter(best%omega, error)
       if (allocated(error)) return
       ! The system is left at the best: its forces are those of this very state.
       call stepper%settle(system, best%state, report)
@@ -218,7 +218,7 @@ contains
       trial%state = from%state
       ! Outside of the range: an amplitude below zero, as of a solution that failed.
       if (omega < follow_range(1)*self%first .or. omega > follow_range(2)*self%first) return
-      call system%set_frequency(omega, error)
+      call system%set_parameter(omega, error)
       if (allocated(error)) return
       call stepper%settle(system, trial%state, report)
       iterations = iterations + report%iterations
@@ -232,7 +232,7 @@ contains
       type(wear_state), intent(in) :: state
       type(point_type) :: point
 
-      call recover_point(system%balance_state, state%x(:system%n_vibration()), self%n_harmonics, &
+      call recover_point(system%vibration, state%x(:system%n_vibration()), self%n_harmonics, &
                          .false., point)
       amplitude = point%amplitude(1)
    end function amplitude_of

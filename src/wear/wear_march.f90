@@ -163,7 +163,7 @@ contains
          self%complete = .true.
          if (self%n_steps == 0) then
             self%ending = 'no pair slips under pressure: nothing wears'
-            if (maxval(system%work(system%problem%forces%pairs)%slip) > 0.0_wp) then
+            if (system%slides()) then
                self%ending = 'no pair has friction: by energy nothing wears'
             end if
          else

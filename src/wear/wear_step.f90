@@ -154,10 +154,8 @@ contains
       integer :: n
 
       n = system%n_vibration()
-      ! With the depths held the system is the balance alone, as any solver takes it.
-      call system%hold_depths(state%x(n + 1:))
-      call self%newton%solve(system%balance_state, state%x(:n), report)
-      call system%free_depths()
+      system%vibration%depth = state%x(n + 1:)
+      call self%newton%solve(system%vibration, state%x(:n), report)
       call system%update_rate()
       state%rate = system%rate
       state%residual = report%residual

@@ -6,18 +6,19 @@
 !> then one depth per pair. Where a pair sticks or stays open, its depth leaves the linear problem:
 !> it equals the base. The derivative dR/dw = B^T G eps e_0 and that of the rate are exact.
 !>
-!> The preconditioner keeps the coupling of both: with M the block diagonal preconditioner of the
-!> balance, B = dR/dw and C = d(wear equations)/dq, it solves [M B; C D] through the Schur
-!> complement D - C M^-1 B, whose order is the number of pairs that wear.
+!> The depths are further unknowns of an augmented system, the growth of each its condition; at held
+!> depths the vibration is solved by itself, as any balance.
 module fw_wear_system
-   use fw_kinds, only: wp
+   use fw_augmented_system, only: augmented_system
+   use fw_balance_state, only: balance_state
+   use fw_complex_form, only: amplitudes_of
    use fw_contact_data, only: contact_type
+   use fw_error, only: error_type
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_stuck
-   use fw_balance_state, only: balance_state
    use fw_fourier, only: to_complex
+   use fw_kinds, only: wp
    use fw_lapack, only: zgemm
-   use fw_linalg, only: lu_type
    implicit none (type, external)
    private
 
@@ -25,7 +26,9 @@ module fw_wear_system
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
-   type, extends(balance_state) :: wear_system
+   type, extends(augmented_system) :: wear_system
+      !> The inner system; its depths are those of the last point.
+      type(balance_state), pointer :: vibration => null()
       !> Cycles of the step, and the depth that it starts from (n_pairs) [length].
       real(wp) :: cycles = 0.0_wp
       real(wp), allocatable :: base(:)
@@ -37,40 +40,37 @@ module fw_wear_system
       real(wp), allocatable, private :: normal(:)
       !> Makes a force of a depth: the same, or where there is none the tangential one (n_pairs).
       real(wp), allocatable, private :: weight(:)
-      !> Pairs whose depth stays in the linear problem (first n_wearing entries).
-      integer, private :: n_wearing = 0
+      !> Pairs whose depth stays in the linear problem (first n_linear_extra entries).
       integer, allocatable, private :: wearing(:)
-      !> Unknowns of the balance in the linear problem.
-      integer, private :: n_balance = 0
-      !> Preconditioner: M^-1 B and the rows of C M^-1 per harmonic, factors of the complement.
-      complex(wp), allocatable, private :: columns(:, :, :), stiff(:, :)
-      type(lu_type), private :: complement
-      real(wp), allocatable, private :: adjusted(:), solved(:)
+      !> Displacements of vectors of the preconditioner (n_coordinates, n_retained, vectors), and
+      !> Z_n of those of one harmonic (n_coordinates, vectors).
+      complex(wp), allocatable, private :: amplitudes(:, :, :), balance(:, :)
    contains
       procedure :: begin_step
       procedure :: n_vibration
-      procedure :: hold_depths
-      procedure :: free_depths
       procedure :: update_rate
       procedure :: force_of_depth
       procedure :: mean_pressure
       procedure :: compression
       procedure :: depth_scale
-      procedure :: residual
-      procedure :: linearize
-      procedure :: reduce
-      procedure :: expand
-      procedure :: apply
-      procedure :: build_preconditioner
-      procedure :: preconditioner_fits
-      procedure :: precondition
+      procedure :: slides
+      procedure :: take
+      procedure :: conditions
+      procedure :: choose
+      procedure :: settle
+      procedure :: reduce_rows
+      procedure :: expand_extra
+      procedure :: add_columns
+      procedure :: rows
+      procedure :: subtract_rows
+      procedure :: corner
    end type wear_system
 
 contains
 
-   !> Add wear to a balance.
+   !> Add wear to a balance, which has to live as long.
    subroutine new_wear_system(balance, contact, coefficient, by_energy, self)
-      type(balance_state), intent(in) :: balance
+      type(balance_state), intent(inout), target :: balance
       type(contact_type), intent(in) :: contact
       !> Wear coefficient k_w [area/force].
       real(wp), intent(in) :: coefficient
@@ -78,17 +78,15 @@ contains
       logical, intent(in) :: by_energy
       type(wear_system), intent(out) :: self
       real(wp) :: tangential(contact%n_pairs)
-      integer :: k
 
-      self%balance_state = balance
-      do k = 1, size(self%work)
-         call self%work(k)%renew_fft()
-      end do
-      call self%free_depths()
-      call self%work(self%problem%forces%pairs)%measure_slip()
-      associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)
-         tangential = maxval(p%stiffness(:, 1:2), dim=2)
-         self%normal = p%stiffness(:, 3)
+      self%vibration => balance
+      call self%augment(balance, contact%n_pairs)
+      associate (problem => balance%problem)
+         call balance%work(problem%forces%pairs)%measure_slip()
+         associate (p => problem%forces%entry(problem%forces%pairs)%law%prediction)
+            tangential = maxval(p%stiffness(:, 1:2), dim=2)
+            self%normal = p%stiffness(:, 3)
+         end associate
       end associate
       allocate (self%base(contact%n_pairs), self%rate(contact%n_pairs), source=0.0_wp)
       allocate (self%factor(contact%n_pairs), source=0.0_wp)
@@ -104,26 +102,8 @@ contains
    pure integer function n_vibration(self)
       class(wear_system), intent(in) :: self
 
-      n_vibration = self%problem%structure%n_coordinates*self%problem%fourier%n_coefficients
+      n_vibration = self%vibration%n
    end function n_vibration
-
-   !> Make the balance a system of its own, at given depths.
-   subroutine hold_depths(self, depth)
-      class(wear_system), intent(inout) :: self
-      real(wp), intent(in) :: depth(:)
-
-      self%n = self%n_vibration()
-      self%pins_normals = .true.
-      self%depth = depth
-   end subroutine hold_depths
-
-   !> Make the depths unknowns again.
-   subroutine free_depths(self)
-      class(wear_system), intent(inout) :: self
-
-      self%n = self%n_vibration() + self%problem%n_pairs
-      self%pins_normals = .false.
-   end subroutine free_depths
 
    !> State the step: residuals are those of its end from now on.
    subroutine begin_step(self, base, cycles)
@@ -138,8 +118,15 @@ contains
    subroutine update_rate(self)
       class(wear_system), intent(inout) :: self
 
-      self%rate = self%factor*self%work(self%problem%forces%pairs)%slip
+      self%rate = self%factor*self%vibration%work(self%vibration%problem%forces%pairs)%slip
    end subroutine update_rate
+
+   !> Whether a pair slides under pressure at the last point.
+   pure logical function slides(self)
+      class(wear_system), intent(in) :: self
+
+      slides = maxval(self%vibration%work(self%vibration%problem%forces%pairs)%slip) > 0.0_wp
+   end function slides
 
    !> Depths in the units in which residuals count them [force].
    pure function force_of_depth(self, depth) result(force)
@@ -153,31 +140,35 @@ contains
    !> Mean compressive force of every pair at the last point [force].
    pure function mean_pressure(self) result(pressure)
       class(wear_system), intent(in) :: self
-      real(wp) :: pressure(self%problem%n_pairs)
+      real(wp) :: pressure(self%n_extra)
 
-      pressure = self%problem%forces%entry(self%problem%forces%pairs)%law%prediction%load
-      if (any(self%problem%joint%row(3, :) > 0)) pressure = merge( &
-         -self%work(self%problem%forces%pairs)%force(:, 3, 1), pressure, &
-            self%problem%joint%row(3, :) > 0)
+      associate (problem => self%vibration%problem)
+         associate (pairs => problem%forces%pairs, row => problem%joint%row)
+            pressure = problem%forces%entry(pairs)%law%prediction%load
+            where (row(3, :) > 0) pressure = -self%vibration%work(pairs)%force(:, 3, 1)
+         end associate
+      end associate
    end function mean_pressure
 
    !> Largest elastic compression of a pair at the last point: the depth that would unload it
    !> alone [length]. Pairs pressed by dead loads do not count; zero where all are.
    pure real(wp) function compression(self)
       class(wear_system), intent(in) :: self
-      real(wp) :: pressure(self%problem%n_pairs), stiffness
+      real(wp) :: pressure(self%n_extra), stiffness
       integer :: i
 
       compression = 0.0_wp
       pressure = self%mean_pressure()
-      do i = 1, self%problem%n_pairs
-         if (self%problem%joint%row(3, i) == 0) cycle
-         stiffness = self%normal(i)
-         if (self%problem%forces%entry(self%problem%forces%pairs)%law%prediction%takes_balance) then
-            stiffness = self%problem%structure%static_stiffness(self%problem%coordinate_of(3, i))
-         end if
-         if (stiffness > 0.0_wp) compression = max(compression, pressure(i)/stiffness)
-      end do
+      associate (problem => self%vibration%problem)
+         do i = 1, self%n_extra
+            if (problem%joint%row(3, i) == 0) cycle
+            stiffness = self%normal(i)
+            if (takes_balance(self)) then
+               stiffness = problem%structure%static_stiffness(problem%coordinate_of(3, i))
+            end if
+            if (stiffness > 0.0_wp) compression = max(compression, pressure(i)/stiffness)
+         end do
+      end associate
    end function compression
 
    !> Depth with which steps may start [length]: the compression, or the slide of a pair under a
@@ -189,307 +180,279 @@ contains
       if (depth_scale <= 0.0_wp) depth_scale = maxval(self%mean_pressure()/self%weight)
    end function depth_scale
 
-   subroutine residual(self, x, r)
+   !> Hold the vibration at depths; any will do.
+   subroutine take(self, z, error)
       class(wear_system), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:)
-      real(wp), intent(out), contiguous :: r(:)
-      integer :: n
+      real(wp), intent(in) :: z(:)
+      type(error_type), allocatable, intent(out) :: error
 
-      n = self%n_vibration()
-      self%depth = x(n + 1:)
-      call self%balance_state%residual(x(:n), r(:n))
+      associate (unused => error)
+      end associate
+      self%vibration%depth = z
+   end subroutine take
+
+   subroutine conditions(self, q, z, g)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in) :: q(:), z(:)
+      real(wp), intent(out) :: g(:)
+
+      associate (unused => q)
+      end associate
       call self%update_rate()
-      r(n + 1:) = self%weight*(x(n + 1:) - self%base - self%cycles*self%rate)
-   end subroutine residual
+      g = self%weight*(z - self%base - self%cycles*self%rate)
+   end subroutine conditions
 
-   subroutine linearize(self, n_linear)
+   !> The depth of a pair that always bears moves its normal component: that one stays, too.
+   subroutine choose(self)
       class(wear_system), intent(inout) :: self
-      integer, intent(out) :: n_linear
       integer :: i
 
-      call self%balance_state%linearize(self%n_balance)
-      self%n_wearing = 0
-      do i = 1, self%problem%n_pairs
-         if (self%work(self%problem%forces%pairs)%linear_state(i) /= pair_mixed) cycle
-         self%n_wearing = self%n_wearing + 1
-         self%wearing(self%n_wearing) = i
-      end do
-      n_linear = self%n_balance + self%n_wearing
-      self%active%n_linear = n_linear
-   end subroutine linearize
+      self%vibration%pins_normals = .false.
+      call self%vibration%linearize(self%n_linear_inner)
+      self%vibration%pins_normals = .true.
+      self%n_linear_extra = 0
+      associate (work => self%vibration%work(self%vibration%problem%forces%pairs))
+         do i = 1, self%n_extra
+            if (work%linear_state(i) /= pair_mixed) cycle
+            self%n_linear_extra = self%n_linear_extra + 1
+            self%wearing(self%n_linear_extra) = i
+         end do
+      end associate
+   end subroutine choose
 
-   subroutine reduce(self, r, rhs)
+   !> Depths that leave the linear problem take their residuals first; those that stay act on no
+   !> row that leaves it.
+   subroutine settle(self, g, dz, r)
       class(wear_system), intent(inout) :: self
-      real(wp), intent(in), contiguous :: r(:)
+      real(wp), intent(in) :: g(:), dz(:)
+      real(wp), intent(inout), contiguous :: r(:)
+      integer :: i, m, row
+
+      associate (unused => dz)
+      end associate
+      associate (problem => self%vibration%problem, &
+                 work => self%vibration%work(self%vibration%problem%forces%pairs))
+         ! `reduce` finds there what the coordinates that are solved at once do to the inputs.
+         work%input = 0.0_wp
+         if (.not. problem%fourier%has_constant()) return
+         m = problem%structure%n_coordinates
+         do i = 1, self%n_extra
+            row = problem%joint%row(3, i)
+            if (row == 0 .or. work%linear_state(i) /= pair_stuck) cycle
+            call problem%incidence%scatter_row(row, problem%incidence%identity, m, m, &
+                                               -self%normal(i)/self%weight(i), g(i:i), r)
+         end do
+      end associate
+   end subroutine settle
+
+   subroutine reduce_rows(self, r, g, rhs)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: r(:), g(:)
       real(wp), intent(out), contiguous :: rhs(:)
-      integer :: n, j, i
+      integer :: i, j
 
-      n = self%n_vibration()
-      self%work(self%problem%forces%pairs)%input = 0.0_wp
-      call settle_depths(self, r)
-      call self%balance_state%reduce(self%adjusted, rhs(:self%n_balance))
-      associate (work => self%work(self%problem%forces%pairs))
-         do j = 1, self%n_wearing
+      associate (work => self%vibration%work(self%vibration%problem%forces%pairs), unused => r)
+         do j = 1, self%n_linear_extra
             i = self%wearing(j)
-            ! The inputs hold what the coordinates that are solved at once do to the prediction.
-            rhs(self%n_balance + j) = -r(n + i) + self%weight(i)*self%cycles*self%factor(i)* &
-                                      dot_product(work%slip_derivative(:, i), work%input(:, i))
+            rhs(j) = -g(i) + self%weight(i)*self%cycles*self%factor(i)* &
+                     dot_product(work%slip_derivative(:, i), work%input(:, i))
          end do
       end associate
-   end subroutine reduce
+   end subroutine reduce_rows
 
-   !> Residuals of the balance after the depths that leave the linear problem have taken theirs.
-   subroutine settle_depths(self, r)
-      type(wear_system), intent(inout) :: self
-      real(wp), intent(in) :: r(:)
-      integer :: i, m, n, row
-
-      m = self%problem%structure%n_coordinates
-      n = self%n_vibration()
-      self%adjusted = r(:n)
-      if (.not. self%problem%fourier%has_constant()) return
-      do i = 1, self%problem%n_pairs
-         row = self%problem%joint%row(3, i)
-         if (row == 0 .or. self%work(self%problem%forces%pairs)%linear_state(i) /= pair_stuck) cycle
-         call self%problem%incidence%scatter_row(row, self%problem%incidence%identity, m, m, &
-                                         -self%normal(i)/self%weight(i), r(n + i:n + i), &
-                                         self%adjusted)
-      end do
-   end subroutine settle_depths
-
-   subroutine expand(self, r, solution, step)
+   subroutine expand_extra(self, g, solution, dz)
       class(wear_system), intent(inout) :: self
-      real(wp), intent(in), contiguous :: r(:), solution(:)
-      real(wp), intent(out), contiguous :: step(:)
-      integer :: n, j
+      real(wp), intent(in) :: g(:), solution(:)
+      real(wp), intent(out) :: dz(:)
+      integer :: j
 
-      n = self%n_vibration()
-      call settle_depths(self, r)
-      call self%balance_state%expand(self%adjusted, solution(:self%n_balance), step(:n))
-      step(n + 1:) = -r(n + 1:)/self%weight
-      do j = 1, self%n_wearing
-         step(n + self%wearing(j)) = solution(self%n_balance + j)
+      dz = -g/self%weight
+      do j = 1, self%n_linear_extra
+         dz(self%wearing(j)) = solution(j)
       end do
-   end subroutine expand
+   end subroutine expand_extra
 
-   subroutine apply(self, vector, product)
+   !> Depths act on the forces of their pairs: product + sum of B^T G eps e_0 depth.
+   subroutine add_columns(self, dz, product)
       class(wear_system), intent(inout) :: self
-      real(wp), intent(in), contiguous :: vector(:)
+      real(wp), intent(in) :: dz(:)
+      real(wp), intent(inout), contiguous :: product(:)
+      integer :: c, i, j, nc
+
+      associate (problem => self%vibration%problem, active => self%vibration%active)
+         nc = problem%fourier%n_coefficients
+         do j = 1, self%n_linear_extra
+            i = self%wearing(j)
+            if (problem%joint%row(3, i) == 0 .or. abs(dz(j)) <= 0.0_wp) cycle
+            do c = 1, 3
+               if (problem%joint%row(c, i) == 0) cycle
+               call problem%incidence%scatter_row( &
+                  problem%joint%row(c, i), active%place, active%n_active, active%n_active, &
+                  self%normal(i)*dz(j), self%vibration%work(problem%forces%pairs)%jacobian( &
+                  2*nc + 1, (c - 1)*nc + 1:c*nc, i), product)
+            end do
+         end do
+      end associate
+   end subroutine add_columns
+
+   !> The product of the balance has left the inputs of the pairs.
+   subroutine rows(self, v, dz, product)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: v(:), dz(:)
       real(wp), intent(out), contiguous :: product(:)
-      integer :: i, j, n
+      integer :: i, j
 
-      n = self%n_balance
-      call self%balance_state%apply(vector(:n), product(:n))
-      associate (work => self%work(self%problem%forces%pairs))
-         do j = 1, self%n_wearing
+      associate (work => self%vibration%work(self%vibration%problem%forces%pairs), unused => v)
+         do j = 1, self%n_linear_extra
             i = self%wearing(j)
-            call add_depth_column(self, i, vector(n + j), product)
-            product(n + j) = self%weight(i)*(vector(n + j) - self%cycles*self%factor(i)*( &
-                             dot_product(work%slip_derivative(:, i), work%input(:, i)) + &
-                             depth_slope(self, i)*vector(n + j)))
+            product(j) = self%weight(i)*(dz(j) - self%cycles*self%factor(i)*( &
+                         dot_product(work%slip_derivative(:, i), work%input(:, i)) + &
+                         depth_slope(self, i)*dz(j)))
          end do
       end associate
-   end subroutine apply
+   end subroutine rows
 
    !> dS/dw of a pair at fixed displacements.
    pure real(wp) function depth_slope(self, pair) result(slope)
-      type(wear_system), intent(in) :: self
+      class(wear_system), intent(in) :: self
       integer, intent(in) :: pair
 
       slope = 0.0_wp
-      if (self%problem%joint%row(3, pair) == 0) return
-      slope = self%normal(pair)* &
-              self%work(self%problem%forces%pairs)%slip_derivative(2* &
-                 self%problem%fourier%n_coefficients + 1, pair)
+      associate (problem => self%vibration%problem)
+         if (problem%joint%row(3, pair) == 0) return
+         slope = self%normal(pair)*self%vibration%work(problem%forces%pairs)%slip_derivative( &
+                 2*problem%fourier%n_coefficients + 1, pair)
+      end associate
    end function depth_slope
 
-   !> product = product + B^T G eps e_0 of one pair, times its depth.
-   subroutine add_depth_column(self, pair, depth, product)
-      type(wear_system), intent(in) :: self
-      integer, intent(in) :: pair
-      real(wp), intent(in) :: depth
-      real(wp), intent(inout) :: product(:)
-      integer :: c, nc
-
-      if (self%problem%joint%row(3, pair) == 0) return
-      nc = self%problem%fourier%n_coefficients
-      do c = 1, 3
-         if (self%problem%joint%row(c, pair) == 0) cycle
-         call self%problem%incidence%scatter_row( &
-            self%problem%joint%row(c, pair), self%active%place, self%active%n_active, &
-               self%active%n_active, &
-            self%normal(pair)*depth, &
-            self%work(self%problem%forces%pairs)%jacobian(2*nc + 1, (c - 1)*nc + 1:c*nc, pair), &
-               product)
-      end do
-   end subroutine add_depth_column
-
-   subroutine build_preconditioner(self)
+   subroutine corner(self, matrix)
       class(wear_system), intent(inout) :: self
-      real(wp), allocatable :: column(:)
-      integer :: h, i, j, na
-      logical :: singular
+      real(wp), intent(out) :: matrix(:, :)
+      integer :: i, j
 
-      call self%balance_state%build_preconditioner()
-      if (self%n_wearing == 0) return
-      na = self%active%n_active
-      call reserve(self)
-      allocate (column(self%n_balance))
-      call self%complement%reserve(self%n_wearing)
-      associate (s => self%complement%matrix)
-         s(:self%n_wearing, :self%n_wearing) = 0.0_wp
-         do j = 1, self%n_wearing
-            i = self%wearing(j)
-            column = 0.0_wp
-            call add_depth_column(self, i, 1.0_wp, column)
-            call harmonics_of(self, na, column, self%columns(:, j, :))
-            s(j, j) = self%weight(i)*(1.0_wp - self%cycles*self%factor(i)*depth_slope(self, i))
-         end do
-         do h = 1, self%problem%fourier%n_retained
-            do j = 1, self%n_wearing
-               call self%preconditioner%harmonic(h)%solve(self%columns(:na, j, h))
-            end do
-            if (takes_balance(self)) call multiply_columns(self, h)
-            call subtract_rows(self, h, self%n_wearing, self%columns(:, :, h), s)
-         end do
-      end associate
-      call self%complement%factor(singular)
-   end subroutine build_preconditioner
-
-   !> The complement holds the cycles of its step and the sliding at its point: it is built anew.
-   pure logical function preconditioner_fits(self)
-      class(wear_system), intent(in) :: self
-
-      preconditioner_fits = self%n_wearing == 0
-      if (preconditioner_fits) preconditioner_fits = self%balance_state%preconditioner_fits()
-   end function preconditioner_fits
-
-   subroutine reserve(self)
-      type(wear_system), intent(inout) :: self
-      integer :: m, n
-
-      m = self%problem%structure%n_coordinates
-      n = self%n_wearing
-      if (allocated(self%columns)) then
-         if (size(self%columns, 2) == n) return
-         deallocate (self%columns, self%stiff)
-      end if
-      allocate (self%columns(m, n, self%problem%fourier%n_retained), self%stiff(m, max(n, 1)))
-   end subroutine reserve
-
-   !> Harmonics of active coordinates as complex rows.
-   pure subroutine harmonics_of(self, na, vector, harmonics)
-      type(wear_system), intent(in) :: self
-      integer, intent(in) :: na
-      real(wp), intent(in) :: vector(na, *)
-      complex(wp), intent(inout) :: harmonics(:, :)
-      integer :: h, k
-
-      do h = 1, self%problem%fourier%n_retained
-         k = self%problem%fourier%column(h)
-         if (self%problem%fourier%harmonic(h) == 0) then
-            harmonics(:na, h) = cmplx(vector(:, k), kind=wp)
-         else
-            harmonics(:na, h) = cmplx(vector(:, k), -vector(:, k + 1), wp)
-         end if
+      matrix = 0.0_wp
+      do j = 1, self%n_linear_extra
+         i = self%wearing(j)
+         matrix(j, j) = self%weight(i)* &
+                        (1.0_wp - self%cycles*self%factor(i)*depth_slope(self, i))
       end do
-   end subroutine harmonics_of
+   end subroutine corner
 
    !> Whether the pairs take the balance: their predictions need Z_n z.
    pure logical function takes_balance(self)
-      type(wear_system), intent(in) :: self
+      class(wear_system), intent(in) :: self
 
-      takes_balance = self%problem%forces%entry( &
-         self%problem%forces%pairs)%law%prediction%takes_balance
+      associate (forces => self%vibration%problem%forces)
+         takes_balance = forces%entry(forces%pairs)%law%prediction%takes_balance
+      end associate
    end function takes_balance
 
-   !> stiff = Z_n columns of one harmonic, rows in use.
-   subroutine multiply_columns(self, h)
-      type(wear_system), intent(inout) :: self
-      integer, intent(in) :: h
+   !> Of the balance that the pairs take, the structure alone.
+   subroutine subtract_rows(self, v, rows, is_built)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: v(:, :)
+      real(wp), intent(inout) :: rows(:, :)
+      logical, intent(in) :: is_built
+      integer :: h, j
+
+      call reserve(self, size(v, 2))
+      associate (b => self%vibration, fourier => self%vibration%problem%fourier)
+         do j = 1, size(v, 2)
+            call amplitudes_of(fourier%harmonic, fourier%column, b%active%n_active, v(:, j), &
+                               size(self%amplitudes, 1), self%amplitudes(:, :, j))
+         end do
+         if (takes_balance(self) .and. is_built) then
+            call b%problem%structure%multiply_active(b%structure_state, v, b%scratch%active_out)
+            call to_complex(fourier, size(b%scratch%active_out, 1), b%scratch%active_out, &
+                            b%scratch%complex_out)
+         end if
+         do h = 1, fourier%n_retained
+            if (takes_balance(self)) then
+               if (is_built) then
+                  self%balance(:, 1) = b%scratch%complex_out(:, h)
+               else
+                  call multiply_block(self, h, size(v, 2))
+               end if
+            end if
+            call subtract_harmonic(self, h, size(v, 2), self%amplitudes(:, h, :), rows)
+         end do
+      end associate
+   end subroutine subtract_rows
+
+   !> Room for the displacements of several vectors.
+   subroutine reserve(self, n)
+      class(wear_system), intent(inout) :: self
+      integer, intent(in) :: n
+      integer :: m
+
+      if (allocated(self%amplitudes)) then
+         if (size(self%amplitudes, 3) >= n) return
+         deallocate (self%amplitudes, self%balance)
+      end if
+      associate (problem => self%vibration%problem)
+         m = problem%structure%n_coordinates
+         allocate (self%amplitudes(m, problem%fourier%n_retained, n), source=zero)
+         allocate (self%balance(m, n), source=zero)
+      end associate
+   end subroutine reserve
+
+   !> balance = Z_n amplitudes of one harmonic, rows in use.
+   subroutine multiply_block(self, h, n)
+      class(wear_system), intent(inout) :: self
+      integer, intent(in) :: h, n
       complex(wp), allocatable :: stiffness(:, :)
 
-      allocate (stiffness(self%active%n_used, self%active%n_active))
-      call self%problem%structure%active_block(self%structure_state, h, stiffness)
-      call zgemm('N', 'N', self%active%n_used, self%n_wearing, self%active%n_active, one, &
-                 stiffness, &
-                 self%active%n_used, self%columns(1, 1, h), size(self%columns, 1), zero, &
-                    self%stiff, &
-                 size(self%stiff, 1))
-   end subroutine multiply_columns
+      associate (b => self%vibration, active => self%vibration%active)
+         allocate (stiffness(active%n_used, active%n_active))
+         call b%problem%structure%active_block(b%structure_state, h, stiffness)
+         call zgemm('N', 'N', active%n_used, n, active%n_active, one, stiffness, active%n_used, &
+                    self%amplitudes(1, h, 1), size(self%amplitudes, 1)*size(self%amplitudes, 2), &
+                    zero, self%balance, size(self%balance, 1))
+      end associate
+   end subroutine multiply_block
 
-   !> rows = rows - C z for displacements z of one harmonic (active coordinates, right-hand side);
-   !> where the pairs take the balance, Z_n z is in `stiff`.
-   subroutine subtract_rows(self, h, n_right, z, rows)
-      type(wear_system), intent(inout) :: self
+   !> rows = rows - C z for displacements z of one harmonic, active coordinates; where the pairs take
+   !> the balance, Z_n z is in `balance`.
+   subroutine subtract_harmonic(self, h, n_right, z, rows)
+      class(wear_system), intent(in) :: self
       integer, intent(in) :: h, n_right
+      !> (n_coordinates, n_right)
       complex(wp), intent(in) :: z(:, :)
       real(wp), intent(inout) :: rows(:, :)
       complex(wp) :: input(n_right), turn
       integer :: c, i, j, k, n, nc, place, row
 
-      nc = self%problem%fourier%n_coefficients
-      n = self%problem%fourier%harmonic(h)
-      associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction, &
-                 work => self%work(self%problem%forces%pairs))
-         do j = 1, self%n_wearing
-            i = self%wearing(j)
-            do c = 1, 3
-               row = self%problem%joint%row(c, i)
-               if (row == 0) cycle
-               ! d/dtau is a factor i n of the complex coefficient.
-               turn = one
-               if (p%order(c) > 0) turn = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
-               turn = turn*p%impedance_ratio(i, c, n, self%frequency())
-               call self%problem%incidence%gather_harmonic(row, h, self%active%place, &
-                                                           self%active%n_active, &
-                                                   turn*p%stiffness(i, c), z, input)
-               place = self%active%place(self%problem%incidence%coordinate_of(row))
-               if (p%takes_balance .and. place > 0) input = input - self%stiff(place, :n_right)
-               k = (c - 1)*nc + self%problem%fourier%column(h)
-               associate (g => work%slip_derivative(:, i), &
-                          scale => self%weight(i)*self%cycles*self%factor(i))
-                  rows(j, :n_right) = rows(j, :n_right) + scale*g(k)*real(input, wp)
-                  if (n > 0) rows(j, :n_right) = rows(j, :n_right) - scale*g(k + 1)*aimag(input)
-               end associate
+      associate (b => self%vibration, problem => self%vibration%problem)
+         nc = problem%fourier%n_coefficients
+         n = problem%fourier%harmonic(h)
+         associate (p => problem%forces%entry(problem%forces%pairs)%law%prediction, &
+                    work => b%work(problem%forces%pairs))
+            do j = 1, self%n_linear_extra
+               i = self%wearing(j)
+               do c = 1, 3
+                  row = problem%joint%row(c, i)
+                  if (row == 0) cycle
+                  ! d/dtau is a factor i n of the complex coefficient.
+                  turn = one
+                  if (p%order(c) > 0) turn = cmplx(0.0_wp, b%rate_unit(p)*n, wp)
+                  turn = turn*p%impedance_ratio(i, c, n, b%frequency())
+                  call problem%incidence%gather_harmonic(row, h, b%active%place, &
+                                                         b%active%n_active, &
+                                                         turn*p%stiffness(i, c), z, input)
+                  place = b%active%place(problem%incidence%coordinate_of(row))
+                  if (p%takes_balance .and. place > 0) then
+                     input = input - self%balance(place, :n_right)
+                  end if
+                  k = (c - 1)*nc + problem%fourier%column(h)
+                  associate (g => work%slip_derivative(:, i), &
+                             scale => self%weight(i)*self%cycles*self%factor(i))
+                     rows(j, :) = rows(j, :) + scale*g(k)*real(input, wp)
+                     if (n > 0) rows(j, :) = rows(j, :) - scale*g(k + 1)*aimag(input)
+                  end associate
+               end do
             end do
-         end do
+         end associate
       end associate
-   end subroutine subtract_rows
-
-   subroutine precondition(self, vector)
-      class(wear_system), intent(inout) :: self
-      real(wp), intent(inout), contiguous :: vector(:)
-      complex(wp), allocatable :: z(:, :, :)
-      real(wp) :: depth(self%n_wearing, 1)
-      integer :: h, k, na, n
-
-      n = self%n_balance
-      call self%balance_state%precondition(vector(:n))
-      if (self%n_wearing == 0) return
-      na = self%active%n_active
-      allocate (z(self%problem%structure%n_coordinates, 1, self%problem%fourier%n_retained))
-      call harmonics_of(self, na, vector, z(:, 1, :))
-      depth(:, 1) = vector(n + 1:)
-      if (takes_balance(self)) then
-         call self%problem%structure%multiply_active(self%structure_state, vector, &
-                                                     self%scratch%active_out)
-         call to_complex(self%problem%fourier, size(self%scratch%active_out, 1), &
-                         self%scratch%active_out, self%scratch%complex_out)
-      end if
-      do h = 1, self%problem%fourier%n_retained
-         self%stiff(:, 1) = self%scratch%complex_out(:, h)
-         call subtract_rows(self, h, 1, z(:, :, h), depth)
-      end do
-      call self%complement%solve(depth(:, 1))
-      vector(n + 1:) = depth(:, 1)
-      do h = 1, self%problem%fourier%n_retained
-         z(:na, 1, h) = matmul(self%columns(:na, :, h), depth(:, 1))
-         k = self%problem%fourier%column(h)
-         vector((k - 1)*na + 1:k*na) = vector((k - 1)*na + 1:k*na) - real(z(:na, 1, h), wp)
-         if (self%problem%fourier%harmonic(h) > 0) vector(k*na + 1:(k + 1)*na) &
-            = vector(k*na + 1:(k + 1)*na) + aimag(z(:na, 1, h))
-      end do
-   end subroutine precondition
+   end subroutine subtract_harmonic
 
 end module fw_wear_system
