@@ -89,7 +89,8 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    are and is checked. Everything is copied.
    n_dof * n_dof: "mass", "stiffness" (both required), "damping", "stiffness_rotation"; symmetric
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
-   n_pairs:       "contact/mu", "contact/gap", "contact/area"
+   n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
+                  "contact/tangential_stiffness", "contact/normal_stiffness"
    3 * n_pairs:   "contact/position", pair after pair */
 int fw_put_reals(fw_handle handle, const char *name, size_t n, const double *values);
 

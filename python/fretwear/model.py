@@ -271,8 +271,8 @@ class Model:
                 if name not in file:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
-                "mass", "stiffness", "damping", "stiffness_rotation", *_CONTACT, *_LOADS)
-                if name in file}
+                "mass", "stiffness", "damping", "stiffness_rotation", *_CONTACT, *_LOADS,
+                *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
             try:
                 return cls(
@@ -295,28 +295,23 @@ class Model:
         Raises
         ------
         InputError
-            The model has springs, constant normal loads or contact stiffnesses, which the format
-            does not hold.
+            The model has springs, which the format does not hold.
         OutputError
             The file cannot be written.
         """
-        self._refuse_what_no_file_holds()
+        if self.springs:
+            raise InputError("springs: a model file cannot hold them; leave them out and give them "
+                             "to the case")
+        pairs = {f"contact/{name}": values for name in _IN_NAMELIST
+                 if (values := getattr(self.contact, name, None)) is not None}
         try:
-            write_model_file(path, self._datasets(), title=self.title,
+            write_model_file(path, {**self._datasets(), **pairs}, title=self.title,
                              unit_system=self.unit_system)
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {error}") from None
 
-    def _refuse_what_no_file_holds(self) -> None:
-        kept_out = ["springs"] if self.springs else []
-        kept_out += [f"contact.{name}" for name in _IN_NAMELIST
-                     if self.contact is not None and getattr(self.contact, name) is not None]
-        if kept_out:
-            raise InputError(f"{', '.join(kept_out)}: a model file cannot hold it; leave it out "
-                             "and give it to the case")
-
     def _datasets(self) -> dict[str, NDArray[Any]]:
-        """Everything that a model file holds, by its names there."""
+        """What a session takes as parts of a model, by the names in a model file."""
         found: dict[str, NDArray[Any]] = dict(self._matrices)
         found.update((name, self._loads[argument]) for name, argument in _LOADS.items()
                      if argument in self._loads)
@@ -361,6 +356,7 @@ class Model:
 
 _CONTACT = tuple(f"contact/{name}" for name in (
     "side_1", "side_2", "mu", "gap", "area", "position", "patch"))
+#: Constants that a session takes as keys, so that one of another law is refused.
 _IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness")
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
@@ -394,7 +390,7 @@ def _contact_of(found: Mapping[str, Any]) -> ContactPairs | None:
     if "contact/side_1" not in found:
         return None
     parts = {name: found.get(f"contact/{name}") for name in (
-        "side_2", "mu", "gap", "area", "position")}
+        "side_2", "mu", "gap", "area", "position", *_IN_NAMELIST)}
     patch = found.get("contact/patch")
     names = None if patch is None else [_text(name) for name in patch]
     return ContactPairs(found["contact/side_1"], **parts, patch=names)

@@ -76,13 +76,14 @@ class Contact(TypedDict, total=False):
     #: [L^2] of a pair: from contact forces to pressure; only: analysis = 'wear' (default: of the
     #: file, else required for wear)
     area: ArrayLike
-    #: [F] constant compressive force; only: pairs without a normal dof (required with friction)
+    #: [F] constant compressive force; only: pairs without a normal dof (default: of the file, else
+    #: required with friction)
     normal_load: ArrayLike
     #: [F/L] contact stiffness; 0 with a parallel pair that has one, or without a tangential dof;
-    #: only: law = 'penalty' (required with tangential dofs)
+    #: only: law = 'penalty' (default: of the file, else required with tangential dofs)
     tangential_stiffness: ArrayLike
     #: [F/L] contact stiffness; 0 without a normal dof; only: law = 'penalty', 'regularised'
-    #: (required with normal dofs)
+    #: (default: of the file, else required with normal dofs)
     normal_stiffness: ArrayLike
     #: [L/s] sliding velocity du/dt at which tanh(1) = 76 % of the friction acts; only: law =
     #: 'regularised' (required with tangential dofs)

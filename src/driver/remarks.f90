@@ -9,6 +9,7 @@ module fw_remarks
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dpotrf
+   use fw_laws, only: law_words
    use fw_peak, only: found_bound
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
@@ -57,6 +58,7 @@ contains
    subroutine remark_input(case, remarks)
       type(case_type), intent(in) :: case
       type(remark_list), intent(inout) :: remarks
+      character(24) :: name
       real(wp), allocatable :: stiffness(:, :)
       logical :: acts
 
@@ -72,6 +74,10 @@ contains
          if (maxval(case%contact%mu) > highest_friction) call remarks%add('high friction', &
             'contact%mu is up to '//to_text(maxval(case%contact%mu))//': dry friction of '// &
             'metals is below '//to_text(highest_friction))
+         call case%contact%constants%first_unused(name)
+         if (len_trim(name) > 0) call remarks%add('constant not used', &
+            "the model gives contact%"//trim(name)//", which contact%law = '"// &
+            trim(law_words(case%contact%law))//"' does not take")
       end if
       acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
              any(abs(case%model%load_sine) > 0.0_wp)

@@ -97,7 +97,7 @@ contains
       logical, intent(in) :: needed
 
       call keys%bind(key('normal_load', 'constant compressive force', at_least(0.0_wp), 'F', &
-                         'n_pairs', absent='required with friction', &
+                         'n_pairs', absent=of_file//', else required with friction', &
                          only='pairs without a normal dof'), contact%normal_load, needed)
    end subroutine bind_normal_load
 
@@ -112,11 +112,13 @@ contains
       integer :: k
 
       contact%constants%law = contact%law
+      contact%constants%is_in_use = .true.
       call new_law(contact%law, law)
       call law%bind_keys(keys, contact, slides, closes)
       do k = 1, size(law_words)
          if (k == contact%law) cycle
          contact%constants%law = k
+         contact%constants%is_in_use = .false.
          call new_law(k, law)
          call law%bind_keys(keys, contact, .false., .false.)
       end do

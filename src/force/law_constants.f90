@@ -20,9 +20,15 @@ module fw_law_constants
    type :: law_constants
       !> Number of the law that declares keys now.
       integer :: law = 0
+      !> Whether that law is the one of the case, which takes what the model offers.
+      logical :: is_in_use = .true.
       type(constant_type), allocatable, private :: constant(:)
+      !> What the model has, with the number of the law that took it (0: none).
+      type(constant_type), allocatable, private :: offered(:)
    contains
       procedure :: bind
+      procedure :: offer
+      procedure :: first_unused
       procedure :: set
       procedure :: get
       procedure :: has
@@ -36,16 +42,51 @@ contains
       class(law_constants), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
       type(key_type), intent(in) :: key
+      !> Whether the case has to give it where the model does not.
       logical, intent(in) :: needed
       type(constant_type) :: new
+      integer :: k
 
       if (.not. allocated(self%constant)) allocate (self%constant(0))
-      if (place_of(self, key%name) > 0) return
+      if (place_of(self%constant, key%name) > 0) return
       new%name = key%name
       new%law = self%law
-      call keys%bind(key, new%values, needed)
+      k = 0
+      ! For another law the values of the model would look as if the case had given them.
+      if (self%is_in_use) k = place_of(self%offered, key%name)
+      if (k > 0) then
+         new%values = self%offered(k)%values
+         self%offered(k)%law = self%law
+      end if
+      call keys%bind(key, new%values, needed .and. k == 0)
       self%constant = [self%constant, new]
    end subroutine bind
+
+   !> What the model has for a constant (n_pairs), if anything: it holds where the case gives none.
+   subroutine offer(self, name, values)
+      class(law_constants), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(in) :: values(:)
+      type(constant_type) :: new
+
+      if (.not. allocated(values)) return
+      if (.not. allocated(self%offered)) allocate (self%offered(0))
+      new%name = name
+      new%values = values
+      self%offered = [self%offered, new]
+   end subroutine offer
+
+   !> A constant of the model that the law of the case has not taken; blank where there is none.
+   pure subroutine first_unused(self, name)
+      class(law_constants), intent(in) :: self
+      character(*), intent(out) :: name
+      integer :: k
+
+      name = ''
+      if (.not. allocated(self%offered)) return
+      k = findloc(self%offered%law, 0, dim=1)
+      if (k > 0) name = self%offered(k)%name
+   end subroutine first_unused
 
    !> Give a constant its values, without a reader.
    subroutine set(self, name, values)
@@ -57,7 +98,7 @@ contains
       integer :: k
 
       if (.not. allocated(self%constant)) allocate (self%constant(0))
-      k = place_of(self, name)
+      k = place_of(self%constant, name)
       if (k == 0) then
          new%name = name
          new%law = self%law
@@ -76,7 +117,7 @@ contains
       integer :: k
 
       values = 0.0_wp
-      k = place_of(self, name)
+      k = place_of(self%constant, name)
       if (k == 0) return
       if (.not. allocated(self%constant(k)%values)) return
       if (size(self%constant(k)%values) == n_pairs) values = self%constant(k)%values
@@ -88,7 +129,7 @@ contains
       character(*), intent(in) :: name
       integer :: k
 
-      k = place_of(self, name)
+      k = place_of(self%constant, name)
       has = .false.
       if (k > 0) has = allocated(self%constant(k)%values)
    end function has
@@ -113,15 +154,15 @@ contains
       end do
    end subroutine first_of_others
 
-   pure integer function place_of(self, name) result(place)
-      type(law_constants), intent(in) :: self
+   pure integer function place_of(list, name) result(place)
+      type(constant_type), allocatable, intent(in) :: list(:)
       character(*), intent(in) :: name
 
       place = 0
-      if (.not. allocated(self%constant)) return
+      if (.not. allocated(list)) return
       ! A loop that runs through leaves place = 0, no such name.
-      do place = size(self%constant), 1, -1
-         if (self%constant(place)%name == name) return
+      do place = size(list), 1, -1
+         if (list(place)%name == name) return
       end do
    end function place_of
 

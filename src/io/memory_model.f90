@@ -25,11 +25,12 @@ module fw_memory_model
 
    !> Parts of one real kind each: of n_dof**2 values, of n_dof, of n_pairs.
    character(*), parameter :: matrix_names(*) = &
-      [character(20) :: 'mass', 'stiffness', 'damping', 'stiffness_rotation']
+      [character(28) :: 'mass', 'stiffness', 'damping', 'stiffness_rotation']
    character(*), parameter :: load_names(*) = &
-      [character(20) :: 'load/static', 'load/cosine', 'load/sine', 'load/static_rotation']
+      [character(28) :: 'load/static', 'load/cosine', 'load/sine', 'load/static_rotation']
    character(*), parameter :: pair_names(*) = &
-      [character(20) :: 'contact/mu', 'contact/gap', 'contact/area', 'contact/position']
+      [character(28) :: 'contact/mu', 'contact/gap', 'contact/area', 'contact/normal_load', &
+       'contact/tangential_stiffness', 'contact/normal_stiffness', 'contact/position']
    character(*), parameter :: integer_names(*) = &
       [character(20) :: 'contact/side_1', 'contact/side_2']
    character(*), parameter :: text_names(*) = &
@@ -121,6 +122,12 @@ contains
             parts%gap = values
          case ('contact/area')
             parts%area = values
+         case ('contact/normal_load')
+            parts%normal_load = values
+         case ('contact/tangential_stiffness')
+            parts%tangential_stiffness = values
+         case ('contact/normal_stiffness')
+            parts%normal_stiffness = values
          case default ! 'contact/position'
             parts%position = reshape(values, [3, self%n_pairs])
          end select

@@ -43,6 +43,8 @@ module fw_model_file
       integer, allocatable :: side_1(:, :), side_2(:, :)
       !> Friction coefficient, gap [length] and area [length**2] of the pairs (n_pairs).
       real(wp), allocatable :: mu(:), gap(:), area(:)
+      !> Constant normal load [force] and stiffnesses [force/length] of the pairs (n_pairs).
+      real(wp), allocatable :: normal_load(:), tangential_stiffness(:), normal_stiffness(:)
       !> Coordinates of the pairs (3, n_pairs) [length] and the names of their patches (n_pairs).
       real(wp), allocatable :: position(:, :)
       type(string_type), allocatable :: patch(:)
@@ -145,6 +147,13 @@ contains
       call read_pair_values(file, '/contact/gap', n, model%gap, error)
       if (allocated(error)) return
       call read_pair_values(file, '/contact/area', n, model%area, error)
+      if (allocated(error)) return
+      call read_pair_values(file, '/contact/normal_load', n, model%normal_load, error)
+      if (allocated(error)) return
+      call read_pair_values(file, '/contact/tangential_stiffness', n, &
+                            model%tangential_stiffness, error)
+      if (allocated(error)) return
+      call read_pair_values(file, '/contact/normal_stiffness', n, model%normal_stiffness, error)
       if (allocated(error)) return
       call read_positions(file, '/contact/position', n, model%position, error)
       if (allocated(error)) return

@@ -63,6 +63,9 @@ contains
          if (allocated(file_model%mu)) contact%mu = file_model%mu
          if (allocated(file_model%gap)) contact%gap = file_model%gap
          if (allocated(file_model%area)) contact%area = file_model%area
+         if (allocated(file_model%normal_load)) contact%normal_load = file_model%normal_load
+         call contact%constants%offer('tangential_stiffness', file_model%tangential_stiffness)
+         call contact%constants%offer('normal_stiffness', file_model%normal_stiffness)
          if (allocated(file_model%position)) contact%position = file_model%position
          if (allocated(file_model%patch)) contact%patch = file_model%patch
       else if (n_file > 0 .and. contact%n_pairs > 0 &
@@ -148,7 +151,8 @@ contains
       call bind_gap(reader, contact, needs_area .and. n_pairs > 0 &
                     .and. .not. allocated(contact%area))
       call bind_normal_load(reader, contact, &
-                            any(slides .and. .not. closes .and. contact%mu > 0.0_wp))
+                            any(slides .and. .not. closes .and. contact%mu > 0.0_wp) .and. &
+                            .not. allocated(contact%normal_load))
       if (.not. allocated(contact%normal_load)) then
          allocate (contact%normal_load(n_pairs), source=0.0_wp)
       else if (all(closes) .and. any(contact%normal_load > 0.0_wp)) then
