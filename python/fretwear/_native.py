@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from .errors import FretwearError, InputError, OutputError
 
-__all__ = ["NOT_CONVERGED", "STOPPED", "Session", "join_texts", "library_version",
+__all__ = ["NOT_CONVERGED", "STOPPED", "Session", "functions", "join_texts", "library_version",
            "namelist_values", "raise_status", "routines"]
 
 OK, USAGE, INPUT, NOT_CONVERGED, IO, STOPPED = 0, 2, 3, 4, 5, 6
 
 
 def routines() -> Any:
-    """The routines of the extension.
+    """The routines of the extension that work on sessions.
 
     Raises
     ------
@@ -32,6 +32,14 @@ def routines() -> Any:
                           "with `pip install .`, or build it and put <build>/python on "
                           f"PYTHONPATH ({error})") from error
     return fw_python
+
+
+def functions() -> Any:
+    """The routines of the extension that are functions of arrays; raises as `routines` does."""
+    routines()
+    from ._core import fw_python_functions
+
+    return fw_python_functions
 
 
 def library_version() -> str:

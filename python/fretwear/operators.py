@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arguments import array, dofs, flag, output, whole
-from ._native import raise_status, routines
+from ._native import functions, raise_status
 from .errors import InputError
 
 __all__ = ["ContactForces", "amplitude", "coefficient_count", "condense", "contact_forces",
@@ -58,7 +58,7 @@ def harmonic_operators(n_harmonics: int, n_time: int, *,
     whole("n_time", n_time, 2 * n_harmonics + 1, _MOST_INSTANTS)
     synthesis = output("synthesis", None, (n_coefficients, n_time))
     analysis = output("analysis", None, (n_coefficients, n_time))
-    routines().harmonic_operators(n_harmonics, odd_only, synthesis, analysis)
+    functions().harmonic_operators(n_harmonics, odd_only, synthesis, analysis)
     return synthesis, analysis
 
 
@@ -85,7 +85,7 @@ def to_time(coefficients: ArrayLike, n_time: int, *, odd_only: bool = False,
     n_harmonics = _harmonics_of("coefficients", given.shape[1], odd_only)
     whole("n_time", n_time, 2 * n_harmonics + 1, _MOST_INSTANTS)
     values = output("out", out, (given.shape[0], n_time))
-    routines().to_time(n_harmonics, odd_only, given, values)
+    functions().to_time(n_harmonics, odd_only, given, values)
     return values
 
 
@@ -112,7 +112,7 @@ def to_coefficients(values: ArrayLike, n_harmonics: int, *, odd_only: bool = Fal
     given = array("values", values, (None, None))
     whole("n_time, the second length of values,", given.shape[1], 2 * n_harmonics + 1)
     coefficients = output("out", out, (given.shape[0], n_coefficients))
-    routines().to_coefficients(n_harmonics, odd_only, given, coefficients)
+    functions().to_coefficients(n_harmonics, odd_only, given, coefficients)
     return coefficients
 
 
@@ -132,7 +132,7 @@ def differentiate(coefficients: ArrayLike, *, odd_only: bool = False,
     given = array("coefficients", coefficients, (None, None))
     n_harmonics = _harmonics_of("coefficients", given.shape[1], odd_only)
     derivative = output("out", out, given.shape)
-    routines().differentiate(n_harmonics, odd_only, given, derivative)
+    functions().differentiate(n_harmonics, odd_only, given, derivative)
     return derivative
 
 
@@ -153,7 +153,7 @@ def amplitude(coefficients: ArrayLike, *, out: Floats | None = None) -> Floats:
     given = array("coefficients", coefficients, (None, None))
     _harmonics_of("coefficients", given.shape[1], False)
     largest = output("out", out, (given.shape[0],))
-    routines().amplitudes(given, largest)
+    functions().amplitudes(given, largest)
     return largest
 
 
@@ -180,7 +180,7 @@ def dynamic_stiffness(M: ArrayLike, C: ArrayLike | None, K: ArrayLike, omega: fl
     mass, damping, stiffness = _matrices(M, C, K)
     numbers = _numbers(harmonics)
     z = output("out", out, (*stiffness.shape, len(numbers)), np.complex128)
-    routines().dynamic_stiffness(mass, damping, stiffness, numbers, _frequency(omega), z)
+    functions().dynamic_stiffness(mass, damping, stiffness, numbers, _frequency(omega), z)
     return z
 
 
@@ -220,7 +220,7 @@ def condense(M: ArrayLike, C: ArrayLike | None, K: ArrayLike, side_1: ArrayLike,
     n_rows, n_harmonics = len(problem.side_1), len(problem.harmonics)
     stiffness = output("stiffness", None, (n_rows, n_rows, n_harmonics), np.complex128)
     load = output("load", None, (n_rows, n_harmonics), np.complex128)
-    problem.call(routines().condense, stiffness, load)
+    problem.call(functions().condense, stiffness, load)
     return stiffness, load
 
 
@@ -247,7 +247,7 @@ def recover(M: ArrayLike, C: ArrayLike | None, K: ArrayLike, side_1: ArrayLike, 
     n_rows, n_harmonics = len(problem.side_1), len(problem.harmonics)
     given = array("q", q, (n_rows, n_harmonics), dtype=np.complex128)
     u = output("out", out, (len(problem.stiffness), n_harmonics), np.complex128)
-    problem.call(routines().recover, given, u)
+    problem.call(functions().recover, given, u)
     return u
 
 
@@ -363,7 +363,7 @@ def contact_forces(prediction: ArrayLike, mu: ArrayLike, n_time: int, *,
     fraction = output("fraction", None, (3, n_pairs))
     size = (3 * n_coefficients, 3 * n_coefficients, n_pairs) if jacobian else (1, 1, 1)
     slopes = output("jacobian", None, size)
-    periodic = routines().contact_forces(
+    periodic = functions().contact_forces(
         n_harmonics, odd_only, remembers, friction, _present(present, n_pairs),
         array("offset", 0.0 if offset is None else offset, (n_pairs,)),
         array("start", np.zeros((n_pairs, 2)) if start is None else start, (n_pairs, 2)),
