@@ -1,25 +1,23 @@
-"""Result files (format "fretwear-result") as arrays with names and units."""
+"""Results as arrays with names and units: points, contact, wear, and single quantities."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arguments import text, whole
+from ._arguments import whole
 from ._native import namelist_values
 from ._notebook import result_dataset, result_html
 from .bifurcation import Bifurcation, read_bifurcations
 from .case import Case
 from .cycle import Cycle, read_cycle
 from .errors import AbsentError, InputError, OutputError
+from .peaks import Peak, read_peaks
+from .result_file import Quantity, ResultFile, plain_text
 
 if TYPE_CHECKING:
     import xarray
@@ -28,59 +26,13 @@ __all__ = ["DIRECTIONS", "STATES", "Quantity", "Result"]
 
 Floats = NDArray[np.float64]
 
-FORMAT, FORMAT_VERSION = "fretwear-result", 1
 #: Components of a contact pair, in the order of `Result.force`.
 DIRECTIONS = ("t1", "t2", "n")
 #: Contact states, in the order of `Result.fraction`.
 STATES = ("stick", "slip", "open")
 
-#: What makes a dataset present, by its name or the group that it is in.
-_REMEDIES = {
-    "contact/position": "give the pairs places (contact/position of a model)",
-    "contact/area": "give the pairs areas (contact%area)",
-    "contact/patch": "give the pairs patches (contact/patch of a model)",
-    "contact/": "it needs contact pairs, and output%contact = .true.",
-    "history/": "run with output%histories = .true.",
-    "floquet/": "run with sweep%stability = .true.",
-    "wear/depth_halved": "run with wear%check_steps = .true.",
-    "wear/": "run with case%analysis = 'wear'",
-    "error_estimate": "run with harmonics%accuracy",
-    "instants": "run with harmonics%accuracy",
-    "harmonics": "run with harmonics%accuracy or harmonics%adaptive = .true.",
-    "fold": "run with sweep%continuation = 'arclength'",
-    "served_by": "run with case%analysis = 'frf' or 'point'",
-    "bifurcation/": "run a sweep with sweep%stability = .true., or a branch that turns",
-    "peak/": "run a sweep (case%analysis = 'frf') with this version of fretwear",
-    "observed/": "name what to observe in output%observe",
-}
 
-
-@dataclass(frozen=True)
-class Quantity:
-    """A dataset as its file declares it.
-
-    Attributes
-    ----------
-    name : str
-        In the file, such as "contact/force".
-    shape : tuple of int
-        Of the array.
-    dimensions : tuple of str
-        Names of its axes ("point", "pair", ...); empty where the file names none.
-    units : str
-        Units of the model; "" where the file does not say.
-    long_name : str
-        What it is, in words.
-    """
-
-    name: str
-    shape: tuple[int, ...]
-    dimensions: tuple[str, ...]
-    units: str
-    long_name: str
-
-
-class Result:
+class Result(ResultFile):
     """What a run has left in its result file.
 
     Nothing is read before it is asked for; arrays are read once, kept, and read-only. The file is
@@ -124,39 +76,12 @@ class Result:
         result._begin(None, image, case)
         return result
 
-    def _begin(self, path: Path | None, image: bytes | None, case: Case | None) -> None:
-        self._path, self._image, self._case = path, image, case
-        self._arrays: dict[str, NDArray[Any]] = {}
+    def _begin(self, path: Path | None, image: bytes | None, case: Case | None = None) -> None:
+        self._case = case
         self._cycles: dict[int, Cycle] = {}
-        with self.open() as file:
-            kind = _text(file.attrs.get("format", ""))
-            if kind != FORMAT:
-                raise InputError(f"{self.name}: format is '{kind}', expected '{FORMAT}'")
-            version = int(file.attrs.get("format_version", 0))
-            if version > FORMAT_VERSION:
-                raise InputError(f"{self.name}: format_version is {version}, this package reads "
-                                 f"up to {FORMAT_VERSION}; update fretwear")
+        super()._begin(path, image)
 
-    # ------------------------------------------------------------------ where it is
-
-    @property
-    def name(self) -> str:
-        """Path of the file, as a text; 'result in memory' of one that has none."""
-        return str(self._path) if self._path is not None else "result in memory"
-
-    @property
-    def path(self) -> Path:
-        """The file.
-
-        Raises
-        ------
-        AbsentError
-            The result is in memory.
-        """
-        if self._path is None:
-            raise AbsentError("the result is in memory and has no file: write one with save(path), "
-                              "or run with file=...")
-        return self._path
+    # ------------------------------------------------------------------ the case
 
     def save(self, path: str | Path) -> Result:
         """Write the result to a file; returns the result of that file.
@@ -244,27 +169,6 @@ class Result:
             self._cycles[point] = read_cycle(self, point)
         return self._cycles[point]
 
-    @cached_property
-    def _declared(self) -> dict[str, Quantity]:
-        """Every dataset of the file."""
-        found: dict[str, Quantity] = {}
-
-        def note(name: str, item: object) -> None:
-            if isinstance(item, h5py.Dataset):
-                words = item.attrs.get("DIMENSION_LABELS", ())
-                found[name] = Quantity(
-                    name, tuple(item.shape), tuple(_text(word) for word in words),
-                    _text(item.attrs.get("units", "")), _text(item.attrs.get("long_name", "")))
-
-        with self.open() as file:
-            file.visititems(note)
-        return found
-
-    @cached_property
-    def _attributes(self) -> dict[str, Any]:
-        with self.open() as file:
-            return {name: _plain(value) for name, value in file.attrs.items()}
-
     def __repr__(self) -> str:
         points = f"{len(self.omega)} points, " if "omega" in self else ""
         return f"<Result {self.name!r}: {points}{self._attributes.get('status', 'no status')}>"
@@ -272,113 +176,6 @@ class Result:
     def _repr_html_(self) -> str:
         """What a notebook shows."""
         return result_html(self)
-
-    @contextmanager
-    def open(self) -> Iterator[h5py.File]:
-        """Open the file for reading with h5py.
-
-        Yields
-        ------
-        h5py.File
-            Closed at the end of the `with` block.
-        """
-        try:
-            if self._image is not None:
-                file = h5py.File(h5py.h5f.open_file_image(self._image))
-            else:
-                file = h5py.File(self.path, "r")
-        except OSError as error:
-            reason = str(error) if self._path is None or self._path.exists() else (
-                "there is no such file")
-            raise OutputError(f"{self.name}: cannot be read: {reason}") from None
-        with file:
-            yield file
-
-    # ------------------------------------------------------------------ any dataset
-
-    def __contains__(self, name: str) -> bool:
-        return isinstance(name, str) and name.strip("/") in self._declared
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(sorted(self._declared))
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        """Read a dataset by its name in the file, such as "contact/force"."""
-        name = self.declared(name).name
-        if name not in self._arrays:
-            with self.open() as file:
-                array: NDArray[Any] = np.asarray(file[name][()])
-            if array.dtype.kind in "SO":
-                array = np.array([_text(word) for word in array.ravel()]).reshape(array.shape)
-            array.flags.writeable = False
-            self._arrays[name] = array
-        return self._arrays[name]
-
-    def declared(self, name: str) -> Quantity:
-        """Shape, dimensions, units and meaning of a dataset, as the file declares them.
-
-        Raises
-        ------
-        AbsentError
-            The file does not hold it; the message says what would.
-        """
-        name = text("name", name).strip("/")
-        if name not in self._declared:
-            raise self._absent(name)
-        return self._declared[name]
-
-    def _absent(self, name: str) -> AbsentError:
-        for start, how in _REMEDIES.items():
-            if name == start or (start.endswith("/") and name.startswith(start)):
-                return AbsentError(f"{self.name}: holds no dataset /{name}: {how}")
-        return AbsentError(f"{self.name}: holds no dataset /{name}; there are "
-                           + ", ".join("/" + known for known in self))
-
-    def units(self, name: str) -> str:
-        """Units of a dataset; '' where the file does not say (units of the model)."""
-        return self.declared(name).units
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of the file: format, title, status, namelist, elapsed, ..."""
-        return dict(self._attributes)
-
-    # ------------------------------------------------------------------ the run
-
-    def _attribute(self, name: str) -> Any:
-        if name not in self._attributes:
-            raise AbsentError(f"{self.name}: has no attribute {name}; a run of this version of "
-                              "fretwear writes it")
-        return self._attributes[name]
-
-    @property
-    def title(self) -> str:
-        """Title of the case."""
-        return str(self._attribute("title"))
-
-    @property
-    def status(self) -> str:
-        """'complete', 'not converged', 'stopped', 'incomplete' or 'failed: ...'."""
-        return str(self._attribute("status"))
-
-    @property
-    def namelist(self) -> str:
-        """The effective input, every default written out."""
-        return str(self._attribute("namelist"))
-
-    @property
-    def elapsed(self) -> float:
-        """Time of the run [s]."""
-        if self.status == "incomplete":
-            raise AbsentError(f"{self.name}: has no time of the run: it has not come to its end, "
-                              "or was killed")
-        return float(self._attribute("elapsed"))
-
-    @property
-    def remarks(self) -> list[str]:
-        """What the program remarked on the input and the answer; empty where nothing."""
-        name = next((name for name in ("remarks/text", "remarks") if name in self), None)
-        return [] if name is None else [str(remark) for remark in self[name]]
 
     # ------------------------------------------------------------------ points
 
@@ -430,7 +227,7 @@ class Result:
         """
         codes = self["served_by"]
         with self.open() as file:
-            names = [_text(name) for name in file["served_by"].attrs["names"]]
+            names = [plain_text(name) for name in file["served_by"].attrs["names"]]
         return [names[int(code)] for code in codes]
 
     @property
@@ -522,7 +319,7 @@ class Result:
         if found is None:
             raise AbsentError(f"{self.name}: does not say whether a steady state was reached: the "
                               "run has not come to its end")
-        return _text(found)
+        return plain_text(found)
 
     # ------------------------------------------------------------------ one quantity
 
@@ -590,6 +387,19 @@ class Result:
         height, omega = max(found)
         return omega, height
 
+    @property
+    def peaks(self) -> tuple[Peak, ...]:
+        """The maxima of every observed quantity, those between the points included.
+
+        In the order of the file: quantity by quantity, each by rising frequency.
+
+        Raises
+        ------
+        AbsentError
+            The run was no sweep, or has not come to its end.
+        """
+        return read_peaks(self)
+
     # ------------------------------------------------------------------ notebooks
 
     def to_xarray(self) -> xarray.Dataset:
@@ -609,15 +419,3 @@ class Result:
             xarray is not installed.
         """
         return result_dataset(self)
-
-
-def _text(value: object) -> str:
-    """Text of an attribute or element, whatever string type HDF5 has used."""
-    return (value.decode() if isinstance(value, bytes) else str(value)).strip()
-
-
-def _plain(value: object) -> Any:
-    """An attribute as a Python value."""
-    if isinstance(value, (bytes, str)):
-        return _text(value)
-    return value.item() if isinstance(value, np.generic) else value

@@ -13,8 +13,9 @@ import fretwear as fw
 
 #: Public attributes that every result has, a file without anything in it too.
 ALWAYS = {"name", "path", "attributes", "remarks"}
-PROPERTIES = sorted(name for name, value in vars(fw.Result).items()
-                    if isinstance(value, property) and not name.startswith("_"))
+PUBLIC = {name: value for kind in fw.Result.__mro__[:-1] for name, value in vars(kind).items()
+          if not name.startswith("_")}
+PROPERTIES = sorted(name for name, value in PUBLIC.items() if isinstance(value, property))
 #: Methods, with arguments that fit any result.
 METHODS: dict[str, tuple[Any, ...]] = {
     "index": (), "amplitude_of": (), "harmonic": (1,), "peak": (), "maximum": (), "cycle": (0,),
@@ -45,8 +46,7 @@ def ask(result: fw.Result, name: str) -> Any:
 
 
 def test_every_accessor_is_asked() -> None:
-    public = {name for name in vars(fw.Result) if not name.startswith("_")}
-    assert public == set(PROPERTIES) | set(METHODS) | OTHERS
+    assert set(PUBLIC) == set(PROPERTIES) | set(METHODS) | OTHERS
     assert set(PROPERTIES) >= ALWAYS | {"omega", "depth", "stable", "steady_state", "status"}
 
 

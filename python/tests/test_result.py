@@ -50,6 +50,38 @@ def test_what_is_read_is_what_the_file_holds(result: Result) -> None:
         result.omega[0] = 1.0
 
 
+def test_peaks_are_those_of_the_file(result: Result) -> None:
+    peaks = result.peaks
+    assert [peak.omega for peak in peaks] == result["peak/omega"].tolist()
+    assert [peak.amplitude for peak in peaks] == result["peak/amplitude"].tolist()
+    assert {peak.observed for peak in peaks} == set(result.observed)
+    highest = max(peaks, key=lambda peak: peak.amplitude)
+    assert (highest.omega, highest.amplitude) == result.maximum(highest.observed)
+    assert highest.found_by in ("row", "search")
+    assert highest.frequency == pytest.approx(highest.omega / (2.0 * np.pi), rel=1e-15)
+    # The amplitude is that of the coefficients, static part and all harmonics included.
+    tau = np.linspace(0.0, 2.0 * np.pi, 4096)
+    wave = np.full_like(tau, highest.coefficients[0])
+    for n in range(1, len(highest.coefficients) // 2 + 1):
+        wave += highest.coefficients[2 * n - 1] * np.cos(n * tau)
+        wave += highest.coefficients[2 * n] * np.sin(n * tau)
+    # A grid of 4096 angles misses the top by less than (H pi/4096)**2/2.
+    assert np.abs(wave).max() == pytest.approx(highest.amplitude, rel=1e-4)
+
+
+def test_the_width_of_a_peak_is_its_damping() -> None:
+    zeta = 0.01
+    model = fretwear.Model([[1.0]], [[2.0 * zeta]], [[1.0]], cosine=[1.0])
+    peak, = (one for one in fretwear.frf(model, 0.8, 1.2, 81).peaks
+             if one.found_by != "end of the sweep")
+    # 1/sqrt(2) of a peak is met at 2 zeta, less terms of the order of zeta**2; samples beside it.
+    assert peak.damping_ratio == pytest.approx(zeta, rel=2e-2)
+    point = fretwear.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0])
+    with pytest.raises(fretwear.AbsentError, match="run a sweep"):
+        _ = fretwear.run(fretwear.Case(point, case={"analysis": "point"},
+                                       sweep={"start": 0.5})).peaks
+
+
 def test_harmonics_follow_the_convention(result: Result) -> None:
     first = result.harmonic(1)
     assert np.array_equal(first.real, result.coefficients[:, 1, 0])
