@@ -24,6 +24,8 @@ from fretwear.plot import (
     plot_harmonics,
     plot_hysteresis,
     plot_response,
+    plot_responses,
+    plot_table,
     plot_wear_bars,
     plot_wear_evolution,
     plot_wear_maps,
@@ -32,6 +34,7 @@ from fretwear.plot.flanks import find_flanks
 from fretwear.plot.style import label_y, new_figure, scale
 from fretwear.result import Result
 from fretwear.rows import pair_fields, synthesis
+from fretwear.study.table import write_table
 
 # What the forces of a result, known to 1e-8, leave of a displacement of 1e-3 mm.
 RECOVERED = 1e-7
@@ -311,3 +314,55 @@ def test_a_notebook_shows_the_picture(coarse: Result) -> None:
     assert fretwear.plot_response is plot_response  # without an import of fretwear.plot
     with pytest.raises(AttributeError, match="no attribute 'plot_nothing'"):
         _ = fretwear.plot_nothing
+
+
+def test_responses_of_several_results(coarse: Result, examples: Path, tmp_path: Path,
+                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    other = run(examples.parent / "jenkins" / "jenkins.nml", tmp_path / "slick.h5",
+                "contact%mu=0.5", "sweep%n_points=5")
+    elastic = run(examples.parent / "jenkins" / "jenkins.nml", tmp_path / "elastic.h5",
+                  "sweep%n_points=5")
+    figure = plot_responses([elastic, other.path])
+    axes, = figure.axes
+    for line, result in zip(axes.lines, (elastic, other)):
+        assert np.array_equal(line.get_ydata(), result.amplitude_of(0), equal_nan=True)
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["elastic", "slick"]
+    _labelled(figure)
+    with pytest.raises(InputError, match="is not observed"):
+        plot_responses([coarse, other])
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", "elastic.h5", "slick.h5", "-o", "both.png"]) == 0
+    assert Path("both.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["plot", "elastic.h5", "slick.h5", "--kind", "hysteresis"]) == 3
+    assert main(["plot", "elastic.h5", "slick.h5", "--point", "1"]) == 3
+
+
+def test_the_table_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                              capsys: pytest.CaptureFixture[str]) -> None:
+    mu = np.array([0.1, 0.2, 0.1, 0.2, 0.3, 0.3])
+    height = np.array([3.0, 2.0, 5.0, 4.0, 1.0, np.nan])
+    table = {"run": np.array(list("abcdef")), "contact%mu": mu,
+             "load%harmonic_scale": np.array([1.0, 1.0, 2.0, 2.0, 1.0, 2.0]),
+             "exit_status": np.zeros(6, dtype=int), "status": np.array(["complete"] * 6),
+             "message": np.array([""] * 6), "seconds": np.ones(6), "result": np.array([""] * 6),
+             "max_amplitude[tip]": height, "frequency_at_peak": 1000.0 + height,
+             "steady_state": np.array(["reached"] * 6)}
+    write_table(table, tmp_path / "study.h5", "study")
+    monkeypatch.chdir(tmp_path)
+    figure = plot_table("study.h5")
+    assert [axes.get_ylabel() for axes in figure.axes] == ["max_amplitude\nof tip",
+                                                           "frequency_at_peak [Hz]"]
+    assert figure.axes[-1].get_xlabel() == "contact%mu"
+    first, second = figure.axes[0].lines
+    assert np.array_equal(first.get_xydata(), [[0.1, 3.0], [0.2, 2.0], [0.3, 1.0]])
+    # The run without a number is left out.
+    assert np.array_equal(second.get_xydata(), [[0.1, 5.0], [0.2, 4.0]])
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["1.0", "2.0"]
+    assert main(["plot", "study.h5"]) == 0
+    assert Path("study.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["plot", "study.h5", "--kind", "response"]) == 3
+    assert "does not go with the table of a study" in capsys.readouterr().err
+    write_table({**table, "contact%mu": np.full(6, 0.1), "load%harmonic_scale": np.ones(6)},
+                tmp_path / "same.h5", "study")
+    assert main(["plot", "same.h5"]) != 0
+    assert "no number varies" in capsys.readouterr().err

@@ -18,9 +18,11 @@ from .response import (
     plot_response,
     read_response,
 )
+from .table import plot_table
+from .together import plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
            "half_power_damping", "main", "plot_convergence", "plot_cycle", "plot_flanks",
-           "plot_harmonics", "plot_hysteresis", "plot_response", "plot_wear_bars",
-           "plot_wear_evolution", "plot_wear_maps", "read_response"]
+           "plot_harmonics", "plot_hysteresis", "plot_response", "plot_responses", "plot_table",
+           "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps", "read_response"]

@@ -1,4 +1,4 @@
-"""`fretwear plot`: pictures of a result file."""
+"""`fretwear plot`: pictures of a result, of several beside each other, or of a study."""
 
 from __future__ import annotations
 
@@ -6,17 +6,24 @@ import argparse
 import sys
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from ..errors import AbsentError, InputError, OutputError
 from ..result import Result
 from ..rows import choose_point
+from ..study.table import is_table
 from .kinds import KINDS, Choices, fitting
+from .table import plot_table
+from .together import plot_responses
 
 __all__ = ["add_arguments", "main"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `fretwear plot`."""
-    parser.add_argument("result", help="result file")
+    parser.add_argument("result", nargs="+",
+                        help="result file, or the table of a study; of several results the "
+                             "responses are drawn into one picture")
     parser.add_argument("-o", "--output", metavar="FILE",
                         help="picture, its suffix is the format (png, svg, pdf); with several "
                              "kinds FILE_kind.png and so on (default: RESULT_kind.png in the "
@@ -37,30 +44,65 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Run `fretwear plot`."""
-    result = Result(options.result)
+    if len(options.result) > 1:
+        _only(options, "several results", "kind", "observe")
+        if options.kind not in (None, "response"):
+            raise InputError(f"--kind {options.kind}: of several results the response is drawn")
+        stem = f"{Path(options.result[0]).stem}_together"
+        return _save(plot_responses(options.result, options.observe), options.output, stem)
+    source = options.result[0]
+    if is_table(source):
+        _only(options, "the table of a study")
+        return _save(plot_table(source), options.output, Path(source).stem)
+    return _draw_kinds(Result(source), options)
+
+
+def _draw_kinds(result: Result, options: argparse.Namespace) -> int:
+    """Every kind of picture that was asked for, or that fits."""
     kinds = _kinds(result, options.kind)
     choices = Choices(
         None if options.point is None else choose_point(result, options.point),
         _numbers(options.pairs), options.observe, options.linear, options.modal_mass)
-    target = Path(options.output or f"{Path(result.name).stem}.png")
-    if not target.absolute().parent.is_dir():
-        raise OutputError(f"{target}: there is no folder {target.absolute().parent}")
+    target = _target(options.output, Path(result.name).stem)
     for name in kinds:
         alone = len(kinds) == 1 and options.output is not None
         path = target if alone else target.with_name(f"{target.stem}_{name}{target.suffix}")
         try:
-            KINDS[name].draw(result, choices).savefig(path)
+            figure = KINDS[name].draw(result, choices)
         except AbsentError as error:
             if options.kind is not None:
                 raise
             print(f"fretwear plot: {name}: {error}", file=sys.stderr)
             continue
-        except ValueError as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path}: {error}") from None  # such as a format not known
-        print(path)
+        _write(figure, path)
     return 0
+
+
+def _only(options: argparse.Namespace, what: str, *served: str) -> None:
+    """Refuse options that a picture of several results or of a study does not take."""
+    for name in ("kind", "point", "pairs", "observe", "linear", "modal_mass"):
+        if name not in served and getattr(options, name) is not None:
+            raise InputError(f"--{name.replace('_', '-')} does not go with {what}")
+
+
+def _target(output: str | None, stem: str) -> Path:
+    target = Path(output or f"{stem}.png")
+    if not target.absolute().parent.is_dir():
+        raise OutputError(f"{target}: there is no folder {target.absolute().parent}")
+    return target
+
+
+def _save(figure: Figure, output: str | None, stem: str) -> int:
+    _write(figure, _target(output, stem))
+    return 0
+
+
+def _write(figure: Figure, path: Path) -> None:
+    try:
+        figure.savefig(path)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None  # such as a format not known
+    print(path)
 
 
 def _kinds(result: Result, text: str | None) -> list[str]:

@@ -18,7 +18,7 @@ from .plan import Plan, Setting
 from .quantities import Value, evaluate
 from .run import Record
 
-__all__ = ["build_table", "need_writer", "read_table", "write_table"]
+__all__ = ["build_table", "is_table", "need_writer", "read_table", "table_parts", "write_table"]
 
 #: A column per name; texts, integers or reals.
 Table = dict[str, NDArray[Any]]
@@ -121,6 +121,25 @@ def write_table(table: Table, path: Path, title: str) -> None:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def is_table(path: str | Path) -> bool:
+    """Whether a file is the table of a study, not a result."""
+    path = Path(path)
+    if path.suffix == ".parquet":
+        return True
+    try:
+        with h5py.File(path, "r") as file:
+            return "columns" in file.attrs and "format" not in file.attrs
+    except OSError:
+        return False
+
+
+def table_parts(table: Table) -> tuple[list[str], list[str]]:
+    """Names of the columns of the keys that vary, and of those of the quantities."""
+    names = list(table)
+    return (names[names.index("run") + 1:names.index("exit_status")],
+            names[names.index("result") + 1:])
 
 
 def read_table(path: str | Path) -> Table:
