@@ -33,6 +33,7 @@ _REMEDIES = {
     "error_estimate": "run with harmonics%accuracy",
     "instants": "run with harmonics%accuracy",
     "harmonics": "run with harmonics%accuracy or harmonics%adaptive = .true.",
+    "tangent/": "run with sweep%continuation = 'arclength'",
     "fold": "run with sweep%continuation = 'arclength'",
     "served_by": "run with case%analysis = 'frf' or 'point'",
     "bifurcation/": "run a sweep with sweep%stability = .true., or a branch that turns",

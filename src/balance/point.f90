@@ -41,6 +41,10 @@ module fw_point
       real(wp) :: error_estimate = 0.0_wp
       !> The branch turns here.
       logical :: fold = .false.
+      !> Direction of the branch: changes of omega [rad/s] and of the coefficients, of any common
+      !> length; only along a branch.
+      real(wp) :: tangent_omega = 0.0_wp
+      real(wp), allocatable :: tangent(:, :)
       !> Floquet multipliers, only when asked for, how far each may be off, huge(1.0_wp) where that
       !> is not known (n_multipliers), and whether all lie in the unit circle.
       complex(wp), allocatable :: multipliers(:)

@@ -12,7 +12,8 @@ module fw_recovery
    implicit none (type, external)
    private
 
-   public :: recover_point, recover_histories, largest_magnitude, carry_solution
+   public :: observe, observed_coefficients, recover_point, recover_histories
+   public :: largest_magnitude, carry_solution
 
 contains
 
@@ -26,30 +27,53 @@ contains
       integer, intent(in) :: n_harmonics
       logical, intent(in) :: with_contact
       type(point_type), intent(inout) :: point
-      complex(wp), allocatable :: q(:, :), observed(:, :)
-      integer :: m, h, n, n_observed, i
+      integer :: i
 
-      m = system%problem%structure%n_coordinates
-      n_observed = system%problem%structure%n_observed
-      allocate (q(m, system%problem%fourier%n_retained))
-      allocate (observed(n_observed, system%problem%fourier%n_retained))
-      call to_complex(system%problem%fourier, m, x, q)
-      call system%problem%structure%recover(system%structure_state, q, observed)
-      allocate (point%coefficients(2*n_harmonics + 1, n_observed), source=0.0_wp)
-      do h = 1, system%problem%fourier%n_retained
-         n = system%problem%fourier%harmonic(h)
-         if (n == 0) then
-            point%coefficients(1, :) = real(observed(:, h), wp)
-         else
-            point%coefficients(2*n, :) = real(observed(:, h), wp)
-            ! U_n = uc_n - i us_n.
-            point%coefficients(2*n + 1, :) = -aimag(observed(:, h))
-         end if
-      end do
-      point%amplitude = [(largest_magnitude(point%coefficients(:, i)), i=1, n_observed)]
+      call observed_coefficients(system, x, n_harmonics, point%coefficients)
+      point%amplitude = [(largest_magnitude(point%coefficients(:, i)), &
+                          i=1, system%problem%structure%n_observed)]
       if (with_contact .and. system%problem%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
    end subroutine recover_point
+
+   !> Observed quantities where the system stands, complex amplitudes (n_observed, n_retained).
+   subroutine observe(system, x, observed)
+      type(balance_state), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      complex(wp), intent(out), contiguous :: observed(:, :)
+      complex(wp), allocatable :: q(:, :)
+
+      associate (m => system%problem%structure%n_coordinates)
+         allocate (q(m, system%problem%fourier%n_retained))
+         call to_complex(system%problem%fourier, m, x, q)
+      end associate
+      call system%problem%structure%recover(system%structure_state, q, observed)
+   end subroutine observe
+
+   !> The same as coefficients (0, c1, s1, ...) (2H+1, n_observed).
+   subroutine observed_coefficients(system, x, n_harmonics, coefficients)
+      type(balance_state), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      integer, intent(in) :: n_harmonics
+      real(wp), allocatable, intent(out) :: coefficients(:, :)
+      complex(wp), allocatable :: observed(:, :)
+      integer :: h, n, n_observed
+
+      n_observed = system%problem%structure%n_observed
+      allocate (observed(n_observed, system%problem%fourier%n_retained))
+      call observe(system, x, observed)
+      allocate (coefficients(2*n_harmonics + 1, n_observed), source=0.0_wp)
+      do h = 1, system%problem%fourier%n_retained
+         n = system%problem%fourier%harmonic(h)
+         if (n == 0) then
+            coefficients(1, :) = real(observed(:, h), wp)
+         else
+            coefficients(2*n, :) = real(observed(:, h), wp)
+            ! U_n = uc_n - i us_n.
+            coefficients(2*n + 1, :) = -aimag(observed(:, h))
+         end if
+      end do
+   end subroutine observed_coefficients
 
    !> Carry a solution between systems of one case, condensed or whole, with more or fewer
    !> harmonics: the relative coordinates are the first of all; harmonics and internal modes that

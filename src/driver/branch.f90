@@ -28,6 +28,7 @@ module fw_branch
    use fw_level, only: level_type
    use fw_problem, only: build_system
    use fw_recovery, only: carry_solution
+   use fw_recovery, only: observed_coefficients
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_solution, only: is_lasting
@@ -41,6 +42,7 @@ module fw_branch
    use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: new_request
    use fw_strategy, only: note_time_limit
+   use fw_response_view, only: response_view
    use fw_sweep, only: point_source
    implicit none (type, external)
    private
@@ -61,9 +63,10 @@ module fw_branch
       type(balance_problem), pointer :: whole_problem => null()
       type(balance_state), pointer :: whole => null()
       !> The balance with values at instants as unknowns, where `hdhb` is asked for.
-      type(hdhb_system) :: in_time
       type(stability_solver) :: stability
-      logical :: is_in_time = .false.
+      type(hdhb_system), pointer :: in_time => null()
+      !> What a condensed structure is measured by.
+      type(response_view), pointer :: view => null()
       integer(int64) :: clock = 0
       real(wp), allocatable :: r(:)
       !> Where it turns and where its stability changes, and the solutions made to find out.
@@ -78,6 +81,7 @@ module fw_branch
       procedure :: begin
       procedure :: next
       procedure :: note
+      procedure :: point_along
       procedure :: closing_words
       final :: release
    end type branch_type
@@ -144,6 +148,8 @@ contains
       if (point%converged) then
          self%level%system%interrupt => observer
          call self%branch%begin(case, self%level%system, self%level%solver%x, error)
+         if (.not. allocated(error)) call self%branch%point_along(case, self%branch%curve%here, &
+                                                                  point, error)
          if (.not. allocated(error)) call self%branch%note(case, self%branch%curve%first, point, &
                                                            error)
       else
@@ -198,13 +204,18 @@ contains
          curve%step = 1.0_wp/real(default_steps, wp)
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       end associate
-      self%is_in_time = case%harmonics%method == method_hdhb
-      if (self%is_in_time) then
+      if (.not. associated(self%whole)) allocate (self%view)
+      if (case%harmonics%method == method_hdhb) then
+         allocate (self%in_time)
          call new_hdhb(self%system, self%in_time)
          allocate (values(self%system%n))
          call self%in_time%to_values(self%system%problem%structure%n_coordinates, whole_x, values)
+         if (associated(self%view)) call self%view%begin(self%system, self%in_time)
+         self%curve%corrector%view => self%view
          call self%curve%begin(self%in_time, values, error)
       else
+         if (associated(self%view)) call self%view%begin(self%system)
+         self%curve%corrector%view => self%view
          call self%curve%begin(self%system, whole_x, error)
       end if
    end subroutine begin
@@ -266,6 +277,8 @@ contains
 
       if (associated(self%whole)) deallocate (self%whole)
       if (associated(self%whole_problem)) deallocate (self%whole_problem)
+      if (associated(self%view)) deallocate (self%view)
+      if (associated(self%in_time)) deallocate (self%in_time)
    end subroutine release
 
    !> The next point of the branch; `more` is false where there is none.
@@ -278,7 +291,7 @@ contains
       type(branch_point) :: found
       integer(int64) :: clock, rate
 
-      if (self%is_in_time) then
+      if (associated(self%in_time)) then
          call self%curve%next(self%in_time, found, more, error)
       else
          call self%curve%next(self%system, found, more, error)
@@ -367,7 +380,7 @@ contains
       associate (curve => self%branch%curve)
          ds = curve%corrector%metric%chord(self%first, self%second)
          call interpolate(curve%corrector%metric, self%first, self%second, share, found)
-         if (self%branch%is_in_time) then
+         if (associated(self%branch%in_time)) then
             call curve%corrector%correct(self%branch%in_time, self%first, ds, found, error)
          else
             call curve%corrector%correct(self%branch%system, self%first, ds, found, error)
@@ -429,7 +442,7 @@ contains
       call self%system%set_frequency(found%p, error)
       if (allocated(error)) return
       coefficients = found%x
-      if (self%is_in_time) then
+      if (associated(self%in_time)) then
          call self%in_time%to_coefficients(self%system%problem%structure%n_coordinates, found%x, &
                                            coefficients)
       end if
@@ -450,6 +463,34 @@ contains
       if (point%converged .and. case%sweep%stability) then
          call self%stability%find(case, self%system, coefficients, point, error)
       end if
+      if (.not. allocated(error)) call self%point_along(case, found, point, error)
    end subroutine describe
+
+   !> The direction of the branch at a point, by a difference along the tangent: observed
+   !> quantities follow from unknowns and frequency, nothing is solved for.
+   subroutine point_along(self, case, found, point, error)
+      class(branch_type), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(branch_point), intent(in) :: found
+      type(point_type), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+      !> Of the tangent, and what it may change of the frequency.
+      real(wp), parameter :: longest = 1.0e-4_wp, difference = 1.0e-7_wp
+      real(wp), allocatable :: beside(:)
+      real(wp) :: step
+
+      point%tangent_omega = found%t_p
+      step = longest
+      if (abs(found%t_p)*step > difference*found%p) step = difference*found%p/abs(found%t_p)
+      call self%system%set_frequency(found%p + step*found%t_p, error)
+      if (allocated(error)) return
+      beside = found%x + step*found%t
+      if (associated(self%in_time)) then
+         call self%in_time%to_coefficients(self%system%problem%structure%n_coordinates, &
+                                           found%x + step*found%t, beside)
+      end if
+      call observed_coefficients(self%system, beside, case%harmonics%n_harmonics, point%tangent)
+      point%tangent = (point%tangent - point%coefficients)/step
+   end subroutine point_along
 
 end module fw_branch

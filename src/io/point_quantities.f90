@@ -91,6 +91,10 @@ contains
       ! What does not fit a line of the table is set behind it.
       list(size(list))%is_served_by = .true.
       call add('fold', l, '', 'point', 'whether the branch turns here', fold, follows_branch)
+      call add('tangent/omega', r, 'rad/s', 'point', 'direction of the branch, frequency', &
+               tangent_omega, follows_branch)
+      call add('tangent/coefficients', r, '<length>', 'point coefficient observed', &
+               'direction of the branch, coefficients', tangent, follows_branch)
       call add('harmonics', i, '1', 'point', 'harmonics of the balance', harmonics, has_levels)
       call add('instants', i, '1', 'point', 'instants of the period', instants, is_accurate)
       call add('error_estimate', r, '1', 'point', 'bound of the relative error of the response', &
@@ -327,6 +331,20 @@ contains
 
       values = [flag(point%fold)]
    end subroutine fold
+
+   subroutine tangent_omega(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%tangent_omega]
+   end subroutine tangent_omega
+
+   subroutine tangent(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%tangent)) values = by_rows(point%tangent)
+   end subroutine tangent
 
    subroutine harmonics(point, values)
       type(point_type), intent(in) :: point

@@ -69,6 +69,7 @@ contains
       type(branch_point), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: r(:), step(:)
+      integer :: iterations, k
       logical :: done
 
       point = next
@@ -93,6 +94,30 @@ contains
             report%iterations = report%iterations + 1
          end associate
       end do
+      if (point%report%converged) then
+         call corrector%find_tangent(system, next, point, done)
+         return
+      end if
+      ! Between pieces it goes round: with a search along each step, from here and from beyond.
+      iterations = point%report%iterations
+      do k = 1, 3
+         select case (k)
+         case (1)
+            call interpolate(corrector%metric, here, next, &
+                             share_at(corrector, here, next, bound), point)
+         case (2)
+            point%x = here%x
+         case default
+            point%x = next%x
+         end select
+         point%p = bound
+         call corrector%correct_across(system, next, point, error)
+         if (allocated(error)) return
+         iterations = iterations + point%report%iterations
+         point%report%iterations = iterations
+         if (point%report%converged) return
+      end do
+      call corrector%see(point%x, point%y)
    end subroutine land
 
    !> The share of the way at which the cubic between two points has a value of p, by bisection.

@@ -10,6 +10,11 @@ module fw_branch_point
    !> A point of the branch with its unit tangent (dx/ds, dp/ds).
    type :: branch_point
       real(wp), allocatable :: x(:), t(:)
+      !> What the branch is measured by at x, and its derivative along the branch: x and t where
+      !> that is the unknowns themselves.
+      real(wp), allocatable :: y(:), t_y(:)
+      !> Its derivative by p at a constant x, where it is not x.
+      real(wp), allocatable :: y_p(:)
       real(wp) :: p = 0.0_wp
       real(wp) :: t_p = 0.0_wp
       !> How it was found; all converged but perhaps for one on a bound.
@@ -20,33 +25,58 @@ module fw_branch_point
       integer :: orientation = 0
    end type branch_point
 
-   !> Lengths: x over the size it has about here and p over the length of its interval, so that a
+   !> Lengths: y over the size it has about here and p over the length of its interval, so that a
    !> step means the same in every system of units, and a narrow resonance bends the branch.
    type :: metric_type
+      real(wp) :: y_scale = 1.0_wp
+      !> Values in front of the unknowns in y, and the scale of these unknowns.
+      integer :: n_seen = 0
       real(wp) :: x_scale = 1.0_wp
       real(wp) :: p_scale = 1.0_wp
    contains
       procedure :: inner
       procedure :: length
+      procedure :: size => size_of
       procedure :: normalize
       procedure :: chord
    end type metric_type
 
 contains
 
-   pure real(wp) function inner(self, x1, p1, x2, p2)
+   pure real(wp) function inner(self, y1, p1, y2, p2)
       class(metric_type), intent(in) :: self
-      real(wp), intent(in) :: x1(:), p1, x2(:), p2
+      real(wp), intent(in) :: y1(:), p1, y2(:), p2
 
-      inner = dot_product(x1, x2)/self%x_scale**2 + p1*p2/self%p_scale**2
+      associate (n => self%n_seen)
+         if (n == 0) then
+            inner = dot_product(y1, y2)/self%y_scale**2 + p1*p2/self%p_scale**2
+         else
+            inner = dot_product(y1(:n), y2(:n))/self%y_scale**2 + &
+                    dot_product(y1(n + 1:), y2(n + 1:))/self%x_scale**2 + p1*p2/self%p_scale**2
+         end if
+      end associate
    end function inner
 
-   pure real(wp) function length(self, x, p)
+   pure real(wp) function length(self, y, p)
       class(metric_type), intent(in) :: self
-      real(wp), intent(in) :: x(:), p
+      real(wp), intent(in) :: y(:), p
 
-      length = hypot(norm2(x)/self%x_scale, p/self%p_scale)
+      length = hypot(self%size(y), p/self%p_scale)
    end function length
+
+   !> Length of a change of y alone.
+   pure real(wp) function size_of(self, y)
+      class(metric_type), intent(in) :: self
+      real(wp), intent(in) :: y(:)
+
+      associate (n => self%n_seen)
+         if (n == 0) then
+            size_of = norm2(y)/self%y_scale
+         else
+            size_of = hypot(norm2(y(:n))/self%y_scale, norm2(y(n + 1:))/self%x_scale)
+         end if
+      end associate
+   end function size_of
 
    !> Give the tangent of a point the length one.
    pure subroutine normalize(self, point)
@@ -54,9 +84,10 @@ contains
       type(branch_point), intent(inout) :: point
       real(wp) :: size
 
-      size = self%length(point%t, point%t_p)
+      size = self%length(point%t_y, point%t_p)
       if (.not. size > 0.0_wp) return
       point%t = point%t/size
+      point%t_y = point%t_y/size
       point%t_p = point%t_p/size
    end subroutine normalize
 
@@ -65,7 +96,7 @@ contains
       class(metric_type), intent(in) :: self
       type(branch_point), intent(in) :: a, b
 
-      chord = self%length(b%x - a%x, b%p - a%p)
+      chord = self%length(b%y - a%y, b%p - a%p)
    end function chord
 
    !> Turn the tangent round.
@@ -73,6 +104,7 @@ contains
       type(branch_point), intent(inout) :: point
 
       point%t = -point%t
+      point%t_y = -point%t_y
       point%t_p = -point%t_p
       point%orientation = -point%orientation
    end subroutine reverse

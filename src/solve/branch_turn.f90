@@ -18,12 +18,14 @@ module fw_branch_turn
    implicit none (type, external)
    private
 
-   public :: leap, turn_at_corner
+   public :: leap, turn_at_corner, all_around, far_ahead
 
    !> A step in p alone: from the longest, a part of the interval, divided by two to this power.
    real(wp), parameter :: longest_leap = 0.02_wp
    integer, parameter :: max_halvings = 7
-   !> How far it may take x, over the size of x.
+   !> Leaps of all lengths on either side, or of the longest ahead.
+   integer, parameter :: all_around = 1, far_ahead = 2
+   !> How far it may take y, over the size of y.
    real(wp), parameter :: furthest = 0.3_wp
 
 contains
@@ -45,6 +47,7 @@ contains
       if (allocated(error)) return
       beyond = here
       beyond%x = here%x + ds*here%t
+      beyond%y = here%y + ds*here%t_y
       beyond%p = here%p + ds*here%t_p
       call system%set_parameter(beyond%p, error)
       if (allocated(error)) return
@@ -56,6 +59,7 @@ contains
       if (corrector%stands(beyond) .or. differ(beyond, here)) call reverse(beyond)
       ! From the piece beyond: a plane across its tangent may meet the piece of `here` as well.
       next%x = beyond%x + ds*beyond%t
+      next%y = beyond%y + ds*beyond%t_y
       next%p = beyond%p + ds*beyond%t_p
       call corrector%correct(system, beyond, ds, next, error)
       if (allocated(error) .or. .not. next%report%converged) return
@@ -67,17 +71,20 @@ contains
    !> A step in p alone, beyond a place where many pieces meet or where the derivative has no bound
    !> (a pair whose slip of a period vanishes): Newton's method with its line search from `here`,
    !> first close by, then further away; ahead, then on the other side, where the branch may turn.
-   subroutine leap(corrector, system, here, next, error)
+   subroutine leap(corrector, system, here, reach, next, error)
       type(corrector_type), intent(inout) :: corrector
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(inout) :: here
+      !> all_around or far_ahead.
+      integer, intent(in) :: reach
       type(branch_point), intent(inout) :: next
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: dp
-      integer :: k, side
+      integer :: k, side, first
 
-      do side = 1, merge(-1, 1, corrector%oriented), -2
-         do k = -max_halvings, 0
+      first = merge(-max_halvings, -2, reach == all_around)
+      do side = 1, merge(-1, 1, corrector%oriented .and. reach == all_around), -2
+         do k = first, 0
             dp = side*sign(2.0_wp**k*longest_leap*corrector%metric%p_scale, here%t_p)
             call leap_to(corrector, system, here, dp, next, error)
             if (allocated(error) .or. next%report%converged) return
@@ -104,9 +111,10 @@ contains
       call newton%solve(system, next%x, next%report)
       call corrector%linear%add_work(newton%linear)
       if (.not. next%report%converged) return
+      call corrector%see(next%x, next%y)
       call corrector%find_tangent(system, here, next, done)
       next%report%converged = done .and. &
-         corrector%metric%length(next%x - here%x, 0.0_wp) <= furthest
+         corrector%metric%length(next%y - here%y, 0.0_wp) <= furthest
       if (.not. next%report%converged) return
       ! Beyond a sharp turn the angle with the last tangent says nothing.
       if (next%t_p*dp < 0.0_wp) call reverse(next)

@@ -14,9 +14,13 @@ module fw_continuation
    use fw_branch_point, only: reverse
    use fw_branch_step, only: allowed_error
    use fw_branch_step, only: extrapolate
+   use fw_branch_step, only: interpolate
    use fw_branch_step, only: missed
+   use fw_branch_step, only: misses_of
    use fw_branch_step, only: step_history
    use fw_branch_step, only: turns_between
+   use fw_branch_turn, only: all_around
+   use fw_branch_turn, only: far_ahead
    use fw_branch_turn, only: leap
    use fw_branch_turn, only: turn_at_corner
    use fw_corrector, only: corrector_type
@@ -58,10 +62,10 @@ module fw_continuation
       ! Where the branch began and has come to, the point after a fold that waits, and the step.
       type(branch_point) :: first, here, waiting
       type(step_history) :: history
-      type(near_response) :: near
-      logical :: waits = .false.
+      type(near_response) :: near, near_ahead
+      logical :: waits = .false., knows_ahead = .false.
       real(wp) :: ds = 0.0_wp
-      integer :: n_points = 0, n_constant = 0
+      integer :: n_points = 0, n_constant = 0, n_failed = 0
    contains
       procedure :: begin
       procedure :: next
@@ -78,8 +82,18 @@ module fw_continuation
    !> What the model of the resonances may say of a step that has been taken, of the error that is
    !> allowed.
    real(wp), parameter :: passed = 0.6_wp
-   !> Longest step: of p over the interval, and of x over its size.
-   real(wp), parameter :: longest_p = 0.0625_wp, longest_x = 0.5_wp
+   !> What may be found at one place of a step, of the error that is allowed.
+   real(wp), parameter :: looked_at = 0.7_wp
+   !> What unknowns count beside the response that they make, where that is what is measured: they
+   !> may run away where the vibration stays.
+   real(wp), parameter :: weight_x = 0.02_wp
+   !> Failures of a step from which on it is tried in p alone, where p is this part of it at least.
+   integer, parameter :: most_failed = 1
+   real(wp), parameter :: least_share = 2.0e-2_wp
+   !> Share of a step at its ends where no corner is looked for.
+   real(wp), parameter :: least_place = 0.25_wp
+   !> Longest step: of p over the interval, and of y over its size.
+   real(wp), parameter :: longest_p = 0.0625_wp, longest_y = 0.5_wp
    !> Step over the distance of a simple pole at which a cubic misses (0.45)^4/16 of it, 0.3 %.
    real(wp), parameter :: beside_pole = 0.45_wp
    !> What is left of the size of x from one point to the next where x itself gets smaller.
@@ -118,8 +132,8 @@ contains
       self%corrector%options = self%options
       call self%corrector%reset(system)
       self%corrector%metric%p_scale = max(abs(self%finish - self%start), tiny(1.0_wp))
-      self%corrector%metric%x_scale = max(self%x_scale, norm2(x), tiny(1.0_wp))
       self%x_scale = max(self%x_scale, tiny(1.0_wp))
+      self%corrector%least_x = self%x_scale
       self%n_points = 1
       self%n_constant = 0
       self%ended = .false.
@@ -129,16 +143,23 @@ contains
       towards_finish%p = self%start
       allocate (towards_finish%t(size(x)), source=0.0_wp)
       towards_finish%t_p = sign(self%corrector%metric%p_scale, self%finish - self%start)
-      self%here = towards_finish
       call system%set_parameter(self%start, error)
       if (allocated(error)) return
+      call self%corrector%see(x, towards_finish%y)
+      if (associated(self%corrector%view)) self%corrector%metric%n_seen = self%corrector%view%n
+      self%corrector%metric%y_scale = 0.0_wp
+      self%corrector%metric%x_scale = 0.0_wp
+      call scale_metric(self, towards_finish)
+      allocate (towards_finish%t_y, mold=towards_finish%y)
+      towards_finish%t_y = 0.0_wp
+      self%here = towards_finish
       call self%corrector%find_tangent(system, towards_finish, self%here, done)
       self%first = self%here
       if (.not. done) then
          call end_branch(self, 'the derivative at its first point is singular')
          return
       end if
-      call self%near%find(self%corrector, system, self%here)
+      call self%near%find(self%corrector, system, self%here, self%corrector%x_scale(x))
       self%ds = self%step*self%corrector%metric%p_scale/abs(self%here%t_p)
       call limit_step(self)
    end subroutine begin
@@ -224,7 +245,7 @@ contains
       if (abs(bound - self%start) > 0.0_wp) then
          self%complete = point%report%converged
          call end_branch(self, 'followed to the end of the sweep')
-      else if (self%corrector%metric%length(point%x - self%first%x, 0.0_wp) <= same) then
+      else if (self%corrector%metric%length(point%y - self%first%y, 0.0_wp) <= same) then
          call end_branch(self, 'it closed on itself at its first point')
       else
          call end_branch(self, 'it returned to the start of the sweep with another response; '// &
@@ -250,6 +271,14 @@ contains
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
 
+      if (associated(self%corrector%view)) then
+         ! With many pairs, places where pieces meet lie close together: across them.
+         call shorten_until_taken(self, system, turning, 0.5_wp, ahead, done, error)
+         if (allocated(error) .or. done) return
+         call leap(self%corrector, system, self%here, far_ahead, ahead, error)
+         done = ahead%report%converged
+         if (allocated(error) .or. done) return
+      end if
       call shorten_until_taken(self, system, shortest, 0.5_wp, ahead, done, error)
       if (allocated(error) .or. done) return
       self%ds = corner
@@ -257,7 +286,7 @@ contains
       call shorten_until_taken(self, system, bifurcation, 0.7_wp, ahead, done, error)
       if (allocated(error) .or. done) return
       self%corrector%careful = .false.
-      call leap(self%corrector, system, self%here, ahead, error)
+      call leap(self%corrector, system, self%here, all_around, ahead, error)
       done = ahead%report%converged
    end subroutine advance
 
@@ -271,6 +300,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: shortening
 
+      self%n_failed = 0
       do
          ahead = self%here
          self%corrector%careful = self%ds < turning .or. .not. self%history%known
@@ -279,6 +309,7 @@ contains
          done = shortening >= 1.0_wp
          if (allocated(error) .or. done) return
          self%n_rejected = self%n_rejected + 1
+         self%n_failed = self%n_failed + 1
          if (self%ds < turning .and. self%corrector%oriented) then
             call turn_at_corner(self%corrector, system, self%here, self%ds, ahead, error)
             done = ahead%report%converged
@@ -299,29 +330,43 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: guess(:)
       real(wp) :: guess_p
-      logical :: done
+      logical :: done, far
 
       shortening = halved
-      guess = ahead%x
+      self%knows_ahead = .false.
+      guess = ahead%y
       guess_p = ahead%p
       call self%corrector%correct(system, self%here, max(self%ds, corner), ahead, error)
-      if (allocated(error) .or. .not. ahead%report%converged) return
+      if (allocated(error)) return
+      if (.not. ahead%report%converged .and. goes_across(self)) then
+         call extrapolate(self%corrector%metric, self%history, self%here, self%ds, ahead)
+         call self%corrector%correct_across(system, self%here, ahead, error)
+         if (allocated(error)) return
+      end if
+      if (.not. ahead%report%converged) return
       associate (metric => self%corrector%metric)
-         if (metric%length(ahead%x - guess, ahead%p - guess_p) > max(max_distance*self%ds, &
-             corner)) &
-            return
+         far = metric%length(ahead%y - guess, ahead%p - guess_p) > max(max_distance*self%ds, corner)
       end associate
+      if (far) return
       if (self%ds <= corner) then
          call look_at_corner(self, system, ahead, done, error)
          if (done) shortening = 1.0_wp
       else
          if (.not. bends_little(self, ahead) .or. differ(ahead, self%here)) return
          if (turns_between(self%corrector%metric, self%here, ahead)) return
-         shortening = shortening_for_error(self, ahead)
-         if (shortening < 1.0_wp .or. self%here%t_p*ahead%t_p <= 0.0_wp) return
-         if (self%near%misses(ahead%p - self%here%p) > passed*allowed_error) shortening = 0.7_wp
+         call measure(self, system, ahead, shortening, error)
       end if
    end subroutine attempt
+
+   !> Whether a step in p alone is worth trying where the corrector has failed more than once: many
+   !> pairs make it go round between pieces, and a search along its steps does not.
+   pure logical function goes_across(self)
+      class(arclength_type), intent(in) :: self
+
+      goes_across = associated(self%corrector%view) .and. self%n_failed >= most_failed .and. &
+                    self%ds >= turning .and. &
+                    abs(self%here%t_p) > least_share*self%corrector%metric%p_scale
+   end function goes_across
 
    !> Whether the angles between tangents and chord are those of one smooth piece.
    pure logical function bends_little(self, ahead)
@@ -331,9 +376,9 @@ contains
 
       associate (metric => self%corrector%metric, here => self%here)
          chord = metric%chord(here, ahead)
-         cosine = [metric%inner(here%t, here%t_p, ahead%t, ahead%t_p), &
-                   metric%inner(here%t, here%t_p, ahead%x - here%x, ahead%p - here%p)/chord, &
-                   metric%inner(ahead%t, ahead%t_p, ahead%x - here%x, ahead%p - here%p)/chord]
+         cosine = [metric%inner(here%t_y, here%t_p, ahead%t_y, ahead%t_p), &
+                   metric%inner(here%t_y, here%t_p, ahead%y - here%y, ahead%p - here%p)/chord, &
+                   metric%inner(ahead%t_y, ahead%t_p, ahead%y - here%y, ahead%p - here%p)/chord]
       end associate
       bends_little = cosine(1) >= cos(max_turn) .and. all(cosine(2:) >= cos(max_chord))
    end function bends_little
@@ -359,7 +404,8 @@ contains
       if (allocated(error)) return
       done = .true.
       if (.not. differ(ahead, self%here)) return
-      if (self%corrector%metric%inner(self%here%t, self%here%t_p, ahead%t, ahead%t_p) <= sharp) then
+      if (self%corrector%metric%inner(self%here%t_y, self%here%t_p, ahead%t_y, ahead%t_p) &
+          <= sharp) then
          call reverse(ahead)
       else
          done = self%ds < bifurcation
@@ -367,43 +413,116 @@ contains
    end subroutine look_at_corner
 
    !> 1 where the cubic of the step is true to the curve, else what part of it would be.
-   pure real(wp) function shortening_for_error(self, ahead) result(shortening)
-      class(arclength_type), intent(in) :: self
+   subroutine measure(self, system, ahead, shortening, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: ahead
-      real(wp) :: error, fourth
+      real(wp), intent(out) :: shortening
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: smooth, corner_error, place, found
 
       shortening = 1.0_wp
-      call missed(self%corrector%metric, self%history, self%here, ahead, error, fourth)
-      if (error <= allowed_error) return
-      shortening = max(least_growth, min(0.8_wp, (aim*allowed_error/error)**0.25_wp))
-   end function shortening_for_error
+      call missed(self%corrector%metric, self%history, self%here, ahead, smooth, corner_error, &
+                  place)
+      if (smooth > allowed_error) then
+         shortening = max(least_growth, min(0.8_wp, (aim*allowed_error/smooth)**0.25_wp))
+      else if (self%here%t_p*ahead%t_p > 0.0_wp) then
+         if (self%near%misses(ahead%p - self%here%p) > passed*allowed_error) shortening = 0.7_wp
+      end if
+      if (shortening < 1.0_wp) return
+      ! While the system stands there.
+      call self%near_ahead%find(self%corrector, system, ahead, x_scale_at(self, ahead))
+      self%knows_ahead = .true.
+      if (corner_error <= allowed_error) return
+      place = max(least_place, min(1.0_wp - least_place, place))
+      call look_between(self, system, ahead, place, found, error)
+      if (found > looked_at*allowed_error) shortening = place
+   end subroutine measure
+
+   !> What the cubic of a step misses at a place of it: a correction there at a constant p.
+   subroutine look_between(self, system, ahead, place, found, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: ahead
+      !> Share of the step.
+      real(wp), intent(in) :: place
+      real(wp), intent(out) :: found
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: between
+      real(wp), allocatable :: change(:)
+      logical :: done
+
+      found = 0.0_wp
+      call interpolate(self%corrector%metric, self%here, ahead, place, between)
+      call self%corrector%try(system, between, change, done, error)
+      if (allocated(error) .or. .not. done) return
+      found = misses_of(self%corrector%metric, self%here, ahead, between, change)
+   end subroutine look_between
+
+   !> Sizes are those of a point.
+   pure subroutine scale_metric(self, point)
+      class(arclength_type), intent(inout) :: self
+      type(branch_point), intent(in) :: point
+
+      associate (metric => self%corrector%metric)
+         metric%y_scale = y_scale_at(self, point)
+         if (metric%n_seen == 0) return
+         metric%x_scale = max(norm2(point%x)/weight_x, fading*metric%x_scale, self%x_scale/weight_x)
+      end associate
+   end subroutine scale_metric
+
+   !> The scale of y at the next point.
+   pure real(wp) function y_scale_at(self, ahead) result(scale)
+      class(arclength_type), intent(in) :: self
+      type(branch_point), intent(in) :: ahead
+
+      associate (metric => self%corrector%metric)
+         scale = max(fading*metric%y_scale, self%x_scale)
+         if (metric%n_seen == 0) then
+            scale = max(norm2(ahead%y), scale)
+         else
+            scale = max(norm2(ahead%y(:metric%n_seen)), scale)
+         end if
+      end associate
+   end function y_scale_at
+
+   pure real(wp) function x_scale_at(self, ahead) result(scale)
+      class(arclength_type), intent(in) :: self
+      type(branch_point), intent(in) :: ahead
+
+      scale = y_scale_at(self, ahead)
+      if (associated(self%corrector%view)) scale = self%corrector%x_scale(ahead%x)
+   end function x_scale_at
 
    !> Go on to a point, and choose the step from there.
    subroutine plan(self, system, ahead)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: ahead
-      real(wp) :: error, fourth, growth, turn
+      real(wp) :: error, unused(2), growth, turn
 
       associate (metric => self%corrector%metric)
          growth = largest_growth
-         call missed(metric, self%history, self%here, ahead, error, fourth)
+         call missed(metric, self%history, self%here, ahead, error, unused(1), unused(2))
          if (error > 0.0_wp) growth = min(growth, (aim*allowed_error/error)**0.25_wp)
-         turn = acos(max(-1.0_wp, min(1.0_wp, metric%inner(self%here%t, self%here%t_p, ahead%t, &
-            ahead%t_p))))
+         turn = acos(max(-1.0_wp, min(1.0_wp, metric%inner(self%here%t_y, self%here%t_p, &
+                                                           ahead%t_y, ahead%t_p))))
          if (turn > 0.0_wp) growth = min(growth, max(least_growth, aimed_turn/turn))
          if (ahead%report%iterations >= slow) growth = min(growth, slower)
          self%history%known = .true.
-         self%history%fourth = fourth
          self%history%before = self%here
          self%here = ahead
          ! Resonances are alike at every size: a step keeps its length when the scale changes.
          self%ds = metric%chord(self%history%before, self%here)
-         metric%x_scale = max(norm2(ahead%x), fading*metric%x_scale, self%x_scale)
+         call scale_metric(self, ahead)
          call metric%normalize(self%here)
          self%ds = max(growth*self%ds, min(corner, largest_growth*self%ds))
       end associate
-      call self%near%find(self%corrector, system, self%here)
+      if (self%knows_ahead) then
+         self%near = self%near_ahead
+      else
+         call self%near%find(self%corrector, system, self%here, x_scale_at(self, self%here))
+      end if
       call limit_step(self)
    end subroutine plan
 
@@ -415,8 +534,8 @@ contains
       associate (metric => self%corrector%metric, here => self%here)
          change = abs(here%t_p)/metric%p_scale
          if (change*self%ds > longest_p) self%ds = longest_p/change
-         change = norm2(here%t)/metric%x_scale
-         if (change*self%ds > longest_x) self%ds = longest_x/change
+         change = metric%size(here%t_y)
+         if (change*self%ds > longest_y) self%ds = longest_y/change
          if (self%near%n == 0 .and. allocated(self%pole)) then
             reach = beside_pole*minval(hypot(here%p - self%pole, self%pole_width))
             if (self%ds*abs(here%t_p) > reach) self%ds = reach/abs(here%t_p)

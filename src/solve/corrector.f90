@@ -11,11 +11,13 @@ module fw_corrector
    use fw_bordered, only: bordered_type
    use fw_branch_point, only: branch_point
    use fw_branch_point, only: metric_type
+   use fw_branch_view, only: branch_view
    use fw_error, only: error_type
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
    use fw_linear_step, only: linear_step_type
+   use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
    use fw_parameter_system, only: parameter_system
    use fw_plane_system, only: plane_system
@@ -34,6 +36,10 @@ module fw_corrector
       type(bordered_type) :: bordered
       type(plane_system) :: plane
       type(metric_type) :: metric
+      !> What the branch is measured by; the unknowns themselves where it is not associated.
+      class(branch_view), pointer :: view => null()
+      !> The least size of x that matters.
+      real(wp) :: least_x = 0.0_wp
       !> Take no risk, whatever it costs: direct solutions of the bordered matrix, and corrections
       !> cut short where the residual does not decrease. For corners.
       logical :: careful = .false.
@@ -42,9 +48,13 @@ module fw_corrector
    contains
       procedure :: reset
       procedure :: correct
+      procedure :: correct_across
+      procedure :: try
       procedure :: find_tangent
       procedure :: find_orientation
       procedure :: stands
+      procedure :: see
+      procedure :: x_scale
    end type corrector_type
 
    !> Corrector iterations: more are a failure.
@@ -69,6 +79,7 @@ module fw_corrector
    integer, parameter :: branch_lu_up_to = 400
    !> Iterative linear solutions: the tangent needs more digits than a Newton step.
    real(wp), parameter :: branch_forcing = 1.0e-6_wp
+   real(wp), parameter :: step_forcing = 1.0e-3_wp
 
 contains
 
@@ -98,13 +109,14 @@ contains
       type(branch_point), intent(inout) :: next
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: r(:), step(:), guess(:)
-      real(wp) :: dp, best, guess_p, size, last_size
+      real(wp) :: dp, best, guess_p, size, last_size, x_scale
       logical :: done
       integer :: stalled, longer
 
       allocate (r(system%n), step(system%n))
-      guess = next%x
+      guess = next%y
       guess_p = next%p
+      x_scale = self%x_scale(here%x)
       next%report = solver_report()
       best = huge(1.0_wp)
       last_size = huge(1.0_wp)
@@ -114,6 +126,8 @@ contains
          call stop_run(system%interrupt, error)
          if (.not. allocated(error)) call system%set_parameter(next%p, error)
          if (allocated(error)) return
+         call self%see(next%x, next%y)
+         if (self%metric%length(next%y - guess, next%p - guess_p) > leash*ds) exit
          call system%residual(next%x, r)
          associate (report => next%report)
             report%residual = norm2(r)/system%reference
@@ -132,16 +146,68 @@ contains
          if (allocated(error)) return
          next%x = next%x + step
          next%p = next%p + dp
-         size = self%metric%length(step, dp)
+         size = hypot(norm2(step)/x_scale, dp/self%metric%p_scale)
          if (size > last_size) longer = longer + 1
          last_size = size
          if (longer > max_longer) exit
-         if (self%metric%length(next%x - guess, next%p - guess_p) > leash*ds) exit
       end do
       if (.not. next%report%converged) return
       call self%find_tangent(system, here, next, done)
       next%report%converged = done
    end subroutine correct
+
+   !> From a guess in `next` to the branch at the p of the guess, by Newton's method with its search
+   !> along each step.
+   subroutine correct_across(self, system, here, next, error)
+      class(corrector_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: here
+      type(branch_point), intent(inout) :: next
+      type(error_type), allocatable, intent(out) :: error
+      type(newton_solver) :: newton
+      logical :: done
+
+      newton%options = self%options
+      newton%options%max_iterations = min(newton%options%max_iterations, max_corrections)
+      newton%linear%lu_follows = .true.
+      next%report = solver_report()
+      call system%set_parameter(next%p, error)
+      if (allocated(error)) return
+      call newton%solve(system, next%x, next%report)
+      call self%linear%add_work(newton%linear)
+      if (next%report%interrupted) call stop_run(system%interrupt, error)
+      if (allocated(error) .or. .not. next%report%converged) return
+      call self%find_tangent(system, here, next, done)
+      next%report%converged = done
+   end subroutine correct_across
+
+   !> The change of y that a correction of a point makes at a constant p; the system stays there.
+   subroutine try(self, system, point, change, done, error)
+      class(corrector_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: point
+      real(wp), allocatable, intent(out) :: change(:)
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      !> One digit of it is enough.
+      real(wp), parameter :: forcing = 0.05_wp
+      real(wp), allocatable :: r(:), step(:), at_point(:)
+
+      done = .false.
+      call system%set_parameter(point%p, error)
+      if (allocated(error)) return
+      allocate (r(system%n), step(system%n))
+      call system%residual(point%x, r)
+      call self%linear%solve(system, r, forcing, step, done)
+      if (.not. done) return
+      if (associated(self%view)) then
+         call self%see(point%x, at_point)
+         call self%see(point%x + step, change)
+         change = change - at_point
+      else
+         change = step
+      end if
+   end subroutine try
 
    !> Halve a correction until the residual decreases; where it never does, what leaves the least.
    subroutine cut_short(system, from, r, step, dp, error)
@@ -199,17 +265,26 @@ contains
       real(wp), intent(out), contiguous :: step(:)
       real(wp), intent(out) :: dp
       logical, intent(out) :: done
-      real(wp), allocatable :: slope(:), dx_dp(:)
+      real(wp), allocatable :: slope(:), dx_dp(:), at_step(:), along(:)
 
       allocate (slope(system%n), dx_dp(system%n))
       dp = 0.0_wp
-      call self%linear%solve(system, r, branch_forcing, step, done)
+      call self%linear%solve(system, r, step_forcing, step, done)
       if (.not. done) return
       call system%parameter_derivative(next%x, slope)
-      call self%linear%solve_prepared(system, slope, branch_forcing, dx_dp, done)
+      call self%linear%solve_prepared(system, slope, step_forcing, dx_dp, done)
       if (.not. done) return
-      dp = -self%metric%inner(here%t, here%t_p, step, 0.0_wp)/ &
-           self%metric%inner(here%t, here%t_p, dx_dp, 1.0_wp)
+      if (associated(self%view)) then
+         ! y is affine in x; its own change with p is taken from `here`.
+         call self%see(next%x + step, at_step)
+         call self%see(next%x + dx_dp, along)
+         along = along - next%y + here%y_p
+         dp = -self%metric%inner(here%t_y, here%t_p, at_step - next%y, 0.0_wp)/ &
+              self%metric%inner(here%t_y, here%t_p, along, 1.0_wp)
+      else
+         dp = -self%metric%inner(here%t, here%t_p, step, 0.0_wp)/ &
+              self%metric%inner(here%t, here%t_p, dx_dp, 1.0_wp)
+      end if
       step = step + dp*dx_dp
    end subroutine combined_step
 
@@ -228,7 +303,7 @@ contains
       dp = 0.0_wp
       ! Through the point where the correction stands: its condition is met.
       call self%plane%cut(system, next%x, next%p, here%t, &
-                          here%t_p*(self%metric%x_scale/self%metric%p_scale)**2)
+                          here%t_p*(self%x_scale(here%x)/self%metric%p_scale)**2)
       call self%bordered%prepare(self%plane, singular)
       self%linear%factorizations = self%linear%factorizations + 1
       done = .not. singular
@@ -251,6 +326,8 @@ contains
       real(wp), allocatable :: r(:), slope(:), t(:)
 
       allocate (r(system%n), slope(system%n), t(system%n))
+      call find_own_slope(self, system, point, done)
+      if (.not. done) return
       call system%residual(point%x, r)
       call self%linear%prepare(system, done)
       if (.not. done) return
@@ -260,8 +337,16 @@ contains
       done = all(ieee_is_finite(t))
       if (.not. done) return
       point%t = t
-      point%t_p = sign(1.0_wp, self%metric%inner(t, 1.0_wp, previous%t, previous%t_p))
-      point%t = point%t_p*t
+      point%t_y = t
+      if (associated(self%view)) then
+         call self%see(point%x, point%y)
+         point%t_y = point%y
+         call self%see(point%x + t, point%t_y)
+         point%t_y = point%t_y - point%y + point%y_p
+      end if
+      point%t_p = sign(1.0_wp, self%metric%inner(point%t_y, 1.0_wp, previous%t_y, previous%t_p))
+      point%t = point%t_p*point%t
+      point%t_y = point%t_p*point%t_y
       call self%metric%normalize(point)
       point%orientation = 0
       if (self%stands(point)) return
@@ -272,6 +357,54 @@ contains
       end if
       if (point%t_p < 0.0_wp) point%orientation = -point%orientation
    end subroutine find_tangent
+
+   !> What the branch is measured by, where the system stands.
+   subroutine see(self, x, y)
+      class(corrector_type), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), allocatable, intent(inout) :: y(:)
+
+      if (associated(self%view)) then
+         if (.not. allocated(y)) allocate (y(self%view%n + size(x)))
+         call self%view%see(x, y(:self%view%n))
+         y(self%view%n + 1:) = x
+      else
+         y = x
+      end if
+   end subroutine see
+
+   !> Change of what is measured with p alone, by a difference; the system comes back to the point.
+   subroutine find_own_slope(self, system, point, done)
+      type(corrector_type), intent(in) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(inout) :: point
+      logical, intent(out) :: done
+      !> Beside the widths of resonances, over p.
+      real(wp), parameter :: difference = 1.0e-7_wp
+      type(error_type), allocatable :: error
+      real(wp) :: dp
+
+      done = .true.
+      if (.not. associated(self%view)) return
+      dp = difference*abs(point%p)
+      call self%see(point%x, point%y)
+      call system%set_parameter(point%p + dp, error)
+      done = .not. allocated(error)
+      if (.not. done) return
+      call self%see(point%x, point%y_p)
+      point%y_p = (point%y_p - point%y)/dp
+      call system%set_parameter(point%p, error)
+      done = .not. allocated(error)
+   end subroutine find_own_slope
+
+   !> The size of x about a point.
+   pure real(wp) function x_scale(self, x)
+      class(corrector_type), intent(in) :: self
+      real(wp), intent(in) :: x(:)
+
+      x_scale = self%metric%y_scale
+      if (associated(self%view)) x_scale = max(norm2(x), self%least_x, tiny(1.0_wp))
+   end function x_scale
 
    !> Sign of det(dR/dx) dp/ds. It is the same all along a branch: det(dR/dx) changes its sign where
    !> p turns, in a smooth fold as at a kink. 0 where p does not move and dR/dx is singular: the

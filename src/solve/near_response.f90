@@ -23,6 +23,8 @@ module fw_near_response
    public :: near_response
 
    type :: near_response
+      !> Whether the branch is measured by x.
+      logical :: measures_x = .true.
       !> Order of the model; 0: nothing is known, and nothing is bounded.
       integer :: n = 0
       !> Norms of dx/dp and x, over the scale of x.
@@ -55,18 +57,19 @@ module fw_near_response
 contains
 
    !> The model at a point at which the tangent has just been found.
-   subroutine find(self, corrector, system, point)
+   subroutine find(self, corrector, system, point, scale)
       class(near_response), intent(inout) :: self
       type(corrector_type), intent(inout) :: corrector
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: point
+      !> The size of x.
+      real(wp), intent(in) :: scale
       real(wp), allocatable :: v(:, :), at_point(:)
-      real(wp) :: scale
       integer :: j, m
 
       self%n = 0
       if (corrector%stands(point) .or. size(corrector%linear%rhs) == 0) return
-      scale = corrector%metric%x_scale
+      self%measures_x = .not. associated(corrector%view)
       self%slope = norm2(point%t)/abs(point%t_p)/scale
       self%size = norm2(point%x)/scale
       if (.not. self%slope > 0.0_wp) return
@@ -160,6 +163,10 @@ contains
          change = shorter*change
       end do
       if (k == 1) return
+      if (.not. self%measures_x) then
+         length = min(wanted, change/(share*p_scale))
+         return
+      end if
       call evaluate(self, change, at_end, slope_end)
       length = sqrt(1.0_wp - share**2)*at_end(1)*sign(1.0_wp, change) + share*change/p_scale
       length = min(wanted, max(length, share*change/p_scale))

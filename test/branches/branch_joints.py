@@ -74,30 +74,39 @@ def random_joint(seed):
     return Joint(kind, text, float(0.6 * omega[0]), float(1.3 * top))
 
 
-def curve(omega, x):
-    """Places along the cubics through rows, with tangents from parabolas through three, and along
-    straight lines: at a corner, such tangents are of no use."""
+def curve(omega, x, tangent=None):
+    """Places along the cubics through rows and tangents. Of a branch without tangents: with those of
+    parabolas through three rows, and along straight lines, for at a corner these are of no use."""
     scale = np.maximum(np.linalg.norm(x, axis=1), 1e-3 * np.linalg.norm(x, axis=1).max())
     z = np.column_stack([omega, x])
     middle = 0.5 * (scale[1:] + scale[:-1])
     step = np.hypot(np.linalg.norm(np.diff(x, axis=0), axis=1) / middle,
                     np.diff(omega) / (omega.max() - omega.min()))
     s = np.concatenate([[0], np.cumsum(np.maximum(step, 1e-12))])
-    slope = np.gradient(z, s, axis=0, edge_order=1)
     u = np.linspace(0, 1, PLACES, endpoint=False)[None, :, None]
     h = np.diff(s)[:, None, None]
     a, b = z[:-1, None], z[1:, None]
+    if tangent is None:
+        slope = np.gradient(z, s, axis=0, edge_order=1)
+        ends = slope[:-1], slope[1:]
+    else:
+        # Tangents of any length: those of the step have the length one in its scales.
+        scale = np.column_stack([np.full(len(step), np.ptp(omega)),
+                                 np.repeat(middle[:, None], x.shape[1], axis=1)])
+        ends = [side / np.linalg.norm(side / scale, axis=1)[:, None]
+                for side in (tangent[:-1], tangent[1:])]
+        cosine = (ends[0] * ends[1] / scale**2).sum(axis=1)
+        h = h * (1 + (1 - np.maximum(cosine, 0)) / 12)[:, None, None]
     places = ((1 + 2 * u) * (1 - u)**2 * a + u**2 * (3 - 2 * u) * b
-              + h * u * (1 - u) * ((1 - u) * slope[:-1, None] - u * slope[1:, None]))
-    straight = (1 - u) * a + u * b
-    return [np.vstack([kind.reshape(-1, z.shape[1]), z[-1:]]) for kind in (places, straight)]
+              + h * u * (1 - u) * ((1 - u) * ends[0][:, None] - u * ends[1][:, None]))
+    kinds = [places] if tangent is not None else [places, (1 - u) * a + u * b]
+    return [np.vstack([kind.reshape(-1, z.shape[1]), z[-1:]]) for kind in kinds]
 
 
-def distances(omega, x, at, points):
+def distances(omega, x, at, points, tangent=None):
     """Of solutions from a branch, over their size."""
-    lines = curve(omega, x)
-    return np.minimum(*(distances_from(places[:, 0], places[:, 1:], at, points)
-                        for places in lines))
+    return np.min([distances_from(places[:, 0], places[:, 1:], at, points)
+                   for places in curve(omega, x, tangent)], axis=0)
 
 
 def distances_from(along, values, at, points):
@@ -117,7 +126,7 @@ def distances_from(along, values, at, points):
 
 def several(up, down):
     """Frequencies at which sweeps both ways give different solutions: between folds."""
-    (omega, good, x, _), (_, other_good, other, _) = up, [part[::-1] for part in down]
+    (omega, good, x, *_), (_, other_good, other, *_) = up, [part[::-1] for part in down]
     x, other = x.reshape(len(omega), -1), other.reshape(len(omega), -1)
     size = np.maximum(np.linalg.norm(x, axis=1), np.linalg.norm(other, axis=1))
     return omega[good & other_good & (np.linalg.norm(x - other, axis=1) > DIFFERENT * size)]
@@ -134,15 +143,17 @@ class Verdict:
 
 
 def judge(joint, branch, sweeps, status):
-    """branch and sweeps: (omega, converged, coefficients (n, 2H+1, n_dof), fold)."""
-    omega, converged, x, fold = branch
+    """branch and sweeps: (omega, converged, coefficients (n, 2H+1, n_dof), fold), and the tangents of
+    a branch that has them (omega and coefficients in a row)."""
+    omega, converged, x, fold, *tangent = branch
     x = x.reshape(len(omega), -1)
+    tangent = tangent[0] if tangent else None
     verdict = Verdict(len(omega))
     verdict.incomplete = status != 0 or not converged.all() or abs(omega[-1] / joint.end - 1) > 1e-9
-    for at, good, points, _ in sweeps:
+    for at, good, points, *_ in sweeps:
         points = points.reshape(len(at), -1)
         inside = good & (at <= omega.max()) & (at >= omega.min())
-        verdict.off += int((distances(omega, x, at[inside], points[inside]) > NEAR).sum())
+        verdict.off += int((distances(omega, x, at[inside], points[inside], tangent) > NEAR).sum())
     folds = omega[fold]
     step = 3 * abs(at[1] - at[0])
     verdict.missed = sum(not (len(folds) and folds.min() - step <= w <= folds.max() + step)

@@ -37,16 +37,25 @@ SECONDS = 120
 
 
 def solve(program, text, folder, name):
-    """Status, frequencies, converged, coefficients and folds of a case."""
+    """Status, and frequencies, converged, coefficients, folds and perhaps tangents of a case."""
     (folder / f"{name}.nml").write_text(text)
-    done = subprocess.run([program, "-q", "-o", f"{name}.h5", f"{name}.nml"], cwd=folder,
+    return run(program, folder, name, f"{name}.nml")
+
+
+def run(program, folder, name, *words):
+    """The same of a namelist on the command line."""
+    done = subprocess.run([program, "-q", "-o", f"{name}.h5", *words], cwd=folder,
                           env={**PATIENT, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
                           timeout=limit(SECONDS), check=False)
     with h5py.File(folder / f"{name}.h5") as file:
         omega = file["omega"][:]
         fold = file["fold"][:] if "fold" in file else np.zeros(len(omega))
-        return done.returncode, (omega, file["converged"][:].astype(bool),
-                                 file["coefficients"][:], fold.astype(bool))
+        found = (omega, file["converged"][:].astype(bool), file["coefficients"][:],
+                 fold.astype(bool))
+        if "tangent" in file:
+            found += (np.column_stack([file["tangent/omega"][:],
+                                       file["tangent/coefficients"][:].reshape(len(omega), -1)]),)
+        return done.returncode, found
 
 
 def judge_chain(program, seed, n_points):

@@ -1,6 +1,8 @@
 """Some of the branches of each family, and proof that the judges see what is wrong."""
 from __future__ import annotations
 
+from pathlib import Path
+
 import branch_chains
 import branch_joints
 import branches
@@ -9,6 +11,9 @@ import pytest
 
 # First seeds of each family: some seconds.
 CHAINS, JOINTS = range(16), range(9)
+SECTOR = Path(__file__).resolve().parents[2] / "example" / "blade_sector"
+# Rows that branches of the sector took when their steps heeded the slip of every pair.
+SECTOR_CASES = (("frf.nml", ("harmonics%n_harmonics=3",), 105), ("frf_48.nml", (), 62))
 
 
 @pytest.mark.parametrize("n_points", branches.FIRST_STEPS)
@@ -24,6 +29,27 @@ def test_a_linear_branch_goes_over_every_resonance(n_points):
 def test_a_branch_holds_what_fine_sweeps_find(seed):
     kind, verdict = branches.judge_joint(branches.PROGRAM, seed)
     assert not (verdict.incomplete or verdict.off or verdict.missed), (kind, verdict)
+
+
+@pytest.mark.parametrize(("name", "settings", "before"), SECTOR_CASES)
+def test_a_branch_of_many_pairs_is_short_and_true_to_its_response(tmp_path, name, settings,
+                                                                  before):
+    words = [word for key in (*settings, "sweep%n_points=41") for word in ("--set", key)]
+    status, (omega, _, x, _, tangent) = branches.run(
+        branches.PROGRAM, tmp_path, "branch", *words, "--set", "sweep%continuation='arclength'",
+        SECTOR / name)
+    sweep = branches.run(branches.PROGRAM, tmp_path, "sweep", *words, SECTOR / name)[1]
+    assert status == 0 and len(omega) < before / 2
+    # The vibration at the tip: a static load moves every row alike.
+    tangent = tangent[:, 1:].reshape(x.shape)[:, 1:, 0], tangent[:, :1]
+    off = branch_joints.distances(omega, x[:, 1:, 0], sweep[0], sweep[2][:, 1:, 0],
+                                  np.hstack(tangent[::-1]))
+    assert off.max() < branches.TRUE
+    # Without every second row it is not.
+    few = slice(None, None, 2)
+    off = branch_joints.distances(omega[few], x[few, 1:, 0], sweep[0], sweep[2][:, 1:, 0],
+                                  np.hstack(tangent[::-1])[few])
+    assert off.max() > branches.TRUE
 
 
 def test_the_judge_of_chains_sees_what_is_wrong():
