@@ -39,6 +39,8 @@ contains
    end procedure linearize
 
    !> Sort the coordinates into active, used and solved at once.
+   !> `used` lists the active ones, then those that are held but whose rows of A are needed; `place`
+   !> is the inverse of the list, with 0 for coordinates that it has not.
    subroutine choose_active(self)
       type(balance_state), intent(inout) :: self
       logical :: held(size(self%active%place)), wanted(size(self%active%place))
@@ -54,6 +56,8 @@ contains
       end if
       self%active%place = 0
       k = 0
+      ! In the order of the structure, so that a problem in which nothing sticks is numbered as it
+      ! is.
       do j = 1, self%problem%structure%n_coordinates
          if (held(j)) cycle
          k = k + 1
@@ -86,6 +90,9 @@ contains
             ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
             if (entry%law%prediction%order(c) > 0) cycle
             j = self%problem%incidence%coordinate_of(entry%row(c, i))
+            ! A pair that bears throughout has G = 1 in the normal direction even while it slips,
+            ! and its row reads eps v = -r. Its friction depends on the pressure all the same, of
+            ! which A v is a part.
             held(j) = work%linear_state(i) == pair_stuck .or. &
                       (c == last .and. self%pins_normals .and. work%always_closed(i))
             wanted(j) = work%linear_state(i) == pair_mixed
@@ -93,6 +100,7 @@ contains
       end do
    end subroutine find_held
 
+   ! self%balance is free between residuals: it takes the steps of the pinned coordinates.
    module procedure reduce
       integer :: m, nc
 
@@ -110,6 +118,8 @@ contains
       real(wp), intent(inout) :: step(m, nc)
       integer :: i, c, j, k, place
 
+      ! G = 1 in these rows: J v = A v + eps v - A v = eps v = -r, whatever the other coordinates
+      ! do.
       step = 0.0_wp
       if (self%active%n_active == m) return
       do k = 1, self%problem%forces%n_laws
@@ -141,10 +151,12 @@ contains
       integer :: k
 
       do k = 1, nc
+         ! J_aa v_a = -r_a - J_ap v_p, with a the active and p the pinned coordinates.
          rhs(:, k) = -r(self%active%used(:self%active%n_active), k)
       end do
       if (self%active%n_active == m .or. self%active%n_active == 0) return
       if (pinned_are_solved(self, m, nc, r)) return
+      ! J_ap v_p as `apply` forms it: Z_r v of the rows in use first, then what the forces add.
       call self%problem%structure%multiply(self%structure_state, self%balance, self%scratch%product)
       do k = 1, nc
          self%scratch%active_out(:self%active%n_used, k) = &
@@ -186,6 +198,7 @@ contains
       call scatter(self, m, nc, solution, step)
    end procedure expand
 
+   !> Shapes for what came as vectors: a step of the active coordinates into that of all.
    subroutine scatter(self, m, nc, solution, step)
       type(balance_state), intent(in) :: self
       integer, intent(in) :: m, nc
@@ -214,6 +227,7 @@ contains
 
       do k = 1, self%problem%forces%n_laws
          associate (p => self%problem%forces%entry(k)%law%prediction)
+            ! Inputs of any other law depend on q alone, and q is held.
             if (.not. (p%takes_balance .or. p%by_time)) cycle
             call inputs_by_frequency(self, self%problem%forces%entry(k), m, nc, q, dr, &
                                      self%work(k)%input)
@@ -241,11 +255,13 @@ contains
       integer :: side
 
       step = relative_step*self%frequency()
+      ! (f(omega + step) - f(omega - step))/(2 step).
       do side = -1, 1, 2
          work%rate = self%frequency() + side*step
          call entry%law%evaluate(self%problem%fourier, work)
          call self%problem%incidence%scatter(entry%rows, m, nc, 0.5_wp*side/step, work%force, dr)
       end do
+      ! And back: what an evaluation leaves in `work` belongs to the present frequency.
       work%rate = self%frequency()
       call entry%law%evaluate(self%problem%fourier, work)
    end subroutine add_law_by_frequency
@@ -265,6 +281,7 @@ contains
             do c = 1, size(row, 1)
                if (row(c, i) == 0) cycle
                associate (y => input((c - 1)*nc + 1:c*nc, i))
+                  ! y = k omega B dq/dtau, so that dy/d omega = k B dq/dtau.
                   if (p%by_time .and. p%order(c) > 0) then
                      call self%problem%incidence%gather_row(row(c, i), &
                                                             self%problem%incidence%identity, m, &
@@ -274,6 +291,8 @@ contains
                   if (p%has_inertia) then
                      call add_inertia_by_frequency(self, p, row(c, i), i, c, m, q, y)
                   end if
+                  ! The balance in y is minus what the residual is without this law, and its slope
+                  ! is -dr.
                   if (p%takes_balance) y = y - &
                      dr(self%problem%incidence%coordinate_of(row(c, i)), :)
                end associate
@@ -308,6 +327,8 @@ contains
       end do
    end subroutine add_inertia_by_frequency
 
+   ! Products of all harmonics at once; the coefficients lie one behind the other in `product`, with
+   ! na entries each, but are n_coordinates apart in the scratch.
    module procedure apply
       integer :: k, na
 
@@ -357,6 +378,8 @@ contains
       real(wp), intent(in) :: vector(n_mapped, *)
       integer :: k
 
+      ! Two passes: outputs of the laws without the balance are in active_out before the others
+      ! take their inputs from it.
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))
             call multiply_element(self, entry, map, n_mapped, vector, work)
@@ -405,6 +428,7 @@ contains
       end do
    end subroutine multiply_derivative
 
+   !> output = G input of one element.
    subroutine multiply_derivative_of(work, element)
       type(force_workspace), intent(inout) :: work
       integer, intent(in) :: element
@@ -412,6 +436,7 @@ contains
 
       if (work%linear_state(element) == pair_mixed) then
          n = size(work%input, 1)
+         ! Stored transposed, (input, output): the laws fill it output by output.
          call dgemv('T', n, n, 1.0_wp, work%jacobian(1, 1, element), n, work%input(1, element), 1, &
                     0.0_wp, work%output(1, element), 1)
       else
@@ -464,6 +489,7 @@ contains
       do h = 1, self%problem%fourier%n_retained
          if (self%problem%fourier%harmonic(h) == 0) cycle
          k = self%problem%fourier%column(h)
+         ! Coefficients uc, us are the complex amplitude uc - i us.
          ratio = prediction%impedance_ratio(element, component, self%problem%fourier%harmonic(h), &
                                             self%frequency())
          if (divides) ratio = one/ratio
@@ -490,6 +516,7 @@ contains
             if (.not. keep_mean) inputs(k) = 0.0_wp
             cycle
          end if
+         ! d/dtau (a cos n tau + b sin n tau) = n b cos n tau - n a sin n tau.
          cosine = inputs(k)
          inputs(k) = n*inputs(k + 1)
          inputs(k + 1) = -n*cosine

@@ -25,10 +25,12 @@ contains
       self%preconditioner%n = self%active%n_active
       self%preconditioner%coordinate(:self%active%n_active) = &
          self%active%used(:self%active%n_active)
+      ! It knows all that are active now; place_kept finds those of later steps in it.
       self%preconditioner%place(:self%active%n_active) = [(h, h=1, self%active%n_active)]
       self%preconditioner%shifted = allocated(self%shift)
    end procedure build_preconditioner
 
+   !> One harmonic: Z_n and the mean of what the forces add to it, scaled for single precision.
    subroutine build_harmonic(self, h)
       type(balance_state), intent(inout) :: self
       integer, intent(in) :: h
@@ -37,6 +39,7 @@ contains
       integer :: k
 
       allocate (stiffness(self%active%n_used, self%active%n_active))
+      ! Rows in use, not only the active ones: add_rows takes rows of A of pinned coordinates too.
       call self%problem%structure%active_block(self%structure_state, h, stiffness)
       call self%preconditioner%harmonic(h)%reserve(self%active%n_active, &
                                                    largest_diagonal(stiffness))
@@ -59,6 +62,7 @@ contains
       complex(wp), intent(in) :: stiffness(:, :)
       integer :: j
 
+      ! The first n_active rows are those of the columns, so that (j, j) is on the diagonal of Z_n.
       largest_diagonal = 0.0_wp
       do j = 1, size(stiffness, 2)
          largest_diagonal = max(largest_diagonal, abs(stiffness(j, j)))
@@ -98,11 +102,15 @@ contains
                             (allocated(self%shift) .or. self%preconditioner%shifted)
       if (.not. preconditioner_fits) return
       n_known = count(self%preconditioner%place(:self%active%n_active) > 0)
+      ! Those that joined, n_active - n_known, and those that left, n - n_known.
       preconditioner_fits = self%active%n_active + self%preconditioner%n - 2*n_known &
                             <= most_changed*self%active%n_active
    end procedure preconditioner_fits
 
    !> Mean over cosine and sine of a block of a transposed derivative, as a complex factor.
+   !> A factor r + i s of uc - i us is the block [r s; -s r] of (uc, us). Of all factors the nearest
+   !> to a block (sum of squares) is r = (G_cc + G_ss)/2, s = (G_cs - G_sc)/2, G_cs being what the
+   !> sine of the input does to the cosine of the output.
    pure complex(wp) function mean_block(block, harmonic, input, output) result(mean)
       real(wp), intent(in) :: block(:, :)
       integer, intent(in) :: harmonic
@@ -117,6 +125,7 @@ contains
       end if
    end function mean_block
 
+   !> Add scale B^T G_mean (eps B d - B A) of the elements of a law, in one harmonic.
    subroutine add_mean_forces(self, entry, work, h, scale, stiffness, m)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
@@ -140,6 +149,7 @@ contains
                   mean = mean_block(work%jacobian(:, :, i), self%problem%fourier%harmonic(h), &
                                     (c_in - 1)*nc + k, (c_out - 1)*nc + k)
                else
+                  ! Stuck: each direction transmits what is predicted for it.
                   mean = merge(one, zero, c_in == c_out)
                end if
                call add_rows(self, entry, h, i, c_out, c_in, work%linear_rests(i), &
@@ -167,6 +177,7 @@ contains
          n = self%problem%fourier%harmonic(h)
          factor = one
          if (p%order(c_in) > 0) factor = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
+         ! A pair at rest takes its mean position, not the rate of it, which is zero.
          if (n == 0 .and. rests) factor = one
          if (p%has_inertia) then
             factor = factor*p%impedance_ratio(element, c_in, n, self%frequency())
@@ -213,6 +224,8 @@ contains
    end procedure precondition
 
    !> With the factors of one harmonic; coordinates that they do not know are taken as stuck.
+   !> Of these the row of a stuck pair would read eps v = r: the right scale, which is all that a
+   !> few coordinates need until the factors are built anew.
    subroutine solve_kept(self, h)
       type(balance_state), intent(inout) :: self
       integer, intent(in) :: h

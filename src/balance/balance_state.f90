@@ -180,6 +180,7 @@ contains
                    self%load)
       self%reference = load_norm(self)
       if (self%problem%fourier%has_constant()) then
+         ! The static load acts in full: only the vibration is brought on by steps.
          self%load(:, 2:) = self%load_share*self%load(:, 2:)
       else
          self%load = self%load_share*self%load
@@ -233,6 +234,7 @@ contains
          static = norm2(self%load(:, 1)) + press_of(self)
       end if
       load_norm = max(load_norm, static_share*static)
+      ! Where nothing loads the joint: what its pairs are pressed by, or pressed together by.
       if (load_norm <= 0.0_wp) then
          associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)
             load_norm = norm2(p%load) + norm2(p%stiffness(:, 3)*p%gap)
@@ -266,6 +268,7 @@ contains
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))
             work%rate = self%frequency()
+            ! Laws without the balance come before those with it, which take what is left.
             call predict(self, entry, m, nc, x, work)
             if (k == self%problem%forces%pairs) call entry%law%set_offset(self%depth, work)
             call entry%law%evaluate(self%problem%fourier, work)
@@ -352,6 +355,7 @@ contains
                cycle
             end if
             do i = 1, size(y, 1)
+               ! d/dtau (a cos n tau + b sin n tau) = n b cos n tau - n a sin n tau.
                cosine = y(i, c, k)
                y(i, c, k) = n*y(i, c, k + 1)
                y(i, c, k + 1) = -n*cosine

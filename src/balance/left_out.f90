@@ -23,6 +23,7 @@ contains
       integer :: k, n_time
 
       n_time = system%problem%fourier%n_time
+      ! Instants n_time resolve harmonics below n_time/2.
       kept = new_fourier(min(n_harmonics, (n_time - 1)/2), n_time)
       all_power = 0.0_wp
       kept_power = 0.0_wp
@@ -36,11 +37,13 @@ contains
       end do
       share = 0.0_wp
       if (all_power > kept_power) then
+         ! Powers are means over the period: a load of norm f has f^2/2.
          share = sqrt((all_power - kept_power)/max(all_power, 0.5_wp*system%reference**2))
       end if
    end function force_left_out
 
    !> Add the vibratory power of rows of values, and its part in the harmonics of `kept`.
+   !> By Parseval's identity the latter is half the sum of their squares.
    subroutine add_power(kept, n_rows, n_time, values, all_power, kept_power)
       type(fourier_type), intent(in) :: kept
       integer, intent(in) :: n_rows, n_time

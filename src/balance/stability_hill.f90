@@ -45,6 +45,7 @@ contains
       integer :: n_dynamic
 
       n_dynamic = basis%n_massive + basis%n_damped
+      ! Static directions go first: the linear pencil in lambda needs a regular leading matrix.
       call assemble_stiffness(basis, tangent, omega, stiffness)
       call eliminate_static(tangent%n_coefficients*n_dynamic, stiffness, error)
       if (allocated(error)) return
@@ -66,6 +67,8 @@ contains
       integer :: j, best
 
       left = .true.
+      ! Copies of a family are one harmonic apart: of one that the harmonics resolve, exactly one
+      ! lies within this band.
       central = abs(mean - centre) < 0.5_wp
       do j = 1, size(exponents)
          if (any(left .and. central)) then
@@ -94,9 +97,11 @@ contains
          do i = 1, basis%n
             row = (i - 1)*nc
             do k = 1, nc
+               ! Constant coefficients couple each coefficient with itself only.
                matrix(row + k, column + k) = basis%stiffness(i, j)
             end do
             call add_derivative(basis%damping(i, j)*omega, row, column, tangent%n_harmonics, matrix)
+            ! S = sum over the terms of direction block direction^T.
             do term = 1, tangent%n_terms
                weight = basis%direction(i, tangent%row(term))* &
                         basis%direction(j, tangent%row(term))
@@ -116,6 +121,7 @@ contains
    end subroutine assemble_stiffness
 
    !> Add factor * d/dtau to the block behind (row, column).
+   !> (a, b) of a cos n tau + b sin n tau becomes (n b, -n a).
    pure subroutine add_derivative(factor, row, column, n_harmonics, matrix)
       real(wp), intent(in) :: factor
       integer, intent(in) :: row, column, n_harmonics
@@ -138,6 +144,9 @@ contains
       logical :: singular
       integer :: n_static, info
 
+      ! The equations of the static part, A_sk p_k + A_ss p_s = 0, give p_s = -A_ss^-1 A_sk p_k,
+      ! and the rest becomes A_kk - A_ks A_ss^-1 A_sk. Exact, since these directions bring no
+      ! lambda.
       n_static = size(matrix, 1) - n_kept
       if (n_static == 0) return
       call lu%reserve(n_static)
@@ -154,6 +163,10 @@ contains
    end subroutine eliminate_static
 
    !> The matrix of (p massive, p damped, lambda p massive).
+   !> With masses and damped dampings of 1 (fw_stability_basis), A the matrix of assemble_stiffness,
+   !> and v = lambda p of the massive ones:
+   !>
+   !>   lambda p_m = v,   lambda p_d = -A_d p,   lambda v = -A_m p - (C + 2 D) v.
    pure subroutine assemble_state(basis, n_harmonics, omega, stiffness, state)
       type(perturbation_basis), intent(in) :: basis
       integer, intent(in) :: n_harmonics
@@ -165,6 +178,7 @@ contains
       n_kept = size(stiffness, 1)
       massive = nc*basis%n_massive
       allocate (state(n_kept + massive, n_kept + massive), source=0.0_wp)
+      ! lambda p_m = v.
       do k = 1, massive
          state(k, n_kept + k) = 1.0_wp
       end do
@@ -194,6 +208,7 @@ contains
 
       n = size(state, 1)
       allocate (re(n), im(n), vectors(n, n), mean(n))
+      ! The first call only asks for the size of the workspace.
       call dgeev('N', 'V', n, state, n, re, im, unused, 1, vectors, n, room, -1, info)
       allocate (work(int(room(1))))
       call dgeev('N', 'V', n, state, n, re, im, unused, 1, vectors, n, work, size(work), info)
@@ -204,6 +219,8 @@ contains
       end if
       values = cmplx(re, im, wp)
       do j = 1, n
+         ! A complex pair has real parts of its vector in one column and imaginary parts in the
+         ! next.
          if (im(j) > 0.0_wp) then
             mean(j) = mean_harmonic(nc, n_rows, vectors(:, j), vectors(:, j + 1))
             ! The conjugate vector is the mirror image.

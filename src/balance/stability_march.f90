@@ -63,6 +63,8 @@ contains
       memory = pack([(k, k=1, size(history%remembers))], history%remembers)
       call start(system, basis, history, memory, march, error)
       if (allocated(error)) return
+      ! From instant 1 through the others, and back to it: derivatives are those at the end of a
+      ! step.
       do k = 1, history%n_time
          call history%derivatives(modulo(k, history%n_time) + 1, march%by_u, march%by_x, &
                                   march%keeps)
@@ -71,6 +73,8 @@ contains
       end do
       associate (nd => basis%n_massive + basis%n_damped)
          allocate (monodromy(size(march%y, 2), size(march%y, 2)))
+         ! Column j is where the j-th unit perturbation is after a period. Static coordinates
+         ! follow the others, and positions without memory are no states: neither has a row.
          monodromy(:nd, :) = march%y(:nd, :)
          monodromy(nd + 1:nd + basis%n_massive, :) = march%v
          monodromy(nd + basis%n_massive + 1:, :) = march%x(memory, :)
@@ -106,6 +110,8 @@ contains
       do j = 1, size(memory)
          self%x(memory(j), nd + nb + j) = 1.0_wp
       end do
+      ! Of the massive ones K + 2/h C + 4/h^2, of the damped ones K + 1/h: their masses and
+      ! dampings are 1 (fw_stability_basis).
       self%fixed = basis%stiffness
       do j = 1, nb
          self%fixed(:nb, j) = self%fixed(:nb, j) + 2.0_wp/self%step*basis%damping(:nb, j)
@@ -132,6 +138,8 @@ contains
       nb = basis%n_massive
       nd = nb + basis%n_damped
       n_static = basis%n - nd
+      ! Positions at the start are perturbed by themselves, not through the law: whatever state the
+      ! pair is in, df = k du - dx.
       by_u = self%by_u
       do row = 1, size(history%remembers)
          if (.not. history%remembers(row)) cycle
@@ -160,6 +168,7 @@ contains
       self%a = -force(:nb, :) - matmul(basis%damping(:nb, :nb), self%v)
    end subroutine settle
 
+   !> A static direction without stiffness: its position is anything.
    subroutine refuse_loose(error)
       type(error_type), allocatable, intent(out) :: error
 
@@ -186,11 +195,15 @@ contains
       end if
       rhs = -matmul(basis%direction, matmul(self%by_x, self%x))
       associate (h => self%step, y => self%y(:nb, :), v => self%v, a => self%a)
+         ! Newmark: y1 = y + h/2 (v + v1), v1 = v + h/2 (a + a1), solved for a1 and v1 in y1 and
+         ! put into a1 + C v1 + K y1 + f1 = 0.
          rhs(:nb, :) = rhs(:nb, :) + 4.0_wp/h**2*y + 4.0_wp/h*v + a + &
                        matmul(basis%damping(:nb, :nb), 2.0_wp/h*y + v)
+         ! Backward Euler: (y1 - y)/h + K y1 + f1 = 0.
          rhs(nb + 1:nd, :) = rhs(nb + 1:nd, :) + self%y(nb + 1:nd, :)/h
          call dgetrs('N', basis%n, size(rhs, 2), self%lu%matrix, basis%n, self%lu%pivot, rhs, &
                      basis%n, info)
+         ! a before v: it needs the velocity at the begin of the step.
          a = 4.0_wp/h**2*(rhs(:nb, :) - y) - 4.0_wp/h*v - a
          v = 2.0_wp/h*(rhs(:nb, :) - y) - v
       end associate
@@ -198,6 +211,7 @@ contains
       rows = matmul(transpose(basis%direction), self%y)
       force = matmul(self%by_u, rows) + matmul(self%by_x, self%x)
       do row = 1, size(rows, 1)
+         ! A pair that slips or is open drags its position along: dx = dy - df.
          if (.not. history%remembers(row) .or. self%keeps(row)) cycle
          self%x(row, :) = history%stiffness(row)*rows(row, :) - force(row, :)
       end do
@@ -211,6 +225,8 @@ contains
 
       singular = .false.
       if (allocated(self%factored)) then
+         ! Long stretches of stick have the same derivative at every instant: one factorization
+         ! serves.
          if (all(abs(self%by_u - self%factored) <= 0.0_wp)) return
       end if
       self%factored = self%by_u
@@ -221,6 +237,7 @@ contains
    end subroutine factor
 
    !> The n_wanted eigenvalues of largest modulus.
+   !> Not in order of size beyond that: n_wanted are picked one by one.
    subroutine largest_eigenvalues(n_wanted, matrix, values, error)
       integer, intent(in) :: n_wanted
       real(wp), contiguous, intent(inout) :: matrix(:, :)

@@ -52,6 +52,7 @@ contains
       self%n_coefficients = coefficient_count(n_harmonics)
       n_terms = 0
       do k = 1, system%problem%forces%n_laws
+         ! At most: pairs without friction have one term, open ones none.
          n_terms = n_terms + count(system%problem%forces%entry(k)%row > 0)
       end do
       allocate (self%row(n_terms))
@@ -103,6 +104,8 @@ contains
                                   max(4, law%facts%instants_per_harmonic)*self%n_harmonics + 2)
             do i = 1, law%n_elements
                row = system%problem%forces%entry(k)%row(1, i)
+               ! Where the solution is at the instants; the force is pointwise, and so is its
+               ! slope.
                elongation = matmul(rows(:, row), fourier%synthesis)
                call add_multiplication(fourier, law%slope_at(i, elongation), row, self)
             end do
@@ -119,13 +122,17 @@ contains
       real(wp), allocatable :: gap(:), slope(:)
       integer :: i, row
 
+      ! A slope of 2 H' harmonics times a perturbation and a test function of H' each: 4 H'
+      ! harmonics, which 4 H' + 2 instants integrate without error.
       fourier = new_fourier(self%n_harmonics, 4*self%n_harmonics + 2)
       wide = new_fourier(2*self%n_harmonics, 4*self%n_harmonics + 2)
       associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
          do i = 1, system%problem%n_pairs
             row = system%problem%joint%row(3, i)
+            ! Those with friction are stuck or open throughout: add_stuck has the former.
             if (row == 0 .or. has_friction(system, i)) cycle
             gap = rows(:, row)
+            ! Negative where the pair is pressed: wear opens it.
             gap(1) = gap(1) + p%gap(i) + system%depth(i)
             ! Harmonics above 2 H' of the slope couple nothing.
             slope = matmul(closed_share(gap, 2*self%n_harmonics), wide%synthesis)
@@ -135,6 +142,7 @@ contains
       end associate
    end subroutine add_gaps
 
+   !> Whether anything resists a tangential motion of the pair.
    pure logical function has_friction(system, pair)
       class(balance_state), intent(in) :: system
       integer, intent(in) :: pair
@@ -159,6 +167,7 @@ contains
       end do
       self%n_terms = self%n_terms + 1
       self%row(self%n_terms) = row
+      ! analysis diag(slope) synthesis^T: to instants, times the slope, back to coefficients.
       self%block(:, :, self%n_terms) = matmul(fourier%analysis, weighted)
    end subroutine add_multiplication
 
@@ -183,6 +192,8 @@ contains
          tau = crossing(gap, (k - 1)*spacing, k*spacing, before < 0.0_wp)
          ! The primitive of the base functions counts where contact ends, less where it begins.
          sign = merge(1.0_wp, -1.0_wp, before < 0.0_wp)
+         ! Mean of the indicator over [begin, end]: (end - begin)/(2 pi); that begun before 0 has
+         ! been given the whole period first.
          share(1) = share(1) + sign*tau/(2.0_wp*pi)
          do m = 1, n_harmonics
             share(2*m) = share(2*m) + sign*sin(m*tau)/(m*pi)
@@ -213,6 +224,7 @@ contains
       end do
    end function crossing
 
+   !> c_1 + sum over n of c_2n cos n tau + c_2n+1 sin n tau.
    pure real(wp) function value_at(coefficients, tau) result(value)
       real(wp), intent(in) :: coefficients(:), tau
       integer :: n

@@ -35,6 +35,7 @@ contains
       complex(wp), allocatable :: answer(:)
       integer :: i, n, n_first
 
+      ! 2 H + 1 rows: the first harmonic without coefficients is H + 1.
       n_first = (size(point%coefficients, 1) + 1)/2
       if (n_tail < n_first) return
       allocate (force(system%problem%n_pairs, 3, coefficient_count(n_tail)), source=0.0_wp)
@@ -42,6 +43,7 @@ contains
          call system%problem%forces%entry(pairs)%law%tail(system%work(pairs), n_tail, force)
       end associate
       call lengthen(point%coefficients, coefficient_count(n_tail))
+      ! Nothing is fed back: the forces stay those of the balance.
       do n = n_first, n_tail
          call answer_to(model, contact, n*omega, force(:, :, 2*n:2*n + 1), answer)
          point%coefficients(2*n, :) = real(answer, wp)
@@ -66,6 +68,7 @@ contains
       logical :: singular
 
       allocate (u(model%n_dof, 1), source=(0.0_wp, 0.0_wp))
+      ! u_r = u(side 1) - u(side 2): the load is -B^T lambda, on side 1, and its reaction on side 2.
       call add_forces(contact%side_1, -1.0_wp, force, u(:, 1))
       call add_forces(contact%side_2, 1.0_wp, force, u(:, 1))
       call lu%reserve(model%n_dof)
@@ -88,6 +91,7 @@ contains
          do c = 1, 3
             dof = abs(side(c, i))
             if (dof == 0) cycle
+            ! A negative number of a dof means that it points the other way.
             load(dof) = load(dof) + sign(sign_of_side, real(side(c, i), wp)*sign_of_side)* &
                         cmplx(force(i, c, 1), -force(i, c, 2), wp)
          end do
@@ -105,6 +109,8 @@ contains
       call move_alloc(longer, values)
    end subroutine lengthen
 
+   !> Coefficients of the contact forces: those of the balance stay as they are, behind them comes
+   !> the tail. `force` is (n_pairs, 3, coefficient), that of a point (3, n_pairs, coefficient).
    pure subroutine lengthen_force(point, force)
       type(point_type), intent(inout) :: point
       real(wp), intent(in) :: force(:, :, :)

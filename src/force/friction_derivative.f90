@@ -48,6 +48,7 @@ contains
       !$omp if(self%n_elements >= pairs_for_threads)
       ! Of one pair at a time, for each thread: of all pairs it would be the largest array of the
       ! program.
+      ! 6 n_coefficients n_time numbers a thread.
       allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
       allocate (by_start(2, 2, fourier%n_time), weight(2, 2, nc))
       !$omp do schedule(dynamic)
@@ -103,6 +104,7 @@ contains
       unique = .false.
       x = work%x(pair, :)
       if (settled) then
+         ! The prediction in `work` is without its mean: the position goes back by it.
          z = x
          if (work%rests(pair)) z = x - work%mean(pair, :)
          call limit_is_unique(self%n_elements, fourier%n_time, pair, work%prediction_time, &
@@ -135,6 +137,8 @@ contains
 
       nc = fourier%n_coefficients
       do c = 1, 2
+         ! (G^T)(:, j) = sum over the instants of rows(:, c, k) analysis(j, k). Rows of one
+         ! direction are every second block of 3 nc: hence the leading dimension.
          call dgemm('N', 'T', 3*nc, nc, fourier%n_time, 1.0_wp, rows(1, c, 1), 6*nc, &
                     fourier%analysis, nc, 0.0_wp, jacobian(1, (c - 1)*nc + 1), 3*nc)
       end do
@@ -148,6 +152,8 @@ contains
                fourier%n_time > 2*maxval(fourier%harmonic)
       factor = merge(-1.0_wp, 1.0_wp, closes)
       do k = 1, fourier%n_time
+         ! lambda_n = min(y_n, 0): G is the sum over closed instants of analysis synthesis, or 1
+         ! less that over the open ones.
          if ((y_n(k) < 0.0_wp) .eqv. closes) cycle
          do j = 1, nc
             jacobian(2*nc + 1:, 2*nc + j) = jacobian(2*nc + 1:, 2*nc + j) + &
@@ -170,6 +176,8 @@ contains
       integer :: c, j, column, nc
 
       nc = fourier%n_coefficients
+      ! lambda = y - x: a later position by dx/dx_0 takes from the force. Coefficients of this
+      ! product first, then the outer product with dx_0 by inputs.
       call dgemm('N', 'T', 4, nc, fourier%n_time, -1.0_wp, by_start, 4, fourier%analysis, nc, &
                  0.0_wp, weight, 4)
       do c = 1, 2

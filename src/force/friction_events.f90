@@ -71,6 +71,7 @@ contains
       if (self%n_elements == 0) return
       select type (room => work%room)
       type is (event_room)
+         ! Rates leave the mean position open: for pairs that come to rest it goes along.
          if (any(self%prediction%order > 0) .and. fourier%has_constant()) then
             call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
                                      work%force, work%x, work%mean)
@@ -99,6 +100,7 @@ contains
       do i = 1, size(work%rests)
          if (work%rests(i) .or. paths%moved(i) .or. .not. paths%closed(i)) cycle
          work%rests(i) = .true.
+         ! lambda = y - x: with x where it started, the mean force is that of a spring from there.
          work%force(i, 1:2, 1) = work%force(i, 1:2, 1) + work%mean(i, :) - work%x_start(i, :)
       end do
    end subroutine hold_stuck_means

@@ -79,6 +79,7 @@ contains
       end select
    end subroutine reserve
 
+   !> Which pairs are followed as displacement laws, and which as oscillators.
    subroutine fill_room(self, fourier, room)
       type(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -104,11 +105,14 @@ contains
                                                  fourier%n_coefficients)
          room%massive(j)%curves%mu = self%mu(room%pair(j))
       end do
+      ! Six rows a pair, one pair behind the other, so that one transform takes them all.
       allocate (room%rows(6*room%n_massive, fourier%n_coefficients), source=0.0_wp)
       allocate (room%values(6*room%n_massive, fourier%n_time), source=0.0_wp)
       allocate (room%force(fourier%n_coefficients, 2, room%n_massive), source=0.0_wp)
    end subroutine fill_room
 
+   !> First all pairs by the displacement law, for those with mass their normal direction alone;
+   !> then those with mass over again.
    subroutine evaluate(self, fourier, work)
       class(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -153,6 +157,7 @@ contains
       end do
    end subroutine classify
 
+   !> Over the whole period: never closed, or always closed without slip; anything else is mixed.
    elemental integer function state_of(open, closed, moved) result(state)
       logical, intent(in) :: open, closed, moved
 
@@ -161,6 +166,7 @@ contains
       if (closed .and. .not. moved) state = pair_stuck
    end function state_of
 
+   !> Grids of all pairs with mass by one transform, then each along its own path.
    subroutine evaluate_massive(self, fourier, work, room)
       class(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -199,6 +205,8 @@ contains
       call take_slopes(fourier, rows)
    end subroutine fill_rows
 
+   !> First and second derivatives by tau, in the rows behind those of P and of N: with (a, b) the
+   !> coefficients, (n b, -n a) and -n^2 (a, b).
    subroutine take_slopes(fourier, rows)
       type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: rows(:, :)
@@ -235,6 +243,7 @@ contains
          do h = 1, fourier%n_retained
             n = fourier%harmonic(h)
             k = fourier%column(h)
+            ! Coefficients by harmonic number: harmonics left out of the balance keep their zeros.
             c%tangential(n, 1) = rows(1, k)
             c%normal(n, 1) = rows(4, k)
             if (n == 0) cycle
@@ -261,6 +270,7 @@ contains
       work%state(i) = state_of(pair%path%open, pair%path%closed, pair%path%moved)
    end subroutine follow_pair
 
+   !> Blocks G of mixed pairs; open and stuck ones have 0 and 1 without being asked.
    subroutine linearize(self, fourier, work)
       class(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -333,11 +343,13 @@ contains
 
       call pair%path_derivative(fourier%n_retained, fourier%harmonic, fourier%column, &
                                 by_tangential, by_normal)
+      ! The other tangential direction is not there: pairs with mass have only one.
       slope = 0.0_wp
       slope(t + 1:t + nc) = by_tangential
       if (has_normal) slope(2*nc + 1:) = by_normal
    end subroutine differentiate_path
 
+   !> Forces at the instants, read off the paths; the normal ones are those of the displacement law.
    subroutine sample(self, work)
       class(rigid_law), intent(in) :: self
       type(force_workspace), intent(inout) :: work
@@ -356,6 +368,7 @@ contains
       end select
    end subroutine sample
 
+   !> Tangential forces of pairs with mass up to the harmonics that their curves know.
    subroutine coefficients(self, work, computed, fourier, force)
       class(rigid_law), intent(in) :: self
       type(force_workspace), intent(inout) :: work
@@ -378,6 +391,7 @@ contains
       end select
    end subroutine coefficients
 
+   !> All harmonics of the force up to `highest`, exact integrals over the pieces of the paths.
    subroutine tail(self, work, highest, force)
       class(rigid_law), intent(in) :: self
       type(force_workspace), intent(inout) :: work
@@ -397,6 +411,7 @@ contains
       end select
    end subroutine tail
 
+   !> Shares of stick, slip and open by durations; those of pairs with mass replace the others.
    pure subroutine fractions(self, work, share)
       class(rigid_law), intent(in) :: self
       type(force_workspace), intent(in) :: work

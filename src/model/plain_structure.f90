@@ -114,6 +114,7 @@ contains
                                            self%n_coordinates, [(j, j=1, self%n_coordinates)])
    end subroutine new_plain_structure
 
+   !> Room for one thread: formed matrices, or what real products need.
    subroutine new_state(self, state)
       class(plain_structure), intent(in) :: self
       class(structure_state), allocatable, intent(out) :: state
@@ -137,6 +138,7 @@ contains
       call move_alloc(plain, state)
    end subroutine new_state
 
+   !> Only an internal mode without damping can fail: D_j = 0 at its own frequency.
    subroutine at(self, state, omega, self_excitation, error)
       class(plain_structure), intent(in) :: self
       class(structure_state), intent(inout) :: state
@@ -161,6 +163,8 @@ contains
       state%self_excitation = self_excitation
    end subroutine at
 
+   !> Factors theta_n and s_n of all harmonics, D factored, loads condensed, and Z_r where it is
+   !> formed.
    subroutine go_to(self, state, omega, self_excitation, n_failed)
       type(plain_structure), intent(in) :: self
       type(plain_state), intent(inout) :: state
@@ -171,6 +175,8 @@ contains
       associate (f => state%factors)
          f%s = self%harmonic*omega
          f%theta = cmplx(f%s**2, f%s*self_excitation, wp)
+         ! A structure without joint: nothing is condensed, and its motion is recovered from loads
+         ! alone.
          if (self%n_coordinates == 0) return
          if (self%forms_blocks) then
             call state%formed%form(self%basis, f%harmonic, f%theta, f%s, state%load, n_failed)
@@ -194,6 +200,7 @@ contains
       m = self%n_coordinates
       n_i = self%basis%n_internal
       do h = 1, size(factors%harmonic)
+         ! F_q here, F_i in the place of the amplitudes of the internal modes.
          load(:, h) = harmonic_load(self%basis%load_q, factors%harmonic(h))
          products%amplitudes(:, h) = harmonic_load(self%basis%load_i, factors%harmonic(h))
       end do
@@ -232,6 +239,7 @@ contains
 
       select type (state)
       type is (plain_state)
+         ! Mostly the same coordinates as in the step before: nothing is gathered again.
          if (state%restricted .and. state%n_active == n_active .and. state%n_used == n_used) then
             if (all(state%used(:n_used) == used(:n_used))) return
          end if
@@ -242,6 +250,7 @@ contains
          if (self%forms_blocks) then
             call state%formed%gather(n_active, n_used, used)
          else
+            ! `packed` has all rows already.
             if (n_active == self%n_coordinates) return
             call state%products%active%pack_blocks(self%basis, n_active, n_used, used)
          end if
@@ -269,6 +278,7 @@ contains
       end associate
    end subroutine multiply_active
 
+   !> Z_r of a harmonic: as it is formed, or from K, M, C and the factors of D for this one call.
    subroutine block_of_all(self, state, h, matrix)
       class(plain_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -289,6 +299,7 @@ contains
       end associate
    end subroutine block_of_all
 
+   !> Rows in use and active columns of Z_r.
    subroutine block_in_use(self, state, h, matrix)
       class(plain_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -307,6 +318,7 @@ contains
                matrix(:, j) = state%formed%matrix(state%used(:state%n_used), state%used(j), h)
             end do
          else
+            ! The active ones are the first of those in use: leading columns.
             call form_block(self%basis, state%factors%theta(h), state%factors%s(h), &
                             state%products%internal(h), state%n_active, &
                             state%used(:state%n_used), matrix)
@@ -372,6 +384,8 @@ contains
       call coefficients_of(self%harmonic, self%column, m, m, derivative, slope)
    end subroutine derive_formed
 
+   !> One harmonic, with the terms named in `derivative`; without self-excitation theta = s^2 and,
+   !> by omega, ' = n d/ds: Z' = n (-2 s M + i C).
    subroutine derive_harmonic(b, harmonic, s, q, derivative)
       type(reduction_type), intent(in) :: b
       integer, intent(in) :: harmonic
@@ -400,6 +414,7 @@ contains
          slope = n*cmplx(-2.0_wp*s*m_iq, c_iq, wp)
       end associate
       call internal%factor(b, cmplx(s**2, kind=wp), s, failed)
+      ! x, recovered; then D^-1 (Z'_iq q + D' x).
       xi(:, 1) = harmonic_load(b%load_i, harmonic) - matmul(coupling, q)
       call internal%solve(1, xi)
       derivative = derivative + matmul(xi(:, 1), slope)
@@ -417,6 +432,7 @@ contains
       slopes = state%factors
       slopes%k = 0.0_wp
       if (parameter == by_frequency) then
+         ! theta = s^2 + i s xi and s = n omega: theta' = n (2 s + i xi) by omega, i s by xi.
          slopes%theta = slopes%harmonic*cmplx(2.0_wp*slopes%s, state%self_excitation, wp)
          slopes%s = real(slopes%harmonic, wp)
       else
@@ -526,16 +542,20 @@ contains
       call coefficients_of(self%harmonic, self%column, m, m, q, coefficients)
       select type (state)
       type is (plain_state)
+         ! Rarely asked for (once a point): factors of its own leave those of the state alone.
          call work%factor(self%basis, state%factors, n_failed)
          call recover_modes(self, state%factors, work, coefficients, x)
       end select
       do h = 1, size(self%harmonic)
+         ! Observed: T_q q + T_i x, with the matrix of observed quantities in both.
          observed(:, h) = matmul(self%basis%observe_q, q(:, h))
          if (self%basis%n_internal == 0) cycle
          observed(:, h) = observed(:, h) + matmul(self%basis%observe_i, x(:, h))
       end do
    end subroutine recover
 
+   !> K_qq - sum K_qi^2/k_i: internal modes give way. Free ones (k_i = 0) do not count: with them
+   !> the stiffness would be none.
    pure real(wp) function static_stiffness(self, coordinate)
       class(plain_structure), intent(in) :: self
       integer, intent(in) :: coordinate
@@ -565,6 +585,8 @@ contains
       matrix = self%basis%blocks(:self%n_coordinates, :, 2)
    end subroutine mass
 
+   !> Of D_j: omega = sqrt(k/m), half width zeta omega = c/(2 m). Static modes (m = 0) and free ones
+   !> (k = 0) do not vibrate.
    pure subroutine held_modes(self, frequency, half_width)
       class(plain_structure), intent(in) :: self
       real(wp), allocatable, intent(out) :: frequency(:), half_width(:)
@@ -587,6 +609,7 @@ contains
       integer :: j, m
 
       m = self%n_coordinates
+      ! Of theta_n the modulus, n |n omega^2 + i omega xi|.
       theta = self%harmonic(h)*abs(cmplx(self%harmonic(h)*state%omega**2, &
                                          state%omega*state%self_excitation, wp))
       sums = 0.0_wp

@@ -85,6 +85,7 @@ contains
 
       allocate (t_q(relative%n_dof, relative%n_coordinates), source=0.0_wp)
       allocate (t_i(relative%n_dof, size(relative%free)), source=0.0_wp)
+      ! Dofs that the relation solves for (pivots) follow q and the free dofs: u_p = c q - r u_f.
       t_q(relative%pivot, :) = relative%c
       t_i(relative%pivot, :) = -relative%r
       do j = 1, size(relative%free)
@@ -109,6 +110,7 @@ contains
       k = congruence(t_i, model%stiffness, t_i)
       m = congruence(t_i, model%mass, t_i)
       do trial = 1, size(shift_trials)
+         ! In units of the ratio of both matrices; no shift where K alone is positive definite.
          shift = shift_trials(trial)*norm2(k)/max(norm2(m), tiny(1.0_wp))
          call solve_symmetric_eigen(m, k + shift*m, self%m_i, modes, done)
          if (done) exit
@@ -119,11 +121,13 @@ contains
                           'and stiffness matrices', status_input)
          return
       end if
+      ! Modes come with x^T (K + shift M) x = 1 and x^T M x = theta.
       self%k_i = 1.0_wp - shift*self%m_i
       where (abs(self%k_i) < free_stiffness) self%k_i = 0.0_wp
       t_i = product_of(t_i, modes)
       if (trial > 1) return
       ! Static constraint modes: K_iq vanishes, and Z_r(0) is exact.
+      ! K_ii = 1 in these modes: x = -K_iq q is the static answer to q.
       k_iq = congruence(t_i, model%stiffness, t_q)
       t_q = t_q - product_of(t_i, k_iq)
    end subroutine internal_modes
@@ -138,6 +142,7 @@ contains
 
       self%n_coordinates = size(t_q, 2)
       self%n_internal = size(t_i, 2)
+      ! Products without a third block are a third cheaper.
       self%n_blocks = merge(3, 2, any(abs(model%damping) > 0.0_wp))
       if (allocated(self%blocks)) deallocate (self%blocks, self%coupling)
       allocate (self%blocks(self%n_coordinates + self%n_internal, self%n_coordinates, &
@@ -148,6 +153,7 @@ contains
       if (self%n_blocks == 3) call fill_blocks(model%damping, t_q, t_i, 3, self)
       damping = congruence(t_i, model%damping, t_i)
       self%c_i = [(damping(j, j), j=1, self%n_internal)]
+      ! What is left off the diagonal decides.
       do j = 1, self%n_internal
          damping(j, j) = 0.0_wp
       end do
@@ -165,6 +171,7 @@ contains
       self%observe_i = product_of(model%observe_matrix, t_i)
    end subroutine transform
 
+   !> T_q^T A T_q over T_i^T A T_q, A being K (block 1), M (2) or C (3).
    subroutine fill_blocks(matrix, t_q, t_i, block, self)
       real(wp), intent(in) :: matrix(:, :), t_q(:, :), t_i(:, :)
       integer, intent(in) :: block
@@ -183,6 +190,7 @@ contains
       integer, intent(in) :: harmonic(:)
       real(wp), intent(in) :: omega_range(2)
       logical :: keep(self%n_internal)
+      ! Near a pole digits are lost as well.
       real(wp), parameter :: margin = 1.0e-2_wp
       real(wp) :: frequency
       integer :: j
@@ -191,6 +199,7 @@ contains
       do j = 1, self%n_internal
          if (self%k_i(j) <= 0.0_wp .or. self%m_i(j) <= 0.0_wp) cycle
          frequency = sqrt(self%k_i(j)/self%m_i(j))
+         ! Damping ratio: c/(2 sqrt(k m)).
          if (self%c_i(j) > 2.0_wp*undamped_ratio*sqrt(self%k_i(j)*self%m_i(j))) cycle
          keep(j) = any(frequency >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
                        frequency <= (1.0_wp + margin)*harmonic*omega_range(2))

@@ -84,6 +84,7 @@ contains
       associate (problem => balance%problem)
          call balance%work(problem%forces%pairs)%measure_slip()
          associate (p => problem%forces%entry(problem%forces%pairs)%law%prediction)
+            ! S takes the path in units of force, eps u: the rate divides by eps.
             tangential = maxval(p%stiffness(:, 1:2), dim=2)
             self%normal = p%stiffness(:, 3)
          end associate
@@ -191,6 +192,8 @@ contains
       self%vibration%depth = z
    end subroutine take
 
+   !> Growth of the depths times a stiffness: forces, as the residuals of the balance are, so that
+   !> one norm measures both.
    subroutine conditions(self, q, z, g)
       class(wear_system), intent(inout) :: self
       real(wp), intent(in) :: q(:), z(:)
@@ -213,6 +216,7 @@ contains
       self%n_linear_extra = 0
       associate (work => self%vibration%work(self%vibration%problem%forces%pairs))
          do i = 1, self%n_extra
+            ! Sliding under pressure of all others is zero around here, and so is its derivative.
             if (work%linear_state(i) /= pair_mixed) cycle
             self%n_linear_extra = self%n_linear_extra + 1
             self%wearing(self%n_linear_extra) = i
@@ -238,6 +242,8 @@ contains
          m = problem%structure%n_coordinates
          do i = 1, self%n_extra
             row = problem%joint%row(3, i)
+            ! dw = -g/weight shifts the normal prediction by eps dw, which a stuck pair transmits
+            ! (G = 1): the residual changes by B^T eps e_0 dw. An open pair transmits nothing.
             if (row == 0 .or. work%linear_state(i) /= pair_stuck) cycle
             call problem%incidence%scatter_row(row, problem%incidence%identity, m, m, &
                                                -self%normal(i)/self%weight(i), g(i:i), r)
@@ -245,6 +251,7 @@ contains
       end associate
    end subroutine settle
 
+   !> -g of the depths that stay, with what the coordinates solved at once do to their sliding.
    subroutine reduce_rows(self, r, g, rhs)
       class(wear_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:), g(:)
@@ -260,6 +267,7 @@ contains
       end associate
    end subroutine reduce_rows
 
+   !> Depths outside of the linear problem go to their base.
    subroutine expand_extra(self, g, solution, dz)
       class(wear_system), intent(inout) :: self
       real(wp), intent(in) :: g(:), solution(:)
@@ -283,6 +291,7 @@ contains
          nc = problem%fourier%n_coefficients
          do j = 1, self%n_linear_extra
             i = self%wearing(j)
+            ! A pair under a dead load keeps its pressure, however deep it wears.
             if (problem%joint%row(3, i) == 0 .or. abs(dz(j)) <= 0.0_wp) cycle
             do c = 1, 3
                if (problem%joint%row(c, i) == 0) cycle
@@ -305,6 +314,8 @@ contains
       associate (work => self%vibration%work(self%vibration%problem%forces%pairs), unused => v)
          do j = 1, self%n_linear_extra
             i = self%wearing(j)
+            ! S depends on the inputs by its gradient, and on the depth by that of the mean normal
+            ! input.
             product(j) = self%weight(i)*(dz(j) - self%cycles*self%factor(i)*( &
                          dot_product(work%slip_derivative(:, i), work%input(:, i)) + &
                          depth_slope(self, i)*dz(j)))
@@ -325,6 +336,8 @@ contains
       end associate
    end function depth_slope
 
+   !> g_z without what the depths do through the vibration: pairs wear by their own sliding, so that
+   !> it is diagonal.
    subroutine corner(self, matrix)
       class(wear_system), intent(inout) :: self
       real(wp), intent(out) :: matrix(:, :)
@@ -355,6 +368,8 @@ contains
       logical, intent(in) :: is_built
       integer :: h, j
 
+      ! While the preconditioner is built there are many columns, for which Z_n is formed once a
+      ! harmonic; in its application there is one vector, which the exact product serves.
       call reserve(self, size(v, 2))
       associate (b => self%vibration, fourier => self%vibration%problem%fourier)
          do j = 1, size(v, 2)
@@ -439,6 +454,8 @@ contains
                   call problem%incidence%gather_harmonic(row, h, b%active%place, &
                                                          b%active%n_active, &
                                                          turn*p%stiffness(i, c), z, input)
+                  ! The prediction changes by eps E d z - Z_n z, the latter where the law takes the
+                  ! balance.
                   place = b%active%place(problem%incidence%coordinate_of(row))
                   if (p%takes_balance .and. place > 0) then
                      input = input - self%balance(place, :n_right)
@@ -446,6 +463,8 @@ contains
                   k = (c - 1)*nc + problem%fourier%column(h)
                   associate (g => work%slip_derivative(:, i), &
                              scale => self%weight(i)*self%cycles*self%factor(i))
+                     ! C = -scale g^T d(prediction): to subtract C z is to add. Cosines are real
+                     ! parts, sines the negative imaginary ones.
                      rows(j, :) = rows(j, :) + scale*g(k)*real(input, wp)
                      if (n > 0) rows(j, :) = rows(j, :) - scale*g(k + 1)*aimag(input)
                   end associate
