@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare paper
-.PHONY: stress long faults peaks rest verify
+.PHONY: stress long faults peaks rest scars verify
 
 BUILD := build/release
 RUN := build/run
@@ -70,7 +70,7 @@ lint: build/deps.stamp ## linters of the Fortran and the Python code, type check
 	@$(PYTHON) tools/comment_share.py
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench tools docs \
-	   test/builds test/rest test/robustness test/stress test/verify
+	   test/builds test/fretting test/rest test/robustness test/stress test/verify
 
 keys: build ## tables of keys in the user guide, settings of the Python package
 	@$(PYTHON) tools/write_keys.py $(BUILD)/fw_run
@@ -139,6 +139,10 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 BEFORE ?=
 rest: build ## where pairs of the velocity law come to rest, also of a program BEFORE
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/rest/shakedown.py \
+	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
+
+scars: build ## steady states of wear against a march of cycles, also of a program BEFORE
+	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/fretting/steady_states.py \
 	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
 
 peaks: build ## reported peaks of random sweeps, also of a program BEFORE, written to docs/robustness.md

@@ -6,6 +6,7 @@ module fw_wear_response
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
    use fw_error, only: status_stopped
+   use fw_finer_wear, only: finer_wear
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
@@ -19,6 +20,7 @@ module fw_wear_response
    use fw_hdf5, only: hdf5_file
    use fw_resonance, only: resonance_type
    use fw_restart_file, only: restart_type
+   use fw_restart_rows, only: c_noted
    use fw_restart_rows, only: restart_row_set
    use fw_result, only: result_writer
    use fw_solution, only: is_lasting
@@ -26,15 +28,19 @@ module fw_wear_response
    use fw_strategy, only: new_request
    use fw_strategy, only: note_time_limit
    use fw_summary, only: summary_type
+   use fw_text, only: to_text
    use fw_wear_march, only: steady_not_reached
+   use fw_wear_march, only: steady_reached
    use fw_wear_march, only: steady_words
    use fw_wear_march, only: wear_march
    use fw_wear_march, only: wear_observer
    use fw_wear_options, only: wear_energy
+   use fw_wear_options, only: wear_explicit
    use fw_wear_options, only: wear_pseudo_time
    use fw_wear_rows, only: start_wear
    use fw_wear_rows, only: state_halved
    use fw_wear_rows, only: state_outcome
+   use fw_wear_step, only: largest_lag
    use fw_wear_step, only: new_wear_stepper
    use fw_wear_step, only: wear_state
    use fw_wear_system, only: new_wear_system
@@ -47,6 +53,11 @@ module fw_wear_response
    !> Largest growth of the depth in a step where the scheme estimates no error and the case names
    !> none, as a part of the depth scale.
    real(wp), parameter :: depth_step = 5.0e-2_wp
+   !> The same as a part of the depth, which a scar that keeps growing leaves behind.
+   real(wp), parameter :: relative_step = 2.0e-2_wp
+
+   !> Part of the largest depth by which halved steps may move a profile without a remark.
+   real(wp), parameter :: large_change = 2.0e-2_wp
 
    !> Watches nothing: the march is repeated for its end alone.
    type, extends(wear_observer) :: silent_observer
@@ -63,10 +74,16 @@ module fw_wear_response
       type(run_state), pointer :: state => null()
       type(restart_row_set) :: restart_rows
       !> Rows written so far, and the clock at the last of them.
+      !> What twice the harmonics say.
+      type(finer_wear) :: finer
+      !> Friction energy up to the last row (n_pairs) [force*length], and the depths there.
+      real(wp), allocatable :: energy(:), depth(:)
       integer :: n_rows = 0
       integer(int64) :: clock = 0_int64
    contains
       procedure :: take
+      procedure :: begin_slip
+      procedure :: allowed_residual
    end type wear_recorder
 
    !> Everything between the start of a run and its end.
@@ -181,6 +198,7 @@ contains
          march%options = case%wear
          if (needs_depth_step(case)) then
             march%options%max_depth_step = depth_step*run%system%depth_scale()
+            march%options%relative_step = relative_step
          end if
          march%stepper = new_wear_stepper(march%options, case%pseudo_time%scheme, &
                                           run%solver%method%newton)
@@ -255,10 +273,38 @@ contains
                                     march%n_rejected, run%state%cycles, &
                                     depth_of(run%system, run%state))
          if (restart%n_rows > 0) call summary%note_restart(restart%n_rows, restart%path)
+         if (.not. march%gave_up .and. allocated(run%state%x)) then
+            call recorder%finer%look_at_end(recorder%case, march, run%system, run%state)
+         end if
+         call recorder%finer%remark(recorder%case, summary)
+         call remark_steps(recorder%case, march, depth_of(run%system, run%state), summary)
+         call recorder%finer%finish()
          call state_outcome(recorder%writer%file, trim(steady_words(march%steady)), &
                             march%ending, error)
       end associate
    end subroutine report_end
+
+   !> What may be wrong with the steps of a run.
+   subroutine remark_steps(case, march, depth, summary)
+      type(case_type), intent(in) :: case
+      type(wear_march), intent(in) :: march
+      !> The largest [length].
+      real(wp), intent(in) :: depth
+      type(summary_type), intent(inout) :: summary
+      !> Explicit steps of a given size end half of one too deep.
+      real(wp), parameter :: fine = 0.02_wp
+
+      if (march%n_unsettled > 0) call summary%remarks%add('slip begins', 'in '// &
+         to_text(march%n_unsettled)//' steps pairs begin to slip that were stuck, and what '// &
+         'they wear depends on the step, however short: compare with wear%check_steps and more '// &
+         'harmonics%n_harmonics')
+      if (march%steady /= steady_reached .or. march%n_steps == 0) return
+      if (case%wear%scheme /= wear_explicit .or. march%options%controls_error()) return
+      if (march%stepper%order > 1 .or. march%options%max_depth_step <= fine*depth) return
+      call summary%remarks%add('steps too long', 'explicit steps of wear%max_depth_step = '// &
+         to_text(march%options%max_depth_step)//' wear more than the joint would: below a '// &
+         'fiftieth of the depth, '//to_text(fine*depth)//', it is about 1 %')
+   end subroutine remark_steps
 
    !> Take over the steps of an earlier run, and stand where it stood after the last of them.
    subroutine resume(restart, recorder, system, march, state, error)
@@ -279,6 +325,10 @@ contains
          call count_point(recorder, restart%points(i))
       end do
       recorder%n_rows = restart%n_rows
+      recorder%depth = restart%state%x(system%n_vibration() + 1:)
+      recorder%energy = friction_energy(recorder%case, recorder%depth)
+      if (allocated(restart%energy)) recorder%energy = restart%energy
+      call recorder%finer%take_notes(restart%control(c_noted:))
       call restart%give_control(march)
       state = restart%state
       call system%set_parameter(restart%omega, error)
@@ -351,6 +401,9 @@ contains
       change = maxval(abs(end_state%x(n + 1:) - state%x(n + 1:)))
       if (change > 0.0_wp) change = change/max(maxval(state%x(n + 1:)), tiny(1.0_wp))
       call recorder%summary%note_profile_change(change, halved%n_steps)
+      if (change > large_change) call recorder%summary%remarks%add('profile depends on steps', &
+         'steps of half the size move the worn profile by '//to_text(100.0_wp*change)// &
+         ' % of its largest depth')
       call state_halved(recorder%writer%file, end_state%x(n + 1:), change, &
                         recorder%case%model%unit_system, error)
    end subroutine compare_halved
@@ -439,15 +492,22 @@ contains
       point%cycles = state%cycles
       point%depth = state%x(n + 1:)
       point%wear_rate = state%rate
-      point%wear_energy = friction_energy(self%case, point%depth)
       point%wear_volume = patch_volumes(self%case%contact, point%depth)
       point%iterations = iterations
       point%residual = state%residual
       ! A state of the march is judged as any point is.
       point%converged = is_lasting(system%vibration)
-      point%converged = point%converged .and. state%residual <= self%case%solver%tolerance
+      point%converged = point%converged .and. state%residual <= self%allowed_residual()
       call recover_point(system%vibration, state%x(:n), self%case%harmonics%n_harmonics, &
-                         self%case%output%contact, point)
+                         .true., point)
+      call add_energy(self, state, point%dissipation)
+      point%wear_energy = self%energy
+      if (.not. self%case%output%contact) then
+         deallocate (point%force, point%fraction, point%dissipation)
+      end if
+      ! The pairs that slip before anything is worn.
+      if (self%n_rows == 0) call self%finer%look(self%case, march, system, state, &
+                                                 state%rate > 0.0_wp)
       if (self%case%output%histories) then
          call recover_histories(system%vibration, size(system%vibration%balance, 1), state%x(:n), &
                                 self%case%harmonics%n_harmonics, point)
@@ -455,7 +515,8 @@ contains
       call system_clock(clock, rate)
       point%seconds = real(clock - self%clock, wp)/real(rate, wp)
       self%clock = clock
-      call self%restart_rows%append(self%writer%file, march, state%x(:n), point%converged, error)
+      call self%restart_rows%append(self%writer%file, march, state%x(:n), point%converged, &
+                                    self%finer%notes(), error)
       if (allocated(error)) return
       call self%writer%add_point(point, error)
       if (allocated(error)) return
@@ -464,6 +525,55 @@ contains
       call self%observer%on_point(self%n_rows, 0, point)
       go_on = .not. self%observer%stop_requested
    end subroutine take
+
+   !> Pairs begin to slip: only for want of harmonics?
+   subroutine begin_slip(self, march, system, state, error)
+      class(wear_recorder), intent(inout) :: self
+      class(wear_march), intent(in) :: march
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: state
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%finer%look(self%case, march, system, state, march%begins)
+   end subroutine begin_slip
+
+   !> Residual of a row that counts as converged: steps of pseudo-time are accepted with what their
+   !> vibration lags behind the depths, which /residual holds.
+   pure real(wp) function allowed_residual(self) result(residual)
+      class(wear_recorder), intent(in) :: self
+
+      residual = self%case%solver%tolerance
+      if (self%case%wear%scheme == wear_pseudo_time) residual = max(residual, largest_lag)
+   end function allowed_residual
+
+   !> Add the friction energy of a step. Its cycles are weighted as its scheme weights them for the
+   !> depth: the growth of a pair times its energy over its depth of a cycle, which are two measures
+   !> of the same slip, that of forces and displacements and that of the march.
+   subroutine add_energy(self, state, dissipation)
+      class(wear_recorder), intent(inout) :: self
+      type(wear_state), intent(in) :: state
+      !> Energy per cycle (n_pairs).
+      real(wp), intent(in) :: dissipation(:)
+      !> Of a rate, as a part of the largest: below it both are round-off, and the law's own measure
+      !> stands in.
+      real(wp), parameter :: measurable = 1.0e-6_wp
+      real(wp) :: growth(size(dissipation))
+      integer :: n
+
+      n = size(state%x) - size(dissipation)
+      if (.not. allocated(self%depth)) then
+         self%depth = state%x(n + 1:)
+         allocate (self%energy(size(dissipation)), source=0.0_wp)
+         return
+      end if
+      growth = state%x(n + 1:) - self%depth
+      where (state%rate > measurable*maxval(state%rate))
+         self%energy = self%energy + growth*dissipation/state%rate
+      else where
+         self%energy = self%energy + friction_energy(self%case, growth + self%case%contact%depth)
+      end where
+      self%depth = state%x(n + 1:)
+   end subroutine add_energy
 
    !> States on the way of pseudo-time need not be in equilibrium.
    subroutine count_point(self, point)

@@ -27,6 +27,7 @@ module fw_restart_file
    use fw_restart_rows, only: c_rejected
    use fw_restart_rows, only: c_spacing
    use fw_restart_rows, only: c_steps
+   use fw_restart_rows, only: c_unsettled
    use fw_restart_rows, only: n_controls
    use fw_restart_rows, only: pair_constants
    use fw_restart_rows, only: pair_keys
@@ -68,6 +69,8 @@ module fw_restart_file
       type(wear_state) :: state
       real(wp) :: omega = 0.0_wp
       real(wp), allocatable :: control(:), checked_rate(:)
+      !> Friction energy after the last step (n_pairs); not allocated where the file has none.
+      real(wp), allocatable :: energy(:)
       !> Unknowns and rates of the first state.
       type(wear_state) :: first
    contains
@@ -201,7 +204,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: cycles(:), residual(:), omega(:)
       real(wp), allocatable :: vibration(:, :), depth(:, :), rate(:, :), checked(:, :)
-      real(wp), allocatable :: control(:, :)
+      real(wp), allocatable :: control(:, :), energy(:, :)
       integer :: n
 
       call read_dataset(file, '/wear/cycles', cycles, error)
@@ -220,6 +223,11 @@ contains
          return
       end if
       n = self%n_rows
+      if (file%exists('/wear/energy')) then
+         call read_dataset(file, '/wear/energy', energy, error)
+         if (allocated(error)) return
+         if (size(energy, 1) == n_pairs .and. size(energy, 2) >= n) self%energy = energy(:, n)
+      end if
       self%omega = omega(n)
       self%state%cycles = cycles(n)
       self%state%residual = residual(n)
@@ -293,6 +301,7 @@ contains
       march%resonance%spacing = self%control(c_spacing)
       march%n_steps = nint(self%control(c_steps))
       march%n_rejected = nint(self%control(c_rejected))
+      march%n_unsettled = nint(self%control(c_unsettled))
       if (allocated(self%checked_rate)) march%checked_rate = self%checked_rate
    end subroutine give_control
 

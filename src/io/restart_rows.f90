@@ -23,16 +23,19 @@ module fw_restart_rows
    private
 
    public :: restart_row_set, pair_constants
-   public :: pair_keys, n_controls
+   public :: pair_keys, n_controls, n_notes
    public :: c_next_cycles, c_largest_rate, c_checked_depth, c_spacing, c_steps, c_rejected, &
-             c_converged
+             c_converged, c_unsettled, c_noted
 
    !> Columns of /restart/control.
    integer, parameter :: c_next_cycles = 1, c_largest_rate = 2, c_checked_depth = 3, &
-                         c_spacing = 4, c_steps = 5, c_rejected = 6, c_converged = 7
-   integer, parameter :: n_controls = 7
+                         c_spacing = 4, c_steps = 5, c_rejected = 6, c_converged = 7, &
+                         c_unsettled = 8, c_noted = 9
+   !> From c_noted on what the observer of the march has noted.
+   integer, parameter :: n_notes = 4, n_controls = c_noted - 1 + n_notes
    character(*), parameter :: control_words(n_controls) = [character(17) :: 'next_cycles', &
-      'largest_rate', 'checked_depth', 'frequency_spacing', 'n_steps', 'n_rejected', 'converged']
+      'largest_rate', 'checked_depth', 'frequency_spacing', 'n_steps', 'n_rejected', 'converged', &
+      'n_unsettled', 'n_finer', 'n_coarse', 'coarse_pair', 'coarse_cycle']
    !> Columns of /restart/pairs: keys of &contact, and the depth of `worn`.
    character(*), parameter :: pair_keys(*) = [character(20) :: 'mu', 'gap', 'area', &
       'normal_load', 'tangential_stiffness', 'normal_stiffness', 'worn']
@@ -106,13 +109,15 @@ contains
    end function pair_constants
 
    !> The march when its observer sees a state, and the vibration of that state.
-   subroutine append_row(self, file, march, vibration, converged, error)
+   subroutine append_row(self, file, march, vibration, converged, notes, error)
       class(restart_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       type(wear_march), intent(in) :: march
       real(wp), intent(in) :: vibration(:)
       !> Whether the state counts as converged.
       logical, intent(in) :: converged
+      !> What the observer has noted so far.
+      real(wp), intent(in) :: notes(n_notes)
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: control(n_controls)
 
@@ -124,6 +129,8 @@ contains
       control(c_steps) = real(march%n_steps, wp)
       control(c_rejected) = real(march%n_rejected, wp)
       control(c_converged) = merge(1.0_wp, 0.0_wp, converged)
+      control(c_unsettled) = real(march%n_unsettled, wp)
+      control(c_noted:) = notes
       !$omp critical (fretwear_io)
       call self%list(d_vibration)%append(file, vibration, error)
       if (.not. allocated(error)) call self%list(d_control)%append(file, control, error)

@@ -44,6 +44,9 @@ module fw_wear_options
       !> A joint is steady when its largest rate has fallen to this part of the first.
       real(wp) :: steady_tolerance = 1.0e-6_wp
       integer :: max_steps = 1000
+      !> Growth of the depth in a step that is allowed in any case, as a part of the largest depth;
+      !> only where nothing in the case tells the size of the steps.
+      real(wp) :: relative_step = 0.0_wp
       !> Run a second time with steps of half the size, to see how far the profile moves.
       logical :: check_steps = .false.
       !> Keep the excitation at the resonance of the first observed quantity.
@@ -128,6 +131,7 @@ contains
       if (self%scheme == wear_explicit) exponent = 2
       if (self%controls_error()) self%error_tolerance = self%tolerance()/2.0_wp**exponent
       self%max_depth_step = 0.5_wp*self%max_depth_step
+      self%relative_step = 0.5_wp*self%relative_step
       ! Room for them, with some for what halving rejects.
       if (self%max_steps <= most_steps) self%max_steps = 4*self%max_steps
    end subroutine halve_steps

@@ -4,6 +4,11 @@
 !> the tolerance; a step that fails is halved, never skipped. Steps aim at a growth of the largest
 !> depth, so that they lengthen as the rate decays.
 !>
+!> A pair that a step makes slip although its start held it stuck may be an artefact of a long step,
+!> or of too few harmonics, and what it wears is never given back: such a step is compared with its
+!> two halves, and taken only where they give that pair the same depth; else the first half is the
+!> next one to be judged. Where it stays, the observer is told.
+!>
 !> A joint is steady when the largest rate has fallen to steady_tolerance of the largest so far:
 !> no pair both slips and bears. There need not be such a state. The whole joint is in gross slip
 !> when every pair that bears also wears, by rates that no longer change although the depth has
@@ -42,6 +47,10 @@ module fw_wear_march
    !> Growth of the first step, where only the error is controlled, as a part of the elastic
    !> compression of the pairs.
    real(wp), parameter :: first_growth = 2.0e-2_wp
+   !> Difference in the depth of a pair that begins to slip, of a step from its halves, as a part
+   !> of the largest depth, that counts as none; and halvings after which the step is taken so.
+   real(wp), parameter :: same_depth = 1.0e-3_wp
+   integer, parameter :: max_onset_halvings = 12
    !> Change of the rates, as a part of the largest, that counts as none; a pair bears and wears
    !> above these parts of the largest pressure and rate.
    real(wp), parameter :: unchanged = 1.0e-2_wp, bears = 1.0e-6_wp, wears = 1.0e-3_wp
@@ -50,6 +59,7 @@ module fw_wear_march
    contains
       !> A state of the march, the first included.
       procedure(state_callback), deferred :: take
+      procedure :: begin_slip
    end type wear_observer
 
    type :: wear_march
@@ -74,6 +84,10 @@ module fw_wear_march
       real(wp) :: checked_depth = 0.0_wp
       real(wp), allocatable :: checked_rate(:)
       !> Steps of the scheme 'bdf', each of which builds on those before.
+      !> Pairs that begin to slip in the last step, though its start held them stuck (n_pairs);
+      !> steps in which what they wear depends on the step, however short.
+      logical, allocatable :: begins(:)
+      integer :: n_unsettled = 0
       type(bdf_integrator), private :: bdf
    contains
       procedure :: run
@@ -96,6 +110,21 @@ module fw_wear_march
    end interface
 
 contains
+
+   !> Pairs begin to slip that were held stuck: without an observer's own say nothing is made of it.
+   subroutine begin_slip(self, march, system, state, error)
+      class(wear_observer), intent(inout) :: self
+      !> `begins` says which.
+      class(wear_march), intent(in) :: march
+      type(wear_system), intent(inout) :: system
+      !> At the end of the step.
+      type(wear_state), intent(in) :: state
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (unused => self, unused_march => march, unused_system => system, &
+                 unused_state => state)
+      end associate
+   end subroutine begin_slip
 
    !> March from a settled state (residual, rates known); the last state is left in it.
    subroutine run(self, system, state, observer, error, resumed)
@@ -126,11 +155,16 @@ contains
          end if
          ! A run that is continued from here has no preconditioners from before either.
          self%stepper%newton%linear%worth_keeping = .false.
+         self%begins = spread(.false., 1, size(state%rate))
          if (self%options%scheme == wear_pseudo_time .and. &
              self%stepper%pseudo_scheme == scheme_bdf) then
             call one_bdf_step(self, system, state, after, iterations)
          else
             call one_step(self, system, state, after, iterations)
+         end if
+         if (any(self%begins) .and. .not. allocated(self%ending)) then
+            call observer%begin_slip(self, system, after, error)
+            if (allocated(error)) exit
          end if
          ! Between steps: within one the frequency is held (docs/theory.md, Wear).
          if (self%options%follow_resonance .and. .not. (allocated(self%ending) .or. &
@@ -221,12 +255,16 @@ contains
       real(wp) :: cycles, error
       type(wear_state) :: before
       integer :: halvings, n_inaccurate
+      logical :: held(size(state%rate)), refined
 
+      held = is_held(self, system, state)
       before = state
       iterations = 0
       halvings = 0
       n_inaccurate = 0
       cycles = next_step(self, system, state)
+      if (self%options%max_depth_step > 0.0_wp) self%stepper%max_depth_step = depth_step(self, &
+                                                                                      system, state)
       do
          call self%stepper%advance(system, before, cycles, after, report)
          iterations = iterations + report%iterations
@@ -245,6 +283,12 @@ contains
             cycles = 0.5_wp*cycles
             self%next_cycles = cycles
             cycle
+         end if
+         call judge_onset(self, system, before, held, cycles, after, report, iterations, refined)
+         if (system%is_interrupted()) return
+         if (refined) then
+            call confirm(self, system, after, report, iterations)
+            exit
          end if
          if (.not. self%options%controls_error()) exit
          error = maxval(abs(report%error))/ &
@@ -265,8 +309,98 @@ contains
       end do
       ! The growth of the depth then limits the next step alone (next_step).
       if (.not. self%options%controls_error()) self%next_cycles = largest_growth*cycles
+      ! What needed short steps may need them again.
+      if (refined) self%next_cycles = 2.0_wp*cycles
       self%n_steps = self%n_steps + 1
    end subroutine one_step
+
+   !> Pairs that bear at a state and do not wear.
+   pure function is_held(self, system, state) result(held)
+      type(wear_march), intent(in) :: self
+      type(wear_system), intent(in) :: system
+      type(wear_state), intent(in) :: state
+      logical :: held(size(state%rate))
+      real(wp) :: pressure(size(state%rate))
+
+      pressure = system%mean_pressure()
+      held = .not. wears_at(self, state) .and. pressure > bears*maxval(pressure)
+   end function is_held
+
+   !> Pairs that wear at a state more than what counts as steady.
+   pure function wears_at(self, state) result(worn)
+      type(wear_march), intent(in) :: self
+      type(wear_state), intent(in) :: state
+      logical :: worn(size(state%rate))
+
+      worn = state%rate > self%options%steady_tolerance*self%largest_rate
+   end function wears_at
+
+   !> See the module header. The step that is left may be a part of the one that was tried.
+   subroutine judge_onset(self, system, before, held, cycles, after, report, iterations, refined)
+      type(wear_march), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      !> Pairs that are stuck at the start of the step.
+      logical, intent(in) :: held(:)
+      !> Of the step.
+      real(wp), intent(inout) :: cycles
+      type(wear_state), intent(inout) :: after
+      type(wear_step_report), intent(inout) :: report
+      integer, intent(inout) :: iterations
+      !> Whether the step is another one than that which was tried, and to be taken as it is.
+      logical, intent(out) :: refined
+      type(wear_state) :: half, whole
+      integer :: k
+
+      refined = .false.
+      self%begins = held .and. wears_at(self, after)
+      if (.not. any(self%begins)) return
+      do k = 1, max_onset_halvings
+         call self%stepper%advance(system, before, 0.5_wp*cycles, half, report)
+         iterations = iterations + report%iterations
+         if (.not. report%converged .or. system%is_interrupted()) exit
+         if (any(held .and. wears_at(self, half))) then
+            call self%stepper%advance(system, half, 0.5_wp*cycles, whole, report)
+            iterations = iterations + report%iterations
+            if (.not. report%converged .or. system%is_interrupted()) exit
+            if (is_same(self, system, cycles, after, whole)) then
+               after = whole
+               refined = .true.
+               return
+            end if
+         end if
+         self%n_rejected = self%n_rejected + 1
+         refined = .true.
+         cycles = 0.5_wp*cycles
+         after = half
+         self%begins = held .and. wears_at(self, after)
+         if (.not. any(self%begins)) return
+      end do
+      if (system%is_interrupted()) return
+      ! No half of it converges, or none is short enough: it is taken, and said.
+      self%n_unsettled = self%n_unsettled + 1
+      report%converged = .true.
+      refined = .true.
+      call self%stepper%evaluate(system, after)
+   end subroutine judge_onset
+
+   !> Whether a step and its halves agree about the pairs that begin to slip.
+   logical function is_same(self, system, cycles, one, two)
+      type(wear_march), intent(in) :: self
+      type(wear_system), intent(in) :: system
+      real(wp), intent(in) :: cycles
+      type(wear_state), intent(in) :: one, two
+      real(wp) :: difference(size(one%rate))
+      integer :: n
+
+      n = system%n_vibration()
+      difference = abs(one%x(n + 1:) - two%x(n + 1:))
+      ! The explicit scheme wears what slips now in the step to come.
+      if (self%options%scheme == wear_explicit) difference = difference + &
+                                                             cycles*abs(one%rate - two%rate)
+      is_same = maxval(difference, mask=self%begins) <= &
+                same_depth*maxval(max(one%x(n + 1:), two%x(n + 1:)))
+   end function is_same
 
    !> One step of the differential-algebraic system: its integrator chooses length and order.
    subroutine one_bdf_step(self, system, state, after, iterations)
@@ -361,7 +495,7 @@ contains
          if (self%options%controls_error()) cycles = first_growth*system%depth_scale()/rate
       end if
       if (self%options%max_depth_step > 0.0_wp) then
-         cycles = min(cycles, self%options%max_depth_step/rate)
+         cycles = min(cycles, depth_step(self, system, state)/rate)
       end if
       if (cycles >= self%options%n_cycles - state%cycles) then
          cycles = self%options%n_cycles - state%cycles
@@ -370,6 +504,16 @@ contains
          cycles = 0.5_wp*(self%options%n_cycles - state%cycles)
       end if
    end function next_step
+
+   !> Largest growth of the depth in the step from a state.
+   pure real(wp) function depth_step(self, system, state)
+      type(wear_march), intent(in) :: self
+      type(wear_system), intent(in) :: system
+      type(wear_state), intent(in) :: state
+
+      depth_step = max(self%options%max_depth_step, self%options%relative_step* &
+                       maxval(state%x(system%n_vibration() + 1:)))
+   end function depth_step
 
    !> The step that the error allows next.
    subroutine adapt(self, cycles, error)

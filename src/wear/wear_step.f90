@@ -18,7 +18,7 @@ module fw_wear_step
    implicit none (type, external)
    private
 
-   public :: wear_state, wear_step_report, wear_stepper, new_wear_stepper
+   public :: wear_state, wear_step_report, wear_stepper, new_wear_stepper, largest_lag
 
    !> Where a wear run stands.
    type :: wear_state
