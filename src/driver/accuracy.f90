@@ -29,7 +29,7 @@ module fw_accuracy
    use fw_known_tail, only: relative_distance
    use fw_known_tail, only: unknown
    use fw_laws, only: is_rigid
-   use fw_laws, only: law_number
+   use fw_laws, only: law_with_tail
    use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
    use fw_level, only: level_type
@@ -139,7 +139,7 @@ contains
       end associate
       ! It follows events, and two directions by the displacement law only.
       if (any(planar) .or. case%harmonics%sampling == sampling_uniform) return
-      case%contact%law = law_number('rigid')
+      case%contact%law = law_with_tail(case%contact%law)
    end subroutine take_oscillator
 
    !> Build a level if it is not there.

@@ -11,7 +11,7 @@ module fw_laws
    implicit none (type, external)
    private
 
-   public :: law_words, law_number, new_law, facts_of, is_rigid
+   public :: law_words, law_number, law_with_tail, new_law, facts_of, is_rigid
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
@@ -51,6 +51,23 @@ contains
       call new_law(number, law)
       is_rigid = law%prediction%takes_balance
    end function is_rigid
+
+   !> The law that has the solutions of the law of a number and knows its forces in every harmonic;
+   !> the number itself where there is none.
+   integer function law_with_tail(number) result(same)
+      integer, intent(in) :: number
+      type(law_facts) :: facts
+      integer :: k
+
+      same = number
+      facts = facts_of(number)
+      ! Rigid, and known to the integration in time: Coulomb's friction, whatever the method.
+      if (.not. (is_rigid(number) .and. facts%is_integrated)) return
+      do k = 1, size(law_words)
+         facts = facts_of(k)
+         if (facts%has_tail) same = k
+      end do
+   end function law_with_tail
 
    !> Where a word stands among `law_words`; 0 where it does not.
    pure integer function law_number(word)

@@ -9,6 +9,8 @@ EVENTS = SRC / "force" / "event"
 OSCILLATOR = SRC / "force" / "oscillator"
 #: The one module of the located events that the rest may name.
 INTERFACE = "fw_event_contact"
+#: The list of the laws: a word and a line of construction each.
+LAWS = SRC / "force" / "laws.f90"
 
 
 def uses(path: Path) -> set[str]:
@@ -42,13 +44,24 @@ def test_the_events_know_no_law_and_no_balance() -> None:
         assert uses(path) - {INTERFACE} <= allowed, path.name
 
 
+def law_words() -> list[str]:
+    """The words of the laws."""
+    (listed,) = re.findall(r":: law_words\(\*\) = &\s*\[(.*?)\]", LAWS.read_text(), re.DOTALL)
+    return re.findall(r"'(\w+)'", listed)
+
+
+def law_modules() -> set[str]:
+    """Modules of laws that nobody outside of the laws needs: multipliers follow `fw_friction`."""
+    return uses(LAWS) - {"fw_force_law", "fw_pair_law", "fw_friction"}
+
+
 #: Outside of the laws a law is known by its facts and its prediction. A name of one, or a question
 #: by its number, is a place more to touch for every new law.
 QUESTIONS = re.compile(
-    r"\blaw_(dlft|dlft_velocity|penalty|regularised)\b"
+    rf"\blaw_({'|'.join(law_words())})\b"
     r"|%law\s*(==|/=)"
     r"|law_words\(.*\)\s*(==|/=)|law_number\("
-    r"|use fw_(regularised|polynomial_law|friction_events)\b"
+    rf"|use ({'|'.join(law_modules())}|fw_polynomial_law|fw_friction_events)\b"
     r"|%(rigid|velocity_level)\b")
 #: The law of wear is another matter.
 OTHERS = re.compile(r"wear%law")
@@ -79,12 +92,21 @@ def test_nothing_outside_of_the_laws_asks_for_a_law_by_kind() -> None:
 
 
 def test_a_law_is_one_file_one_word_and_one_line() -> None:
-    naming = [
-        path.name for path in SRC.rglob("*.f90")
-        if re.search(r"regularised_friction|fw_regularised", path.read_text())
-    ]
-    assert sorted(naming) == ["laws.f90", "regularised.f90"]
-    registry = (SRC / "force" / "laws.f90").read_text()
-    lines = [line for line in registry.splitlines() if "regularised" in line]
+    assert "fw_regularised" in law_modules()
+    for module in law_modules():
+        naming = [path.name for path in SRC.rglob("*.f90") if module in uses(path)]
+        assert naming == [LAWS.name], module
+    lines = [line for line in LAWS.read_text().splitlines() if "regularised" in line]
     # The word, its line of construction, and the `use` of its file.
     assert len(lines) == 3
+
+
+def test_multipliers_and_integration_in_time_are_promised_for_coulomb_alone() -> None:
+    # src/balance/stability_history.f90 and src/time march Coulomb's law whatever law the pairs
+    # have: any other that promised these facts would get the numbers of that one, without a word.
+    # The springs of polynomial_law.f90 have ways of their own through both.
+    promising = {
+        path.name for path in SRC.rglob("*.f90")
+        if re.search(r"\b(has_multipliers|is_integrated)\s*=\s*\.true\.", path.read_text())
+    }
+    assert promising == {"friction.f90", "rigid_law.f90", "polynomial_law.f90"}
