@@ -13,6 +13,7 @@ module fw_contact_keys
    use fw_key_range, only: dof_numbers
    use fw_key_range, only: from_to
    use fw_kinds, only: wp
+   use fw_laws, only: law_help
    use fw_laws, only: law_words
    use fw_laws, only: new_law
    use fw_pair_law, only: pair_law
@@ -45,9 +46,7 @@ contains
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
 
-      call keys%bind_word(key('law', 'rigid, rigid at velocity level, elastic, rigid of high '// &
-                              'order (friction on dofs with mass), or smooth in the velocity'), &
-                          contact%law, law_words)
+      call keys%bind_word(key('law', law_help), contact%law, law_words)
    end subroutine bind_law
 
    !> Dofs of both sides; a pair between one side and the ground has no side 2.
@@ -111,6 +110,13 @@ contains
       class(pair_law), allocatable :: law
       integer :: k
 
+      contact%constants%is_asked = .true.
+      do k = 1, size(law_words)
+         contact%constants%word = law_words(k)
+         call new_law(k, law)
+         call law%bind_keys(keys, contact, .false., .false.)
+      end do
+      contact%constants%is_asked = .false.
       contact%constants%law = contact%law
       contact%constants%is_in_use = .true.
       call new_law(contact%law, law)

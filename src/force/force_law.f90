@@ -69,13 +69,16 @@ module fw_force_law
       logical :: follows_events = .false.
       !> Its forces are the projection of their histories alone, not a collocation.
       logical :: needs_projection = .false.
-      !> Sliding under pressure, with its derivative: what wear takes.
+      !> Sliding under pressure, with its derivative: what wear takes. The law leaves both in its
+      !> workspace where that asks for them (`work%slip`, `work%slip_derivative`).
       logical :: measures_slip = .false.
       !> Its forces are known in every harmonic (`tail`), where a pair has one tangential direction.
       logical :: has_tail = .false.
-      !> A perturbation can be followed through the period: Floquet multipliers.
+      !> A perturbation can be followed through the period: Floquet multipliers. With pairs that
+      !> is done for Coulomb's law behind springs alone (`src/balance/stability_history.f90`): any
+      !> other law of pairs would get the multipliers of that one.
       logical :: has_multipliers = .false.
-      !> The integration in time knows the law.
+      !> The integration in time (`src/time`) knows the law: Coulomb's, rigid or behind springs.
       logical :: is_integrated = .false.
       !> Instants below which the sampling error exceeds that of the truncation: in all, for each
       !> harmonic, and for each harmonic where elements may separate or the normal load varies.

@@ -109,8 +109,7 @@ contains
       if (self%prediction%takes_balance) return
       call contact%constants%bind(keys, key('tangential_stiffness', 'contact stiffness; '// &
          '0 with a parallel pair that has one, or without a tangential dof', at_least(0.0_wp), &
-         'F/L', 'n_pairs', absent='of the file, else required with tangential dofs', &
-         only="law = 'penalty'"), slides)
+         'F/L', 'n_pairs', absent='of the file, else required with tangential dofs'), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
    end subroutine bind_keys
 

@@ -11,6 +11,8 @@ module fw_law_constants
 
    type :: constant_type
       character(24) :: name = ''
+      !> Which laws declare it, as its key says: law = 'one', 'another'.
+      character(60) :: only = ''
       !> Number of the law that declared it.
       integer :: law = 0
       !> One for each pair; not allocated where none was given.
@@ -18,11 +20,15 @@ module fw_law_constants
    end type constant_type
 
    type :: law_constants
-      !> Number of the law that declares keys now.
+      !> Number of the law that declares keys now, and its word.
       integer :: law = 0
+      character(24) :: word = ''
+      !> Whether laws are only asked for the names of their keys: before any is read, so that each
+      !> key can name all the laws that have it.
+      logical :: is_asked = .false.
       !> Whether that law is the one of the case, which takes what the model offers.
       logical :: is_in_use = .true.
-      type(constant_type), allocatable, private :: constant(:)
+      type(constant_type), allocatable, private :: constant(:), named(:)
       !> What the model has, with the number of the law that took it (0: none).
       type(constant_type), allocatable, private :: offered(:)
    contains
@@ -45,10 +51,18 @@ contains
       !> Whether the case has to give it where the model does not.
       logical, intent(in) :: needed
       type(constant_type) :: new
+      type(key_type) :: shown
       integer :: k
 
+      if (self%is_asked) then
+         call note_law(self, key%name)
+         return
+      end if
       if (.not. allocated(self%constant)) allocate (self%constant(0))
       if (place_of(self%constant, key%name) > 0) return
+      shown = key
+      k = place_of(self%named, key%name)
+      if (k > 0) shown%only = self%named(k)%only
       new%name = key%name
       new%law = self%law
       k = 0
@@ -58,9 +72,27 @@ contains
          new%values = self%offered(k)%values
          self%offered(k)%law = self%law
       end if
-      call keys%bind(key, new%values, needed .and. k == 0)
+      call keys%bind(shown, new%values, needed .and. k == 0)
       self%constant = [self%constant, new]
    end subroutine bind
+
+   !> The law that declares now has a constant of this name.
+   subroutine note_law(self, name)
+      class(law_constants), intent(inout) :: self
+      character(*), intent(in) :: name
+      type(constant_type) :: new
+      integer :: k
+
+      if (.not. allocated(self%named)) allocate (self%named(0))
+      k = place_of(self%named, name)
+      if (k > 0) then
+         self%named(k)%only = trim(self%named(k)%only)//", '"//trim(self%word)//"'"
+      else
+         new%name = name
+         new%only = "law = '"//trim(self%word)//"'"
+         self%named = [self%named, new]
+      end if
+   end subroutine note_law
 
    !> What the model has for a constant (n_pairs), if anything: it holds where the case gives none.
    subroutine offer(self, name, values)
@@ -108,15 +140,17 @@ contains
       self%constant(k)%values = values
    end subroutine set
 
-   !> Values of a constant (n_pairs); zero where none were given.
-   pure function get(self, name, n_pairs) result(values)
+   !> Values of a constant (n_pairs); where none were given the default, zero if there is none.
+   pure function get(self, name, n_pairs, default) result(values)
       class(law_constants), intent(in) :: self
       character(*), intent(in) :: name
       integer, intent(in) :: n_pairs
+      real(wp), intent(in), optional :: default
       real(wp) :: values(n_pairs)
       integer :: k
 
       values = 0.0_wp
+      if (present(default)) values = default
       k = place_of(self%constant, name)
       if (k == 0) return
       if (.not. allocated(self%constant(k)%values)) return

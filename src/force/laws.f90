@@ -11,10 +11,13 @@ module fw_laws
    implicit none (type, external)
    private
 
-   public :: law_words, law_number, law_with_tail, new_law, facts_of, is_rigid
+   public :: law_words, law_help, law_number, law_with_tail, new_law, facts_of, is_rigid
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
+   !> What they are, in the same order, for the key `law` (160 characters).
+   character(*), parameter :: law_help = 'rigid, rigid at velocity level, elastic, rigid of '// &
+      'high order (friction on dofs with mass), or smooth in the velocity'
 
 contains
 

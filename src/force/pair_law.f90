@@ -68,8 +68,7 @@ contains
    pure type(key_type) function normal_stiffness_key()
       normal_stiffness_key = key('normal_stiffness', 'contact stiffness; 0 without a normal '// &
                                  'dof', at_least(0.0_wp), 'F/L', 'n_pairs', &
-                                 absent='of the file, else required with normal dofs', &
-                                 only="law = 'penalty', 'regularised'")
+                                 absent='of the file, else required with normal dofs')
    end function normal_stiffness_key
 
    !> Take what `bind_keys` declared, once the pairs are there.

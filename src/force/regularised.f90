@@ -61,7 +61,7 @@ contains
       end associate
       call contact%constants%bind(keys, key('slip_speed', 'sliding velocity du/dt at which '// &
          'tanh(1) = 76 % of the friction acts', above(0.0_wp), 'L/s', 'n_pairs', &
-         absent='required with tangential dofs', only="law = 'regularised'"), slides)
+         absent='required with tangential dofs'), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
    end subroutine bind_keys
 
@@ -70,9 +70,8 @@ contains
       type(contact_type), intent(in) :: contact
       integer :: c
 
-      self%slip_speed = contact%constants%get('slip_speed', self%n_elements)
-      ! A pair that does not slide needs none; any will do.
-      where (self%slip_speed <= 0.0_wp) self%slip_speed = 1.0_wp
+      ! Pairs that do not slide need none; any will do.
+      self%slip_speed = contact%constants%get('slip_speed', self%n_elements, default=1.0_wp)
       associate (p => self%prediction)
          do c = 1, 2
             p%stiffness(:, c) = merge(1.0_wp, 0.0_wp, self%present(c, :))
