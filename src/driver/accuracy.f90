@@ -24,6 +24,7 @@ module fw_accuracy
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_harmonics_options, only: sampling_uniform
+   use fw_known_tail, only: all_know_tails
    use fw_known_tail, only: is_like_structure
    use fw_known_tail, only: known_tail
    use fw_known_tail, only: relative_distance
@@ -52,6 +53,8 @@ module fw_accuracy
    real(wp), parameter :: linear_up_to = 0.1_wp, better_below = 0.03_wp
    !> Part of |u2 - u| that the next change may be, unless both are round-off.
    real(wp), parameter :: contraction = 0.5_wp, round_off = 1.0e-9_wp
+   !> Harmonics up to which rigid pairs that are no oscillators may stick where they should slip.
+   integer, parameter :: few_harmonics = 3
    !> Order of the error in 1/H, where the tail does not tell: elastic contact and springs; rigid
    !> contact on nodes that answer as if they had no mass, and on others.
    real(wp), parameter :: order_elastic = 1.5_wp, order_massless = 1.25_wp, order_rigid = 0.3_wp
@@ -272,8 +275,13 @@ contains
          call tail%correct(level%system, change)
          if (.not. change <= linear_up_to) return
          call tail%next_change(level%system, next)
-         told = next <= max(contraction*change, round_off)
-         if (.not. told) return
+         if (next > max(contraction*change, round_off)) then
+            ! Rigid pairs may find other states of stick and slip with more harmonics.
+            told = is_rigid(self%case%contact%law) .and. self%case%contact%n_pairs > 0
+            return
+         end if
+         if (.not. all_know_tails(level%system) .and. &
+             level%harmonics%n_harmonics <= few_harmonics) return
          tail%is_better = change <= better_below
          if (tail%is_better) then
             bound = factor_of_tail*max(next, least_part*change) &

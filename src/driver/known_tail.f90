@@ -29,7 +29,7 @@ module fw_known_tail
    implicit none (type, external)
    private
 
-   public :: known_tail, relative_distance, unknown, is_like_structure
+   public :: known_tail, relative_distance, unknown, is_like_structure, all_know_tails
 
    !> Where nothing is known.
    real(wp), parameter :: unknown = huge(1.0_wp)
@@ -402,6 +402,25 @@ contains
       end associate
       is_like = 2*n_alike >= n_all
    end function is_like_structure
+
+   !> Whether every rigid pair follows the motion above H by itself, as an oscillator whose mass
+   !> outweighs its spring there; elastic ones and springs have no need to.
+   pure logical function all_know_tails(system) result(know)
+      type(balance_state), intent(in) :: system
+      real(wp) :: s
+      integer :: i
+
+      know = .true.
+      associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
+         if (.not. p%takes_balance) return
+         know = p%has_inertia
+         if (.not. know) return
+         s = (maxval(system%problem%fourier%harmonic) + 1)*system%frequency()
+         do i = 1, system%problem%n_pairs
+            know = know .and. any(s**2*p%inertia(i, 1:2) > p%stiffness(i, 1:2))
+         end do
+      end associate
+   end function all_know_tails
 
    !> Largest relative distance of the quantities in two sets of coefficients (2H+1, n_observed), of
    !> which the second may hold fewer harmonics: root mean square over the vibration of the first.
