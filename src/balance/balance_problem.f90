@@ -32,6 +32,8 @@ module fw_balance_problem
       real(wp), allocatable :: depth(:)
       !> Whether states solve by themselves what they can, see `reduced` of nonlinear_system.
       logical :: reduced = .true.
+      !> Unknowns are the values at the instants, not the coefficients (hdhb).
+      logical :: solves_values = .false.
    contains
       procedure :: coordinate_of
       procedure :: scale_forces

@@ -37,6 +37,7 @@ module fw_accuracy
    use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
    use fw_run_state, only: run_state
+   use fw_reduction, only: held_basis
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
    use fw_strategy, only: solver_memory
@@ -86,6 +87,8 @@ module fw_accuracy
       real(wp) :: worst = 0.0_wp, worst_omega = 0.0_wp
       !> (numbers of harmonics, doublings of the instants)
       type(level_type), allocatable :: level(:, :)
+      !> Modes of the structure with its contact held, which all of them share.
+      type(held_basis), private :: held
       type(known_tail), allocatable, private :: tail(:, :)
       !> What instants were last found to leave out.
       real(wp), allocatable, private :: by_instants(:, :)
@@ -151,7 +154,8 @@ contains
       integer, intent(in) :: k, doublings
       type(error_type), allocatable, intent(out) :: error
 
-      call self%level(k, doublings)%build(self%case, self%n_harmonics(k), error, doublings)
+      call self%level(k, doublings)%build(self%case, self%n_harmonics(k), error, doublings, &
+                                          held=self%held)
    end subroutine need
 
    !> Solve at a frequency; the point says at which level, and how accurately.

@@ -11,6 +11,7 @@ module fw_adaptive
    use fw_level, only: level_type
    use fw_point, only: point_type
    use fw_run_state, only: run_state
+   use fw_reduction, only: held_basis
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
    use fw_strategy, only: solver_memory
@@ -32,6 +33,8 @@ module fw_adaptive
       integer :: n_short = 0
       !> One for each of these numbers, built when it is first needed.
       type(level_type), allocatable :: level(:)
+      !> Modes of the structure with its contact held, which all of them share.
+      type(held_basis), private :: held
    contains
       procedure :: start
       procedure :: solve
@@ -50,7 +53,7 @@ contains
 
       self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics)
       allocate (self%level(size(self%n_harmonics)))
-      call self%level(1)%build(case, self%n_harmonics(1), error)
+      call self%level(1)%build(case, self%n_harmonics(1), error, held=self%held)
    end subroutine start
 
    !> Solve at a frequency; the point says how many harmonics it took.
@@ -115,7 +118,7 @@ contains
       integer, intent(in) :: next
       type(error_type), allocatable, intent(out) :: error
 
-      call self%level(next)%build(case, self%n_harmonics(next), error)
+      call self%level(next)%build(case, self%n_harmonics(next), error, held=self%held)
       if (allocated(error)) return
       call self%level(next)%take_over(self%level(self%current))
       self%current = next

@@ -14,15 +14,14 @@ module fw_branch
    use fw_crossing_search, only: probe_type
    use fw_crossing_search, only: search_crossings
    use fw_error, only: error_type
-   use fw_harmonics_options, only: method_hdhb
+   use fw_formulation, only: formulation_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_hdhb, only: hdhb_system
-   use fw_hdhb, only: new_hdhb
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
    use fw_newton, only: tight_forcing
    use fw_observer, only: observer_type
+   use fw_parameter_system, only: parameter_system
    use fw_point, only: point_type
    use fw_point, only: served_by_arclength
    use fw_level, only: level_type
@@ -62,9 +61,10 @@ module fw_branch
       !> step control then.
       type(balance_problem), pointer :: whole_problem => null()
       type(balance_state), pointer :: whole => null()
-      !> The balance with values at instants as unknowns, where `hdhb` is asked for.
+      !> What the curve is followed in.
+      type(formulation_type) :: formulation
+      class(parameter_system), pointer :: solved => null()
       type(stability_solver) :: stability
-      type(hdhb_system), pointer :: in_time => null()
       !> What a condensed structure is measured by.
       type(response_view), pointer :: view => null()
       integer(int64) :: clock = 0
@@ -181,12 +181,12 @@ contains
    !> Start at a converged point x of the system at sweep%start, which counts as the first of
    !> sweep%max_points. The system has to outlive the branch.
    subroutine begin(self, case, system, x, error)
-      class(branch_type), intent(inout) :: self
+      class(branch_type), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(balance_state), intent(inout), target :: system
       real(wp), intent(in), contiguous :: x(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: values(:), whole_x(:)
+      real(wp), allocatable :: unknowns(:), whole_x(:)
 
       self%system => system
       call system_clock(self%clock)
@@ -205,19 +205,13 @@ contains
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       end associate
       if (.not. associated(self%whole)) allocate (self%view)
-      if (case%harmonics%method == method_hdhb) then
-         allocate (self%in_time)
-         call new_hdhb(self%system, self%in_time)
-         allocate (values(self%system%n))
-         call self%in_time%to_values(self%system%problem%structure%n_coordinates, whole_x, values)
-         if (associated(self%view)) call self%view%begin(self%system, self%in_time)
-         self%curve%corrector%view => self%view
-         call self%curve%begin(self%in_time, values, error)
-      else
-         if (associated(self%view)) call self%view%begin(self%system)
-         self%curve%corrector%view => self%view
-         call self%curve%begin(self%system, whole_x, error)
-      end if
+      call self%formulation%begin(self%system)
+      self%solved => self%formulation%as_solved()
+      allocate (unknowns(self%system%n))
+      call self%formulation%from_coefficients(whole_x, unknowns)
+      if (associated(self%view)) call self%view%begin(self%system, self%formulation)
+      self%curve%corrector%view => self%view
+      call self%curve%begin(self%solved, unknowns, error)
    end subroutine begin
 
    !> Where the structure is small, take it whole: resonances of what condensation leaves out would
@@ -278,7 +272,6 @@ contains
       if (associated(self%whole)) deallocate (self%whole)
       if (associated(self%whole_problem)) deallocate (self%whole_problem)
       if (associated(self%view)) deallocate (self%view)
-      if (associated(self%in_time)) deallocate (self%in_time)
    end subroutine release
 
    !> The next point of the branch; `more` is false where there is none.
@@ -291,11 +284,7 @@ contains
       type(branch_point) :: found
       integer(int64) :: clock, rate
 
-      if (associated(self%in_time)) then
-         call self%curve%next(self%in_time, found, more, error)
-      else
-         call self%curve%next(self%system, found, more, error)
-      end if
+      call self%curve%next(self%solved, found, more, error)
       if (allocated(error) .or. .not. more) return
       call describe(self, case, found, point, error)
       if (.not. allocated(error)) call self%note(case, found, point, error)
@@ -380,11 +369,7 @@ contains
       associate (curve => self%branch%curve)
          ds = curve%corrector%metric%chord(self%first, self%second)
          call interpolate(curve%corrector%metric, self%first, self%second, share, found)
-         if (associated(self%branch%in_time)) then
-            call curve%corrector%correct(self%branch%in_time, self%first, ds, found, error)
-         else
-            call curve%corrector%correct(self%branch%system, self%first, ds, found, error)
-         end if
+         call curve%corrector%correct(self%branch%solved, self%first, ds, found, error)
       end associate
       self%n_solved = self%n_solved + 1
       self%iterations = self%iterations + found%report%iterations
@@ -441,11 +426,8 @@ contains
       ! A fold is located by steps of its own: the system may stand at another frequency.
       call self%system%set_frequency(found%p, error)
       if (allocated(error)) return
-      coefficients = found%x
-      if (associated(self%in_time)) then
-         call self%in_time%to_coefficients(self%system%problem%structure%n_coordinates, found%x, &
-                                           coefficients)
-      end if
+      allocate (coefficients(size(found%x)))
+      call self%formulation%to_coefficients(found%x, coefficients)
       call self%system%residual(coefficients, self%r)
       point%omega = found%p
       point%converged = found%report%converged
@@ -484,11 +466,8 @@ contains
       if (abs(found%t_p)*step > difference*found%p) step = difference*found%p/abs(found%t_p)
       call self%system%set_frequency(found%p + step*found%t_p, error)
       if (allocated(error)) return
-      beside = found%x + step*found%t
-      if (associated(self%in_time)) then
-         call self%in_time%to_coefficients(self%system%problem%structure%n_coordinates, &
-                                           found%x + step*found%t, beside)
-      end if
+      allocate (beside(size(found%x)))
+      call self%formulation%to_coefficients(found%x + step*found%t, beside)
       call observed_coefficients(self%system, beside, case%harmonics%n_harmonics, point%tangent)
       point%tangent = (point%tangent - point%coefficients)/step
    end subroutine point_along

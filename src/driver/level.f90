@@ -14,6 +14,7 @@ module fw_level
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
    use fw_recovery, only: carry_solution
+   use fw_reduction, only: held_basis
    use fw_strategy, only: point_request
    use fw_summary, only: summary_type
    implicit none (type, external)
@@ -83,19 +84,21 @@ contains
    end subroutine describe_levels
 
    !> Build the system, unless it is there.
-   subroutine build(self, case, n_harmonics, error, doublings)
+   subroutine build(self, case, n_harmonics, error, doublings, held)
       class(level_type), intent(inout), target :: self
       type(case_type), intent(in) :: case
       integer, intent(in) :: n_harmonics
       type(error_type), allocatable, intent(out) :: error
       !> Of the instants that the input leaves the choice of (default: none).
       integer, intent(in), optional :: doublings
+      !> The modes that all levels share.
+      type(held_basis), intent(inout), optional :: held
 
       if (self%is_built) return
       self%harmonics = case%harmonics
       self%harmonics%n_harmonics = n_harmonics
       if (present(doublings)) self%harmonics%doublings = doublings
-      call build_system(case, self%problem, self%system, error, of_level=self%harmonics)
+      call build_system(case, self%problem, self%system, error, of_level=self%harmonics, held=held)
       if (allocated(error)) return
       call self%solver%start(case, self%harmonics, self%system%n)
       self%is_built = .true.

@@ -31,6 +31,7 @@ module fw_problem
    use fw_memory, only: require_memory
    use fw_plain_structure, only: new_plain_structure
    use fw_plain_structure, only: plain_structure
+   use fw_reduction, only: held_basis
    use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_powell
    use fw_structure_operator, only: structure_operator
@@ -50,7 +51,7 @@ module fw_problem
 contains
 
    !> Build the problem of a case, and a state of it at the first frequency of its sweep.
-   subroutine build_system(case, problem, system, error, keep_all, of_level, forces)
+   subroutine build_system(case, problem, system, error, keep_all, of_level, forces, held)
       type(case_type), intent(in) :: case
       !> Has to stay where it is as long as the system lives.
       type(balance_problem), intent(out), target :: problem
@@ -62,14 +63,17 @@ contains
       type(harmonics_options), intent(in), optional :: of_level
       !> Laws of another problem of the case, with the stiffness that its structure gave them.
       type(force_list), intent(in), optional :: forces
+      !> Modes of the structure with its contact held: taken where they are known, else found and left
+      !> for other problems of the case.
+      type(held_basis), intent(inout), optional :: held
       class(structure_state), allocatable :: stand
 
-      call build_problem(case, problem, stand, error, keep_all, of_level, forces)
+      call build_problem(case, problem, stand, error, keep_all, of_level, forces, held)
       if (allocated(error)) return
       call new_balance_state(problem, system, stand)
    end subroutine build_system
 
-   subroutine build_problem(case, problem, stand, error, keep_all, of_level, forces)
+   subroutine build_problem(case, problem, stand, error, keep_all, of_level, forces, held)
       type(case_type), intent(in) :: case
       type(balance_problem), intent(out) :: problem
       !> Its structure at the first frequency.
@@ -78,6 +82,7 @@ contains
       logical, intent(in), optional :: keep_all
       type(harmonics_options), intent(in), optional :: of_level
       type(force_list), intent(in), optional :: forces
+      type(held_basis), intent(inout), optional :: held
       type(harmonics_options) :: harmonics
       logical :: skip_idle
       type(joint_type) :: joint
@@ -109,7 +114,7 @@ contains
       end if
       allocate (plain)
       call new_plain_structure(case%model, joint%relative, fourier%harmonic, range, plain, &
-                               error, keep_all)
+                               error, keep_all, held=held)
       if (allocated(error)) return
       call move_alloc(plain, structure)
       call structure%new_state(stand)
@@ -117,6 +122,7 @@ contains
       if (allocated(error)) return
       call new_balance_problem(joint, structure, fourier, laws, case%contact%depth, problem)
       problem%reduced = case%solver%skips
+      problem%solves_values = harmonics%method == method_hdhb
       if (.not. present(forces)) call problem%scale_forces(stand)
    end subroutine build_problem
 

@@ -4,7 +4,7 @@
 module fw_response_view
    use fw_branch_view, only: branch_view
    use fw_balance_state, only: balance_state
-   use fw_hdhb, only: hdhb_system
+   use fw_formulation, only: formulation_type
    use fw_kinds, only: wp
    use fw_recovery, only: observe
    implicit none (type, external)
@@ -14,8 +14,9 @@ module fw_response_view
 
    type, extends(branch_view) :: response_view
       type(balance_state), pointer, private :: system => null()
-      !> Turns values at instants into coefficients, where they are the unknowns.
-      type(hdhb_system), pointer, private :: in_time => null()
+      type(formulation_type), pointer, private :: formulation => null()
+      ! Of the unknowns in view (n).
+      real(wp), allocatable, private :: coefficients(:)
       ! (n_observed, n_retained)
       complex(wp), allocatable, private :: observed(:, :)
    contains
@@ -25,15 +26,16 @@ module fw_response_view
 
 contains
 
-   !> Get ready to look at a system, which has to outlive the view.
-   subroutine begin(self, system, in_time)
+   !> Get ready to look at a system and its unknowns, which have to outlive the view.
+   subroutine begin(self, system, formulation)
       class(response_view), intent(inout) :: self
       type(balance_state), intent(inout), target :: system
-      type(hdhb_system), intent(inout), target, optional :: in_time
+      type(formulation_type), intent(inout), target :: formulation
       integer :: n_observed
 
       self%system => system
-      if (present(in_time)) self%in_time => in_time
+      self%formulation => formulation
+      allocate (self%coefficients(system%n))
       n_observed = system%problem%structure%n_observed
       allocate (self%observed(n_observed, system%problem%fourier%n_retained))
       ! A static load moves every point alike, and would hide the vibration.
@@ -44,17 +46,10 @@ contains
       class(response_view), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
       real(wp), intent(out), contiguous :: y(:)
-      real(wp), allocatable :: coefficients(:)
       integer :: h, i, k
 
-      if (associated(self%in_time)) then
-         allocate (coefficients, mold=x)
-         call self%in_time%to_coefficients(self%system%problem%structure%n_coordinates, x, &
-                                           coefficients)
-         call observe(self%system, coefficients, self%observed)
-      else
-         call observe(self%system, x, self%observed)
-      end if
+      call self%formulation%to_coefficients(x, self%coefficients)
+      call observe(self%system, self%coefficients, self%observed)
       k = 0
       do h = 1, size(self%observed, 2)
          if (self%system%problem%fourier%harmonic(h) == 0) cycle

@@ -7,13 +7,11 @@ module fw_solution
    use fw_error, only: error_type
    use fw_flow, only: flow_system
    use fw_flow, only: new_flow
+   use fw_formulation, only: formulation_type
    use fw_guess, only: held_without_contact
    use fw_harmonics_options, only: harmonics_options
-   use fw_harmonics_options, only: method_hdhb
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_hdhb, only: hdhb_system
-   use fw_hdhb, only: new_hdhb
    use fw_kinsol, only: kinsol_solver
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
@@ -42,8 +40,6 @@ module fw_solution
       integer :: kind = 0
       !> Of the system that is solved.
       type(harmonics_options) :: harmonics
-      !> Unknowns are values at the instants (hdhb).
-      logical :: in_time = .false.
       !> The balance with nothing condensed, made when a flow is first needed.
       type(balance_problem), allocatable :: whole_problem
       type(balance_state), allocatable :: whole
@@ -73,7 +69,6 @@ contains
       self%powell%options = case%solver
       self%kinsol%options = case%solver
       self%harmonics = harmonics
-      self%in_time = harmonics%method == method_hdhb
    end subroutine start
 
    !> From the guess in the coefficients x. What does not count as converged: forces whose march
@@ -84,21 +79,16 @@ contains
       type(balance_state), intent(inout), target :: system
       real(wp), intent(inout), contiguous :: x(:)
       type(solver_report), intent(out) :: report
-      type(hdhb_system) :: in_time
-      real(wp), allocatable :: values(:)
-      integer :: m
+      type(formulation_type), target :: formulation
+      class(parameter_system), pointer :: solved
+      real(wp), allocatable :: unknowns(:)
 
-      if (self%in_time) then
-         ! Values at the instants as unknowns; outside of here only coefficients are known.
-         call new_hdhb(system, in_time)
-         m = system%problem%structure%n_coordinates
-         allocate (values(system%n))
-         call in_time%to_values(m, x, values)
-         call solve_system(self, in_time, values, report)
-         call in_time%to_coefficients(m, values, x)
-      else
-         call solve_system(self, system, x, report)
-      end if
+      call formulation%begin(system)
+      solved => formulation%as_solved()
+      allocate (unknowns(system%n))
+      call formulation%from_coefficients(x, unknowns)
+      call solve_system(self, solved, unknowns, report)
+      call formulation%to_coefficients(unknowns, x)
       if (report%converged) call refuse_unreal(self, system, x, report)
    end subroutine solve
 

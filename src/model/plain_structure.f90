@@ -29,6 +29,7 @@ module fw_plain_structure
    use fw_real_products, only: harmonic_factors
    use fw_real_products, only: packed_blocks
    use fw_real_products, only: real_products
+   use fw_reduction, only: held_basis
    use fw_reduction, only: reduction_type
    use fw_reduction, only: new_reduction
    use fw_relative, only: relative_type
@@ -85,7 +86,7 @@ contains
 
    !> Prepare the condensation of a model to its relative coordinates.
    subroutine new_plain_structure(model, relative, harmonic, omega_range, self, error, keep_all, &
-                                  forms_blocks)
+                                  forms_blocks, held)
       type(model_type), intent(in) :: model
       type(relative_type), intent(in) :: relative
       !> Harmonics in use.
@@ -98,9 +99,12 @@ contains
       logical, intent(in), optional :: keep_all
       !> Form Z_r at each frequency, or never; chosen by size where it is not given.
       logical, intent(in), optional :: forms_blocks
+      !> Modes of the model with these relative coordinates held, see new_reduction.
+      type(held_basis), intent(inout), optional :: held
       integer :: j
 
-      call new_reduction(model, relative, harmonic, omega_range, self%basis, error, keep_all)
+      call new_reduction(model, relative, harmonic, omega_range, self%basis, error, keep_all, &
+                         held)
       if (allocated(error)) return
       self%n_coordinates = self%basis%n_coordinates
       self%n_relative = relative%n_coordinates

@@ -12,7 +12,7 @@ module fw_reduction
    implicit none (type, external)
    private
 
-   public :: reduction_type, new_reduction
+   public :: reduction_type, new_reduction, held_basis
 
    type :: reduction_type
       integer :: n_coordinates = 0
@@ -37,6 +37,17 @@ module fw_reduction
       real(wp), allocatable :: observe_q(:, :), observe_i(:, :)
    end type reduction_type
 
+   !> What asks for the eigenproblem, and neither depends on harmonics nor on frequencies: balances
+   !> of one structure with several numbers of harmonics share it.
+   type :: held_basis
+      !> T_q and T_i; not allocated before the first.
+      real(wp), allocatable, private :: t_q(:, :), t_i(:, :)
+      !> Stiffness and mass of the modes with q held.
+      real(wp), allocatable, private :: k_i(:), m_i(:)
+   contains
+      procedure :: is_known
+   end type held_basis
+
    !> Internal damping counts as diagonal where what is off the diagonal is round-off.
    real(wp), parameter :: off_diagonal_tolerance = 1.0e-12_wp
    !> A mode with a smaller damping ratio counts as undamped: near its resonance the condensed
@@ -48,7 +59,7 @@ module fw_reduction
 contains
 
    !> Build the basis; errors where the structure has a part that nothing holds.
-   subroutine new_reduction(model, relative, harmonic, omega_range, self, error, keep_all)
+   subroutine new_reduction(model, relative, harmonic, omega_range, self, error, keep_all, held)
       type(model_type), intent(in) :: model
       type(relative_type), intent(in) :: relative
       integer, intent(in) :: harmonic(:)
@@ -58,13 +69,23 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Condense nothing: every internal mode becomes a coordinate.
       logical, intent(in), optional :: keep_all
+      !> Of the same model and relative coordinates: taken where it is known, else found and left.
+      type(held_basis), intent(inout), optional :: held
+      type(held_basis) :: basis
       real(wp), allocatable :: t_q(:, :), t_i(:, :)
       logical, allocatable :: keep(:)
       integer :: j
 
-      call split_basis(relative, t_q, t_i)
-      call internal_modes(model, t_q, t_i, self, error)
-      if (allocated(error)) return
+      if (present(held)) basis = held
+      if (.not. basis%is_known()) then
+         call find_basis(model, relative, basis, error)
+         if (allocated(error)) return
+         if (present(held)) held = basis
+      end if
+      call move_alloc(basis%t_q, t_q)
+      call move_alloc(basis%t_i, t_i)
+      call move_alloc(basis%k_i, self%k_i)
+      call move_alloc(basis%m_i, self%m_i)
       call transform(model, t_q, t_i, self)
       call check_free_modes(self, error)
       if (allocated(error)) return
@@ -76,6 +97,22 @@ contains
       end if
       self%kept = pack([(j, j=1, size(keep))], keep)
    end subroutine new_reduction
+
+   pure logical function is_known(self)
+      class(held_basis), intent(in) :: self
+
+      is_known = allocated(self%t_q)
+   end function is_known
+
+   subroutine find_basis(model, relative, basis, error)
+      type(model_type), intent(in) :: model
+      type(relative_type), intent(in) :: relative
+      type(held_basis), intent(out) :: basis
+      type(error_type), allocatable, intent(out) :: error
+
+      call split_basis(relative, basis%t_q, basis%t_i)
+      call internal_modes(model, basis%t_q, basis%t_i, basis%k_i, basis%m_i, error)
+   end subroutine find_basis
 
    !> u = t_q q + t_i eta of the relative coordinates, before any mode.
    subroutine split_basis(relative, t_q, t_i)
@@ -95,10 +132,10 @@ contains
 
    !> Modes of the structure with q held. With K_ii positive definite they come from
    !> M x = theta K x, so that massless dofs are no exception; otherwise from a shifted pencil.
-   subroutine internal_modes(model, t_q, t_i, self, error)
+   subroutine internal_modes(model, t_q, t_i, k_i, m_i, error)
       type(model_type), intent(in) :: model
       real(wp), intent(inout), allocatable :: t_q(:, :), t_i(:, :)
-      type(reduction_type), intent(inout) :: self
+      real(wp), intent(out), allocatable :: k_i(:), m_i(:)
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: shift_trials(*) = [0.0_wp, 1.0e-3_wp, 1.0_wp, 1.0e3_wp]
       real(wp), allocatable :: k(:, :), m(:, :), modes(:, :), k_iq(:, :)
@@ -106,13 +143,12 @@ contains
       integer :: trial
       logical :: done
 
-      self%n_internal = size(t_i, 2)
       k = congruence(t_i, model%stiffness, t_i)
       m = congruence(t_i, model%mass, t_i)
       do trial = 1, size(shift_trials)
          ! In units of the ratio of both matrices; no shift where K alone is positive definite.
          shift = shift_trials(trial)*norm2(k)/max(norm2(m), tiny(1.0_wp))
-         call solve_symmetric_eigen(m, k + shift*m, self%m_i, modes, done)
+         call solve_symmetric_eigen(m, k + shift*m, m_i, modes, done)
          if (done) exit
       end do
       if (.not. done) then
@@ -122,8 +158,8 @@ contains
          return
       end if
       ! Modes come with x^T (K + shift M) x = 1 and x^T M x = theta.
-      self%k_i = 1.0_wp - shift*self%m_i
-      where (abs(self%k_i) < free_stiffness) self%k_i = 0.0_wp
+      k_i = 1.0_wp - shift*m_i
+      where (abs(k_i) < free_stiffness) k_i = 0.0_wp
       t_i = product_of(t_i, modes)
       if (trial > 1) return
       ! Static constraint modes: K_iq vanishes, and Z_r(0) is exact.

@@ -13,6 +13,7 @@ TYPES = {
     "active_set": "balance/active_set.f90",
     "kept_factors": "balance/kept_factors.f90",
     "balance_scratch": "balance/balance_scratch.f90",
+    "formulation_type": "balance/formulation.f90",
     "hdhb_system": "balance/hdhb.f90",
     "flow_system": "balance/flow.f90",
     "wear_system": "wear/wear_system.f90",
@@ -61,3 +62,12 @@ def test_components_are_counted_as_they_are_declared():
    end type b
 """
     assert public_components(text, "b") == ["n", "m", "x", "y", "act"]
+
+
+def test_only_the_builder_asks_for_the_formulation():
+    """Which unknowns are solved for is chosen once, and the values of hdhb are known to one file."""
+    for path in SOURCES.glob("driver/*.f90"):
+        text = path.read_text()
+        assert "fw_hdhb" not in text, path
+        if "method_hdhb" in text:
+            assert "subroutine build_problem" in text, path
