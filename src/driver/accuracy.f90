@@ -463,7 +463,7 @@ contains
       end do
       call describe_levels(size(self%level), self%level, case%solver%kind, &
                            state%all_converged(), summary, work)
-      call summary%describe_accuracy(self%worst, case%harmonics%accuracy)
+      call summary%describe_accuracy(self%worst, case%harmonics%accuracy, state%n_converged > 0)
       message = ''
       if (self%n_short == 0) return
       write (wanted, '(es9.2)') case%harmonics%accuracy

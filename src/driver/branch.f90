@@ -7,6 +7,8 @@ module fw_branch
    use fw_bifurcation, only: bifurcation_type
    use fw_bifurcation, only: kind_fold
    use fw_bifurcation, only: way_turn
+   use fw_branch_peaks, only: branch_peaks
+   use fw_branch_peaks, only: branch_segment
    use fw_branch_step, only: interpolate
    use fw_case, only: case_type
    use fw_continuation, only: arclength_type
@@ -69,6 +71,10 @@ module fw_branch
       type(response_view), pointer :: view => null()
       integer(int64) :: clock = 0
       real(wp), allocatable :: r(:)
+      type(branch_peaks) :: peaks
+      !> The first row, and the last point of the curve.
+      type(point_type) :: first_row
+      type(branch_point), private :: before
       !> Where it turns and where its stability changes, and the solutions made to find out.
       type(bifurcation_list) :: bifurcations
       integer :: n_solved = 0, iterations = 0
@@ -94,6 +100,15 @@ module fw_branch
    contains
       procedure :: at
    end type branch_probe
+
+   !> The same for maxima.
+   type, extends(branch_segment) :: peak_segment
+      type(branch_type), pointer :: branch => null()
+      type(case_type), pointer :: case => null()
+      type(branch_point) :: first, second
+   contains
+      procedure :: solve => solve_peak
+   end type peak_segment
 
    !> The same as a source of a sweep.
    type, extends(point_source) :: branch_source
@@ -286,7 +301,7 @@ contains
 
       call self%curve%next(self%solved, found, more, error)
       if (allocated(error) .or. .not. more) return
-      call describe(self, case, found, point, error)
+      call describe(self, case, found, case%sweep%stability, point, error)
       if (.not. allocated(error)) call self%note(case, found, point, error)
       if (allocated(error)) return
       call system_clock(clock, rate)
@@ -303,6 +318,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: signature(3)
 
+      call note_peak(self, case, found, point, error)
+      if (allocated(error)) return
       if (point%fold) then
          call add_fold(self, point)
          return
@@ -315,6 +332,40 @@ contains
       self%last_point = point
       self%has_fold = .false.
    end subroutine note
+
+   !> The maxima between a point and the last.
+   subroutine note_peak(self, case, found, point, error)
+      type(branch_type), intent(inout), target :: self
+      type(case_type), intent(in), target :: case
+      type(branch_point), intent(in) :: found
+      type(point_type), intent(in) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(peak_segment) :: segment
+
+      if (allocated(self%before%x)) then
+         segment%branch => self
+         segment%case => case
+         segment%first = self%before
+         segment%second = found
+         segment%length = self%curve%corrector%metric%chord(self%before, found)
+      else
+         self%first_row = point
+      end if
+      call self%peaks%add(point, segment, error)
+      self%before = found
+   end subroutine note_peak
+
+   subroutine solve_peak(self, share, point, error)
+      class(peak_segment), intent(inout) :: self
+      real(wp), intent(in) :: share
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+
+      call solve_between(self%branch, self%case, self%first, self%second, share, .false., point, &
+                         error)
+      self%n_solved = self%n_solved + 1
+      self%iterations = self%iterations + point%iterations
+   end subroutine solve_peak
 
    subroutine add_fold(self, point)
       type(branch_type), intent(inout) :: self
@@ -363,19 +414,33 @@ contains
       real(wp), intent(in) :: share
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
+
+      call solve_between(self%branch, self%case, self%first, self%second, share, &
+                         self%case%sweep%stability, point, error)
+      self%n_solved = self%n_solved + 1
+      self%iterations = self%iterations + point%iterations
+   end subroutine at
+
+   subroutine solve_between(self, case, first, second, share, with_stability, point, error)
+      type(branch_type), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(branch_point), intent(in) :: first, second
+      real(wp), intent(in) :: share
+      logical, intent(in) :: with_stability
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
       type(branch_point) :: found
       real(wp) :: ds
 
-      associate (curve => self%branch%curve)
-         ds = curve%corrector%metric%chord(self%first, self%second)
-         call interpolate(curve%corrector%metric, self%first, self%second, share, found)
-         call curve%corrector%correct(self%branch%solved, self%first, ds, found, error)
+      associate (curve => self%curve)
+         ds = curve%corrector%metric%chord(first, second)
+         call interpolate(curve%corrector%metric, first, second, share, found)
+         call curve%corrector%correct(self%solved, first, ds, found, error)
       end associate
-      self%n_solved = self%n_solved + 1
-      self%iterations = self%iterations + found%report%iterations
-      if (allocated(error) .or. .not. found%report%converged) return
-      call describe(self%branch, self%case, found, point, error)
-   end subroutine at
+      if (allocated(error)) return
+      if (found%report%converged) call describe(self, case, found, with_stability, point, error)
+      point%iterations = found%report%iterations
+   end subroutine solve_between
 
    !> Why the branch ended, once it has.
    subroutine closing_words(self, case, words)
@@ -415,10 +480,11 @@ contains
    end function displacement_scale
 
    !> What is known of a point of the curve.
-   subroutine describe(self, case, found, point, error)
+   subroutine describe(self, case, found, with_stability, point, error)
       type(branch_type), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(branch_point), intent(in) :: found
+      logical, intent(in) :: with_stability
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: coefficients(:)
@@ -442,7 +508,7 @@ contains
          call recover_histories(self%system, size(self%system%balance, 1), coefficients, &
                                 case%harmonics%n_harmonics, point)
       end if
-      if (point%converged .and. case%sweep%stability) then
+      if (point%converged .and. with_stability) then
          call self%stability%find(case, self%system, coefficients, point, error)
       end if
       if (.not. allocated(error)) call self%point_along(case, found, point, error)

@@ -57,7 +57,6 @@ contains
       type(peak_finder), target :: finder
       type(sweep_bifurcations), target :: changes
       type(sink_list) :: sinks
-      character(:), allocatable :: message
 
       call new_strategy(case, strategy)
       call strategy%start(case, error)
@@ -72,14 +71,14 @@ contains
       call sinks%add(to_summary)
       call sinks%add(to_observer)
       call observer%on_start(case%title, to_observer%n_points)
-      ! A branch tells its peaks by its points; a single frequency has none.
+      ! A branch finds its peaks itself; a single frequency has none.
       select type (source)
       type is (frequency_source)
-         if (case%analysis == analysis_frf .and. size(source%omega) > 1) then
+         if (size(source%omega) > 1) then
             call finder%start(case, source%omega, source, strategy, observer)
             call sinks%add(finder)
             call remark_range(case, finder%modes, summary%remarks)
-            if (case%sweep%stability .and. finder%in_order) then
+            if (case%analysis == analysis_frf .and. case%sweep%stability .and. finder%in_order) then
                call changes%start(source, strategy, observer)
                call sinks%add(changes)
             end if
@@ -89,19 +88,33 @@ contains
       call observer%on_end()
       call remark_stability(summary%verdicts(verdict_undecided), sum(summary%verdicts), &
                             summary%remarks)
-      call strategy%describe(case, state, summary, message)
-      if (len(message) > 0 .and. .not. allocated(error)) call observer%on_message(message)
+      ! Rows that are still to come count with the others.
+      if (.not. case%sweep%refine) call describe(case, strategy, observer, state, summary, error)
       ! A run that was stopped is not made longer by a search.
       if (.not. (allocated(error) .or. state%was_stopped)) then
-         call find_peaks(case, finder, writer, summary, error)
+         call find_peaks(case, source, finder, writer, summary, error)
          if (.not. allocated(error)) call changes%search(case, error)
          if (.not. allocated(error)) call add_rows(case, finder, sinks, writer, state, error)
          call note_stop(observer, state, error)
       end if
+      if (case%sweep%refine) call describe(case, strategy, observer, state, summary, error)
       if (.not. allocated(error)) call keep_bifurcations(case, source, changes, writer, summary, &
                                                          error)
       call finder%clear()
    end subroutine run_frequency_response
+
+   subroutine describe(case, strategy, observer, state, summary, error)
+      type(case_type), intent(in) :: case
+      class(point_strategy), intent(inout), target :: strategy
+      class(observer_type), intent(inout) :: observer
+      type(run_state), intent(in) :: state
+      type(summary_type), intent(inout) :: summary
+      type(error_type), allocatable, intent(in) :: error
+      character(:), allocatable :: message
+
+      call strategy%describe(case, state, summary, message)
+      if (len(message) > 0 .and. .not. allocated(error)) call observer%on_message(message)
+   end subroutine describe
 
    !> Where the response turns or its stability changes goes to the result and the summary; of a
    !> run that was stopped, what was found by then.
@@ -167,18 +180,26 @@ contains
    end subroutine note_stop
 
    !> The maxima between the rows go to the result and the summary.
-   subroutine find_peaks(case, finder, writer, summary, error)
+   subroutine find_peaks(case, source, finder, writer, summary, error)
       type(case_type), intent(in) :: case
+      class(point_source), intent(in) :: source
       type(peak_finder), intent(inout) :: finder
       type(result_writer), intent(inout) :: writer
       type(summary_type), intent(inout) :: summary
       type(error_type), allocatable, intent(out) :: error
       type(peak_type), allocatable :: peaks(:)
 
-      call finder%search(case, error)
-      if (allocated(error)) return
-      call finder%peaks(peaks)
-      call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
+      select type (source)
+      type is (branch_source)
+         call source%branch%peaks%list(source%branch%first_row, peaks)
+         call summary%describe_peaks(peaks, source%branch%peaks%n_solved, &
+                                     source%branch%peaks%iterations)
+      class default
+         call finder%search(case, error)
+         if (allocated(error)) return
+         call finder%peaks(peaks)
+         call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
+      end select
       call remark_peaks(peaks, case%model%observe_name, summary%remarks)
       call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, error)
    end subroutine find_peaks

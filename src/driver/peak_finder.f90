@@ -6,6 +6,7 @@
 !> lies there and is narrow for the interval. After the sweep a few more solutions find the maxima;
 !> rows do not change by it.
 module fw_peak_finder
+   use fw_case, only: analysis_time
    use fw_case, only: case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
@@ -261,7 +262,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: k, budget
 
-      if (.not. self%is_active .or. case%contact%memory == memory_carried) return
+      if (.not. self%is_active) return
+      ! There a point depends on those before, or takes too long.
+      if (case%contact%memory == memory_carried .or. case%analysis == analysis_time) return
       if (.not. self%in_order) call suspect_all(self)
       budget = min(max(least_budget, self%n_rows/budget_share), most_budget)
       do k = 1, size(self%suspects)

@@ -270,10 +270,12 @@ contains
    end subroutine describe_harmonics
 
    !> What the points took to be accurate.
-   subroutine describe_accuracy(self, worst, accuracy)
+   subroutine describe_accuracy(self, worst, accuracy, known)
       class(summary_type), intent(inout) :: self
       !> Largest estimate of the error, and what was asked for.
       real(wp), intent(in) :: worst, accuracy
+      !> Whether there is an estimate.
+      logical, intent(in) :: known
       character(10) :: text(2)
 
       write (text(1), '(es8.1)') worst
@@ -282,8 +284,12 @@ contains
                     to_text(self%harmonics(2)))
       call add_line(self%work, 'instants', to_text(self%instants(1))//' to '// &
                     to_text(self%instants(2)))
-      call add_line(self%work, 'error', 'at most '//trim(adjustl(text(1)))//' by estimate, '// &
-                    trim(adjustl(text(2)))//' asked for')
+      if (known) then
+         call add_line(self%work, 'error', 'at most '//trim(adjustl(text(1)))//' by estimate, '// &
+                       trim(adjustl(text(2)))//' asked for')
+      else
+         call add_line(self%work, 'error', 'not known: no point converged')
+      end if
    end subroutine describe_accuracy
 
    !> What became of the wear.

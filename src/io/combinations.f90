@@ -41,6 +41,7 @@ contains
 
       call check_jacobian(case, error)
       if (.not. allocated(error)) call check_memory(case, error)
+      if (.not. allocated(error)) call check_refine(case, error)
       if (.not. allocated(error)) call check_adaptive(case, error)
       if (.not. allocated(error)) call check_accuracy(case, error)
       if (.not. allocated(error)) call check_stability(case, error)
@@ -185,6 +186,23 @@ contains
          "contact%memory = 'carried' does not go with sweep%continuation "// &
                        "= 'arclength': use 'assembly'", status_input)
    end subroutine check_memory
+
+   !> Where no maxima are looked for there is nothing that could become a row.
+   subroutine check_refine(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. case%sweep%refine) return
+      if (case%analysis /= analysis_frf .or. case%sweep%n_points < 2 .or. &
+          case%sweep%continuation /= continuation_natural) then
+         call fatal_error(error, "sweep%refine = .true. goes with natural sweeps of "// &
+                          "analysis = 'frf' with more than one point: leave it out", status_input)
+      else if (case%contact%memory == memory_carried) then
+         call fatal_error(error, "sweep%refine = .true. does not go with contact%memory = "// &
+                          "'carried', where a point depends on those before: leave it out", &
+                          status_input)
+      end if
+   end subroutine check_refine
 
    !> Harmonics change from point to point of a natural sweep; a history has one length.
    subroutine check_adaptive(case, error)

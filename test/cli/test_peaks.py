@@ -79,6 +79,60 @@ def test_refined_rows_hold_the_peak_in_the_order_of_the_sweep(tmp_path, down):
     assert amplitude.max() == pytest.approx(true, rel=peak_family.RIGHT)
 
 
+def branched(groups, **extra):
+    """The same along a branch: a spring of nothing makes unknowns of a linear structure."""
+    return {**groups, "spring": {"n_springs": 1, "side_1": 1, "coefficient": 1e-30, "power": 3},
+            "sweep": {**groups["sweep"], "continuation": "arclength", **extra}}
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("down", [False, True])
+def test_a_branch_solves_for_its_maxima(tmp_path, seed, down):
+    groups, true = peak_family.linear(seed)
+    ends = (groups["sweep"]["start"], groups["sweep"]["end"])
+    start, end = ends[::-1] if down else ends
+    run(tmp_path, branched(groups, start=start, end=end))
+    with h5py.File(tmp_path / "case.h5") as file:
+        best = file["peak/amplitude"][:].argmax()
+        omega, width = file["peak/omega"][best], file["peak/bandwidth"][best]
+        assert file["peak/found_by"][best] in (0, 1)
+        assert file["peak/amplitude"][best] >= file["amplitude"][:, 0].max()
+        assert file["peak/amplitude"][best] == pytest.approx(true, rel=1e-5)
+    # But for the tails of the other modes.
+    assert width == pytest.approx(2.0 * groups["model"]["modal_damping"] * omega, rel=0.1)
+
+
+def test_a_branch_that_ends_on_its_flank_says_so(tmp_path):
+    groups, _ = peak_family.linear(0)
+    start = groups["sweep"]["start"]
+    run(tmp_path, branched(groups, start=start, end=1.05 * start))
+    with h5py.File(tmp_path / "case.h5") as file:
+        names = list(file["peak/found_by"].attrs["names"])
+        found = [names[k] for k in file["peak/found_by"][:]]
+        assert found == ["end of the sweep"]
+        assert file["peak/amplitude"][0] == file["amplitude"][-1, 0]
+
+
+def test_integration_in_time_has_the_peaks_of_its_rows(tmp_path):
+    groups = merged(PLAIN, {"case": {"analysis": "time"}, "sweep": {"n_points": 9},
+                            "contact": {"law": "penalty", "tangential_stiffness": 1.0}})
+    run(tmp_path, groups)
+    with h5py.File(tmp_path / "case.h5") as file:
+        amplitude = file["amplitude"][:, 0]
+        assert file["peak/amplitude"][:].max() == amplitude.max()
+
+
+@pytest.mark.parametrize("change", [
+    {"sweep": {"continuation": "arclength"}}, {"case": {"analysis": "point"}},
+    {"case": {"analysis": "time"}}, {"sweep": {"n_points": 1}}, {"contact": {"memory": "carried"}}])
+def test_refinement_is_refused_where_nothing_is_looked_for(tmp_path, change):
+    groups = merged(merged(PLAIN, {"sweep": {"refine": True}}), change)
+    write_namelist(tmp_path / "case.nml", groups)
+    done = subprocess.run([PROGRAM, "-q", "case.nml"], cwd=tmp_path, capture_output=True, text=True,
+                          check=False, timeout=limit(20))
+    assert done.returncode == 3 and "sweep%refine" in done.stderr, done.stderr
+
+
 def test_a_peak_at_the_end_of_the_sweep_is_said(tmp_path):
     groups, _ = peak_family.linear(0)
     groups["sweep"]["end"] = groups["sweep"]["start"] * 1.05

@@ -1,0 +1,286 @@
+!> The maxima of a response along its branch. A row knows whether the amplitude rises or falls there,
+!> from its tangent: between one where it rises and the next where it falls lies a maximum, which is
+!> solved for on the branch.
+module fw_branch_peaks
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_peak, only: found_bound
+   use fw_peak, only: found_row
+   use fw_peak, only: found_search
+   use fw_peak, only: found_unresolved
+   use fw_peak, only: peak_type
+   use fw_point, only: point_type
+   use fw_recovery, only: largest_magnitude
+   implicit none (type, external)
+   private
+
+   public :: branch_peaks, branch_segment
+
+   !> The branch between its last two rows.
+   type, abstract :: branch_segment
+      !> Length of the step.
+      real(wp) :: length = 0.0_wp
+      !> Solutions made on it, and their iterations.
+      integer :: n_solved = 0, iterations = 0
+   contains
+      procedure(solve_between), deferred :: solve
+   end type branch_segment
+
+   abstract interface
+      !> The point at a share of the way, not converged where it is not found.
+      subroutine solve_between(self, share, point, error)
+         import :: branch_segment, point_type, error_type, wp
+         class(branch_segment), intent(inout) :: self
+         real(wp), intent(in) :: share
+         type(point_type), intent(out) :: point
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine solve_between
+   end interface
+
+   !> What is kept of a row: amplitudes and their derivatives along the branch (n_observed).
+   type :: row_type
+      real(wp) :: omega = 0.0_wp
+      real(wp), allocatable :: amplitude(:), rise(:)
+   end type row_type
+
+   type :: branch_peaks
+      integer :: n_solved = 0, iterations = 0
+      type(row_type), allocatable, private :: row(:)
+      integer, private :: n_rows = 0
+      type(point_type), private :: last
+      ! Maxima, and the rows that they lie behind.
+      type(peak_type), allocatable, private :: found(:)
+      integer, allocatable, private :: place(:)
+   contains
+      procedure :: add
+      procedure :: list
+   end type branch_peaks
+
+   !> Rise that may still be found, relative.
+   real(wp), parameter :: small_gain = 1.0e-5_wp
+   integer, parameter :: most_trials = 8
+   !> Quantities that hardly move, as a part of the largest one, have no maxima.
+   real(wp), parameter :: negligible = 1.0e-11_wp
+   !> Fall on both sides from which on a maximum is none of the instants of sampled contact.
+   real(wp), parameter :: prominent = 2.0e-3_wp
+
+contains
+
+   !> A row of the branch; maxima between it and the last are solved for.
+   subroutine add(self, point, segment, error)
+      class(branch_peaks), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      class(branch_segment), intent(inout) :: segment
+      type(error_type), allocatable, intent(out) :: error
+      type(row_type), allocatable :: longer(:)
+      integer, parameter :: first_size = 64
+      type(peak_type) :: peak
+      integer :: i, n
+
+      if (.not. (point%converged .and. allocated(point%tangent))) return
+      if (.not. allocated(self%row)) allocate (self%row(first_size), self%found(0), self%place(0))
+      if (self%n_rows == size(self%row)) then
+         allocate (longer(2*self%n_rows))
+         longer(:self%n_rows) = self%row
+         call move_alloc(longer, self%row)
+      end if
+      n = self%n_rows + 1
+      self%row(n)%omega = point%omega
+      self%row(n)%amplitude = point%amplitude
+      self%row(n)%rise = rise_of(point)
+      self%n_rows = n
+      if (n == 1) then
+         self%last = point
+         return
+      end if
+      do i = 1, size(point%amplitude)
+         if (.not. (self%row(n - 1)%rise(i) > 0.0_wp .and. self%row(n)%rise(i) <= 0.0_wp)) cycle
+         if (point%amplitude(i) <= negligible*maxval(point%amplitude)) cycle
+         call climb(self, point, segment, i, peak, error)
+         if (allocated(error)) return
+         self%found = [self%found, peak]
+         self%place = [self%place, n - 1]
+      end do
+      self%n_solved = self%n_solved + segment%n_solved
+      self%iterations = self%iterations + segment%iterations
+      self%last = point
+   end subroutine add
+
+   !> Change of the amplitudes along the branch (n_observed).
+   pure function rise_of(point) result(rise)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable :: rise(:)
+      !> Of a difference, over the size of what changes.
+      real(wp), parameter :: difference = 1.0e-5_wp
+      real(wp) :: step
+      integer :: i
+
+      allocate (rise(size(point%amplitude)), source=0.0_wp)
+      do i = 1, size(rise)
+         step = norm2(point%tangent(:, i))
+         if (.not. step > 0.0_wp) cycle
+         step = difference*norm2(point%coefficients(:, i))/step
+         if (.not. step > 0.0_wp) cycle
+         rise(i) = (largest_magnitude(point%coefficients(:, i) + step*point%tangent(:, i)) - &
+                    largest_magnitude(point%coefficients(:, i) - step*point%tangent(:, i))) &
+                   /(2.0_wp*step)
+      end do
+   end function rise_of
+
+   !> Solve where the rise of quantity i vanishes between the last row and this one (Illinois).
+   subroutine climb(self, point, segment, i, peak, error)
+      class(branch_peaks), intent(in) :: self
+      type(point_type), intent(in) :: point
+      class(branch_segment), intent(inout) :: segment
+      integer, intent(in) :: i
+      type(peak_type), intent(out) :: peak
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: between
+      real(wp) :: low, high, at_low, at_high, share, gain, rise(size(point%amplitude))
+      integer :: k
+
+      peak = peak_of(self%last, i)
+      if (point%amplitude(i) > peak%amplitude) peak = peak_of(point, i)
+      peak%found_by = found_unresolved
+      low = 0.0_wp
+      high = 1.0_wp
+      at_low = self%row(self%n_rows - 1)%rise(i)
+      at_high = self%row(self%n_rows)%rise(i)
+      if (gain_of(at_high) <= small_gain*peak%amplitude .or. &
+          gain_of(at_low) <= small_gain*peak%amplitude) then
+         peak%found_by = found_row
+         return
+      end if
+      do k = 1, most_trials
+         share = (low*at_high - high*at_low)/(at_high - at_low)
+         call segment%solve(share, between, error)
+         if (allocated(error)) return
+         if (.not. between%converged) return
+         rise = rise_of(between)
+         gain = gain_of(rise(i))
+         if (between%amplitude(i) > peak%amplitude) peak = peak_of(between, i)
+         peak%found_by = merge(found_search, found_unresolved, gain <= small_gain*peak%amplitude)
+         if (peak%found_by == found_search) return
+         if (rise(i) > 0.0_wp) then
+            low = share
+            at_low = rise(i)
+            at_high = 0.5_wp*at_high
+         else
+            high = share
+            at_high = rise(i)
+            at_low = 0.5_wp*at_low
+         end if
+      end do
+
+   contains
+
+      !> What a parabola with the rises of both ends gains on a place of a given one.
+      pure real(wp) function gain_of(rise)
+         real(wp), intent(in) :: rise
+
+         gain_of = 0.0_wp
+         if (at_low > at_high) gain_of = 0.5_wp*rise**2*(high - low)*segment%length/ &
+                                         (at_low - at_high)
+      end function gain_of
+
+   end subroutine climb
+
+   pure function peak_of(point, i) result(peak)
+      type(point_type), intent(in) :: point
+      integer, intent(in) :: i
+      type(peak_type) :: peak
+
+      peak%observed = i
+      peak%omega = point%omega
+      peak%amplitude = point%amplitude(i)
+      peak%coefficients = point%coefficients(:, i)
+   end function peak_of
+
+   !> The maxima of every quantity in the order of the branch, and its ends where they are higher
+   !> than what lies next to them.
+   subroutine list(self, first, peaks)
+      class(branch_peaks), intent(in) :: self
+      !> The first row.
+      type(point_type), intent(in) :: first
+      type(peak_type), allocatable, intent(out) :: peaks(:)
+      type(peak_type) :: peak
+      integer :: i, k
+
+      allocate (peaks(0))
+      if (self%n_rows < 2) return
+      do i = 1, size(self%row(1)%amplitude)
+         if (self%row(1)%rise(i) < 0.0_wp .and. first%amplitude(i) > 0.0_wp) then
+            peak = peak_of(first, i)
+            peak%found_by = found_bound
+            peaks = [peaks, peak]
+         end if
+         do k = 1, size(self%found)
+            if (self%found(k)%observed /= i) cycle
+            if (.not. stands_out(self, k)) cycle
+            peak = self%found(k)
+            peak%bandwidth = width_of(self, k)
+            peaks = [peaks, peak]
+         end do
+         if (self%row(self%n_rows)%rise(i) > 0.0_wp) then
+            peak = peak_of(self%last, i)
+            peak%found_by = found_bound
+            peaks = [peaks, peak]
+         end if
+      end do
+   end subroutine list
+
+   !> Whether the amplitude falls on both sides of a maximum before it gets higher; at an end of the
+   !> branch it may.
+   pure logical function stands_out(self, k)
+      class(branch_peaks), intent(in) :: self
+      integer, intent(in) :: k
+      integer :: side, j
+      real(wp) :: floor
+
+      stands_out = .true.
+      floor = (1.0_wp - prominent)*self%found(k)%amplitude
+      do side = 0, 1
+         j = self%place(k) + side
+         do while (j >= 1 .and. j <= self%n_rows)
+            associate (at => self%row(j)%amplitude(self%found(k)%observed))
+               if (at < floor) exit
+               stands_out = stands_out .and. at <= self%found(k)%amplitude
+            end associate
+            j = j + merge(-1, 1, side == 0)
+         end do
+      end do
+   end function stands_out
+
+   !> Width at half of the power of the vibration [rad/s], below 0 where the branch does not fall so
+   !> far; between rows as in fw_peak_rules.
+   pure real(wp) function width_of(self, k) result(width)
+      class(branch_peaks), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp) :: inner(2), outer(2), edge(2), mean
+      integer :: side, j
+
+      width = -1.0_wp
+      associate (peak => self%found(k))
+         mean = abs(peak%coefficients(1))
+         do side = 1, 2
+            inner = [peak%omega**2, 0.0_wp]
+            j = self%place(k) + side - 1
+            do
+               if (j < 1 .or. j > self%n_rows) return
+               associate (swing => max(self%row(j)%amplitude(peak%observed) - mean, &
+                                       tiny(1.0_wp)**0.25_wp*peak%amplitude))
+                  outer = [self%row(j)%omega**2, &
+                           sqrt(max(((peak%amplitude - mean)/swing)**2 - 1.0_wp, 0.0_wp))]
+               end associate
+               if (outer(2) >= 1.0_wp) exit
+               inner = outer
+               j = j + merge(-1, 1, side == 1)
+            end do
+            edge(side) = sqrt(inner(1) + (1.0_wp - inner(2))/(outer(2) - inner(2))* &
+                              (outer(1) - inner(1)))
+         end do
+      end associate
+      width = abs(edge(2) - edge(1))
+   end function width_of
+
+end module fw_branch_peaks
