@@ -153,6 +153,7 @@ contains
       call self%factors(h)%factor(singular)
    end subroutine factor_flow
 
+   !> P v.
    subroutine flow_product(self, vector, product)
       class(flow_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: vector(:)
@@ -161,6 +162,7 @@ contains
       call multiply(self, size(self%p, 1), vector, product)
    end subroutine flow_product
 
+   !> In complex amplitudes, since P couples cosine and sine of a harmonic, but no two harmonics.
    subroutine multiply(self, m, vector, product)
       class(flow_system), intent(inout) :: self
       integer, intent(in) :: m
@@ -177,6 +179,7 @@ contains
       call to_real(self%balance%problem%fourier, m, self%output, product)
    end subroutine multiply
 
+   !> P^-1 v, massless directions with the mass that factor_flow has given them.
    subroutine flow_solve(self, vector)
       class(flow_system), intent(inout) :: self
       real(wp), intent(inout), contiguous :: vector(:)
@@ -190,6 +193,7 @@ contains
       call to_real(self%balance%problem%fourier, m, self%input, vector)
    end subroutine flow_solve
 
+   !> From now on R(U) + P (U - x_old)/h = 0 is solved: one step of implicit Euler.
    subroutine set_shift(self, h, x_old)
       class(flow_system), intent(inout) :: self
       real(wp), intent(in) :: h
@@ -215,6 +219,8 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       real(wp), intent(out), contiguous :: r(:)
 
+      ! The shift stands outside of the contact laws: no row reads eps v = -r any more, and nothing
+      ! leaves the linear problem.
       self%balance%reduced = .false.
       call self%balance%residual(x, r)
       if (self%inverse_step <= 0.0_wp) return

@@ -75,6 +75,8 @@ contains
             end do
          end do
       end associate
+      ! The march of the pairs starts where that of the balance did, and so comes to the same
+      ! limit.
       self%forces%x_start = system%work(system%problem%forces%pairs)%x_start
       call self%law%set_offset(system%depth, self%forces)
       call self%law%evaluate(fourier, self%forces)
@@ -135,6 +137,8 @@ contains
       do i = 1, size(self%row, 2)
          if (.not. self%rubs(i)) cycle
          sticks = .true.
+         ! A settled pair has d = y - x within its cone at every instant, x being that of the
+         ! instant before.
          do k = 1, self%n_time
             before = modulo(k - 2, self%n_time) + 1
             p = -self%forces%prediction_time(i, 3, k)
@@ -191,10 +195,12 @@ contains
       before = modulo(k - 2, self%n_time) + 1
       do i = 1, size(self%row, 2)
          p = -self%forces%prediction_time(i, 3, k)
+         ! Open: no force, and x follows y. All derivatives stay zero.
          if (p <= 0.0_wp) cycle
          ! Whatever the state of a pair, its position is y - lambda.
          d = self%forces%prediction_time(i, 1:2, k) - &
              (self%forces%prediction_time(i, 1:2, before) - self%forces%force_time(i, 1:2, before))
+         ! Predictor from the position of the instant before: beyond the cone mu p it slips.
          length = norm2(d)
          if (length > self%law%mu(i)*p) then
             call slip(self, i, self%law%mu(i)*p/length, d/length, by_u, by_x)
@@ -207,6 +213,7 @@ contains
       end do
    end subroutine derivatives
 
+   !> df = k du - dx, with x in units of force.
    pure subroutine stick(self, pair, by_u, by_x, keeps)
       class(history_type), intent(in) :: self
       integer, intent(in) :: pair
@@ -241,6 +248,8 @@ contains
             column = self%row(b, pair)
             ! With one direction there is nothing to turn.
             if (any(self%row(1:2, pair) == 0)) cycle
+            ! mu p d/|d|: its derivative by d is mu p/|d| (I - e e^T), by p it is mu e, with dp =
+            ! -dy_n.
             turn = share*(merge(1.0_wp, 0.0_wp, b == c) - e(c)*e(b))
             by_u(row, column) = turn*self%stiffness(column)
             by_x(row, column) = -turn

@@ -2,7 +2,7 @@
 !> interfaces are conversions of arguments around these.
 !>
 !> Statuses are those of fw_error; the words that go with one are kept with the session. Points
-!> and frequencies count from 1 here, and 0 is the last point.
+!> and frequencies count from 1 here; 0 is the last point, but no frequency.
 !>
 !> A call that changes the session takes it with `enter`, which fails while another call is at work
 !> on it (another thread, or a callback of the run itself), and gives it back with `leave`. Calls

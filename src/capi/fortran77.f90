@@ -4,7 +4,8 @@
 ! Texts are trimmed on the way in and filled with blanks on the way out: blanks at the end cannot be
 ! part of a name here. Arrays are of assumed size with N beside them, of which a negative one counts
 ! as none.
-! Points and frequencies count from 1, and 0 is the last point. docs/library.md lists the routines.
+! Points and frequencies count from 1; 0 is the last point, but no frequency. docs/library.md lists
+! the routines.
 
 !> Create a handle.
 !> HANDLE is 0 where none is left.

@@ -76,6 +76,7 @@ contains
       type is (frequency_source)
          if (size(source%omega) > 1) then
             call finder%start(case, source%omega, source, strategy, observer)
+            ! It keeps the rows that a search after them may need.
             call sinks%add(finder)
             call remark_range(case, finder%modes, summary%remarks)
             if (case%analysis == analysis_frf .and. case%sweep%stability .and. finder%in_order) then
@@ -84,6 +85,7 @@ contains
             end if
          end if
       end select
+      ! Points in their order; searches between them come after the last.
       call run_sweep(case, source, sinks, observer, state, error)
       call observer%on_end()
       call remark_stability(summary%verdicts(verdict_undecided), sum(summary%verdicts), &
@@ -135,6 +137,7 @@ contains
 
    contains
 
+      !> The one list or the other, with the work that it took.
       subroutine keep(list, n_solved, iterations)
          type(bifurcation_list), intent(in) :: list
          integer, intent(in) :: n_solved, iterations
@@ -161,6 +164,7 @@ contains
          if (allocated(error)) return
          call state%note(finder%added%item(k)%point)
       end do
+      ! Rows were written as they were found: at the end, whatever their frequency.
       if (finder%added%n > 0) call writer%sort_points(case%sweep%end < case%sweep%start, error)
    end subroutine add_rows
 

@@ -93,6 +93,7 @@ contains
       integer, parameter :: fewest = 16
       integer :: least
 
+      ! N = 4 H instants take harmonic N - n for n: aliases come from harmonics above 3 H only.
       least = max(fewest, 4*case%harmonics%n_harmonics)
       if (case%time%steps_per_period >= least) return
       call fatal_error(error, '&time steps_per_period = '//to_text(case%time%steps_per_period)// &
@@ -107,6 +108,7 @@ contains
       type(case_type) :: start
       integer :: i
 
+      ! One solution serves: contact results and histories are those of the integration.
       start = case
       start%analysis = analysis_frf
       start%harmonics%method = method_hbm
@@ -138,6 +140,7 @@ contains
                              max(case%solver%tolerance, tightest_change), state, &
                              case%harmonics%n_harmonics, point, error, request%interrupt)
       if (allocated(error)) return
+      ! The integration leaves all; the request says what of it a row has.
       if (.not. request%histories) then
          deallocate (point%history)
          if (allocated(point%force_history)) deallocate (point%force_history, point%slip_history)
@@ -195,6 +198,7 @@ contains
       integer :: i, c, r
 
       allocate (state%corrected(2, structure%n_pairs), source=0.0_wp)
+      ! A stuck guess has pairs where they were assembled: x = 0.
       if (.not. converged) return
       associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction, &
                  contact => system%work(system%problem%forces%pairs))

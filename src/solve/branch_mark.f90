@@ -1,4 +1,6 @@
 !> Points of a branch that lie between two others: folds, and the bounds of its interval.
+!> Both lie on the cubic between the points (fw_branch_step) as well as that goes, which is a guess
+!> for a corrector.
 module fw_branch_mark
    use fw_branch_point, only: branch_point
    use fw_branch_step, only: interpolate
@@ -23,6 +25,8 @@ contains
 
    !> Between two points whose tangents differ in the sign of dp/ds lies a fold: regula falsi
    !> (Illinois) on that sign.
+   !> An end that stays twice would hold the secant back; the Illinois rule halves its value. t_p is
+   !> dp/ds of the unit tangent, which is zero where the branch turns, and changes there linearly.
    subroutine find_fold(corrector, system, here, next, fold, error)
       type(corrector_type), intent(inout) :: corrector
       class(parameter_system), intent(inout) :: system
@@ -45,6 +49,7 @@ contains
          call corrector%correct(system, here, ds, fold, error)
          if (allocated(error)) return
          if (.not. fold%report%converged) return
+         ! p is stationary at the fold: it settles with the square of the error along the branch.
          if (abs(fold%p - p_before) <= fold_tolerance*abs(fold%p)) exit
          p_before = fold%p
          if (fold%t_p*at_low > 0.0_wp) then
@@ -61,6 +66,7 @@ contains
    end subroutine find_fold
 
    !> The branch leaves the interval between two points: its last point lies exactly on the bound.
+   !> Newton's method at constant p = bound, from the cubic.
    subroutine land(corrector, system, here, next, bound, point, error)
       type(corrector_type), intent(inout) :: corrector
       class(parameter_system), intent(inout) :: system
@@ -75,6 +81,7 @@ contains
       point = next
       point%fold = .false.
       point%report = solver_report()
+      ! Not quite at the bound by itself: p of the cubic is bisected, and then held there.
       call interpolate(corrector%metric, here, next, share_at(corrector, here, next, bound), point)
       point%p = bound
       allocate (r(system%n), step(system%n))
@@ -121,6 +128,8 @@ contains
    end subroutine land
 
    !> The share of the way at which the cubic between two points has a value of p, by bisection.
+   !> Where the cubic takes the value several times, one of them: `next` lies beyond the bound, so
+   !> that there is one.
    pure real(wp) function share_at(corrector, here, next, p)
       type(corrector_type), intent(in) :: corrector
       type(branch_point), intent(in) :: here, next

@@ -114,6 +114,7 @@ contains
       integer :: stalled, longer
 
       allocate (r(system%n), step(system%n))
+      ! What the branch is measured by, not the unknowns: the leash is to hold what is seen.
       guess = next%y
       guess_p = next%p
       x_scale = self%x_scale(here%x)
@@ -127,6 +128,7 @@ contains
          if (.not. allocated(error)) call system%set_parameter(next%p, error)
          if (allocated(error)) return
          call self%see(next%x, next%y)
+         ! Before the residual: a point that has left the neighbourhood is not worth one.
          if (self%metric%length(next%y - guess, next%p - guess_p) > leash*ds) exit
          call system%residual(next%x, r)
          associate (report => next%report)
@@ -137,6 +139,7 @@ contains
             stalled = stalled + 1
             if (report%residual < 0.9_wp*best) stalled = 0
             best = min(best, report%residual)
+            ! A cycle makes no progress; what has grown a thousandfold does not come back.
             if (stalled >= patience .or. report%residual > 1.0e3_wp*best) exit
             call newton_step(self, system, here, next, r, step, dp, done)
             if (.not. done) exit
@@ -146,12 +149,15 @@ contains
          if (allocated(error)) return
          next%x = next%x + step
          next%p = next%p + dp
+         ! Quadratic convergence shortens each correction; those that grow again and again go
+         ! elsewhere.
          size = hypot(norm2(step)/x_scale, dp/self%metric%p_scale)
          if (size > last_size) longer = longer + 1
          last_size = size
          if (longer > max_longer) exit
       end do
       if (.not. next%report%converged) return
+      ! A solution without a tangent is no point of the branch: nothing can go on from it.
       call self%find_tangent(system, here, next, done)
       next%report%converged = done
    end subroutine correct
@@ -210,6 +216,8 @@ contains
    end subroutine try
 
    !> Halve a correction until the residual decreases; where it never does, what leaves the least.
+   !> The test is that of Armijo: a share s of a Newton step should leave 1 - s of the residual, and
+   !> has to gain 1e-4 of that.
    subroutine cut_short(system, from, r, step, dp, error)
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: from
@@ -239,6 +247,7 @@ contains
       dp = best_share*dp
    end subroutine cut_short
 
+   !> Two solutions with dR/dx where that is regular enough, else the bordered matrix.
    subroutine newton_step(self, system, here, next, r, step, dp, done)
       type(corrector_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
@@ -248,6 +257,7 @@ contains
       real(wp), intent(out) :: dp
       logical, intent(out) :: done
 
+      ! Beyond that size a dense matrix of all unknowns costs too much.
       if (self%oriented .and. (self%careful .or. &
                                abs(here%t_p) < steep*self%metric%p_scale)) then
          call bordered_step(self, system, here, next, r, step, dp, done)
@@ -268,6 +278,8 @@ contains
       real(wp), allocatable :: slope(:), dx_dp(:), at_step(:), along(:)
 
       allocate (slope(system%n), dx_dp(system%n))
+      ! With dx = a + b dp, a = -J^-1 R and b = -J^-1 R_p, the plane t . dx + t_p dp = 0 gives dp =
+      ! -(t . a)/(t . b + t_p).
       dp = 0.0_wp
       call self%linear%solve(system, r, step_forcing, step, done)
       if (.not. done) return
@@ -344,6 +356,7 @@ contains
          call self%see(point%x + t, point%t_y)
          point%t_y = point%t_y - point%y + point%y_p
       end if
+      ! (t, 1) is tangent with either sign: the one that makes the smaller angle with that before.
       point%t_p = sign(1.0_wp, self%metric%inner(point%t_y, 1.0_wp, previous%t_y, previous%t_p))
       point%t = point%t_p*point%t
       point%t_y = point%t_p*point%t_y

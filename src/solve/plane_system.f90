@@ -4,6 +4,9 @@
 !>
 !> with p as a further unknown: regular where dR/dx alone is singular, at folds and along a branch
 !> that runs away at a constant p.
+!> As an augmented system it has one further unknown, p, and one condition, the plane: g_q = b^T and
+!> g_z = b_p. The inner system may solve some unknowns at once; what these do enters the column, the
+!> corner and the right-hand side of the condition through `expand`.
 module fw_plane_system
    use fw_augmented_system, only: augmented_system
    use fw_error, only: error_type
@@ -61,6 +64,7 @@ contains
       self%whole = x_0
    end subroutine cut
 
+   !> The further unknown is the parameter of the inner system.
    subroutine take(self, z, error)
       class(plane_system), intent(inout) :: self
       real(wp), intent(in) :: z(:)
@@ -69,6 +73,7 @@ contains
       call self%inner%set_parameter(z(1), error)
    end subroutine take
 
+   !> The distance from the plane, in the units of b.
    subroutine conditions(self, q, z, g)
       class(plane_system), intent(inout) :: self
       real(wp), intent(in) :: q(:), z(:)
@@ -87,12 +92,16 @@ contains
       call self%inner%parameter_derivative(self%x, self%slope)
       if (allocated(self%column)) deallocate (self%column, self%nothing)
       allocate (self%column(self%n_linear_inner), self%nothing(self%n_linear_inner), source=0.0_wp)
+      ! `reduce` gives the right-hand side for a residual, which is minus the column of p.
       call self%inner%reduce(self%slope, self%column)
       self%column = -self%column
+      ! Unknowns that are solved at once move by `whole` for each unit of p, and the plane sees
+      ! them.
       call self%inner%expand(self%slope, self%nothing, self%whole)
       self%corner_p = self%border_p + dot_product(self%border, self%whole)
    end subroutine choose
 
+   !> Unknowns that are solved at once see the change of p as well: R + R_p dp.
    subroutine settle(self, g, dz, r)
       class(plane_system), intent(inout) :: self
       real(wp), intent(in) :: g(:), dz(:)
@@ -103,6 +112,7 @@ contains
       r = r + dz(1)*self%slope
    end subroutine settle
 
+   !> -g, less what the unknowns that are solved at once do to the plane.
    subroutine reduce_rows(self, r, g, rhs)
       class(plane_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:), g(:)
@@ -112,6 +122,7 @@ contains
       rhs = -g - dot_product(self%border, self%whole)
    end subroutine reduce_rows
 
+   !> product + R_p dp, in the linear problem.
    subroutine add_columns(self, dz, product)
       class(plane_system), intent(inout) :: self
       real(wp), intent(in) :: dz(:)
@@ -120,6 +131,7 @@ contains
       product = product + dz(1)*self%column
    end subroutine add_columns
 
+   !> b . v + g_p dp.
    subroutine rows(self, v, dz, product)
       class(plane_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: v(:), dz(:)
@@ -128,6 +140,7 @@ contains
       product = self%corner_p*dz + border_times(self, v)
    end subroutine rows
 
+   !> Exact here: the border is a row of numbers, whatever the preconditioner leaves out elsewhere.
    subroutine subtract_rows(self, v, rows, is_built)
       class(plane_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: v(:, :)
@@ -153,6 +166,7 @@ contains
       border_times = dot_product(self%border, self%whole)
    end function border_times
 
+   !> g_p, with what p does through the unknowns that are solved at once.
    subroutine corner(self, matrix)
       class(plane_system), intent(inout) :: self
       real(wp), intent(out) :: matrix(:, :)
@@ -170,6 +184,8 @@ contains
       n = self%n_linear_inner
       if (n > 0) call self%inner%assemble(matrix)
       matrix(:n, n + 1) = self%column
+      ! A row of the border in the linear problem is b . expand(e_j): unknown by unknown, since
+      ! `expand` is all that is known of how they lie in x.
       do j = 1, n
          unit = 0.0_wp
          unit(j) = 1.0_wp
