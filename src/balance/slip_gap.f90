@@ -56,6 +56,7 @@ contains
             all_sizes = all_sizes + size_of_slip
          end do
          if (all_slip <= least_slip*all_sizes) return
+         ! g H > limit, without a division by a path of zero.
          lacks = maxval(problem%fourier%harmonic)*(possible - done) > limit*possible
       end associate
    end function lacks_friction
@@ -92,6 +93,7 @@ contains
                n = fourier%harmonic(h)
                if (n == 0) cycle
                k = fourier%column(h)
+               ! int lambda du over a period, u = u_c cos n tau + u_s sin n tau.
                work = work + pi*n*(force(i, c, k)*u(c, k + 1) - force(i, c, k + 1)*u(c, k))
             end do
          end do
@@ -124,12 +126,14 @@ contains
                n = fourier%harmonic(h)
                if (n == 0) cycle
                k = fourier%column(h)
+               ! dx/dtau.
                v = v + n*(u(:, k + 1)*cos(n*tau) - u(:, k)*sin(n*tau))
             end do
             path = path + pressure*norm2(v)
             mean = mean + pressure
          end do
       end associate
+      ! The rule of rectangles, which is that of trapezoids for a period.
       path = path*2.0_wp*pi/n_steps
       square = (mean/n_steps)**2
    end subroutine friction_path
@@ -150,6 +154,7 @@ contains
                do h = 1, fourier%n_retained
                   n = fourier%harmonic(h)
                   k = fourier%column(h)
+                  ! A pressure is minus the force, which opens.
                   limit_force = limit_force - force(i, 3, k)*cos(n*tau)
                   if (n > 0) limit_force = limit_force - force(i, 3, k + 1)*sin(n*tau)
                end do

@@ -196,6 +196,7 @@ contains
    end subroutine next
 
    !> A step has come to `ahead`: it is the next point, unless a fold or a bound lies before it.
+   !> A fold between the two is given out first and `ahead` waits: `next` gives it out afterwards.
    subroutine settle(self, system, ahead, point, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
@@ -206,6 +207,7 @@ contains
       real(wp) :: bound
 
       before = self%here
+      ! Outside of both bounds: the one on whose side it lies.
       if ((ahead%p - self%start)*(ahead%p - self%finish) > 0.0_wp) then
          bound = merge(self%start, self%finish, (ahead%p - self%start)*(self%finish - &
             self%start) < 0.0_wp)
@@ -217,6 +219,7 @@ contains
          self%waiting = ahead
       end if
       if (allocated(error)) return
+      ! dp/ds has changed its sign.
       self%waits = before%t_p*ahead%t_p < 0.0_wp
       if (self%waits) call find_fold(self%corrector, system, before, ahead, point, error)
       if (allocated(error)) return
@@ -237,6 +240,8 @@ contains
       if (self%runs_away) call end_branch(self, 'its points run away at a constant parameter')
    end subroutine pass
 
+   !> At the far bound the branch is complete; at the near one it has come back, to its first point
+   !> or to another solution of the same frequency.
    subroutine end_at_bound(self, point, bound)
       class(arclength_type), intent(inout) :: self
       type(branch_point), intent(in) :: point
@@ -253,6 +258,7 @@ contains
       end if
    end subroutine end_at_bound
 
+   !> The first reason is the one that counts.
    subroutine end_branch(self, reason)
       class(arclength_type), intent(inout) :: self
       character(*), intent(in) :: reason
@@ -281,6 +287,7 @@ contains
       end if
       call shorten_until_taken(self, system, shortest, 0.5_wp, ahead, done, error)
       if (allocated(error) .or. done) return
+      ! A predictor from before a corner leads away from it: along the tangent, then.
       self%ds = corner
       self%history%known = .false.
       call shorten_until_taken(self, system, bifurcation, 0.7_wp, ahead, done, error)
@@ -290,6 +297,7 @@ contains
       done = ahead%report%converged
    end subroutine advance
 
+   !> Attempts from the present step on, each shorter than the one before.
    subroutine shorten_until_taken(self, system, least, factor, ahead, done, error)
       class(arclength_type), intent(inout) :: self
       class(parameter_system), intent(inout) :: system
@@ -316,6 +324,8 @@ contains
             if (allocated(error) .or. done) return
          end if
          if (self%ds < least) exit
+         ! An attempt that has only failed says nothing of the length that would do; a measured
+         ! error does.
          self%ds = self%ds*merge(factor, shortening, abs(shortening - halved) <= 0.0_wp)
       end do
    end subroutine shorten_until_taken
@@ -347,6 +357,7 @@ contains
       associate (metric => self%corrector%metric)
          far = metric%length(ahead%y - guess, ahead%p - guess_p) > max(max_distance*self%ds, corner)
       end associate
+      ! Converged, but on something else than what was predicted.
       if (far) return
       if (self%ds <= corner) then
          call look_at_corner(self, system, ahead, done, error)
@@ -375,6 +386,7 @@ contains
       real(wp) :: chord, cosine(3)
 
       associate (metric => self%corrector%metric, here => self%here)
+         ! Cosines of the angles: tangent to tangent, and either tangent to the chord.
          chord = metric%chord(here, ahead)
          cosine = [metric%inner(here%t_y, here%t_p, ahead%t_y, ahead%t_p), &
                    metric%inner(here%t_y, here%t_p, ahead%y - here%y, ahead%p - here%p)/chord, &
@@ -424,6 +436,7 @@ contains
       shortening = 1.0_wp
       call missed(self%corrector%metric, self%history, self%here, ahead, smooth, corner_error, &
                   place)
+      ! The error of a cubic grows like ds^4: its fourth root gives the step.
       if (smooth > allowed_error) then
          shortening = max(least_growth, min(0.8_wp, (aim*allowed_error/smooth)**0.25_wp))
       else if (self%here%t_p*ahead%t_p > 0.0_wp) then
@@ -435,6 +448,7 @@ contains
       self%knows_ahead = .true.
       if (corner_error <= allowed_error) return
       place = max(least_place, min(1.0_wp - least_place, place))
+      ! The estimate of a corner may be a false alarm: one correction there tells.
       call look_between(self, system, ahead, place, found, error)
       if (found > looked_at*allowed_error) shortening = place
    end subroutine measure
@@ -467,6 +481,7 @@ contains
       associate (metric => self%corrector%metric)
          metric%y_scale = y_scale_at(self, point)
          if (metric%n_seen == 0) return
+         ! From point to point scales fall by `fading` at most: a response near zero keeps one.
          metric%x_scale = max(norm2(point%x)/weight_x, fading*metric%x_scale, self%x_scale/weight_x)
       end associate
    end subroutine scale_metric
@@ -486,6 +501,7 @@ contains
       end associate
    end function y_scale_at
 
+   !> The scale of x at the next point: that of y where the branch is measured by x itself.
    pure real(wp) function x_scale_at(self, ahead) result(scale)
       class(arclength_type), intent(in) :: self
       type(branch_point), intent(in) :: ahead
@@ -504,6 +520,8 @@ contains
       associate (metric => self%corrector%metric)
          growth = largest_growth
          call missed(metric, self%history, self%here, ahead, error, unused(1), unused(2))
+         ! The least of three: by the error of the cubic, by the turn of the tangent, and by the
+         ! work that the corrector had.
          if (error > 0.0_wp) growth = min(growth, (aim*allowed_error/error)**0.25_wp)
          turn = acos(max(-1.0_wp, min(1.0_wp, metric%inner(self%here%t_y, self%here%t_p, &
                                                            ahead%t_y, ahead%t_p))))
@@ -533,10 +551,13 @@ contains
 
       associate (metric => self%corrector%metric, here => self%here)
          change = abs(here%t_p)/metric%p_scale
+         ! In shares of the scales of p and of y.
          if (change*self%ds > longest_p) self%ds = longest_p/change
          change = metric%size(here%t_y)
          if (change*self%ds > longest_y) self%ds = longest_y/change
          if (self%near%n == 0 .and. allocated(self%pole)) then
+            ! By the distance to the nearest pole, and by its width: a resonance there takes
+            ! several steps.
             reach = beside_pole*minval(hypot(here%p - self%pole, self%pole_width))
             if (self%ds*abs(here%t_p) > reach) self%ds = reach/abs(here%t_p)
          end if
