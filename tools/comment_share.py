@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Comments in src: their share of the lines that are not blank, folder by folder.
 
-    comment_share.py [--least 0.1]
+    comment_share.py [--least 0.13]
 
 15 % is the aim (CONTRIBUTING.md); the least share, which `make lint` holds, follows it upwards. A
 comment is a line of its own that says something in words: rules, bare marks, directives and code
@@ -44,7 +44,7 @@ def count(text: str) -> tuple[int, int]:
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(description="Share of comments in src.")
-    parser.add_argument("--least", type=float, default=0.1)
+    parser.add_argument("--least", type=float, default=0.13)
     least = parser.parse_args().least
     folders: dict[str, list[int]] = defaultdict(lambda: [0, 0])
     bare = []
