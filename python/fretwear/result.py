@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -280,7 +279,7 @@ class Result(ResultFile):
         """
         return self["floquet/stable"].astype(int)
 
-    @cached_property
+    @property
     def bifurcations(self) -> list[Bifurcation]:
         """Where the response turns or its stability changes, in the order along it.
 
