@@ -25,7 +25,8 @@ contains
          '                         was killed (FILE.part)', &
          '  --keys [GROUP]         what every key accepts and means, its unit and its default;', &
          '                         --keys=json for programs', &
-         '  --check                validate, print the effective input, run nothing', &
+         '  --check                validate, print the effective input and the natural', &
+         '                         frequencies within the sweep, run nothing', &
          '  -q                     errors only', &
          '  -v                     iterations and residual of every point', &
          '  --help                 this text', &
@@ -36,6 +37,7 @@ contains
       write (unit, '(a)') &
          '  &case         title, kind of analysis, threads', &
          '  &model        mass, stiffness and damping, inline or from a file', &
+         '  &cyclic       sectors around an axis and the wave that runs around it', &
          '  &contact      contact pairs, friction, gap, contact law', &
          '  &spring       nonlinear springs', &
          '  &load         static and harmonic loads', &

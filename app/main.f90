@@ -13,6 +13,7 @@ program fw_run_program
    use fw_reader_text, only: printable
    use fw_restart_trial, only: try_restart
    use fw_run, only: check_case, run_case
+   use fw_run_modes, only: list_in_range
    use fw_text, only: string_type
    use fw_threads, only: thread_scope
    use fw_version, only: version
@@ -70,6 +71,7 @@ contains
       type(outcome_type) :: outcome
       type(progress_type) :: progress
       type(thread_scope) :: threads
+      type(string_type), allocatable :: lines(:)
       integer :: i
 
       input%path = options%input
@@ -87,6 +89,10 @@ contains
          call check_case(case, error)
          if (allocated(error)) return
          write (output_unit, '(a)', advance='no') case%namelist
+         call list_in_range(case, lines)
+         do i = 1, size(lines)
+            write (output_unit, '(a)') lines(i)%text
+         end do
          return
       end if
       progress = new_progress(options%quiet, options%verbose)

@@ -51,13 +51,14 @@ from .errors import (
     OutputError,
     RunInterrupted,
 )
-from .model import ContactPairs, Model, Spring
+from .model import ContactPairs, Model, Sectors, Spring
 from .result import Result
 from .steps import Point, Steps
 
 __all__ = ["AbsentError", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "FretwearError", "InputError", "Model", "OutputError", "Point",
-           "Result", "RunInterrupted", "Spring", "Steps", "__version__", "frf", "run", "wear"]
+           "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "frf", "run",
+           "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -17,7 +17,7 @@ from ._native import Session
 from .errors import InputError, OutputError
 from .model_file import FORMAT, strings, write_model_file
 
-__all__ = ["ContactPairs", "Model", "Spring"]
+__all__ = ["ContactPairs", "Model", "Sectors", "Spring"]
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +34,8 @@ class ContactPairs:
     side_1, side_2 : (n_pairs, 3) int
         Signed dof numbers, counted from 1: a negative one takes the dof with its sign turned, 0
         is the ground or a direction that the pair does not have. side_2 is the ground by default.
+    sector_2 : int or (n_pairs,), optional
+        Of cyclic structures: sector of side 2, counted from that of side 1 (0 by default).
     mu : float or (n_pairs,), optional
         Friction coefficient [-].
     gap : float or (n_pairs,), optional
@@ -60,6 +62,7 @@ class ContactPairs:
     normal_stiffness: ArrayLike | None = None
     position: ArrayLike | None = None
     patch: Sequence[str] | None = None
+    sector_2: ArrayLike | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -71,6 +74,8 @@ class ContactPairs:
             array(f"contact.{name}", getattr(self, name), (n_pairs,))
             for name in ("mu", "gap", "area", "normal_load", "tangential_stiffness",
                          "normal_stiffness")}
+        if self.sector_2 is not None:
+            values["sector_2"] = _whole_numbers("contact.sector_2", self.sector_2, n_pairs)
         if self.position is not None:
             values["position"] = array("contact.position", self.position, (n_pairs, 3))
         if self.patch is not None:
@@ -92,12 +97,45 @@ class Spring:
         [force/length^power]
     power : int
         1 is a linear spring, 3 a cubic one.
+    sector_2 : int
+        Of cyclic structures: sector of side 2, counted from that of side 1.
     """
 
     side_1: int
     side_2: int = 0
     coefficient: float = 0.0
     power: int = 3
+    sector_2: int = 0
+
+
+@dataclass(frozen=True)
+class Sectors:
+    """What makes a model one of equal sectors around an axis.
+
+    The wave that runs around it is a matter of the case: ``cyclic={"engine_order": 4}``.
+
+    Parameters
+    ----------
+    n_sectors : int
+        Sectors.
+    left, right : (n_interface,) int
+        Dofs of one interface, counted from 1, and of the other, which moves as the left one of the
+        next sector; there a negative number takes the dof with its sign turned. None where only
+        contact joins the sectors.
+    """
+
+    n_sectors: int
+    left: ArrayLike = ()
+    right: ArrayLike = ()
+
+    def checked(self, n_dof: int) -> Sectors:
+        """The same with arrays that fit each other; raises InputError where they do not."""
+        if not isinstance(self.n_sectors, (int, np.integer)) or self.n_sectors < 1:
+            raise InputError(f"sectors.n_sectors = {self.n_sectors!r}: must be a whole number "
+                             "from 1")
+        left = dofs("sectors.left", self.left, (None,), n_dof)
+        right = dofs("sectors.right", self.right, (len(left),), n_dof)
+        return Sectors(int(self.n_sectors), left, right)
 
 
 #: A dof number, counted from 1, or a row of factors, one per dof.
@@ -128,6 +166,8 @@ class Model:
         Stiffness per square of the rotation speed [force/length/(rad/s)^2].
     static_rotation : (n_dof,), optional
         Static load per square of the rotation speed [force/(rad/s)^2].
+    sectors : Sectors, optional
+        Makes the model one of equal sectors around an axis.
     observe : mapping, optional
         Name of every observed quantity, with a dof number, counted from 1, or with a row of
         factors (n_dof,). Every dof without it.
@@ -145,7 +185,7 @@ class Model:
                  contact: ContactPairs | None = None, springs: Iterable[Spring] = (),
                  static: ArrayLike | None = None, cosine: ArrayLike | None = None,
                  sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
-                 static_rotation: ArrayLike | None = None,
+                 static_rotation: ArrayLike | None = None, sectors: Sectors | None = None,
                  observe: Mapping[str, Observation] | None = None,
                  title: str = "", unit_system: str = "") -> None:
         n = self.n_dof = _order(M, C, K)
@@ -172,6 +212,9 @@ class Model:
                                  "Spring")
             dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
             array(f"springs[{number}].coefficient", spring.coefficient, ())
+        if sectors is not None and not isinstance(sectors, Sectors):
+            raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
+        self.sectors = None if sectors is None else sectors.checked(n)
         self._observe = None if observe is None else _rows(observe, n)
         self.title, self.unit_system = text("title", title), text("unit_system", unit_system)
 
@@ -267,6 +310,9 @@ class Model:
             kind = _text(file.attrs.get("format", ""))
             if kind != FORMAT:
                 raise InputError(f"{path}: format is '{kind}', expected '{FORMAT}'")
+            if "nodal_diameter" in file:
+                raise InputError(f"{path}: holds matrices of nodal diameters, which a Model does "
+                                 "not: name the file in the case (model%file)")
             for name in ("mass", "stiffness"):
                 if name not in file:
                     raise InputError(f"{path}: dataset /{name} is missing")
@@ -278,6 +324,7 @@ class Model:
                 return cls(
                     found["mass"], found.get("damping"), found["stiffness"],
                     contact=_contact_of(found), observe=_observed_of(file), **loads,
+                    sectors=_sectors_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
@@ -305,8 +352,10 @@ class Model:
         pairs = {f"contact/{name}": values for name in _IN_NAMELIST
                  if (values := getattr(self.contact, name, None)) is not None}
         try:
+            groups = {} if self.sectors is None else {
+                "cyclic": {"n_sectors": self.sectors.n_sectors}}
             write_model_file(path, {**self._datasets(), **pairs}, title=self.title,
-                             unit_system=self.unit_system)
+                             unit_system=self.unit_system, groups=groups)
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {error}") from None
 
@@ -320,6 +369,9 @@ class Model:
                 value = getattr(self.contact, name.split("/")[1])
                 if value is not None:
                     found[name] = strings(value) if name == "contact/patch" else value
+        if self.sectors is not None and len(np.asarray(self.sectors.left)) > 0:
+            found["cyclic/left"] = np.asarray(self.sectors.left)
+            found["cyclic/right"] = np.asarray(self.sectors.right)
         if self._observe is not None:
             found["observe/name"] = strings(self._observe[0])
             found["observe/matrix"] = self._observe[1]
@@ -331,7 +383,7 @@ class Model:
         """Hand the model to a session; returns the keys that say the rest of it."""
         session.new_model(self.n_dof, self.n_pairs)
         for name, values in self._datasets().items():
-            if not name.startswith("observe/") and values.dtype.kind in "if":
+            if not name.startswith(_NO_PARTS) and values.dtype.kind in "if":
                 session.put(name, values)
         for name in ("title", "unit_system"):
             if getattr(self, name):
@@ -343,19 +395,33 @@ class Model:
             if self.contact.patch is not None:
                 session.put_texts("contact/patch", self.contact.patch)
             settings += [(f"contact%{name}", literal(getattr(self.contact, name)))
-                         for name in _IN_NAMELIST if getattr(self.contact, name) is not None]
-        return tuple(settings)
+                         for name in (*_IN_NAMELIST, "sector_2")
+                         if getattr(self.contact, name) is not None]
+        return tuple(settings + self._sector_settings())
+
+    def _sector_settings(self) -> list[tuple[str, str]]:
+        if self.sectors is None:
+            return []
+        settings = [("cyclic%n_sectors", literal(self.sectors.n_sectors))]
+        n = len(np.asarray(self.sectors.left))
+        if n > 0:
+            settings += [("cyclic%n_interface", literal(n)),
+                         ("cyclic%left", literal(self.sectors.left)),
+                         ("cyclic%right", literal(self.sectors.right))]
+        return settings
 
     def _spring_settings(self) -> list[tuple[str, str]]:
         if not self.springs:
             return []
         return [("spring%n_springs", literal(len(self.springs)))] + [
             (f"spring%{name}", literal([getattr(spring, name) for spring in self.springs]))
-            for name in ("side_1", "side_2", "coefficient", "power")]
+            for name in ("side_1", "side_2", "sector_2", "coefficient", "power")]
 
 
 _CONTACT = tuple(f"contact/{name}" for name in (
-    "side_1", "side_2", "mu", "gap", "area", "position", "patch"))
+    "side_1", "side_2", "sector_2", "mu", "gap", "area", "position", "patch"))
+#: What a session takes as keys of the namelist, or by a call of its own.
+_NO_PARTS = ("observe/", "cyclic/", "contact/sector_2")
 #: Constants that a session takes as keys, so that one of another law is refused.
 _IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness")
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
@@ -390,10 +456,26 @@ def _contact_of(found: Mapping[str, Any]) -> ContactPairs | None:
     if "contact/side_1" not in found:
         return None
     parts = {name: found.get(f"contact/{name}") for name in (
-        "side_2", "mu", "gap", "area", "position", *_IN_NAMELIST)}
+        "side_2", "sector_2", "mu", "gap", "area", "position", *_IN_NAMELIST)}
     patch = found.get("contact/patch")
     names = None if patch is None else [_text(name) for name in patch]
     return ContactPairs(found["contact/side_1"], **parts, patch=names)
+
+
+def _sectors_of(file: h5py.File) -> Sectors | None:
+    if "cyclic" not in file:
+        return None
+    group = file["cyclic"]
+    sides = {name: group[name][()] for name in ("left", "right") if name in group}
+    return Sectors(int(group.attrs["n_sectors"]), **sides)
+
+
+def _whole_numbers(name: str, values: ArrayLike, n: int) -> NDArray[np.int64]:
+    """One for each of n, or one for all."""
+    found = np.asarray(values)
+    if found.dtype.kind not in "iu" or found.shape not in ((), (n,)):
+        raise InputError(f"{name}: must be a whole number, or {n} of them")
+    return np.array(np.broadcast_to(found, (n,)), dtype=np.int64)
 
 
 def _observed_of(file: h5py.File) -> dict[str, Observation] | None:

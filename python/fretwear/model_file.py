@@ -16,7 +16,8 @@ FORMAT, FORMAT_VERSION = "fretwear-model", 1
 
 
 def write_model_file(path: str | Path, datasets: Mapping[str, NDArray[Any]], *, title: str,
-                     unit_system: str = "", attributes: Mapping[str, str] | None = None) -> None:
+                     unit_system: str = "", attributes: Mapping[str, str] | None = None,
+                     groups: Mapping[str, Mapping[str, int]] | None = None) -> None:
     """Write a model file; an older one of that name is replaced once the new one is complete.
 
     Parameters
@@ -29,6 +30,8 @@ def write_model_file(path: str | Path, datasets: Mapping[str, NDArray[Any]], *, 
         Attributes of the format.
     attributes : mapping of str to str, optional
         Further attributes, which are no part of the format.
+    groups : mapping of str to mapping, optional
+        Attributes of groups.
     """
     path = Path(path)
     partial = path.with_name(path.name + ".part")
@@ -44,6 +47,9 @@ def write_model_file(path: str | Path, datasets: Mapping[str, NDArray[Any]], *, 
                 # Filters pay for themselves on matrices only.
                 packed = {"compression": "gzip", "compression_opts": 9, "shuffle": True}
                 file.create_dataset(name, data=data, **(packed if data.size > 10_000 else {}))
+            for group, numbers in (groups or {}).items():
+                file.require_group(group).attrs.update(
+                    {name: np.int32(number) for name, number in numbers.items()})
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)

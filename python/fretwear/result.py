@@ -208,6 +208,41 @@ class Result(ResultFile):
         """Fourier coefficients (0, c1, s1, c2, ...) (n_points, 2H+1, n_observed)."""
         return self["coefficients"]
 
+    def sector(self, j: int, name: str = "coefficients") -> Floats:
+        """Fourier coefficients of sector j of a cyclic structure: those of sector 0, delayed.
+
+        Parameters
+        ----------
+        j : int
+            Any whole number; sectors are counted from 0.
+        name : str
+            "coefficients" or "contact/force".
+
+        Returns
+        -------
+        (n_points, 2H+1, ..) array
+
+        Raises
+        ------
+        AbsentError
+            The result is of no cyclic structure.
+        """
+        if "engine_order" not in self.attributes:
+            raise AbsentError(f"{self.name}: has no sectors: give the case &cyclic n_sectors and "
+                              "engine_order")
+        if name not in ("coefficients", "contact/force"):
+            raise InputError(f"name = {name!r}: must be 'coefficients' or 'contact/force'")
+        values = np.array(self[name])
+        n_sectors = int(self.attributes["n_sectors"])
+        turn = j * int(self.attributes["engine_order"]) % n_sectors / n_sectors
+        for n in range(1, (values.shape[1] + 1) // 2):
+            # U_n = c_n - i s_n of sector j is that of sector 0 times exp(-i n j phi).
+            c, s = np.cos(2.0 * np.pi * n * turn), np.sin(2.0 * np.pi * n * turn)
+            cosine, sine = values[:, 2 * n - 1].copy(), values[:, 2 * n].copy()
+            values[:, 2 * n - 1] = c * cosine - s * sine
+            values[:, 2 * n] = s * cosine + c * sine
+        return values
+
     @property
     def amplitude(self) -> Floats:
         """Largest magnitude over the period, static part included (n_points, n_observed)."""

@@ -37,6 +37,8 @@ _REMEDIES = {
     "fold": "run with sweep%continuation = 'arclength'",
     "served_by": "run with case%analysis = 'frf' or 'point'",
     "bifurcation/": "run a sweep with sweep%stability = .true., or a branch that turns",
+    "cyclic/": "give the case sectors (&cyclic n_sectors, engine_order)",
+    "modes/": "run with case%analysis = 'modes'",
     "peak/": "run a sweep (case%analysis = 'frf') with this version of fretwear",
     "observed/": "name what to observe in output%observe",
 }

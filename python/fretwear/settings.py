@@ -12,8 +12,8 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["CaseGroup", "Contact", "Groups", "Harmonics", "Load", "Output", "PseudoTime", "Solver",
-           "Spring", "Structure", "Sweep", "Time", "Wear"]
+__all__ = ["CaseGroup", "Contact", "Cyclic", "Groups", "Harmonics", "Load", "Output", "PseudoTime",
+           "Solver", "Spring", "Structure", "Sweep", "Time", "Wear"]
 
 
 class CaseGroup(TypedDict, total=False):
@@ -21,8 +21,9 @@ class CaseGroup(TypedDict, total=False):
 
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
-    #: a sweep, one frequency, wear at one frequency, or integration in time (default: 'frf')
-    analysis: Literal["frf", "point", "wear", "time"]
+    #: a sweep, one frequency, wear at one frequency, integration in time, or natural frequencies
+    #: (default: 'frf')
+    analysis: Literal["frf", "point", "wear", "time", "modes"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
@@ -55,6 +56,26 @@ class Structure(TypedDict, total=False):
     rotation_speed: float
 
 
+class Cyclic(TypedDict, total=False):
+    """Group &cyclic: sectors around an axis and the wave that runs around it."""
+
+    #: equal sectors, of which the model is one (default: of the file, else not cyclic)
+    n_sectors: int
+    #: each sector moves as the one before it, this part of n_sectors periods later; negative: the
+    #: other way; only: cyclic, all but analysis = 'modes' (required with sectors)
+    engine_order: int
+    #: natural frequencies of each nodal diameter; only: analysis = 'modes' (default: 10)
+    n_modes: int
+    #: dofs of an interface; 0: only contact joins the sectors (default: of the file, else 0, else
+    #: 0)
+    n_interface: int
+    #: dofs of the left interface (default: of the file)
+    left: ArrayLike
+    #: the same of the right one, which moves as the left one of the next sector; negative: with its
+    #: sign turned (default: of the file)
+    right: ArrayLike
+
+
 class Contact(TypedDict, total=False):
     """Group &contact: contact pairs, friction, gap, contact law."""
 
@@ -69,6 +90,9 @@ class Contact(TypedDict, total=False):
     #: the same of the other side, 0: ground; the normal points from side 2 to side 1 (default: of
     #: the file, else 0)
     side_2: ArrayLike
+    #: sector of side 2, counted from that of side 1: 1 is the next, -1 the one before; only:
+    #: &cyclic (default: of the file, else 0, else 0)
+    sector_2: ArrayLike
     #: friction coefficient (default: of the file, else required with tangential dofs)
     mu: ArrayLike
     #: [L] initial gap; negative: interference, which preloads (default: of the file, else 0)
@@ -110,6 +134,8 @@ class Spring(TypedDict, total=False):
     side_1: ArrayLike
     #: dof on the other side, 0: ground (default: 0)
     side_2: ArrayLike
+    #: sector of side 2, counted from that of side 1; only: &cyclic (default: 0)
+    sector_2: ArrayLike
     #: [F/L^power] force = coefficient * elongation**power (required)
     coefficient: ArrayLike
     #: odd powers keep the symmetry of odd harmonics (default: 3)
@@ -294,6 +320,7 @@ class Groups(TypedDict, total=False):
 
     case: CaseGroup
     structure: Structure
+    cyclic: Cyclic
     contact: Contact
     spring: Spring
     load: Load

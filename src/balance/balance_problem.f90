@@ -53,7 +53,8 @@ contains
       type(balance_problem), intent(out) :: self
 
       self%joint = joint
-      call new_incidence(joint%relative, structure%n_coordinates, self%incidence)
+      call new_incidence(joint%relative, structure%n_coordinates, self%incidence, &
+                         structure%harmonic, structure%column)
       call move_alloc(structure, self%structure)
       self%fourier = fourier
       self%n = self%structure%n_coordinates*fourier%n_coefficients

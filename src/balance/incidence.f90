@@ -5,7 +5,8 @@
 !> The only loops over B are here. A row of B has few entries, one where the row itself is a
 !> coordinate. Every procedure takes all coefficients of a row at once, or says which harmonic is
 !> meant: weights that differ from harmonic to harmonic and are complex (sectors of a cyclic
-!> structure) need no other calls. Vectors are (coordinate, coefficient).
+!> structure: B^H in the place of B^T) need no other calls. Vectors are (coordinate, coefficient).
+!> Fewer coefficients than all are the first of them.
 !>
 !> Vectors of some of the coordinates come with a map (n_coordinates): the place of each coordinate
 !> in the vector. Places 0 and those beyond the vector do not count. `identity` is the map of all.
@@ -26,6 +27,10 @@ module fw_incidence
       !> Row r is sum_e weight(e) q(coordinate(e)), e = first(r) .. first(r+1)-1.
       integer, allocatable, private :: first(:), coordinate(:)
       real(wp), allocatable, private :: weight(:)
+      !> In place of them where weights turn from harmonic to harmonic (sectors of a cyclic
+      !> structure): complex ones (entries, n_retained), and what the coefficients are of.
+      complex(wp), allocatable, private :: turned(:, :)
+      integer, allocatable, private :: harmonic(:), column(:)
    contains
       procedure :: coordinate_of
       procedure :: weights_of
@@ -42,16 +47,23 @@ module fw_incidence
 contains
 
    !> The rows of relative coordinates, in a vector of n_coordinates: these are the first of them.
-   pure subroutine new_incidence(relative, n_coordinates, self)
+   pure subroutine new_incidence(relative, n_coordinates, self, harmonic, column)
       type(relative_type), intent(in) :: relative
       integer, intent(in) :: n_coordinates
       type(incidence_type), intent(out) :: self
+      !> Harmonics and the columns of their coefficients, for weights that turn (n_retained).
+      integer, intent(in), optional :: harmonic(:), column(:)
       integer :: j
 
       self%n_rows = relative%n_rows
       self%first = relative%row_start
       self%coordinate = relative%row_coordinate
       self%weight = relative%row_weight
+      if (allocated(relative%turned) .and. present(harmonic) .and. present(column)) then
+         self%turned = relative%turned
+         self%harmonic = harmonic
+         self%column = column
+      end if
       self%identity = [(j, j=1, n_coordinates)]
    end subroutine new_incidence
 
@@ -87,6 +99,17 @@ contains
       real(wp), intent(out) :: values(size(rows), n_columns)
       integer :: i, e, k
 
+      if (allocated(self%turned)) then
+         values = 0.0_wp
+         do i = 1, size(rows)
+            if (rows(i) == 0) cycle
+            do e = self%first(rows(i)), self%first(rows(i) + 1) - 1
+               call add_turned(self, e, .false., n_columns, 1.0_wp, q(self%coordinate(e), :), &
+                               values(i, :))
+            end do
+         end do
+         return
+      end if
       do k = 1, n_columns
          do i = 1, size(rows)
             values(i, k) = 0.0_wp
@@ -108,6 +131,16 @@ contains
       real(wp), intent(inout) :: q(n_coordinates, n_columns)
       integer :: i, e, k
 
+      if (allocated(self%turned)) then
+         do i = 1, size(rows)
+            if (rows(i) == 0) cycle
+            do e = self%first(rows(i)), self%first(rows(i) + 1) - 1
+               call add_turned(self, e, .true., n_columns, factor, values(i, :), &
+                               q(self%coordinate(e), :))
+            end do
+         end do
+         return
+      end if
       do k = 1, n_columns
          do i = 1, size(rows)
             if (rows(i) == 0) cycle
@@ -136,6 +169,10 @@ contains
       do e = self%first(row), self%first(row + 1) - 1
          place = map(self%coordinate(e))
          if (place == 0 .or. place > n_mapped) cycle
+         if (allocated(self%turned)) then
+            call add_turned(self, e, .false., size(values), factor, q(place, :size(values)), values)
+            cycle
+         end if
          do k = 1, size(values)
             values(k) = values(k) + factor*self%weight(e)*q(place, k)
          end do
@@ -157,6 +194,10 @@ contains
       do e = self%first(row), self%first(row + 1) - 1
          place = map(self%coordinate(e))
          if (place == 0 .or. place > n_mapped) cycle
+         if (allocated(self%turned)) then
+            call add_turned(self, e, .true., size(values), factor, values, q(place, :size(values)))
+            cycle
+         end if
          do k = 1, size(values)
             q(place, k) = q(place, k) + factor*self%weight(e)*values(k)
          end do
@@ -240,15 +281,44 @@ contains
       end do
    end subroutine add_mapped_block
 
-   !> Weight of an entry in a harmonic: the same real one in all, as long as nothing turns from
-   !> harmonic to harmonic.
+   !> target = target + factor w source of one entry, or its conjugate weight, coefficient by
+   !> coefficient: w (uc - i us) is the complex amplitude.
+   pure subroutine add_turned(self, e, conjugated, n_columns, factor, source, target)
+      type(incidence_type), intent(in) :: self
+      integer, intent(in) :: e
+      logical, intent(in) :: conjugated
+      integer, intent(in) :: n_columns
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: source(:)
+      real(wp), intent(inout) :: target(:)
+      real(wp) :: a, b
+      integer :: h, k
+
+      do h = 1, size(self%harmonic)
+         k = self%column(h)
+         if (k > n_columns) exit
+         a = factor*real(self%turned(e, h), wp)
+         if (self%harmonic(h) == 0) then
+            target(k) = target(k) + a*source(k)
+            cycle
+         end if
+         b = factor*aimag(self%turned(e, h))
+         if (conjugated) b = -b
+         target(k) = target(k) + a*source(k) + b*source(k + 1)
+         target(k + 1) = target(k + 1) + a*source(k + 1) - b*source(k)
+      end do
+   end subroutine add_turned
+
+   !> Weight of an entry in a harmonic: the same real one in all, or one that turns.
    pure complex(wp) function harmonic_weight(self, e, h) result(weight)
       type(incidence_type), intent(in) :: self
       integer, intent(in) :: e, h
 
-      associate (unused => h)
-      end associate
-      weight = cmplx(self%weight(e), kind=wp)
+      if (allocated(self%turned)) then
+         weight = self%turned(e, h)
+      else
+         weight = cmplx(self%weight(e), kind=wp)
+      end if
    end function harmonic_weight
 
 end module fw_incidence

@@ -5,6 +5,8 @@ module fw_joint
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: spring_type
    use fw_contact_data, only: memory_carried
+   use fw_cyclic_relative, only: cyclic_relative
+   use fw_cyclic_relative, only: new_cyclic_relative
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -17,7 +19,7 @@ module fw_joint
    implicit none (type, external)
    private
 
-   public :: joint_type, new_joint
+   public :: joint_type, new_joint, turn_joint
 
    type :: joint_type
       !> Rows of pairs and springs, and the coordinates that they are combinations of.
@@ -31,6 +33,8 @@ module fw_joint
       integer :: n_idle = 0
       !> Whether the solution has odd harmonics only (u(t + T/2) = -u(t)).
       logical :: half_wave_symmetric = .false.
+      !> Of a cyclic structure: the coordinates of every nodal diameter.
+      type(cyclic_relative) :: cyclic
    end type joint_type
 
 contains
@@ -43,7 +47,7 @@ contains
       logical, intent(in) :: skip_idle
       type(joint_type), intent(out) :: self
       type(error_type), allocatable, intent(out) :: error
-      integer, allocatable :: side_1(:), side_2(:)
+      integer, allocatable :: side_1(:), side_2(:), sector_2(:)
       logical, allocatable :: moving(:)
       integer :: i, c, n_rows
 
@@ -51,7 +55,7 @@ contains
       call find_moving_dofs(model, contact, springs, moving)
       allocate (self%row(3, contact%n_pairs), source=0)
       allocate (self%idle(3, contact%n_pairs), source=.false.)
-      allocate (side_1(0), side_2(0))
+      allocate (side_1(0), side_2(0), sector_2(0))
       n_rows = 0
       do i = 1, contact%n_pairs
          do c = 1, 3
@@ -67,17 +71,61 @@ contains
             self%row(c, i) = n_rows
             side_1 = [side_1, contact%side_1(c, i)]
             side_2 = [side_2, contact%side_2(c, i)]
+            sector_2 = [sector_2, sector_of(contact%sector_2, i)]
          end do
       end do
       self%spring_row = [(n_rows + i, i=1, springs%n_springs)]
       if (springs%n_springs > 0) then
          side_1 = [side_1, springs%side_1]
          side_2 = [side_2, springs%side_2]
+         sector_2 = [sector_2, (sector_of(springs%sector_2, i), i=1, springs%n_springs)]
+      end if
+      self%half_wave_symmetric = symmetric(model, contact, springs, self)
+      if (model%cyclic%is_cyclic) then
+         call new_cyclic_relative(model, side_1, side_2, sector_2, self%cyclic)
+         return
       end if
       call new_relative(model%n_dof, side_1, side_2, self%relative)
-      self%half_wave_symmetric = symmetric(model, contact, springs, self)
       call check_independent(contact, self, error)
    end subroutine new_joint
+
+   pure integer function sector_of(sector_2, element) result(sector)
+      integer, allocatable, intent(in) :: sector_2(:)
+      integer, intent(in) :: element
+
+      sector = 0
+      if (allocated(sector_2)) sector = sector_2(element)
+   end function sector_of
+
+   !> Give the rows of a cyclic structure the weights that they have in the harmonics in use.
+   subroutine turn_joint(model, contact, harmonic, self, error)
+      type(model_type), intent(in) :: model
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: harmonic(:)
+      type(joint_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: component(*) = [character(2) :: 't1', 't2', 'n']
+      type(law_facts) :: facts
+      integer :: h, i, k, row
+      integer :: place(2)
+
+      if (.not. model%cyclic%is_cyclic) return
+      call self%cyclic%lay_out(model%cyclic, harmonic, self%relative)
+      facts = facts_of(contact%law)
+      if (.not. facts%needs_independent .or. contact%n_pairs == 0) return
+      do h = 1, size(harmonic)
+         k = model%cyclic%nodal_diameter(harmonic(h))
+         row = self%cyclic%first_dependent(k, [(any(self%row == i), i=1, self%cyclic%n_rows)])
+         if (row == 0) cycle
+         place = findloc(self%row, row)
+         call fatal_error(error, '&contact pair '//to_text(place(2))//', '// &
+                          trim(component(place(1)))//': in nodal diameter '//to_text(k)// &
+                          ' its relative displacement vanishes or follows from that of earlier '// &
+                          'pairs, so rigid contact forces are not determined; remove the pair '// &
+                          'or use law = ''penalty''', status_input)
+         return
+      end do
+   end subroutine turn_joint
 
    !> Dofs that a load can reach through the matrices, the pairs and the springs (0:n_dof; entry
    !> 0, the ground, never moves). What no load reaches stays at rest exactly.
@@ -89,6 +137,11 @@ contains
       integer :: i, c, n_moving
 
       allocate (moving(0:model%n_dof), source=.false.)
+      if (model%cyclic%has_nodal()) then
+         ! Modal coordinates join everything.
+         moving(1:) = .true.
+         return
+      end if
       moving(1:) = abs(model%load_static) + abs(model%load_cosine) + abs(model%load_sine) > 0.0_wp
       do i = 1, contact%n_pairs
          ! An interference pushes both sides.
@@ -113,6 +166,11 @@ contains
          do i = 1, springs%n_springs
             call couple(springs%side_1(i), springs%side_2(i))
          end do
+         if (allocated(model%cyclic%left)) then
+            do i = 1, size(model%cyclic%left)
+               call couple(model%cyclic%left(i), model%cyclic%right(i))
+            end do
+         end if
          if (count(moving) == n_moving) exit
       end do
 

@@ -242,6 +242,7 @@ contains
       type(solver_report) :: report
 
       whole_x = x
+      if (case%model%cyclic%is_cyclic) return
       if (case%model%n_dof*system%problem%fourier%n_coefficients > whole_up_to) return
       allocate (self%whole, self%whole_problem)
       ! One and the same law.

@@ -7,6 +7,7 @@ module fw_joint_modes
    use fw_laws, only: new_law
    use fw_modes, only: mode_type
    use fw_pair_law, only: pair_law
+   use fw_sector_modes, only: find_sector_modes
    implicit none (type, external)
    private
 
@@ -28,6 +29,8 @@ module fw_joint_modes
    !> Dofs up to which modes are looked for: their eigenvalue problems cost the cube of that, the
    !> solution of a point far less with as many.
    integer, parameter :: most_dofs = 2000
+   !> The first component of pairs that each state holds.
+   integer, parameter :: first_held(*) = [4, 3, 1]
 
 contains
 
@@ -46,6 +49,11 @@ contains
       load = reshape([case%model%load_cosine, case%model%load_sine], [case%model%n_dof, 2])
       do state = state_free, state_stuck
          if (.not. differs(case, state)) cycle
+         if (case%model%cyclic%is_cyclic) then
+            call find_sector_modes(case, first_held(state), range, found)
+            call join(found, state, modes)
+            cycle
+         end if
          call held_stiffness(case, state, stiffness)
          call find_modes(case%model%mass, case%model%damping, stiffness, load, &
                          case%model%observe_matrix, range, found)

@@ -73,6 +73,7 @@ contains
                                     state%all_converged())
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
          if (state%was_stopped .or. state%all_converged()) return
+         if (case%model%cyclic%is_cyclic .and. case%solver%fallback) call summary%leave_fallback()
          ! What cannot help in this case is left out.
          message = 'try a finer sweep, the other direction'
          if (takes_scale(system)) message = message//', another penalty_scale (0.3 or 3)'

@@ -212,7 +212,8 @@ contains
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
 
-      if (self%flow_failures < max_flow_failures) then
+      ! No flow has been derived for the whole of cyclic structures.
+      if (self%flow_failures < max_flow_failures .and. .not. case%model%cyclic%is_cyclic) then
          call by_flow(self, case, pseudo_time_options(max_steps=fallback_steps), system, omega, &
                       report, iterations, error)
          if (allocated(error)) return

@@ -9,6 +9,11 @@ module fw_problem
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_point
    use fw_case, only: analysis_wear
+   use fw_cyclic_structure, only: cyclic_structure
+   use fw_cyclic_structure, only: means_none
+   use fw_cyclic_structure, only: means_split
+   use fw_cyclic_structure, only: means_static
+   use fw_cyclic_structure, only: new_cyclic_structure
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -28,6 +33,7 @@ module fw_problem
    use fw_harmonics_options, only: sampling_events
    use fw_joint, only: joint_type
    use fw_joint, only: new_joint
+   use fw_joint, only: turn_joint
    use fw_memory, only: require_memory
    use fw_plain_structure, only: new_plain_structure
    use fw_plain_structure, only: plain_structure
@@ -87,7 +93,6 @@ contains
       logical :: skip_idle
       type(joint_type) :: joint
       type(fourier_type) :: fourier
-      type(plain_structure), allocatable :: plain
       class(structure_operator), allocatable :: structure
       type(force_list) :: laws
       real(wp) :: range(2)
@@ -112,11 +117,10 @@ contains
       if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
          range = follow_range*range
       end if
-      allocate (plain)
-      call new_plain_structure(case%model, joint%relative, fourier%harmonic, range, plain, &
-                               error, keep_all, held=held)
+      call turn_joint(case%model, case%contact, fourier%harmonic, joint, error)
+      if (.not. allocated(error)) call new_structure(case, joint, laws, fourier, range, structure, &
+                                                     error, keep_all, held)
       if (allocated(error)) return
-      call move_alloc(plain, structure)
       call structure%new_state(stand)
       call structure%at(stand, case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
@@ -125,6 +129,42 @@ contains
       problem%solves_values = harmonics%method == method_hdhb
       if (.not. present(forces)) call problem%scale_forces(stand)
    end subroutine build_problem
+
+   !> The structure of a case, condensed.
+   subroutine new_structure(case, joint, forces, fourier, range, structure, error, keep_all, &
+                            held)
+      type(case_type), intent(in) :: case
+      type(joint_type), intent(in) :: joint
+      type(force_list), intent(in) :: forces
+      type(fourier_type), intent(in) :: fourier
+      !> Lowest and highest frequency [rad/s].
+      real(wp), intent(in) :: range(2)
+      class(structure_operator), allocatable, intent(out) :: structure
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: keep_all
+      !> Of plain structures, see build_system.
+      type(held_basis), intent(inout), optional :: held
+      type(plain_structure), allocatable :: plain
+      type(cyclic_structure), allocatable :: cyclic
+      integer :: means
+
+      if (.not. case%model%cyclic%is_cyclic) then
+         allocate (plain)
+         call new_plain_structure(case%model, joint%relative, fourier%harmonic, range, plain, &
+                                  error, keep_all, held=held)
+         call move_alloc(plain, structure)
+         return
+      end if
+      associate (p => forces%entry(forces%pairs)%law%prediction)
+         means = means_none
+         if (p%takes_balance) means = means_static
+         if (p%has_inertia) means = means_split
+      end associate
+      allocate (cyclic)
+      call new_cyclic_structure(case%model, joint%cyclic, fourier%harmonic, range, means, cyclic, &
+                                error)
+      call move_alloc(cyclic, structure)
+   end subroutine new_structure
 
    !> Only odd harmonics where the symmetry is exact, and keeps so at the instants: their number
    !> must be even.
@@ -236,7 +276,8 @@ contains
    !> Whether events are located. Left to the program, they are where that is exact (one tangential
    !> direction) and nothing asks for instants: as fast as sampling, faster from 7 harmonics on, and
    !> more accurate (measured by `make bench-precision`). With an accuracy to keep, also for few
-   !> pairs with two directions: for one or 16, fewer instants make up for what each costs; for 48 not.
+   !> pairs with two directions: for one or 16, fewer instants make up for what each costs; for 48
+   !> not.
    pure logical function locates_events(case, harmonics, joint)
       type(case_type), intent(in) :: case
       type(harmonics_options), intent(in) :: harmonics

@@ -4,6 +4,7 @@ module fw_run
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_combinations, only: check_combinations
+   use fw_case, only: analysis_modes
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -17,9 +18,11 @@ module fw_run
    use fw_restart_file, only: read_restart
    use fw_restart_file, only: restart_type
    use fw_result, only: result_writer
+   use fw_run_modes, only: run_modes
    use fw_run_state, only: run_state
    use fw_summary, only: summary_type
    use fw_summary, only: new_summary
+   use fw_text, only: string_type
    use fw_text, only: to_text
    use fw_threads, only: thread_scope
    use fw_wear_response, only: run_wear
@@ -44,7 +47,7 @@ contains
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
       call threads%enter(case%threads)
-      call build_system(case, problem, system, error)
+      if (case%analysis /= analysis_modes) call build_system(case, problem, system, error)
       call threads%leave()
    end subroutine check_case
 
@@ -67,6 +70,7 @@ contains
       type(thread_scope) :: threads
       type(error_type), allocatable :: close_error
       type(restart_type) :: restart
+      type(string_type), allocatable :: table(:)
       integer(int64) :: clock, clock_end, rate
       real(wp) :: elapsed
 
@@ -88,8 +92,10 @@ contains
       ! host.
       call threads%enter(case%threads)
       summary = new_summary(case)
-      call remark_input(case, summary%remarks)
-      if (case%analysis == analysis_wear) then
+      if (case%analysis /= analysis_modes) call remark_input(case, summary%remarks)
+      if (case%analysis == analysis_modes) then
+         call run_modes(case, writer, table, error)
+      else if (case%analysis == analysis_wear) then
          call run_wear(case, restart, observer, writer, summary, state, error)
       else
          call run_frequency_response(case, observer, writer, summary, state, error)
@@ -118,7 +124,11 @@ contains
          '%max_seconds = '//to_text(case%max_seconds)//' s')
       call writer%close(trim(state%words()), elapsed, error, summary%skipped, summary%sampling)
       if (present(image)) call move_alloc(writer%image, image)
-      outcome%summary = summary%lines(state, elapsed)
+      if (allocated(table)) then
+         call move_alloc(table, outcome%summary)
+      else
+         outcome%summary = summary%lines(state, elapsed)
+      end if
    end subroutine run_case
 
    !> A flag that may be absent: then it is true.

@@ -65,6 +65,7 @@ module fw_summary
       procedure :: describe_peaks
       procedure :: describe_bifurcations
       procedure :: note_fallback
+      procedure :: leave_fallback
       procedure :: describe_harmonics
       procedure :: describe_accuracy
       procedure :: describe_wear
@@ -251,6 +252,13 @@ contains
 
       call add_line(self%work, 'fallback', 'pseudo-time served '//to_text(n_points)//' points')
    end subroutine note_fallback
+
+   !> Points of cyclic structures that did not converge might have done with it.
+   subroutine leave_fallback(self)
+      class(summary_type), intent(inout) :: self
+
+      call add_line(self%work, 'left out', 'pseudo-time, which cyclic structures do not have')
+   end subroutine leave_fallback
 
    !> How many harmonics the points took.
    subroutine describe_harmonics(self, n_short, tolerance)

@@ -23,6 +23,9 @@ module fw_contact_data
       integer :: law = 1
       !> Signed dof numbers of (t1, t2, n), 0 where there is none (3, n_pairs).
       integer, allocatable :: side_1(:, :), side_2(:, :)
+      !> Sector of side 2 from that of side 1, in cyclic structures (n_pairs); 0 where it is not
+      !> allocated.
+      integer, allocatable :: sector_2(:)
       !> Friction coefficient (n_pairs).
       real(wp), allocatable :: mu(:)
       !> Initial gap, negative for an interference [length] (n_pairs).
@@ -52,6 +55,8 @@ module fw_contact_data
       integer :: n_springs = 0
       !> Signed dof numbers, 0 for ground (n_springs).
       integer, allocatable :: side_1(:), side_2(:)
+      !> As of contact_type (n_springs).
+      integer, allocatable :: sector_2(:)
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
    end type spring_type

@@ -63,6 +63,9 @@ contains
       call keys%bind(key('side_2', 'the same of the other side, 0: ground; the normal points '// &
                          'from side 2 to side 1', dof_numbers(), shape='3 x n_pairs', &
                          absent=of_file), contact%side_2, default=0)
+      call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1: 1 is the '// &
+                         'next, -1 the one before', shape='n_pairs', absent='of the file, else 0', &
+                         only='&cyclic'), contact%sector_2, default=0)
    end subroutine bind_sides
 
    !> Friction coefficients; only pairs with tangential dofs need one.
@@ -170,6 +173,8 @@ contains
                          absent='required'), springs%side_1, needed)
       call keys%bind(key('side_2', 'dof on the other side, 0: ground', dof_numbers(), &
                          shape='n_springs'), springs%side_2, default=0)
+      call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1', &
+                         shape='n_springs', only='&cyclic'), springs%sector_2, default=0)
       call keys%bind(key('coefficient', 'force = coefficient * elongation**power', &
                          unit='F/L^power', shape='n_springs', absent='required'), &
                      springs%coefficient, needed)

@@ -17,10 +17,13 @@ module fw_case
    private
 
    public :: case_type, output_options
-   public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time
+   public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
+             analysis_modes
 
-   character(*), parameter :: analysis_words(*) = [character(5) :: 'frf', 'point', 'wear', 'time']
-   integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, analysis_time = 4
+   character(*), parameter :: analysis_words(*) = &
+      [character(5) :: 'frf', 'point', 'wear', 'time', 'modes']
+   integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
+                         analysis_time = 4, analysis_modes = 5
 
    !> What is written (group &output).
    type :: output_options
@@ -76,8 +79,9 @@ contains
       call keys%open('case', 'title, kind of analysis, threads')
       call keys%bind(key('title', 'stands in the result file', &
                          absent='title of the model file, or name of the namelist'), self%title)
-      call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, or '// &
-                              'integration in time'), self%analysis, analysis_words)
+      call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
+                              'integration in time, or natural frequencies'), self%analysis, &
+                          analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)
       call keys%bind(key('max_seconds', 'time after which the run ends with the points that '// &

@@ -3,7 +3,8 @@
 !> Ranges of single keys are checked where the keys are declared, and what needs the model where it
 !> is built. The first combination that fails is told: others may follow from it.
 module fw_combinations
-   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_time, analysis_wear
+   use fw_case, only: case_type, analysis_frf, analysis_modes, analysis_point, analysis_time, &
+                      analysis_wear
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
@@ -45,9 +46,31 @@ contains
       if (.not. allocated(error)) call check_adaptive(case, error)
       if (.not. allocated(error)) call check_accuracy(case, error)
       if (.not. allocated(error)) call check_stability(case, error)
+      if (.not. allocated(error)) call check_cyclic(case, error)
       if (.not. allocated(error)) call check_law(case, error)
       if (.not. allocated(error)) call check_wear(case, error)
    end subroutine check_combinations
+
+   !> What waves around a cyclic structure cannot do.
+   subroutine check_cyclic(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: with = ' does not go with a cyclic structure (&cyclic): '
+
+      if (.not. case%model%cyclic%is_cyclic) return
+      if (case%analysis == analysis_time) then
+         call fatal_error(error, "case%analysis = 'time'"//with//"use 'frf' or 'point', or "// &
+                          'model all sectors', status_input)
+      else if (case%sweep%stability .and. case%analysis /= analysis_modes) then
+         call fatal_error(error, 'sweep%stability = .true.'//with//'a wave may lose its '// &
+                          'stability to motions of other nodal diameters; leave it out', &
+                          status_input)
+      else if (case%solver%kind == solver_pseudo_time) then
+         call fatal_error(error, "solver%kind = 'pseudo_time'"//with//"use 'newton'", status_input)
+      else if (case%output%tail > 0) then
+         call fatal_error(error, 'output%tail'//with//'take more n_harmonics', status_input)
+      end if
+   end subroutine check_cyclic
 
    !> What the law of the pairs cannot do.
    subroutine check_law(case, error)

@@ -4,6 +4,8 @@
 !> HDF5 counts the slowest dimension first, and matrices are transposed back, so that element
 !> (i, j) is the one h5py calls [i-1, j-1].
 module fw_model_file
+   use fw_cyclic_file, only: cyclic_parts
+   use fw_cyclic_file, only: read_cyclic_file
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -54,9 +56,21 @@ module fw_model_file
       !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
       type(string_type), allocatable :: observe_name(:)
       real(wp), allocatable :: observe_matrix(:, :)
+      !> What makes the model a sector of a cyclic structure.
+      type(cyclic_parts) :: cyclic
+   contains
+      procedure :: order
    end type file_model_type
 
 contains
+
+   !> Number of dofs: of matrices of nodal diameters, the displacements in front.
+   pure integer function order(self)
+      class(file_model_type), intent(in) :: self
+
+      order = self%cyclic%n_physical
+      if (allocated(self%stiffness)) order = size(self%stiffness, 1)
+   end function order
 
    !> Read a model file.
    subroutine read_model_hdf5(path, model, error)
@@ -73,6 +87,7 @@ contains
       model%files(1)%text = path
       ! In this order: the mass gives n_dof, the dofs of side 1 the number of pairs.
       call read_header(file, model, error)
+      if (.not. allocated(error)) call read_cyclic_file(file, model%cyclic, error)
       if (.not. allocated(error)) call read_structure(file, model, error)
       if (.not. allocated(error)) call read_contact(file, model, error)
       if (.not. allocated(error)) call read_loads(file, model, error)
@@ -119,6 +134,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: n
 
+      if (allocated(model%cyclic%nodal)) return
       call read_matrix(file, '/mass', 0, model%mass, error, required=.true.)
       if (allocated(error)) return
       n = size(model%mass, 1)
@@ -158,6 +174,13 @@ contains
       call read_positions(file, '/contact/position', n, model%position, error)
       if (allocated(error)) return
       call read_names(file, '/contact/patch', n, model%patch, error)
+      if (allocated(error) .or. .not. file%exists('/contact/sector_2')) return
+      call read_dataset(file, '/contact/sector_2', model%cyclic%sector_2, error)
+      if (allocated(error)) return
+      if (size(model%cyclic%sector_2) == n) return
+      call dataset_failure(file, '/contact/sector_2', 'has '// &
+                           to_text(size(model%cyclic%sector_2))//' values, expected '// &
+                           to_text(n), error)
    end subroutine read_contact
 
    !> Loads; an absent one is zero.
@@ -167,7 +190,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: n
 
-      n = size(model%mass, 1)
+      n = model%order()
       call read_vector(file, '/load/static', n, model%load_static, error)
       if (allocated(error)) return
       call read_vector(file, '/load/cosine', n, model%load_cosine, error)
@@ -187,6 +210,11 @@ contains
       if (.not. file%exists('/observe')) return
       by_dof = file%exists('/observe/dof')
       by_matrix = file%exists('/observe/matrix')
+      if (allocated(model%cyclic%nodal) .and. .not. (by_dof .or. by_matrix)) then
+         ! The rows stand with the nodal diameters.
+         call read_names(file, '/observe/name', -1, model%observe_name, error, required=.true.)
+         return
+      end if
       if (by_dof .eqv. by_matrix) then
          call fatal_error(error, file%path//': group /observe holds '// &
                           trim(merge('both   ', 'neither', by_dof))// &
@@ -196,7 +224,7 @@ contains
       call read_names(file, '/observe/name', -1, model%observe_name, error, required=.true.)
       if (allocated(error)) return
       if (by_matrix) then
-         call read_matrix(file, '/observe/matrix', size(model%mass, 1), model%observe_matrix, &
+         call read_matrix(file, '/observe/matrix', model%order(), model%observe_matrix, &
                           error, n_rows=size(model%observe_name))
       else
          call read_observed_dofs(file, model, error)
@@ -211,7 +239,7 @@ contains
       integer, allocatable :: dof(:)
       integer :: i, n
 
-      n = size(model%mass, 1)
+      n = model%order()
       call read_dataset(file, '/observe/dof', dof, error)
       if (allocated(error)) return
       if (size(dof) /= size(model%observe_name)) then

@@ -1,7 +1,7 @@
 !> From a namelist file to a validated case.
 module fw_read_case
    use fw_combinations, only: check_combinations
-   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_wear
+   use fw_case, only: case_type, analysis_frf, analysis_modes, analysis_point, analysis_wear
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
@@ -10,6 +10,7 @@ module fw_read_case
    use fw_model_keys, only: model_options
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
+   use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_model, only: read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_sweep
    use fw_read_output, only: read_output, read_observed
@@ -221,9 +222,12 @@ contains
       type(file_model_type), intent(in), optional :: memory_model
       type(model_options) :: options
       character(:), allocatable :: worn
+      integer :: n_dof
 
-      call read_model(reader, directory_of(path), options, raw, error, memory_model)
+      call read_model(reader, directory_of(path), options, raw, n_dof, error, memory_model)
       if (allocated(error)) return
+      call read_cyclic(reader, raw%cyclic, n_dof, case%analysis /= analysis_modes, &
+                       case%model%cyclic)
       call read_contact(reader, raw, case%analysis == analysis_wear, case%contact)
       call read_worn(reader, directory_of(path), case%contact, worn, error)
       if (allocated(error)) return
@@ -232,6 +236,7 @@ contains
          call append(case%inputs, worn)
       end if
       call read_springs(reader, case%springs)
+      call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
       call read_loads(reader, options, raw)
       call finish_model(reader, options, raw, case%model, error)
       if (.not. allocated(case%title)) then

@@ -60,6 +60,7 @@ contains
       if (contact%n_pairs == n_file .and. n_file > 0) then
          contact%side_1 = file_model%side_1
          contact%side_2 = file_model%side_2
+         if (allocated(file_model%cyclic%sector_2)) contact%sector_2 = file_model%cyclic%sector_2
          if (allocated(file_model%mu)) contact%mu = file_model%mu
          if (allocated(file_model%gap)) contact%gap = file_model%gap
          if (allocated(file_model%area)) contact%area = file_model%area
@@ -105,7 +106,8 @@ contains
             end if
             ! A dof against itself would be a force of the pair on itself.
             do k = t1, n
-               if (a(k) == b(k) .and. a(k) > 0) then
+               ! Of another sector it is another dof.
+               if (a(k) == b(k) .and. a(k) > 0 .and. contact%sector_2(i) == 0) then
                   call refuse_pair(reader, i, 'has dof '//to_text(a(k))//' on both sides: '// &
                                    'they must differ')
                end if
@@ -226,6 +228,10 @@ contains
       associate (a => contact%side_1(t1:t2, :), b => contact%side_2(t1:t2, :))
          do k = 1, contact%n_pairs
             ! Turned round, the pair is the same.
+            if (contact%sector_2(k) /= contact%sector_2(i)) then
+               is(k) = .false.
+               cycle
+            end if
             is(k) = (all(a(:, k) == a(:, i)) .and. all(b(:, k) == b(:, i))) .or. &
                     (all(a(:, k) == b(:, i)) .and. all(b(:, k) == a(:, i)))
          end do
@@ -266,6 +272,7 @@ contains
       if (reader%failed()) return
       do i = 1, m
          if (abs(springs%side_1(i)) /= abs(springs%side_2(i))) cycle
+         if (springs%sector_2(i) /= 0) cycle
          call reader%refuse('spring', 'side_1', 'and side_2: spring '//to_text(i)//' has dof '// &
                             to_text(springs%side_1(i))//' on both sides: they must differ')
       end do

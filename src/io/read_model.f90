@@ -15,6 +15,7 @@ module fw_read_model
                             source_memory
    use fw_damping, only: add_modal_damping
    use fw_paths, only: resolve_path
+   use fw_read_nodal, only: finish_nodal
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_trial, only: trial_type
@@ -34,17 +35,17 @@ module fw_read_model
 contains
 
    !> Group &model: the matrices as they are given, before rotation and damping.
-   subroutine read_model(reader, directory, options, raw, error, memory_model)
+   subroutine read_model(reader, directory, options, raw, n_dof, error, memory_model)
       type(reader_type), intent(inout) :: reader
       !> Of the namelist; relative files start there.
       character(*), intent(in) :: directory
       type(model_options), intent(inout) :: options
       !> What the model consists of, whatever its source.
       type(file_model_type), intent(out) :: raw
+      integer, intent(out) :: n_dof
       type(error_type), allocatable, intent(out) :: error
       !> What the calling program hands over, with mass and stiffness.
       type(file_model_type), intent(in), optional :: memory_model
-      integer :: n_dof
       logical :: is_inline, is_file
 
       call choose_source(reader, present(memory_model), options)
@@ -55,11 +56,11 @@ contains
       if (present(memory_model)) then
          raw = memory_model
          reader%in_memory = .true.
-         n_dof = size(raw%stiffness, 1)
+         n_dof = raw%order()
       else if (is_file .and. allocated(options%file)) then
          call read_file(reader, directory, options, raw, error)
          if (allocated(error)) return
-         n_dof = size(raw%stiffness, 1)
+         n_dof = raw%order()
       end if
       if (allocated(options%file) .and. .not. is_file) then
          call reader%refuse('model', 'file', "is given, but source = '"// &
@@ -127,16 +128,16 @@ contains
    end subroutine read_in_trial
 
    !> The inline matrices, or the refusal of them beside a model file.
-   subroutine read_matrices(reader, is_inline, n_file, raw)
+   subroutine read_matrices(reader, is_inline, n_dof, raw)
       type(reader_type), intent(inout) :: reader
       logical, intent(in) :: is_inline
-      !> Dofs of the model file.
-      integer, intent(in) :: n_file
+      !> Dofs of the model file on entry.
+      integer, intent(inout) :: n_dof
       type(file_model_type), intent(inout) :: raw
       real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
-      integer :: n_dof
+      integer :: n_file
 
-      n_dof = n_file
+      n_file = n_dof
       call bind_order(reader, n_dof, is_inline)
       if (.not. is_inline .and. n_dof /= n_file) then
          call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model has '// &
@@ -182,6 +183,11 @@ contains
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
 
+      if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
+      if (allocated(raw%cyclic%nodal)) then
+         call finish_nodal(reader, options, raw, model, error)
+         return
+      end if
       call check_parts(reader, raw, options%source == source_inline)
       if (reader%failed()) return
       model%n_dof = size(raw%stiffness, 1)
@@ -201,9 +207,11 @@ contains
       end if
       model%damping = model%damping + options%rayleigh_mass*model%mass &
                       + options%rayleigh_stiffness*model%stiffness
-      if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
       ! Last: its modes are those of the rotating structure, contact open.
-      if (options%modal_damping > 0.0_wp) then
+      if (model%cyclic%is_cyclic) then
+         ! Modes are those of the tied sectors.
+         model%cyclic%modal_damping = options%modal_damping
+      else if (options%modal_damping > 0.0_wp) then
          call add_modal_damping(model%mass, model%stiffness, options%modal_damping, model%damping, &
                                 error)
       end if

@@ -3,7 +3,7 @@
 !> Single values have passed the range of their key already (fw_key_range). Here are the refusals
 !> that need two keys or the analysis, and what follows from other keys where one is left out.
 module fw_read_options
-   use fw_case, only: analysis_frf, analysis_time
+   use fw_case, only: analysis_frf, analysis_modes, analysis_time
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
                                    instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
@@ -82,8 +82,11 @@ contains
       integer, intent(in) :: analysis
       type(sweep_options), intent(inout) :: options
 
-      call reader%require_group('sweep', 'the frequency: start (and end and n_points of a sweep)')
-      call options%bind_keys(reader, analysis == analysis_frf)
+      if (analysis /= analysis_modes) then
+         call reader%require_group('sweep', &
+                                   'the frequency: start (and end and n_points of a sweep)')
+      end if
+      call options%bind_keys(reader, analysis == analysis_frf, analysis /= analysis_modes)
       call check_ends(reader, analysis, options)
       if (allocated(options%frequencies)) call take_list(reader, analysis, options)
       ! Everything inside is in rad/s; the effective input keeps the unit of the user.

@@ -6,6 +6,7 @@ module fw_read_output
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type
+   use fw_read_nodal, only: observe_nodal
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
@@ -44,7 +45,7 @@ contains
       type(model_type), intent(inout) :: model
       type(string_type), allocatable :: chosen(:), names(:)
       logical, allocatable :: is_text(:)
-      real(wp), allocatable :: rows(:, :)
+      real(wp), allocatable :: rows(:, :), chosen_rows(:, :)
       integer :: i, most
 
       most = model%n_dof
@@ -55,17 +56,19 @@ contains
       call list_default(raw, model%n_dof, names, rows)
       if (size(chosen) == 0) then
          call move_alloc(names, model%observe_name)
-         call move_alloc(rows, model%observe_matrix)
-         return
+         call move_alloc(rows, chosen_rows)
+      else
+         allocate (model%observe_name(size(chosen)))
+         allocate (chosen_rows(size(chosen), size(rows, 2)), source=0.0_wp)
+         do i = 1, size(chosen)
+            call choose(reader, chosen(i)%text, is_text(i), names, rows, model%n_dof, &
+                        model%observe_name(i)%text, chosen_rows(i, :))
+            call refuse_repeated(reader, model%observe_name(:i))
+            if (reader%failed()) return
+         end do
       end if
-      allocate (model%observe_name(size(chosen)))
-      allocate (model%observe_matrix(size(chosen), model%n_dof), source=0.0_wp)
-      do i = 1, size(chosen)
-         call choose(reader, chosen(i)%text, is_text(i), names, rows, model%observe_name(i)%text, &
-                     model%observe_matrix(i, :))
-         call refuse_repeated(reader, model%observe_name(:i))
-         if (reader%failed()) return
-      end do
+      model%observe_matrix = chosen_rows(:, :model%n_dof)
+      call observe_nodal(raw, chosen_rows(:, model%n_dof + 1:), model)
    end subroutine read_observed
 
    !> The key of what is observed: numbers and names as they are given.
@@ -89,11 +92,20 @@ contains
       integer, intent(in) :: n_dof
       type(string_type), allocatable, intent(out) :: names(:)
       real(wp), allocatable, intent(out) :: rows(:, :)
-      integer :: i
+      integer :: i, n
 
       if (allocated(raw%observe_matrix) .and. allocated(raw%observe_name)) then
          names = raw%observe_name
          rows = raw%observe_matrix
+         return
+      else if (allocated(raw%observe_name)) then
+         ! Rows that stand with the nodal diameters: each is its own number there.
+         names = raw%observe_name
+         n = size(names)
+         allocate (rows(n, n_dof + n), source=0.0_wp)
+         do i = 1, n
+            rows(i, n_dof + i) = 1.0_wp
+         end do
          return
       end if
       allocate (names(n_dof))
@@ -105,12 +117,13 @@ contains
    end subroutine list_default
 
    !> One value of `observe`: a dof number, or a name.
-   subroutine choose(reader, value, is_text, names, rows, name, row)
+   subroutine choose(reader, value, is_text, names, rows, n_dof, name, row)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: value
       logical, intent(in) :: is_text
       type(string_type), intent(in) :: names(:)
       real(wp), intent(in) :: rows(:, :)
+      integer, intent(in) :: n_dof
       character(:), allocatable, intent(out) :: name
       real(wp), intent(inout) :: row(:)
       integer :: dof, i
@@ -126,11 +139,11 @@ contains
       call read_integer(value, dof, is_number)
       if (is_number .and. .not. is_text) then
          name = 'u'//to_text(dof)
-         if (dof >= 1 .and. dof <= size(row)) then
+         if (dof >= 1 .and. dof <= n_dof) then
             row(dof) = 1.0_wp
          else
             call reader%refuse('output', 'observe', '= '//to_text(dof)// &
-                               ': must be a dof from 1 to '//to_text(size(row)))
+                               ': must be a dof from 1 to '//to_text(n_dof))
          end if
       else
          call reader%refuse('output', 'observe', '= '//quoted_text(value)// &

@@ -9,7 +9,10 @@ module fw_result
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_bifurcation, only: bifurcation_list
    use fw_bifurcation_group, only: write_bifurcations
+   use fw_case, only: analysis_modes
    use fw_case, only: case_type
+   use fw_cyclic_group, only: write_cyclic
+   use fw_cyclic_group, only: write_modes
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -61,6 +64,7 @@ module fw_result
       procedure :: add_peaks
       procedure :: add_bifurcations
       procedure :: add_remarks
+      procedure :: add_modes
       procedure :: sort_points
       procedure :: flush
       procedure :: close
@@ -104,7 +108,11 @@ contains
       if (allocated(error)) return
       call write_header(self%file, case, error)
       if (.not. allocated(error)) call write_pairs(self%file, case, error)
-      if (.not. allocated(error)) call self%rows%create(self%file, case, error)
+      if (.not. allocated(error)) call write_cyclic(self%file, case, error)
+      ! Natural frequencies are no points.
+      if (.not. allocated(error) .and. case%analysis /= analysis_modes) then
+         call self%rows%create(self%file, case, error)
+      end if
       if (.not. allocated(error)) call flush_file(self, error)
       if (allocated(error)) call discard_file(self)
    end subroutine create_file
@@ -166,6 +174,22 @@ contains
       call write_bifurcations(self%file, list, n_harmonics, unit_system, error)
       !$omp end critical (fretwear_io)
    end subroutine add_bifurcations
+
+   !> Natural frequencies of the nodal diameters.
+   subroutine add_modes(self, nodal_diameter, open, closed, unit_system, error)
+      class(result_writer), intent(inout) :: self
+      integer, intent(in) :: nodal_diameter(:)
+      !> (n_modes, n_diameters) [rad/s].
+      real(wp), intent(in) :: open(:, :), closed(:, :)
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call write_modes(self%file, nodal_diameter, open, closed, unit_system, error)
+      !$omp end critical (fretwear_io)
+   end subroutine add_modes
 
    !> Bring the rows into the order of their frequencies.
    subroutine sort_points(self, descending, error)

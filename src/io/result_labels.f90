@@ -50,6 +50,13 @@ module fw_result_labels
                  'what happens there, an index into names'), &
       label_type('/bifurcation/found_by', '', 'bifurcation', &
                  'how it was found, an index into names'), &
+      label_type('/cyclic/nodal_diameter', '', 'harmonic', &
+                 'signed nodal diameter of each harmonic'), &
+      label_type('/modes/nodal_diameter', '', 'diameter', 'nodal diameter'), &
+      label_type('/modes/open', 'rad/s', 'diameter mode', &
+                 'natural frequencies without contact'), &
+      label_type('/modes/closed', 'rad/s', 'diameter mode', &
+                 'natural frequencies with every pair closed'), &
       label_type('/wear/depth_halved', '<length>', 'pair', &
                  'final wear depth with steps of half the size')]
 

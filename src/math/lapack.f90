@@ -10,7 +10,7 @@ module fw_lapack
    private
 
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
-   public :: dgeev, dpotrf, ztrsv, cgetrf, claswp, ctrsv
+   public :: dgeev, dpotrf, ztrsv, cgetrf, claswp, ctrsv, zhegvd, zpotrf, zpotrs
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -166,6 +166,39 @@ module fw_lapack
          real(wp), intent(inout) :: work(*)
          integer, intent(out) :: info
       end subroutine dgeev
+
+      !> As dsygvd for Hermitian matrices.
+      subroutine zhegvd(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, rwork, lrwork, &
+                        iwork, liwork, info)
+         import :: wp
+         integer, intent(in) :: itype, n, lda, ldb, lwork, lrwork, liwork
+         character, intent(in) :: jobz, uplo
+         complex(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         real(wp), intent(out) :: w(*)
+         complex(wp), intent(inout) :: work(*)
+         real(wp), intent(inout) :: rwork(*)
+         integer, intent(inout) :: iwork(*)
+         integer, intent(out) :: info
+      end subroutine zhegvd
+
+      !> As dpotrf for a Hermitian matrix.
+      subroutine zpotrf(uplo, n, a, lda, info)
+         import :: wp
+         character, intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         complex(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: info
+      end subroutine zpotrf
+
+      !> Solutions by the factor of zpotrf, in place of the right-hand sides.
+      subroutine zpotrs(uplo, n, nrhs, a, lda, b, ldb, info)
+         import :: wp
+         character, intent(in) :: uplo
+         integer, intent(in) :: n, nrhs, lda, ldb
+         complex(wp), intent(in) :: a(lda, *)
+         complex(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine zpotrs
 
    end interface
 

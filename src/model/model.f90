@@ -1,6 +1,7 @@
 !> A linear structure: M u'' + C u' + K u = f_0 + f_c cos(omega t) + f_s sin(omega t), with the
 !> quantities that are observed of it. Read-only once built; may be shared between threads.
 module fw_model
+   use fw_cyclic_data, only: cyclic_type
    use fw_kinds, only: wp
    use fw_text, only: string_type
    implicit none (type, external)
@@ -18,6 +19,8 @@ module fw_model
       !> Observed quantities: rows of linear combinations of the dofs (n_observed, n_dof).
       real(wp), allocatable :: observe_matrix(:, :)
       type(string_type), allocatable :: observe_name(:)
+      !> Sectors around an axis, of which the matrices are one.
+      type(cyclic_type) :: cyclic
       !> Names of the units, 'length-mass-time-force', for labels; not allocated if not known.
       character(:), allocatable :: unit_system
    end type model_type

@@ -19,6 +19,9 @@ module fw_relative
       !> Row r is sum_e row_weight(e) q(row_coordinate(e)), e = row_start(r) .. row_start(r+1)-1.
       integer, allocatable :: row_start(:), row_coordinate(:)
       real(wp), allocatable :: row_weight(:)
+      !> In place of row_weight where weights differ from harmonic to harmonic (entries,
+      !> n_retained).
+      complex(wp), allocatable :: turned(:, :)
       !> Dofs that are eliminated (n_coordinates) and the others.
       integer, allocatable :: pivot(:), free(:)
       !> u(pivot) = c q - r eta  (n_coordinates, n_coordinates) and (n_coordinates, n_free).

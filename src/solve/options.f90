@@ -151,12 +151,14 @@ contains
    end subroutine bind_pseudo_time_keys
 
    !> The keys of group &sweep.
-   subroutine bind_sweep_keys(self, keys, is_sweep)
+   subroutine bind_sweep_keys(self, keys, is_sweep, needs_start)
       class(sweep_options), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
       !> Whether the analysis is one of a range.
       logical, intent(in) :: is_sweep
-      logical :: is_range
+      !> Whether it has a frequency at all (default: yes).
+      logical, intent(in), optional :: needs_start
+      logical :: is_range, needs
 
       call keys%open('sweep', 'frequencies')
       call keys%bind(key('frequencies', 'a list of frequencies in any order, in place of '// &
@@ -164,9 +166,11 @@ contains
                          repeats=.false., absent='none', only="analysis = 'frf', 'time', "// &
                          "continuation = 'natural'"), self%frequencies)
       is_range = is_sweep .and. .not. allocated(self%frequencies)
+      needs = .not. allocated(self%frequencies)
+      if (present(needs_start)) needs = needs .and. needs_start
       call keys%bind(key('start', 'first frequency, or the only one', above(0.0_wp), &
                          unit='unit', absent='required'), self%start, &
-                     needed=.not. allocated(self%frequencies))
+                     needed=needs)
       call keys%bind(key('end', 'last frequency; below start the sweep goes down', &
                          at_least(0.0_wp), unit='unit', absent='required for frf'), self%end, &
                      needed=is_range)

@@ -24,6 +24,8 @@ NUMBERS = {
     "gap/gap.nml": [("amplitude", 1.15, 0, 1.332770444, 5e-6)],
     "separation/separation.nml": [("amplitude", 0.9, 0, 2.240312606, 5e-6),
                                   ("contact/dissipation", 0.9, 0, 2.830244154, 2e-5)],
+    "bladed_disk/disk.nml": [("amplitude", 2.1885, 5, 0.3722907832442835, 1e-7),
+                             ("contact/dissipation", 2.1885, 0, 0.09091664838734204, 1e-6)],
     "wear/two_pairs.nml": [("wear/depth", None, 0, 0.2, 1e-5),
                            ("wear/depth", None, 1, 0.0, 0.0)],
     "wear/oscillator.nml": [("wear/depth", None, 0, 0.294758, 2e-6),

@@ -5,7 +5,7 @@ from pathlib import Path
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 #: Storage of the rows, where they are made (model/relative.f90) and where loops run over them.
 STORAGE = re.compile(r"\brow_(start|coordinate|weight)\b", re.IGNORECASE)
-OWNERS = {"model/relative.f90", "balance/incidence.f90"}
+OWNERS = {"model/relative.f90", "model/cyclic_relative.f90", "balance/incidence.f90"}
 
 
 def naming_rows():

@@ -1,0 +1,231 @@
+!> Analysis 'modes': natural frequencies of a structure with its contact open, and closed: every
+!> pair as its springs (laws that are elastic at rest) or held (all others). Of a cyclic structure
+!> in each nodal diameter, of any other in nodal diameter 0 alone.
+module fw_natural_modes
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use fw_case, only: case_type
+   use fw_cyclic_data, only: nodal_matrices
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_hermitian, only: congruence
+   use fw_hermitian, only: is_regular
+   use fw_hermitian, only: solve_hermitian_eigen
+   use fw_kinds, only: wp
+   use fw_laws, only: new_law
+   use fw_pair_law, only: pair_law
+   use fw_sector, only: add_sector_spring
+   use fw_sector, only: sector_at
+   use fw_sector, only: sector_rows
+   use fw_sector_relative, only: new_sector_relative
+   use fw_sector_relative, only: sector_relative
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: natural_modes, find_natural_modes
+
+   !> Frequencies in ascending order [rad/s], NaN where there are fewer (n_modes, n_diameters).
+   type :: natural_modes
+      integer, allocatable :: nodal_diameter(:)
+      real(wp), allocatable :: open(:, :), closed(:, :)
+   end type natural_modes
+
+   !> Shifts of a stiffness that does not hold the structure, in parts of K over M.
+   real(wp), parameter :: shift_trials(*) = [1.0e-6_wp, 1.0e-3_wp, 1.0_wp, 1.0e3_wp]
+   !> Eigenvalues below this part of the largest are massless directions: round-off.
+   real(wp), parameter :: massless = 1.0e-13_wp
+   !> Squares of frequencies below this part of the shift are rigid motions.
+   real(wp), parameter :: rigid = 1.0e-7_wp
+
+contains
+
+   !> The lowest frequencies of every nodal diameter that the model holds, or of some.
+   subroutine find_natural_modes(case, n_modes, modes, error, wanted)
+      type(case_type), intent(in) :: case
+      !> Frequencies of each nodal diameter.
+      integer, intent(in) :: n_modes
+      type(natural_modes), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      !> Nodal diameters, 0 to N/2 (default: all).
+      integer, intent(in), optional :: wanted(:)
+      integer, allocatable :: list(:)
+      integer :: j, k
+
+      associate (cyclic => case%model%cyclic)
+         list = [(k, k=0, cyclic%n_sectors/2)]
+         if (present(wanted)) list = wanted
+         modes%nodal_diameter = pack(list, [(cyclic%holds(list(j)), j=1, size(list))])
+      end associate
+      allocate (modes%open(n_modes, size(modes%nodal_diameter)), &
+                modes%closed(n_modes, size(modes%nodal_diameter)))
+      modes%open = ieee_value(1.0_wp, ieee_quiet_nan)
+      modes%closed = modes%open
+      do j = 1, size(modes%nodal_diameter)
+         call find_in_diameter(case, modes%nodal_diameter(j), modes%open(:, j), &
+                               modes%closed(:, j), error)
+         if (allocated(error)) return
+      end do
+   end subroutine find_natural_modes
+
+   subroutine find_in_diameter(case, k, open, closed, error)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: k
+      real(wp), intent(inout) :: open(:), closed(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices) :: nodal
+      type(sector_relative) :: relative
+      complex(wp), allocatable :: stiffness(:, :), held(:, :), basis(:, :)
+
+      call sector_at(case%model, k, nodal, error)
+      if (allocated(error)) return
+      stiffness = nodal%stiffness
+      call add_springs(case, k, stiffness)
+      call list_frequencies(nodal%mass, stiffness, k, open, error)
+      if (allocated(error)) return
+      closed = open
+      if (case%contact%n_pairs == 0) return
+      call close_pairs(case, k, stiffness, held)
+      if (size(held, 1) == 0) then
+         call list_frequencies(nodal%mass, stiffness, k, closed, error)
+         return
+      end if
+      closed = ieee_value(1.0_wp, ieee_quiet_nan)
+      call new_sector_relative(held, relative)
+      call held_basis(relative, size(nodal%mass, 1), basis)
+      if (size(basis, 2) == 0) return
+      call list_frequencies(congruence(basis, nodal%mass, basis), &
+                            congruence(basis, stiffness, basis), k, closed, error)
+   end subroutine find_in_diameter
+
+   !> Springs that are linear.
+   subroutine add_springs(case, k, stiffness)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: k
+      complex(wp), intent(inout) :: stiffness(:, :)
+      complex(wp), allocatable :: rows(:, :)
+      integer :: i
+
+      associate (springs => case%springs)
+         if (springs%n_springs == 0) return
+         call sector_rows(case%model, k, springs%side_1, springs%side_2, springs%sector_2, rows)
+         do i = 1, springs%n_springs
+            if (springs%power(i) /= 1) cycle
+            call add_sector_spring(rows(i, :), springs%coefficient(i), stiffness)
+         end do
+      end associate
+   end subroutine add_springs
+
+   !> Elastic pairs as springs; of all others the rows that they hold.
+   subroutine close_pairs(case, k, stiffness, held)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: k
+      complex(wp), intent(inout) :: stiffness(:, :)
+      complex(wp), allocatable, intent(out) :: held(:, :)
+      class(pair_law), allocatable :: law
+      complex(wp), allocatable :: rows(:, :)
+      logical, allocatable :: is_held(:)
+      integer :: c, i
+
+      associate (contact => case%contact)
+         call new_law(contact%law, law)
+         call law%build(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0)
+         allocate (held(0, 0))
+         do c = 1, 3
+            call sector_rows(case%model, k, contact%side_1(c, :), contact%side_2(c, :), &
+                             contact%sector_2, rows)
+            allocate (is_held(contact%n_pairs))
+            is_held = contact%side_1(c, :) /= 0 .or. contact%side_2(c, :) /= 0
+            if (.not. law%prediction%takes_balance .and. law%prediction%order(c) == 0) then
+               do i = 1, contact%n_pairs
+                  if (.not. is_held(i)) cycle
+                  call add_sector_spring(rows(i, :), law%prediction%stiffness(i, c), stiffness)
+               end do
+               is_held = .false.
+            end if
+            call join(rows, is_held, held)
+            deallocate (is_held)
+         end do
+      end associate
+   end subroutine close_pairs
+
+   pure subroutine join(rows, is_held, held)
+      complex(wp), intent(in) :: rows(:, :)
+      logical, intent(in) :: is_held(:)
+      complex(wp), allocatable, intent(inout) :: held(:, :)
+      complex(wp), allocatable :: longer(:, :)
+      integer :: i, n
+
+      n = size(held, 1)
+      allocate (longer(n + count(is_held), size(rows, 2)))
+      if (n > 0) longer(:n, :) = held
+      do i = 1, size(is_held)
+         if (.not. is_held(i)) cycle
+         n = n + 1
+         longer(n, :) = rows(i, :)
+      end do
+      call move_alloc(longer, held)
+   end subroutine join
+
+   !> Motions in which no held row moves.
+   pure subroutine held_basis(relative, n, basis)
+      type(sector_relative), intent(in) :: relative
+      integer, intent(in) :: n
+      complex(wp), allocatable, intent(out) :: basis(:, :)
+      integer :: j, n_free, n_rows
+
+      n_free = size(relative%free)
+      n_rows = n_free + size(relative%pivot)
+      allocate (basis(n, n - size(relative%pivot)), source=(0.0_wp, 0.0_wp))
+      basis(relative%pivot, :n_free) = -relative%r
+      do j = 1, n_free
+         basis(relative%free(j), j) = (1.0_wp, 0.0_wp)
+      end do
+      do j = 1, n - n_rows
+         basis(n_rows + j, n_free + j) = (1.0_wp, 0.0_wp)
+      end do
+   end subroutine held_basis
+
+   !> The lowest frequencies, from M x = theta (K + s M) x: massless dofs, and a stiffness that
+   !> holds the structure in part, are no exceptions.
+   subroutine list_frequencies(mass, stiffness, k, frequency, error)
+      complex(wp), intent(in) :: mass(:, :), stiffness(:, :)
+      integer, intent(in) :: k
+      real(wp), intent(inout) :: frequency(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: theta(:)
+      complex(wp), allocatable :: vectors(:, :)
+      real(wp) :: shift, square
+      integer :: i, j, trial
+      logical :: done
+
+      shift = 0.0_wp
+      done = .false.
+      if (is_regular(stiffness)) call solve_hermitian_eigen(mass, stiffness, theta, vectors, done)
+      do trial = 1, size(shift_trials)
+         if (done) exit
+         shift = shift_trials(trial)*norm2(abs(stiffness))/max(norm2(abs(mass)), tiny(1.0_wp))
+         if (.not. is_regular(stiffness + shift*mass)) cycle
+         call solve_hermitian_eigen(mass, stiffness + shift*mass, theta, vectors, done)
+      end do
+      if (.not. done) then
+         call fatal_error(error, 'nodal diameter '//to_text(k)//': the structure has a part '// &
+                          'without both stiffness and mass (or a mass that is not positive); '// &
+                          'check the mass and stiffness matrices', status_input)
+         return
+      end if
+      frequency = ieee_value(1.0_wp, ieee_quiet_nan)
+      do i = 1, size(frequency)
+         j = size(theta) - i + 1
+         if (j < 1) exit
+         if (theta(j) <= massless*theta(size(theta))) exit
+         square = 1.0_wp/theta(j) - shift
+         if (abs(square) <= rigid*shift) square = 0.0_wp
+         ! Unstable at rest: no frequency.
+         frequency(i) = merge(sqrt(max(square, 0.0_wp)), ieee_value(1.0_wp, ieee_quiet_nan), &
+                              square >= 0.0_wp)
+      end do
+   end subroutine list_frequencies
+
+end module fw_natural_modes

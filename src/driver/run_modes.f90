@@ -1,0 +1,145 @@
+!> Runs analysis 'modes', and lists the natural frequencies that a sweep covers.
+module fw_run_modes
+   use fw_case, only: analysis_modes
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   use fw_natural_modes, only: find_natural_modes
+   use fw_natural_modes, only: natural_modes
+   use fw_result, only: result_writer
+   use fw_solver_options, only: unit_hertz
+   use fw_solver_options, only: unit_words
+   use fw_text, only: string_type
+   use fw_text, only: to_text
+   use fw_text_list, only: append
+   implicit none (type, external)
+   private
+
+   public :: run_modes, list_in_range
+
+   !> Frequencies of a line of a table, and dofs up to which a check looks for them: eigenvalues
+   !> take seconds from there on.
+   integer, parameter :: most_shown = 6, most_checked = 500
+   !> Frequencies looked at for those within the range of a sweep.
+   integer, parameter :: most_listed = 60
+
+contains
+
+   !> Find, write and tabulate the natural frequencies of all nodal diameters.
+   subroutine run_modes(case, writer, table, error)
+      type(case_type), intent(in) :: case
+      type(result_writer), intent(inout) :: writer
+      type(string_type), allocatable, intent(out) :: table(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(natural_modes) :: modes
+      character(:), allocatable :: text
+      integer :: j
+
+      call find_natural_modes(case, min(case%model%cyclic%n_modes, most_of(case)), modes, error)
+      if (allocated(error)) return
+      call writer%add_modes(modes%nodal_diameter, modes%open, modes%closed, &
+                            case%model%unit_system, error)
+      if (allocated(error)) return
+      allocate (table(0))
+      call append(table, 'natural frequencies ['//trim(unit_words(case%sweep%unit))// &
+                  '] of each nodal diameter')
+      do j = 1, size(modes%nodal_diameter)
+         call line_of(case, modes%open(:, j), -1.0_wp, huge(1.0_wp), text)
+         call append(table, to_text(modes%nodal_diameter(j))//' open'//text)
+         if (case%contact%n_pairs == 0) cycle
+         call line_of(case, modes%closed(:, j), -1.0_wp, huge(1.0_wp), text)
+         call append(table, to_text(modes%nodal_diameter(j))//' closed'//text)
+      end do
+   end subroutine run_modes
+
+   !> No more modes than coordinates.
+   pure integer function most_of(case)
+      type(case_type), intent(in) :: case
+      integer :: k
+
+      most_of = case%model%n_dof
+      if (.not. case%model%cyclic%has_nodal()) return
+      do k = 1, size(case%model%cyclic%nodal)
+         if (allocated(case%model%cyclic%nodal(k)%mass)) most_of = &
+            max(most_of, size(case%model%cyclic%nodal(k)%mass, 1))
+      end do
+   end function most_of
+
+   !> The frequencies within the range of a sweep, as comments of a namelist: of the nodal
+   !> diameters that its harmonics have.
+   subroutine list_in_range(case, lines)
+      type(case_type), intent(in) :: case
+      type(string_type), allocatable, intent(out) :: lines(:)
+      type(natural_modes) :: modes
+      type(error_type), allocatable :: ignored
+      character(:), allocatable :: name, text
+      real(wp) :: range(2)
+      integer :: j
+
+      allocate (lines(0))
+      if (case%analysis == analysis_modes) return
+      if (most_of(case) > most_checked) then
+         call append(lines, "! natural frequencies: see analysis 'modes' (more than "// &
+                     to_text(most_checked)//' dofs)')
+         return
+      end if
+      range = case%sweep%range()
+      if (range(2) <= 0.0_wp) range(2) = range(1)
+      call find_natural_modes(case, min(most_listed, most_of(case)), modes, ignored, &
+                              diameters_of(case))
+      if (allocated(ignored)) return
+      call append(lines, '! natural frequencies ['//trim(unit_words(case%sweep%unit))// &
+                  '] within the sweep:')
+      do j = 1, size(modes%nodal_diameter)
+         call line_of(case, modes%open(:, j), range(1), range(2), text)
+         name = ''
+         if (case%model%cyclic%is_cyclic) name = 'nodal diameter '//to_text( &
+                                                 modes%nodal_diameter(j))//' '
+         call append(lines, '!   '//name//'open'//text)
+         if (case%contact%n_pairs == 0) cycle
+         call line_of(case, modes%closed(:, j), range(1), range(2), text)
+         call append(lines, '!   '//name//'closed'//text)
+      end do
+   end subroutine list_in_range
+
+   !> Nodal diameters, 0 to N/2, of the harmonics, each once.
+   pure function diameters_of(case) result(list)
+      type(case_type), intent(in) :: case
+      integer, allocatable :: list(:)
+      integer :: h, k
+
+      allocate (list(0))
+      do h = 1, case%harmonics%n_harmonics
+         k = abs(case%model%cyclic%nodal_diameter(h))
+         if (.not. any(list == k)) list = [list, k]
+         if (size(list) > case%model%cyclic%n_sectors/2) exit
+      end do
+   end function diameters_of
+
+   !> Frequencies between two in the unit of the sweep.
+   subroutine line_of(case, frequency, first, last, text)
+      type(case_type), intent(in) :: case
+      real(wp), intent(in) :: frequency(:)
+      real(wp), intent(in) :: first, last
+      character(:), allocatable, intent(out) :: text
+      character(14) :: number
+      real(wp) :: factor
+      integer :: i, n
+
+      factor = 1.0_wp
+      if (case%sweep%unit == unit_hertz) factor = 0.5_wp/pi
+      text = ''
+      n = 0
+      do i = 1, size(frequency)
+         if (.not. (frequency(i) >= first .and. frequency(i) <= last)) cycle
+         n = n + 1
+         if (n > most_shown) cycle
+         write (number, '(es13.5)') factor*frequency(i)
+         text = text//' '//trim(adjustl(number))
+      end do
+      if (n > most_shown) text = text//' and '//to_text(n - most_shown)//' more'
+      if (n == 0) text = ' none'
+   end subroutine line_of
+
+end module fw_run_modes

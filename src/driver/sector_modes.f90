@@ -1,0 +1,121 @@
+!> Modes of a cyclic structure in the nodal diameter of its first harmonic, with its joint in a
+!> linear state: what fw_joint_modes finds of other structures.
+module fw_sector_modes
+   use fw_case, only: case_type
+   use fw_cyclic_data, only: nodal_matrices
+   use fw_error, only: error_type
+   use fw_hermitian, only: solve_hermitian_eigen
+   use fw_kinds, only: wp
+   use fw_laws, only: new_law
+   use fw_modes, only: mode_type
+   use fw_pair_law, only: pair_law
+   use fw_sector, only: add_sector_spring
+   use fw_sector, only: sector_at
+   use fw_sector, only: sector_rows
+   implicit none (type, external)
+   private
+
+   public :: find_sector_modes
+
+   !> As of fw_modes and fw_joint_modes, with the same reasons.
+   real(wp), parameter :: least_width = 1.0e-6_wp, massless = 1.0e-13_wp, hold = 1.0e6_wp
+   real(wp), parameter :: shift_trials(*) = [0.0_wp, 1.0e-3_wp, 1.0_wp]
+
+contains
+
+   !> The modes with frequencies within a range; none where the pencil has no solution.
+   subroutine find_sector_modes(case, first_component, range, modes)
+      type(case_type), intent(in) :: case
+      !> Components of the pairs from this one on are held; 4: none.
+      integer, intent(in) :: first_component
+      !> Lowest and highest frequency [rad/s].
+      real(wp), intent(in) :: range(2)
+      type(mode_type), allocatable, intent(out) :: modes(:)
+      type(nodal_matrices) :: nodal
+      type(error_type), allocatable :: error
+      complex(wp), allocatable :: shapes(:, :), load(:)
+      real(wp), allocatable :: theta(:)
+      integer, allocatable :: in_range(:)
+      real(wp) :: shift, square
+      integer :: i, j, k, trial
+      logical :: done
+
+      allocate (modes(0))
+      allocate (in_range(0))
+      k = abs(case%model%cyclic%nodal_diameter(1))
+      if (.not. case%model%cyclic%holds(k)) return
+      call sector_at(case%model, k, nodal, error)
+      if (allocated(error)) return
+      call hold_joint(case, k, first_component, nodal%stiffness)
+      do trial = 1, size(shift_trials)
+         shift = shift_trials(trial)*norm2(abs(nodal%stiffness))/ &
+                 max(norm2(abs(nodal%mass)), tiny(1.0_wp))
+         call solve_hermitian_eigen(nodal%mass, nodal%stiffness + shift*nodal%mass, theta, shapes, &
+                                    done)
+         if (done) exit
+      end do
+      if (.not. done) return
+      do j = size(theta), 1, -1
+         if (theta(j) <= massless*theta(size(theta))) exit
+         square = 1.0_wp/theta(j) - shift
+         if (square < range(1)**2 .or. square > range(2)**2 .or. square <= 0.0_wp) cycle
+         in_range = [in_range, j]
+      end do
+      load = nodal%load(:, 2) - (0.0_wp, 1.0_wp)*nodal%load(:, 3)
+      deallocate (modes)
+      allocate (modes(size(in_range)))
+      do i = 1, size(in_range)
+         j = in_range(i)
+         call describe(sqrt(1.0_wp/theta(j) - shift), shapes(:, j)/sqrt(theta(j)), nodal, load, &
+                       modes(i))
+      end do
+   end subroutine find_sector_modes
+
+   !> Linear springs, and what the contact holds.
+   subroutine hold_joint(case, k, first_component, stiffness)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: k, first_component
+      complex(wp), intent(inout) :: stiffness(:, :)
+      class(pair_law), allocatable :: law
+      complex(wp), allocatable :: rows(:, :)
+      real(wp) :: rigid, spring
+      integer :: c, i
+
+      associate (springs => case%springs, contact => case%contact)
+         call sector_rows(case%model, k, springs%side_1, springs%side_2, springs%sector_2, rows)
+         do i = 1, springs%n_springs
+            if (springs%power(i) == 1) call add_sector_spring(rows(i, :), springs%coefficient(i), &
+                                                              stiffness)
+         end do
+         rigid = hold*maxval(abs(stiffness))
+         call new_law(contact%law, law)
+         call law%build(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0)
+         do c = first_component, 3
+            call sector_rows(case%model, k, contact%side_1(c, :), contact%side_2(c, :), &
+                             contact%sector_2, rows)
+            do i = 1, contact%n_pairs
+               spring = rigid
+               if (.not. law%prediction%takes_balance .and. law%prediction%order(c) == 0) then
+                  spring = law%prediction%stiffness(i, c)
+               end if
+               call add_sector_spring(rows(i, :), spring, stiffness)
+            end do
+         end do
+      end associate
+   end subroutine hold_joint
+
+   !> A mode of unit modal mass.
+   pure subroutine describe(omega, shape_of, nodal, load, mode)
+      real(wp), intent(in) :: omega
+      complex(wp), intent(in) :: shape_of(:), load(:)
+      type(nodal_matrices), intent(in) :: nodal
+      type(mode_type), intent(out) :: mode
+
+      mode%omega = omega
+      if (allocated(nodal%damping)) mode%width = real(dot_product(shape_of, &
+                                                    matmul(nodal%damping, shape_of)), wp)
+      mode%amplitude = abs(matmul(nodal%observe, shape_of))*abs(dot_product(shape_of, load))/ &
+                       (omega*max(mode%width, least_width*omega))
+   end subroutine describe
+
+end module fw_sector_modes

@@ -1,0 +1,104 @@
+!> A structure of equal sectors around an axis, of which one is given, and the wave that runs around
+!> it: the motion of each sector is that of the one before it, delayed by engine_order/n_sectors of
+!> a period. Harmonic n has the nodal diameter k = n engine_order modulo n_sectors, and from sector
+!> to sector the factor z = exp(-2 pi i k/n_sectors).
+module fw_cyclic_data
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: cyclic_type, nodal_matrices
+
+   !> The sector tied to its neighbours, as it moves in one nodal diameter.
+   type :: nodal_matrices
+      !> Hermitian (n, n); the damping is not allocated where there is none.
+      complex(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
+      !> Static, cosine and sine loads in columns (n, 3); of a higher wave than N/2, conjugates.
+      complex(wp), allocatable :: load(:, :)
+      !> Observed quantities (n_observed, n).
+      complex(wp), allocatable :: observe(:, :)
+   end type nodal_matrices
+
+   type :: cyclic_type
+      logical :: is_cyclic = .false.
+      integer :: n_sectors = 1
+      integer :: engine_order = 0
+      !> Dofs of the interfaces: the right one of a sector is the left one of the next; a negative
+      !> number on the right with its sign turned (n_interface).
+      integer, allocatable :: left(:), right(:)
+      !> Frequencies of each nodal diameter that analysis 'modes' lists.
+      integer :: n_modes = 10
+      !> Fraction of critical damping of every mode of every nodal diameter, where the matrices are
+      !> those of a sector.
+      real(wp) :: modal_damping = 0.0_wp
+      !> In place of the matrices of a sector: those of nodal diameter k at place k + 1. What is
+      !> not given is not allocated there.
+      type(nodal_matrices), allocatable :: nodal(:)
+   contains
+      procedure :: nodal_diameter
+      procedure :: factor
+      procedure :: has_nodal
+      procedure :: holds
+   end type cyclic_type
+
+contains
+
+   !> Signed nodal diameter of a harmonic, above -N/2 up to N/2: positive towards higher sectors.
+   elemental integer function nodal_diameter(self, harmonic) result(k)
+      class(cyclic_type), intent(in) :: self
+      integer, intent(in) :: harmonic
+      integer(int64) :: turn
+
+      turn = int(modulo(self%engine_order, self%n_sectors), int64)*harmonic
+      k = int(modulo(turn, int(self%n_sectors, int64)))
+      if (2_int64*k > self%n_sectors) k = k - self%n_sectors
+   end function nodal_diameter
+
+   !> exp(-2 pi i k sectors/N), exact where it is real or imaginary.
+   elemental complex(wp) function factor(self, k, sectors) result(z)
+      class(cyclic_type), intent(in) :: self
+      integer, intent(in) :: k, sectors
+      integer(int64) :: n, steps
+      real(wp) :: angle
+
+      n = self%n_sectors
+      steps = modulo(int(k, int64)*sectors, n)
+      if (modulo(4*steps, n) == 0) then
+         select case (4*steps/n)
+         case (0)
+            z = (1.0_wp, 0.0_wp)
+         case (1)
+            z = (0.0_wp, -1.0_wp)
+         case (2)
+            z = (-1.0_wp, 0.0_wp)
+         case default ! three quarters
+            z = (0.0_wp, 1.0_wp)
+         end select
+         return
+      end if
+      ! Conjugates are conjugates to the last bit.
+      angle = -2.0_wp*pi*real(min(steps, n - steps), wp)/real(n, wp)
+      z = cmplx(cos(angle), merge(sin(angle), -sin(angle), 2*steps < n), wp)
+   end function factor
+
+   !> Whether the model holds matrices of nodal diameters, not of a sector.
+   pure logical function has_nodal(self)
+      class(cyclic_type), intent(in) :: self
+
+      has_nodal = allocated(self%nodal)
+   end function has_nodal
+
+   !> Whether the model holds what nodal diameter k = 0 .. N/2 needs.
+   pure logical function holds(self, k)
+      class(cyclic_type), intent(in) :: self
+      integer, intent(in) :: k
+
+      holds = .not. allocated(self%nodal)
+      if (holds) return
+      if (k >= size(self%nodal)) return
+      holds = allocated(self%nodal(k + 1)%mass)
+   end function holds
+
+end module fw_cyclic_data

@@ -1,0 +1,556 @@
+!> A cyclic structure under a travelling wave, behind the face of any structure: one sector, of
+!> which harmonic n moves in the nodal diameter n engine_order modulo n_sectors. The condensation of
+!> every nodal diameter is that of a plain structure with Hermitian matrices; only one basis is kept
+!> for k and N - k, whose matrices are conjugates. Z_r is formed at each frequency.
+module fw_cyclic_structure
+   use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
+   use fw_cyclic_data, only: nodal_matrices
+   use fw_cyclic_relative, only: cyclic_relative
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_formed_stiffness, only: formed_stiffness
+   use fw_kinds, only: wp
+   use fw_model, only: model_type
+   use fw_sector, only: sector_at
+   use fw_sector_reduction, only: sector_reduction
+   use fw_sector_reduction, only: static_diagonal
+   use fw_sector_split, only: split_sector
+   use fw_sector_stiffness, only: derive_sector
+   use fw_sector_stiffness, only: form_sector
+   use fw_sector_stiffness, only: harmonic_point
+   use fw_sector_stiffness, only: recover_sector
+   use fw_structure_operator, only: by_frequency
+   use fw_structure_operator, only: lay_out_coefficients
+   use fw_structure_operator, only: structure_operator
+   use fw_structure_operator, only: structure_state
+   use fw_text, only: to_text
+   use fw_threads, only: coordinates_for_threads
+   implicit none (type, external)
+   private
+
+   public :: cyclic_structure, new_cyclic_structure
+   public :: means_none, means_static, means_split
+
+   !> What laws ask of the mean over all nodal diameters: nothing, the static stiffness, or what a
+   !> coordinate is to motion above the harmonics as well.
+   integer, parameter :: means_none = 0, means_static = 1, means_split = 2
+
+   !> More internal modes than any nodal diameter has.
+   integer, parameter :: most_modes = 1000000
+
+   type, extends(structure_operator) :: cyclic_structure
+      !> Bases of the nodal diameters in use; the one of each harmonic, and whether its conjugates
+      !> act (n_retained).
+      type(sector_reduction), allocatable :: basis(:)
+      integer, allocatable :: basis_of(:)
+      logical, allocatable :: conjugated(:)
+      !> Mean of the static stiffness over all nodal diameters, which is the diagonal of all sectors
+      !> together (n_relative) [force/length].
+      real(wp), allocatable :: static(:)
+      !> Bases of all nodal diameters without kept modes, their weights among all of them, and the
+      !> place of each coordinate there; only where the split is asked for.
+      type(sector_reduction), allocatable :: all(:)
+      real(wp), allocatable :: share(:)
+      integer, allocatable :: place(:, :)
+   contains
+      procedure :: new_state
+      procedure :: at
+      procedure :: multiply
+      procedure :: restrict
+      procedure :: multiply_active
+      procedure :: block => block_of_all
+      procedure :: active_block => block_in_use
+      procedure :: diagonal
+      procedure :: derivative
+      procedure :: recover
+      procedure :: static_stiffness
+      procedure :: split
+      procedure :: mass
+      procedure :: held_modes
+      procedure :: magnitudes
+   end type cyclic_structure
+
+   type, extends(structure_state) :: cyclic_state
+      type(harmonic_point), allocatable :: point(:)
+      type(formed_stiffness) :: formed
+      !> Whether rows in use are those of the present frequency.
+      logical :: restricted = .false.
+   end type cyclic_state
+
+contains
+
+   !> Condense a sector in the nodal diameters of the harmonics.
+   subroutine new_cyclic_structure(model, relative, harmonic, omega_range, means, self, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_relative), intent(in) :: relative
+      !> Harmonics in use.
+      integer, intent(in) :: harmonic(:)
+      !> Lowest and highest frequency that will be asked for [rad/s].
+      real(wp), intent(in) :: omega_range(2)
+      !> means_none, means_static or means_split.
+      integer, intent(in) :: means
+      type(cyclic_structure), intent(out) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call lay_out_coefficients(self, harmonic)
+      self%n_relative = relative%n_coordinates
+      self%n_observed = size(model%observe_matrix, 1)
+      call find_bases(model, relative, omega_range, self, error)
+      if (allocated(error)) return
+      if (means >= means_static) call take_static_means(model, relative, self, error)
+      if (allocated(error)) return
+      if (means == means_split) call take_all(model, relative, self, error)
+   end subroutine new_cyclic_structure
+
+   !> A basis for each nodal diameter in use, with coordinates at places that all share.
+   subroutine find_bases(model, relative, omega_range, self, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_relative), intent(in) :: relative
+      real(wp), intent(in) :: omega_range(2)
+      type(cyclic_structure), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices), allocatable :: nodal(:)
+      integer, allocatable :: used(:), slot(:)
+      integer :: h, j, n_kept
+
+      call list_diameters(model, self, used)
+      allocate (self%basis(size(used)), nodal(size(used)))
+      do j = 1, size(used)
+         call require_diameter(model, self, used(j), error)
+         if (.not. allocated(error)) call sector_at(model, used(j), nodal(j), error)
+         if (.not. allocated(error)) then
+            call self%basis(j)%find_modes(used(j), nodal(j), relative%at(used(j) + 1), error)
+         end if
+         if (.not. allocated(error) .and. used(j) == 0) then
+            call check_free_modes(self%basis(j), nodal(j), error)
+         end if
+         if (allocated(error)) return
+         call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range)
+      end do
+      self%n_coordinates = self%n_relative + sum([(size(self%basis(j)%kept), j=1, size(used))])
+      allocate (self%kept(0))
+      n_kept = 0
+      do j = 1, size(used)
+         slot = [relative%slots(used(j)), (self%n_relative + n_kept + h, &
+                                          h=1, size(self%basis(j)%kept))]
+         n_kept = n_kept + size(self%basis(j)%kept)
+         ! Numbers that tell nodal diameters apart too.
+         self%kept = [self%kept, used(j)*most_modes + self%basis(j)%kept]
+         call self%basis(j)%transform(nodal(j), slot, self%n_coordinates)
+      end do
+   end subroutine find_bases
+
+   !> Nodal diameters of the harmonics, 0 to N/2, and which harmonics take their conjugates.
+   subroutine list_diameters(model, self, used)
+      type(model_type), intent(in) :: model
+      type(cyclic_structure), intent(inout) :: self
+      integer, allocatable, intent(out) :: used(:)
+      integer :: h, k
+
+      allocate (used(0))
+      allocate (self%basis_of(size(self%harmonic)), self%conjugated(size(self%harmonic)))
+      do h = 1, size(self%harmonic)
+         k = model%cyclic%nodal_diameter(self%harmonic(h))
+         self%conjugated(h) = k < 0
+         if (.not. any(used == abs(k))) used = [used, abs(k)]
+         self%basis_of(h) = findloc(used, abs(k), dim=1)
+      end do
+   end subroutine list_diameters
+
+   !> Refuse a harmonic whose nodal diameter the model does not hold.
+   subroutine require_diameter(model, self, k, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_structure), intent(in) :: self
+      integer, intent(in) :: k
+      type(error_type), allocatable, intent(out) :: error
+      integer :: h
+
+      if (model%cyclic%holds(k)) return
+      do h = 1, size(self%harmonic)
+         if (abs(model%cyclic%nodal_diameter(self%harmonic(h))) == k) exit
+      end do
+      call fatal_error(error, 'harmonic '//to_text(self%harmonic(h))//' has nodal diameter '// &
+                       to_text(k)//', of which the model holds no matrices: must have '// &
+                       '/nodal_diameter/'//to_text(k)//', or fewer harmonics', status_input)
+   end subroutine require_diameter
+
+   !> A free internal mode has no static position: refuse a static load on it.
+   subroutine check_free_modes(basis, nodal, error)
+      type(sector_reduction), intent(in) :: basis
+      type(nodal_matrices), intent(in) :: nodal
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. basis%pushes_free_mode(nodal)) return
+      call fatal_error(error, '&load static pushes a part of the sectors that neither '// &
+                       'stiffness nor contact holds; hold it or remove the load', status_input)
+   end subroutine check_free_modes
+
+   !> The diagonal of the static stiffness of all sectors together.
+   subroutine take_static_means(model, relative, self, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_relative), intent(in) :: relative
+      type(cyclic_structure), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices) :: nodal
+      real(wp), allocatable :: diagonal(:)
+      real(wp) :: weight(self%n_relative), share
+      integer, allocatable :: slot(:)
+      integer :: j, k
+
+      allocate (self%static(self%n_relative), source=0.0_wp)
+      weight = 0.0_wp
+      do k = 0, model%cyclic%n_sectors/2
+         if (.not. model%cyclic%holds(k)) cycle
+         call sector_at(model, k, nodal, error)
+         if (.not. allocated(error)) call static_diagonal(k, nodal, relative%at(k + 1), diagonal, &
+                                                          error)
+         if (allocated(error)) return
+         share = share_of(model, k)
+         slot = relative%slots(k)
+         do j = 1, size(slot)
+            if (slot(j) == 0) cycle
+            self%static(slot(j)) = self%static(slot(j)) + share*diagonal(j)
+            weight(slot(j)) = weight(slot(j)) + share
+         end do
+      end do
+      where (weight > 0.0_wp) self%static = self%static/weight
+   end subroutine take_static_means
+
+   !> Waves in both directions count, but those that stand.
+   pure real(wp) function share_of(model, k) result(share)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+
+      share = merge(1.0_wp, 2.0_wp, k == 0 .or. 2*k == model%cyclic%n_sectors)
+   end function share_of
+
+   !> Bases of all nodal diameters.
+   subroutine take_all(model, relative, self, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_relative), intent(in) :: relative
+      type(cyclic_structure), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices) :: nodal
+      integer, allocatable :: slot(:)
+      integer :: j, k, n
+
+      n = model%cyclic%n_sectors/2 + 1
+      allocate (self%all(n), self%share(n), self%place(self%n_relative, n))
+      self%share = 0.0_wp
+      self%place = 0
+      do k = 0, n - 1
+         if (.not. model%cyclic%holds(k)) cycle
+         call sector_at(model, k, nodal, error)
+         if (.not. allocated(error)) then
+            call self%all(k + 1)%find_modes(k, nodal, relative%at(k + 1), error)
+         end if
+         if (allocated(error)) return
+         slot = relative%slots(k)
+         call self%all(k + 1)%transform(nodal, [(j, j=1, size(slot))], size(slot))
+         self%share(k + 1) = share_of(model, k)
+         do j = 1, size(slot)
+            if (slot(j) > 0) self%place(slot(j), k + 1) = j
+         end do
+      end do
+   end subroutine take_all
+
+   subroutine new_state(self, state)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), allocatable, intent(out) :: state
+      type(cyclic_state), allocatable :: cyclic
+      integer :: m, nh
+
+      m = self%n_coordinates
+      nh = size(self%harmonic)
+      allocate (cyclic)
+      allocate (cyclic%point(nh))
+      cyclic%point%harmonic = self%harmonic
+      cyclic%point%conjugated = self%conjugated
+      allocate (cyclic%load(m, nh), source=(0.0_wp, 0.0_wp))
+      allocate (cyclic%used(m), source=0)
+      call cyclic%formed%reserve(m, nh)
+      call move_alloc(cyclic, state)
+   end subroutine new_state
+
+   subroutine at(self, state, omega, self_excitation, error)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: omega, self_excitation
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n_failed
+
+      if (abs(omega - state%omega) <= 0.0_wp .and. &
+          abs(self_excitation - state%self_excitation) <= 0.0_wp) return
+      n_failed = 0
+      select type (state)
+      type is (cyclic_state)
+         state%point%s = self%harmonic*omega
+         state%point%theta = cmplx(state%point%s**2, state%point%s*self_excitation, wp)
+         if (self%n_coordinates > 0) call form_all(self, state, n_failed)
+         state%restricted = .false.
+      end select
+      if (n_failed > 0) then
+         call fatal_error(error, 'the structure resonates without damping at omega = '// &
+                          to_text(omega)//' rad/s in a mode that no contact pair touches; '// &
+                          'give it damping or shift the frequency', status_input)
+         return
+      end if
+      state%omega = omega
+      state%self_excitation = self_excitation
+   end subroutine at
+
+   subroutine form_all(self, state, n_failed)
+      class(cyclic_structure), intent(in) :: self
+      type(cyclic_state), intent(inout) :: state
+      integer, intent(inout) :: n_failed
+      logical :: failed
+      integer :: h
+
+      !$omp parallel do default(none) shared(self, state) private(h, failed) &
+      !$omp reduction(+:n_failed) schedule(dynamic) &
+      !$omp if(self%n_coordinates >= coordinates_for_threads)
+      do h = 1, size(self%harmonic)
+         call form_sector(self%basis(self%basis_of(h)), state%point(h), &
+                          state%formed%matrix(:, :, h), state%load(:, h), failed)
+         if (failed) n_failed = n_failed + 1
+      end do
+      !$omp end parallel do
+   end subroutine form_all
+
+   subroutine multiply(self, state, q, product)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: product(*)
+
+      select type (state)
+      type is (cyclic_state)
+         call state%formed%multiply(self%harmonic, self%column, self%n_coordinates, q, product)
+      end select
+   end subroutine multiply
+
+   subroutine restrict(self, state, n_active, n_used, used)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      integer, intent(in) :: n_active, n_used
+      integer, intent(in) :: used(:)
+
+      associate (unused => self)
+      end associate
+      select type (state)
+      type is (cyclic_state)
+         if (state%restricted .and. state%n_active == n_active .and. state%n_used == n_used) then
+            if (all(state%used(:n_used) == used(:n_used))) return
+         end if
+         state%n_active = n_active
+         state%n_used = n_used
+         state%used(:n_used) = used(:n_used)
+         state%restricted = .true.
+         call state%formed%gather(n_active, n_used, used)
+      end select
+   end subroutine restrict
+
+   subroutine multiply_active(self, state, v, product)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: v(*)
+      real(wp), intent(inout) :: product(*)
+
+      select type (state)
+      type is (cyclic_state)
+         call state%formed%multiply_active(self%harmonic, self%column, state%n_active, &
+                                           state%n_used, v, self%n_coordinates, product)
+      end select
+   end subroutine multiply_active
+
+   subroutine block_of_all(self, state, h, matrix)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+
+      associate (unused => self)
+      end associate
+      select type (state)
+      type is (cyclic_state)
+         matrix = state%formed%matrix(:, :, h)
+      end select
+   end subroutine block_of_all
+
+   subroutine block_in_use(self, state, h, matrix)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+      integer :: j
+
+      if (state%n_active == self%n_coordinates) then
+         call self%block(state, h, matrix)
+         return
+      end if
+      select type (state)
+      type is (cyclic_state)
+         do j = 1, state%n_active
+            matrix(:, j) = state%formed%matrix(state%used(:state%n_used), state%used(j), h)
+         end do
+      end select
+   end subroutine block_in_use
+
+   complex(wp) function diagonal(self, state, h, coordinate)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h, coordinate
+
+      associate (unused => self)
+      end associate
+      diagonal = (0.0_wp, 0.0_wp)
+      select type (state)
+      type is (cyclic_state)
+         diagonal = state%formed%matrix(coordinate, coordinate, h)
+      end select
+   end function diagonal
+
+   subroutine derivative(self, state, parameter, q, slope)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      integer, intent(in) :: parameter
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: slope(*)
+      complex(wp) :: amplitude(self%n_coordinates, size(self%harmonic))
+      complex(wp) :: slopes(self%n_coordinates, size(self%harmonic))
+      integer :: h, m
+
+      m = self%n_coordinates
+      call amplitudes_of(self%harmonic, self%column, m, q, m, amplitude)
+      select type (state)
+      type is (cyclic_state)
+         do h = 1, size(self%harmonic)
+            call derive_sector(self%basis(self%basis_of(h)), state%point(h), &
+                               slopes_of(state%point(h), state%self_excitation, parameter), &
+                               amplitude(:, h), slopes(:, h))
+         end do
+      end select
+      call coefficients_of(self%harmonic, self%column, m, m, slopes, slope)
+   end subroutine derivative
+
+   !> d/dp of the factors of K, M and C.
+   pure type(harmonic_point) function slopes_of(point, self_excitation, parameter) result(slopes)
+      type(harmonic_point), intent(in) :: point
+      real(wp), intent(in) :: self_excitation
+      integer, intent(in) :: parameter
+
+      slopes = point
+      slopes%k = 0.0_wp
+      if (parameter == by_frequency) then
+         slopes%theta = point%harmonic*cmplx(2.0_wp*point%s, self_excitation, wp)
+         slopes%s = real(point%harmonic, wp)
+      else
+         slopes%theta = cmplx(0.0_wp, point%s, wp)
+         slopes%s = 0.0_wp
+      end if
+   end function slopes_of
+
+   subroutine recover(self, state, q, observed)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      complex(wp), intent(in), contiguous :: q(:, :)
+      complex(wp), intent(out), contiguous :: observed(:, :)
+      integer :: h
+
+      select type (state)
+      type is (cyclic_state)
+         do h = 1, size(self%harmonic)
+            call recover_sector(self%basis(self%basis_of(h)), state%point(h), q(:, h), &
+                                observed(:, h))
+         end do
+      end select
+   end subroutine recover
+
+   pure real(wp) function static_stiffness(self, coordinate)
+      class(cyclic_structure), intent(in) :: self
+      integer, intent(in) :: coordinate
+
+      static_stiffness = 0.0_wp
+      if (.not. allocated(self%static)) return
+      if (coordinate <= size(self%static)) static_stiffness = self%static(coordinate)
+   end function static_stiffness
+
+   !> The mean over all nodal diameters, as of the static stiffness.
+   pure subroutine split(self, coordinate, limit, m, c, k)
+      class(cyclic_structure), intent(in) :: self
+      integer, intent(in) :: coordinate
+      real(wp), intent(in) :: limit
+      real(wp), intent(out) :: m, c, k
+      real(wp) :: part(3), total
+      integer :: j
+
+      m = 0.0_wp
+      c = 0.0_wp
+      k = 0.0_wp
+      if (.not. allocated(self%all) .or. coordinate > self%n_relative) return
+      total = 0.0_wp
+      do j = 1, size(self%all)
+         if (self%place(coordinate, j) == 0) cycle
+         call split_sector(self%all(j), self%place(coordinate, j), limit, part(1), part(2), part(3))
+         m = m + self%share(j)*part(1)
+         c = c + self%share(j)*part(2)
+         k = k + self%share(j)*part(3)
+         total = total + self%share(j)
+      end do
+      if (total <= 0.0_wp) return
+      m = max(m/total, 0.0_wp)
+      c = max(c/total, 0.0_wp)
+      k = k/total
+   end subroutine split
+
+   !> Of the nodal diameter of the first harmonic, the real part: what flows in pseudo-time would
+   !> take, which cyclic structures do not have.
+   pure subroutine mass(self, matrix)
+      class(cyclic_structure), intent(in) :: self
+      real(wp), intent(out) :: matrix(:, :)
+
+      matrix = real(self%basis(of_first_harmonic(self))%blocks(:self%n_coordinates, :, 2), wp)
+   end subroutine mass
+
+   pure integer function of_first_harmonic(self) result(basis)
+      class(cyclic_structure), intent(in) :: self
+
+      basis = self%basis_of(max(1, findloc(self%harmonic, 1, dim=1)))
+   end function of_first_harmonic
+
+   !> In the nodal diameter of the first harmonic.
+   pure subroutine held_modes(self, frequency, half_width)
+      class(cyclic_structure), intent(in) :: self
+      real(wp), allocatable, intent(out) :: frequency(:), half_width(:)
+      logical, allocatable :: vibrates(:)
+
+      associate (b => self%basis(of_first_harmonic(self)))
+         vibrates = b%k_i > 0.0_wp .and. b%m_i > 0.0_wp
+         frequency = sqrt(pack(b%k_i, vibrates)/pack(b%m_i, vibrates))
+         half_width = 0.5_wp*pack(b%c_i, vibrates)/pack(b%m_i, vibrates)
+      end associate
+   end subroutine held_modes
+
+   pure subroutine magnitudes(self, state, h, amplitude, sums)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      real(wp), intent(in) :: amplitude(:)
+      real(wp), intent(out) :: sums(:)
+      real(wp) :: theta
+      integer :: j, m
+
+      m = self%n_coordinates
+      theta = self%harmonic(h)*abs(cmplx(self%harmonic(h)*state%omega**2, &
+                                         state%omega*state%self_excitation, wp))
+      sums = 0.0_wp
+      associate (b => self%basis(self%basis_of(h))%blocks)
+         do j = 1, m
+            sums = sums + (abs(b(:m, j, 1)) + theta*abs(b(:m, j, 2)))*amplitude(j)
+         end do
+      end associate
+   end subroutine magnitudes
+
+end module fw_cyclic_structure

@@ -1,0 +1,184 @@
+!> A sector tied to its neighbours in a nodal diameter k: u(right) = z u(left), z = exp(-2 pi i
+!> k/N),
+!>
+!>   K_k = T^H K T,   F = T^H f,   rows of relative displacements (S_1 - z**sector_2 S_2) T,
+!>
+!> T being the identity but for the right interface, which is no coordinate any more. Where the
+!> model holds matrices of nodal diameters, T is the identity of the physical coordinates.
+module fw_sector
+   use fw_cyclic_data, only: nodal_matrices
+   use fw_damping, only: add_modal_damping
+   use fw_error, only: error_type
+   use fw_hermitian, only: complex_part
+   use fw_hermitian, only: real_form
+   use fw_kinds, only: wp
+   use fw_model, only: model_type
+   implicit none (type, external)
+   private
+
+   public :: sector_at, sector_rows, tie_sector, damp_modes, add_sector_spring
+
+contains
+
+   !> The matrices of nodal diameter k = 0 .. N/2, with damping of modes.
+   subroutine sector_at(model, k, nodal, error)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      type(nodal_matrices), intent(out) :: nodal
+      type(error_type), allocatable, intent(out) :: error
+      complex(wp) :: turn(model%n_dof)
+      integer :: place(model%n_dof), n
+
+      if (model%cyclic%has_nodal()) then
+         nodal = model%cyclic%nodal(k + 1)
+         return
+      end if
+      call tie_sector(model, k, place, turn, n)
+      nodal%mass = tied(model%mass, place, turn, n)
+      nodal%stiffness = tied(model%stiffness, place, turn, n)
+      if (any(abs(model%damping) > 0.0_wp)) nodal%damping = tied(model%damping, place, turn, n)
+      call tie_vectors(model, place, turn, n, nodal)
+      if (model%cyclic%modal_damping > 0.0_wp) then
+         call damp_modes(model%cyclic%modal_damping, nodal, error)
+      end if
+   end subroutine sector_at
+
+   !> Where the dofs of a sector stand in the tied one, and the factor of each: T.
+   pure subroutine tie_sector(model, k, place, turn, n)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      !> (n_dof).
+      integer, intent(out) :: place(:)
+      complex(wp), intent(out) :: turn(:)
+      !> Coordinates of the tied sector, those of all nodal diameters alike.
+      integer, intent(out) :: n
+      integer :: i
+
+      turn = (1.0_wp, 0.0_wp)
+      place = 0
+      associate (cyclic => model%cyclic)
+         if (allocated(cyclic%right)) then
+            do i = 1, size(cyclic%right)
+               turn(abs(cyclic%right(i))) = sign(1, cyclic%right(i))*cyclic%factor(k, 1)
+               place(abs(cyclic%right(i))) = -cyclic%left(i)
+            end do
+         end if
+         n = 0
+         do i = 1, model%n_dof
+            if (place(i) < 0) cycle
+            n = n + 1
+            place(i) = n
+         end do
+         do i = 1, model%n_dof
+            if (place(i) < 0) place(i) = place(-place(i))
+         end do
+      end associate
+   end subroutine tie_sector
+
+   !> T^H A T.
+   pure function tied(matrix, place, turn, n) result(reduced)
+      real(wp), intent(in) :: matrix(:, :)
+      integer, intent(in) :: place(:)
+      complex(wp), intent(in) :: turn(:)
+      integer, intent(in) :: n
+      complex(wp), allocatable :: reduced(:, :)
+      integer :: i, j
+
+      allocate (reduced(n, n), source=(0.0_wp, 0.0_wp))
+      do j = 1, size(place)
+         do i = 1, size(place)
+            reduced(place(i), place(j)) = reduced(place(i), place(j)) + &
+                                          conjg(turn(i))*matrix(i, j)*turn(j)
+         end do
+      end do
+   end function tied
+
+   !> Loads T^H f and observed rows times T.
+   pure subroutine tie_vectors(model, place, turn, n, nodal)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: place(:)
+      complex(wp), intent(in) :: turn(:)
+      integer, intent(in) :: n
+      type(nodal_matrices), intent(inout) :: nodal
+      integer :: i
+
+      allocate (nodal%load(n, 3), nodal%observe(size(model%observe_matrix, 1), n), &
+                source=(0.0_wp, 0.0_wp))
+      do i = 1, model%n_dof
+         associate (f => nodal%load(place(i), :), row => nodal%observe(:, place(i)))
+            f = f + conjg(turn(i))* &
+                [model%load_static(i), model%load_cosine(i), model%load_sine(i)]
+            row = row + turn(i)*model%observe_matrix(:, i)
+         end associate
+      end do
+   end subroutine tie_vectors
+
+   !> Modal damping of Hermitian modes: those of the real form, in which each stands twice.
+   subroutine damp_modes(ratio, nodal, error)
+      real(wp), intent(in) :: ratio
+      type(nodal_matrices), intent(inout) :: nodal
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: damping(:, :)
+      integer :: n
+
+      n = size(nodal%mass, 1)
+      allocate (damping(2*n, 2*n), source=0.0_wp)
+      call add_modal_damping(real_form(nodal%mass), real_form(nodal%stiffness), ratio, damping, &
+                             error)
+      if (allocated(error)) return
+      if (allocated(nodal%damping)) then
+         nodal%damping = nodal%damping + complex_part(damping)
+      else
+         nodal%damping = complex_part(damping)
+      end if
+   end subroutine damp_modes
+
+   !> Rows (S_1 - z**sector_2 S_2) T of pairs and springs (n_rows, n).
+   pure subroutine sector_rows(model, k, side_1, side_2, sector_2, rows)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      !> Signed dofs, 0 for the ground, and the sector of the second (n_rows).
+      integer, intent(in) :: side_1(:), side_2(:), sector_2(:)
+      complex(wp), intent(out), allocatable :: rows(:, :)
+      complex(wp) :: turn(model%n_dof), z
+      integer :: place(model%n_dof), n, r
+
+      call tie_sector(model, k, place, turn, n)
+      allocate (rows(size(side_1), n), source=(0.0_wp, 0.0_wp))
+      do r = 1, size(side_1)
+         z = model%cyclic%factor(k, sector_2(r))
+         associate (row => rows(r, :))
+            if (side_1(r) /= 0) call add_side(place, turn, side_1(r), (1.0_wp, 0.0_wp), row)
+            if (side_2(r) /= 0) call add_side(place, turn, side_2(r), -z, row)
+         end associate
+      end do
+   end subroutine sector_rows
+
+   pure subroutine add_side(place, turn, side, weight, row)
+      integer, intent(in) :: place(:)
+      complex(wp), intent(in) :: turn(:)
+      integer, intent(in) :: side
+      complex(wp), intent(in) :: weight
+      complex(wp), intent(inout) :: row(:)
+
+      associate (i => place(abs(side)))
+         row(i) = row(i) + sign(1, side)*weight*turn(abs(side))
+      end associate
+   end subroutine add_side
+
+   !> stiffness + row^H coefficient row; the row holds the first coordinates.
+   pure subroutine add_sector_spring(row, coefficient, stiffness)
+      complex(wp), intent(in) :: row(:)
+      real(wp), intent(in) :: coefficient
+      complex(wp), intent(inout) :: stiffness(:, :)
+      integer :: i, j
+
+      do j = 1, size(row)
+         if (abs(row(j)) <= 0.0_wp) cycle
+         do i = 1, size(row)
+            stiffness(i, j) = stiffness(i, j) + conjg(row(i))*coefficient*row(j)
+         end do
+      end do
+   end subroutine add_sector_spring
+
+end module fw_sector

@@ -1,0 +1,262 @@
+!> The condensed stiffness of a sector in one harmonic, from the basis of its nodal diameter, or the
+!> conjugates of it where that diameter is above N/2 (K_(N-k) = conj(K_k)):
+!>
+!>   D = k_i - theta m_i + i s c_i,   Z_r = Z_qq - Z_qi D^-1 Z_iq,   F_r = F_q - Z_qi D^-1 F_i.
+!>
+!> Z_qi is not the transpose of Z_iq: the blocks of K, M and C are Hermitian, their sum is not.
+module fw_sector_stiffness
+   use fw_kinds, only: wp
+   use fw_lapack, only: zgemm
+   use fw_linalg, only: complex_lu_type
+   use fw_sector_reduction, only: sector_reduction
+   implicit none (type, external)
+   private
+
+   public :: harmonic_point, form_sector, derive_sector, recover_sector
+
+   !> Where a harmonic stands: factors of K, M and C in Z = k K - theta M + i s C.
+   type :: harmonic_point
+      integer :: harmonic = 0
+      !> Whether the conjugates of the basis act.
+      logical :: conjugated = .false.
+      complex(wp) :: theta = (0.0_wp, 0.0_wp)
+      real(wp) :: s = 0.0_wp
+      !> 1, or 0 in a derivative.
+      real(wp) :: k = 1.0_wp
+   end type harmonic_point
+
+   !> D, factored where damping couples the modes.
+   type :: internal_type
+      complex(wp), allocatable :: inverse(:)
+      logical :: coupled = .false.
+      type(complex_lu_type) :: lu
+   end type internal_type
+
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp)
+
+contains
+
+   !> Z_r and F_r; fails where a mode resonates without damping.
+   subroutine form_sector(basis, point, matrix, load, failed)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      !> (n_coordinates, n_coordinates) and (n_coordinates).
+      complex(wp), intent(inout), contiguous :: matrix(:, :)
+      complex(wp), intent(inout) :: load(:)
+      logical, intent(out) :: failed
+      type(internal_type) :: internal
+      complex(wp), allocatable :: z_iq(:, :), z_qi(:, :), solved(:, :)
+      integer :: m, n
+
+      m = basis%n_coordinates
+      n = basis%n_internal
+      call factor_internal(basis, point, internal, failed)
+      call combine_rows(basis, point, 1, m, .false., matrix)
+      load = load_of(basis%load_q, point)
+      if (n == 0) return
+      allocate (z_iq(n, m), z_qi(n, m), solved(n, m + 1))
+      call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
+      ! The transpose of Z_qi.
+      call combine_rows(basis, point, m + 1, m + n, .true., z_qi)
+      solved(:, :m) = z_iq
+      solved(:, m + 1) = load_of(basis%load_i, point)
+      call solve_internal(internal, m + 1, solved)
+      call zgemm('T', 'N', m, m, n, -one, z_qi, n, solved, n, one, matrix, m)
+      load = load - matmul(transpose(z_qi), solved(:, m + 1))
+   end subroutine form_sector
+
+   !> d(Z_r q - F_r)/dp, from the derivatives of the factors:
+   !> Z'_qq q + Z'_qi x - Z_qi D^-1 (Z'_iq q + D' x).
+   subroutine derive_sector(basis, point, slopes, q, derivative)
+      type(sector_reduction), intent(in) :: basis
+      !> `slopes` holds the derivatives of the factors.
+      type(harmonic_point), intent(in) :: point, slopes
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: derivative(:)
+      type(internal_type) :: internal
+      complex(wp), allocatable :: block(:, :), x(:, :)
+      integer :: m, n
+      logical :: failed
+
+      m = basis%n_coordinates
+      n = basis%n_internal
+      allocate (block(m, m))
+      call combine_rows(basis, slopes, 1, m, .false., block)
+      derivative = matmul(block, q)
+      if (n == 0) return
+      call factor_internal(basis, point, internal, failed)
+      allocate (x(n, 1))
+      deallocate (block)
+      allocate (block(n, m))
+      x(:, 1) = modes_of(basis, point, internal, q)
+      call combine_rows(basis, slopes, m + 1, m + n, .true., block)
+      derivative = derivative + matmul(x(:, 1), block)
+      call combine_rows(basis, slopes, m + 1, m + n, .false., block)
+      x(:, 1) = matmul(block, q) + internal_slope(basis, slopes, x(:, 1))
+      call solve_internal(internal, 1, x)
+      call combine_rows(basis, point, m + 1, m + n, .true., block)
+      derivative = derivative - matmul(x(:, 1), block)
+   end subroutine derive_sector
+
+   !> Observed quantities of sector 0.
+   subroutine recover_sector(basis, point, q, observed)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: observed(:)
+      type(internal_type) :: internal
+      logical :: failed
+
+      observed = matmul(turned(basis%observe_q, point), q)
+      if (basis%n_internal == 0) return
+      call factor_internal(basis, point, internal, failed)
+      observed = observed + matmul(turned(basis%observe_i, point), &
+                                   modes_of(basis, point, internal, q))
+   end subroutine recover_sector
+
+   !> x = D^-1 (F_i - Z_iq q).
+   function modes_of(basis, point, internal, q) result(x)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      type(internal_type), intent(in) :: internal
+      complex(wp), intent(in) :: q(:)
+      complex(wp) :: x(basis%n_internal)
+      complex(wp), allocatable :: z_iq(:, :), rhs(:, :)
+
+      associate (m => basis%n_coordinates, n => basis%n_internal)
+         allocate (z_iq(n, m), rhs(n, 1))
+         call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
+         rhs(:, 1) = load_of(basis%load_i, point) - matmul(z_iq, q)
+         call solve_internal(internal, 1, rhs)
+         x = rhs(:, 1)
+      end associate
+   end function modes_of
+
+   !> k K - theta M + i s C of some rows of the blocks, or of their conjugates.
+   pure subroutine combine_rows(basis, point, first, last, adjoint, z)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      integer, intent(in) :: first, last
+      logical, intent(in) :: adjoint
+      complex(wp), intent(inout) :: z(:, :)
+      complex(wp) :: c
+      integer :: i, j
+
+      c = cmplx(0.0_wp, point%s, wp)
+      associate (b => basis%blocks)
+         do j = 1, basis%n_coordinates
+            do i = first, last
+               if (point%conjugated .neqv. adjoint) then
+                  z(i - first + 1, j) = point%k*conjg(b(i, j, 1)) - point%theta*conjg(b(i, j, 2))
+                  if (basis%n_blocks == 3) z(i - first + 1, j) = z(i - first + 1, j) + &
+                     c*conjg(b(i, j, 3))
+               else
+                  z(i - first + 1, j) = point%k*b(i, j, 1) - point%theta*b(i, j, 2)
+                  if (basis%n_blocks == 3) z(i - first + 1, j) = z(i - first + 1, j) + c*b(i, j, 3)
+               end if
+            end do
+         end do
+      end associate
+   end subroutine combine_rows
+
+   subroutine factor_internal(basis, point, self, failed)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      type(internal_type), intent(out) :: self
+      logical, intent(out) :: failed
+      integer :: j
+
+      failed = .false.
+      self%coupled = allocated(basis%c_ii)
+      self%inverse = cmplx(basis%k_i - real(point%theta, wp)*basis%m_i, &
+                           -aimag(point%theta)*basis%m_i, wp)
+      if (self%coupled) then
+         call self%lu%reserve(basis%n_internal)
+         self%lu%matrix = cmplx(0.0_wp, point%s, wp)*turned(basis%c_ii, point)
+         do j = 1, basis%n_internal
+            self%lu%matrix(j, j) = self%lu%matrix(j, j) + self%inverse(j)
+            if (abs(self%inverse(j)) <= 0.0_wp .and. point%s <= 0.0_wp) then
+               self%lu%matrix(j, j) = one
+            end if
+         end do
+         call self%lu%factor(failed)
+      else
+         self%inverse = self%inverse + cmplx(0.0_wp, point%s*basis%c_i, wp)
+         failed = point%s > 0.0_wp .and. any(abs(self%inverse) <= 0.0_wp)
+      end if
+      ! A free internal mode carries no static load (checked on construction): it stays at rest.
+      do j = 1, basis%n_internal
+         if (abs(self%inverse(j)) > 0.0_wp) then
+            self%inverse(j) = 1.0_wp/self%inverse(j)
+         else if (point%s > 0.0_wp) then
+            self%inverse(j) = one
+         end if
+      end do
+   end subroutine factor_internal
+
+   !> D x = rhs in place.
+   subroutine solve_internal(self, n_right, rhs)
+      type(internal_type), intent(in) :: self
+      integer, intent(in) :: n_right
+      complex(wp), intent(inout), contiguous :: rhs(:, :)
+      integer :: j
+
+      if (self%coupled) then
+         call self%lu%solve(n_right, rhs)
+         do j = 1, size(self%inverse)
+            if (abs(self%inverse(j)) <= 0.0_wp) rhs(j, :n_right) = (0.0_wp, 0.0_wp)
+         end do
+      else
+         do j = 1, n_right
+            rhs(:, j) = self%inverse*rhs(:, j)
+         end do
+      end if
+   end subroutine solve_internal
+
+   !> D' times a vector.
+   pure function internal_slope(basis, slopes, vector) result(product)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: slopes
+      complex(wp), intent(in) :: vector(:)
+      complex(wp) :: product(size(vector))
+
+      product = -slopes%theta*basis%m_i*vector
+      if (allocated(basis%c_ii)) then
+         product = product + cmplx(0.0_wp, slopes%s, wp)*matmul(turned(basis%c_ii, slopes), vector)
+      else
+         product = product + cmplx(0.0_wp, slopes%s, wp)*basis%c_i*vector
+      end if
+   end function internal_slope
+
+   !> Complex load of a harmonic: G_c - i G_s, of a conjugated basis from the conjugates of both.
+   pure function load_of(parts, point) result(load)
+      complex(wp), intent(in) :: parts(:, :)
+      type(harmonic_point), intent(in) :: point
+      complex(wp) :: load(size(parts, 1))
+      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+
+      select case (point%harmonic)
+      case (0)
+         load = cmplx(real(parts(:, 1), wp), kind=wp)
+      case (1)
+         if (point%conjugated) then
+            load = conjg(parts(:, 2)) - i*conjg(parts(:, 3))
+         else
+            load = parts(:, 2) - i*parts(:, 3)
+         end if
+      case default
+         load = (0.0_wp, 0.0_wp)
+      end select
+   end function load_of
+
+   !> A matrix of the basis as the harmonic takes it.
+   pure function turned(matrix, point) result(as_taken)
+      complex(wp), intent(in) :: matrix(:, :)
+      type(harmonic_point), intent(in) :: point
+      complex(wp), allocatable :: as_taken(:, :)
+
+      as_taken = matrix
+      if (point%conjugated) as_taken = conjg(matrix)
+   end function turned
+
+end module fw_sector_stiffness
