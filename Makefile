@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare paper
-.PHONY: stress long faults peaks rest scars verify
+.PHONY: stress long faults peaks rest scars slow verify
 
 BUILD := build/release
 RUN := build/run
@@ -139,6 +139,10 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 BEFORE ?=
 rest: build ## where pairs of the velocity law come to rest, also of a program BEFORE
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/rest/shakedown.py \
+	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
+
+slow: build ## slow stick-slip, also of a program BEFORE, written to docs/robustness.md
+	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/rigid/slow_family.py \
 	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
 
 scars: build ## steady states of wear against a march of cycles, also of a program BEFORE

@@ -1,11 +1,13 @@
 !> Points with the harmonics of the case, each started from what is known of those before.
 module fw_one_level
    use fw_case, only: case_type
+   use fw_contact_data, only: memory_carried
    use fw_diagnosis, only: explain_failure
    use fw_diagnosis, only: finer
    use fw_diagnosis, only: takes_scale
    use fw_error, only: error_type
    use fw_level, only: level_type
+   use fw_other_starts, only: start_elsewhere
    use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
@@ -17,9 +19,17 @@ module fw_one_level
 
    public :: one_level
 
+   !> Points without a solution in a row after which no other balance is looked at.
+   integer, parameter :: most_failures = 2
+   character(*), parameter :: in_time = &
+      "; analysis = 'time' integrates what no balance converges to, such as slow stick-slip"
+
    !> The strategy of a given number of harmonics: one system and one solver serve all points.
    type, extends(point_strategy) :: one_level
       type(level_type) :: level
+      !> Points that other balances of the case led to, and what did so last.
+      integer :: n_elsewhere = 0
+      character(:), allocatable :: way
    contains
       procedure :: start
       procedure :: solve
@@ -51,6 +61,15 @@ contains
       if (allocated(self%note)) deallocate (self%note)
       call self%level%solve(case, request, point, error)
       if (allocated(error)) return
+      if (.not. point%converged .and. goes_on(self, case, request)) then
+         call start_elsewhere(case, self%level, request, point, error)
+         if (allocated(error)) return
+         if (point%converged) then
+            self%level%solver%point_failures = 0
+            self%n_elsewhere = self%n_elsewhere + 1
+            if (allocated(point%note)) self%way = point%note
+         end if
+      end if
       associate (method => self%level%solver%method)
          ! Pseudo-time says why it failed; the other solvers have no more to tell than the point.
          if (.not. point%converged .and. allocated(method%message)) then
@@ -58,6 +77,20 @@ contains
          end if
       end associate
    end subroutine solve
+
+   !> Whether other balances of the case are worth their solutions: nothing ended the work on the
+   !> point, and it is not one of many in a row that have no solution.
+   logical function goes_on(self, case, request)
+      class(one_level), intent(in) :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
+
+      goes_on = request%fallback .and. self%level%solver%point_failures <= most_failures &
+                .and. .not. self%level%solver%method%unbounded &
+                .and. case%contact%n_pairs + case%springs%n_springs > 0 &
+                .and. case%contact%memory /= memory_carried
+      if (goes_on .and. associated(request%interrupt)) goes_on = .not. request%interrupt%is_due()
+   end function goes_on
 
    !> The work done, and why points failed.
    subroutine describe(self, case, state, summary, message)
@@ -72,6 +105,7 @@ contains
          call summary%describe_work(system, solver%method%newton%linear, case%solver%kind, &
                                     state%all_converged())
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
+         if (self%n_elsewhere > 0) call summary%note_elsewhere(self%n_elsewhere, self%way)
          if (state%was_stopped .or. state%all_converged()) return
          if (case%model%cyclic%is_cyclic .and. case%solver%fallback) call summary%leave_fallback()
          ! What cannot help in this case is left out.
@@ -85,9 +119,20 @@ contains
                       "(dissipation short of mu N |v| by more than 1/H): take "// &
                       "contact%law = 'rigid' where friction acts on mass"
          end if
-         message = 'not converged: '//message
+         message = 'not converged: '//message//advice_in_time(system%problem%forces%entry( &
+                   system%problem%forces%pairs)%law%facts%is_integrated .and. &
+                   case%contact%n_pairs > 0)
       end associate
    end subroutine describe
+
+   !> Stick-slip that no balance of few harmonics follows is no trouble to an integration in time.
+   pure function advice_in_time(is_integrated) result(advice)
+      !> Whether the integration knows the law of the pairs.
+      logical, intent(in) :: is_integrated
+      character(len=merge(len(in_time), 0, is_integrated)) :: advice
+
+      advice = in_time
+   end function advice_in_time
 
    !> The last converged solution, so that points of a search start from it.
    subroutine remember(self, memory)

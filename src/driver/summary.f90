@@ -66,6 +66,7 @@ module fw_summary
       procedure :: describe_bifurcations
       procedure :: note_fallback
       procedure :: leave_fallback
+      procedure :: note_elsewhere
       procedure :: describe_harmonics
       procedure :: describe_accuracy
       procedure :: describe_wear
@@ -259,6 +260,16 @@ contains
 
       call add_line(self%work, 'left out', 'pseudo-time, which cyclic structures do not have')
    end subroutine leave_fallback
+
+   !> Points that easier balances of the same case led to.
+   subroutine note_elsewhere(self, n_points, way)
+      class(summary_type), intent(inout) :: self
+      integer, intent(in) :: n_points
+      !> What did so.
+      character(*), intent(in) :: way
+
+      call add_line(self%work, 'other balances', 'served '//to_text(n_points)//' points, '//way)
+   end subroutine note_elsewhere
 
    !> How many harmonics the points took.
    subroutine describe_harmonics(self, n_short, tolerance)

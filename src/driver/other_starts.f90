@@ -1,0 +1,238 @@
+!> Starts for a point that no way of its own balance reaches: the solutions of easier balances of
+!> the same case. In the order that pays:
+!>
+!> * with fewer harmonics, lifted from level to level: slow stick-slip, whose many harmonics of a
+!>   square wave let Newton's method wander, has a smooth beginning;
+!> * with softer elastic pairs, or another eps of rigid ones, at the harmonics of the case.
+module fw_other_starts
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_level, only: harmonic_levels
+   use fw_level, only: level_type
+   use fw_point, only: point_type
+   use fw_point, only: served_by_other_balance
+   use fw_strategy, only: point_request
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: start_elsewhere
+
+   !> Iterations of all balances together, beyond which no other one is begun.
+   integer, parameter :: most_work = 1200
+   !> Times the stiffness of elastic pairs, and times the eps of rigid ones: softer ones lead on to
+   !> stiffer ones; for eps there is no such order.
+   real(wp), parameter :: softer(3) = [0.03_wp, 0.1_wp, 0.3_wp], other_eps(2) = [3.0_wp, 0.3_wp]
+
+contains
+
+   !> Solve a point of a level that its own solver did not reach; `point` stays where this fails
+   !> too.
+   subroutine start_elsewhere(case, level, request, point, error)
+      type(case_type), intent(in) :: case
+      type(level_type), intent(inout), target :: level
+      type(point_request), intent(in) :: request
+      type(point_type), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+      integer :: work, harmonics
+      logical :: done
+
+      work = point%iterations
+      call by_fewer_harmonics(case, level, request, point, work, done, harmonics, error)
+      if (allocated(error)) return
+      if (done) then
+         point%note = 'started from '//to_text(harmonics)//' harmonics'
+      else if (case%contact%n_pairs > 0 .and. work < most_work) then
+         call by_stiffness(case, level, request, point, work, done, error)
+         if (allocated(error)) return
+         if (done) point%note = 'started from another stiffness of its pairs'
+      end if
+      point%iterations = work
+      if (done) point%served_by = served_by_other_balance
+   end subroutine start_elsewhere
+
+   !> Up the ladder of harmonics; steps between the last that has a solution and the wanted one are
+   !> halved.
+   subroutine by_fewer_harmonics(case, level, request, point, work, done, lower, error)
+      type(case_type), intent(in) :: case
+      type(level_type), intent(inout), target :: level
+      type(point_request), intent(in) :: request
+      type(point_type), intent(inout) :: point
+      integer, intent(inout) :: work
+      logical, intent(out) :: done
+      !> Harmonics of the last level with a solution below (0: none).
+      integer, intent(out) :: lower
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: ladder(:)
+      type(level_type), pointer :: last, next
+      integer :: most, upper, k
+
+      nullify (last)
+      lower = 0
+      done = .false.
+      most = case%harmonics%n_harmonics
+      ladder = harmonic_levels(most)
+      do k = 1, size(ladder) - 1
+         if (work >= most_work) exit
+         allocate (next)
+         call climb(case, ladder(k), request, last, next, work, done, error)
+         if (allocated(error)) exit
+         if (done) then
+            lower = ladder(k)
+         else if (lower > 0) then
+            ! Higher levels start from this one.
+            exit
+         end if
+      end do
+      upper = most
+      do while (lower > 0 .and. .not. allocated(error))
+         call arrive(case, last, level, request, point, work, done, error)
+         if (done .or. allocated(error) .or. work >= most_work) exit
+         ! One level more, in the middle of what could not be crossed.
+         do
+            upper = lower + 2*((upper - lower)/4)
+            if (upper <= lower .or. work >= most_work) exit
+            allocate (next)
+            call climb(case, upper, request, last, next, work, done, error)
+            if (done .or. allocated(error)) exit
+         end do
+         if (.not. done .or. allocated(error)) exit
+         lower = upper
+         upper = most
+      end do
+      if (associated(last)) deallocate (last)
+   end subroutine by_fewer_harmonics
+
+   !> With other stiffnesses of the pairs.
+   subroutine by_stiffness(case, level, request, point, work, done, error)
+      type(case_type), intent(in) :: case
+      type(level_type), intent(inout), target :: level
+      type(point_request), intent(in) :: request
+      type(point_type), intent(inout) :: point
+      integer, intent(inout) :: work
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: easier
+      type(level_type), pointer :: last, next
+      real(wp), allocatable :: scales(:)
+      logical :: rigid
+      integer :: k
+
+      nullify (last)
+      done = .false.
+      associate (forces => level%system%problem%forces)
+         rigid = forces%entry(forces%pairs)%law%prediction%takes_balance
+      end associate
+      scales = softer
+      if (rigid) scales = other_eps
+      do k = 1, size(scales)
+         if (work >= most_work) exit
+         easier = case
+         if (rigid) then
+            easier%contact%penalty_scale = scales(k)*case%contact%penalty_scale
+         else
+            easier%contact%tangential_stiffness = scales(k)*case%contact%tangential_stiffness
+            easier%contact%normal_stiffness = scales(k)*case%contact%normal_stiffness
+         end if
+         allocate (next)
+         call climb(easier, case%harmonics%n_harmonics, request, last, next, work, done, error)
+         if (allocated(error)) exit
+         if (.not. done .or. (.not. rigid .and. k < size(scales))) cycle
+         call arrive(case, last, level, request, point, work, done, error)
+         if (done .or. allocated(error)) exit
+      end do
+      if (associated(last)) deallocate (last)
+   end subroutine by_stiffness
+
+   !> Solve an easier balance, from the last one that has a solution; where it has one, it takes its
+   !> place, else it is given back.
+   subroutine climb(easier, n_harmonics, request, last, next, work, done, error)
+      type(case_type), intent(in) :: easier
+      integer, intent(in) :: n_harmonics
+      type(point_request), intent(in) :: request
+      type(level_type), pointer, intent(inout) :: last, next
+      integer, intent(inout) :: work
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      type(point_request) :: bare
+      type(point_type) :: point
+
+      done = .false.
+      bare = request
+      bare%stability = .false.
+      bare%contact = .false.
+      bare%histories = .false.
+      bare%fallback = .true.
+      call next%build(easier, n_harmonics, error)
+      if (.not. allocated(error)) then
+         if (associated(last)) call next%take_over(last)
+         call next%solve(easier, bare, point, error)
+      end if
+      if (.not. allocated(error)) then
+         work = work + point%iterations
+         done = point%converged
+      end if
+      if (done) then
+         if (associated(last)) deallocate (last)
+         last => next
+      else
+         deallocate (next)
+      end if
+      nullify (next)
+   end subroutine climb
+
+   !> From the solution of another balance to the wanted one.
+   subroutine arrive(case, last, level, request, point, work, done, error)
+      type(case_type), intent(in) :: case
+      type(level_type), intent(in) :: last
+      type(level_type), intent(inout), target :: level
+      type(point_request), intent(in) :: request
+      type(point_type), intent(inout) :: point
+      integer, intent(inout) :: work
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      type(point_request) :: plain
+      type(point_type) :: trial
+      real(wp), allocatable :: x(:), before(:)
+      real(wp) :: omega, omega_before
+      integer :: n, failures
+
+      done = .false.
+      associate (solver => level%solver)
+         ! What the solver knows is given back where this leads nowhere.
+         x = solver%last
+         before = solver%before
+         omega = solver%omega_last
+         omega_before = solver%omega_before
+         n = solver%n_converged
+         failures = solver%point_failures
+         call level%take_over(last)
+         plain = request
+         plain%fallback = .false.
+         call level%solve(case, plain, trial, error)
+         if (allocated(error)) return
+         work = work + trial%iterations
+         if (.not. trial%converged .and. work < most_work) then
+            ! Pseudo-time flows on from here, where Newton's method has gone astray.
+            plain%fallback = .true.
+            solver%flow_failures = 0
+            call level%solve(case, plain, trial, error)
+            if (allocated(error)) return
+            work = work + trial%iterations
+         end if
+         done = trial%converged
+         if (done) then
+            point = trial
+            return
+         end if
+         solver%last = x
+         solver%before = before
+         solver%omega_last = omega
+         solver%omega_before = omega_before
+         solver%n_converged = n
+         solver%point_failures = failures
+      end associate
+   end subroutine arrive
+
+end module fw_other_starts
