@@ -141,10 +141,12 @@ contains
       end if
       sample = new_sample(point)
       sample%row = self%n_rows
+      ! In order, look_back decides of each row what of it is kept; in no order, all are kept.
       sample%is_needed = .not. self%in_order
       call self%source%remember(sample%memory)
       call self%samples%insert(sample, place)
       self%n_following = self%n_following + 1
+      ! Two neighbours without a failure between them, which says nothing of the interval.
       if (self%in_order .and. self%n_following >= 2) call look_back(self, place)
       if (modulo(self%n_rows, most_samples) == 0 .and. self%samples%n >= most_samples) then
          call self%samples%thin()
@@ -170,6 +172,7 @@ contains
             end if
          end associate
          if (n < 3) return
+         ! The row before the last has neighbours on both sides now.
          is_peak = .false.
          do i = 1, size(item(place)%at%amplitude)
             is_peak = is_peak .or. is_maximum(self%samples, place + back, i)
@@ -228,9 +231,12 @@ contains
       type(joint_mode_type), intent(in) :: mode
       type(sample_type), intent(in) :: below, above
 
+      ! In the interval, and so narrow that rows may pass it by.
       hides_mode = mode%omega > below%omega .and. mode%omega < above%omega .and. &
                    intervals_of_width*(above%omega - below%omega) > mode%width
       if (.not. hides_mode) return
+      ! High enough to make a maximum of what vibrates here, and of a joint that is as the mode
+      ! needs it.
       hides_mode = any(mode%amplitude > least_part*max(below%amplitude - below%mean, &
                                                        above%amplitude - above%mean)) .and. &
                    (is_in_state(mode%state, below) .or. is_in_state(mode%state, above))
@@ -267,6 +273,8 @@ contains
       if (case%contact%memory == memory_carried .or. case%analysis == analysis_time) return
       if (.not. self%in_order) call suspect_all(self)
       budget = min(max(least_budget, self%n_rows/budget_share), most_budget)
+      ! In the order of what they may find: resonances that no row shows, ends of the range,
+      ! summits of maxima that rows show, and last the widths, which change no maximum.
       do k = 1, size(self%suspects)
          call look_into(self, case, self%suspects(k), budget, error)
          if (allocated(error)) return
@@ -293,6 +301,7 @@ contains
       if (n < 2) return
       is_high = .false.
       do i = 1, size(self%samples%item(1)%at%amplitude)
+         ! A low end is no candidate for the highest amplitude, whichever way it slopes.
          associate (item => self%samples%item, highest => highest_of(self%samples, i))
             is_high = is_high .or. [is_bound(self%samples, 1, i), is_bound(self%samples, n, i)] &
                       .and. [item(1)%at%amplitude(i), item(n)%at%amplitude(i)] >= 0.5_wp*highest
@@ -323,12 +332,14 @@ contains
       do j = 1, size(self%modes)
          associate (mode => self%modes(j))
             if (mode%omega <= suspect%below .or. mode%omega >= suspect%above) cycle
+            ! The maximum of displacement, omega sqrt(1 - 2 zeta^2), with the width 2 zeta omega.
             omega = sqrt(mode%omega**2 - 0.5_wp*min(mode%width, mode%omega)**2)
          end associate
          if (.not. is_open(self, self%modes(j), omega)) cycle
          call solve_at(self, case, omega, budget, error)
          if (allocated(error)) return
       end do
+      ! Then where the phase turns: each solution divides the interval, or shows the maximum.
       do trial = 1, most_trials
          call find_turn(self, suspect, omega, found)
          if (.not. found) exit

@@ -166,6 +166,8 @@ contains
       integer, intent(in) :: i
       real(wp) :: total
 
+      ! Of one undamped mode a (omega_r^2 - omega^2) is its load over its mass, up to a sign the
+      ! same for both samples: a_1 (omega_r^2 - omega_1^2) = a_2 (omega_2^2 - omega_r^2).
       total = below%first(i) + above%first(i)
       omega = 0.5_wp*(below%omega + above%omega)
       if (total <= 0.0_wp) return
