@@ -2,6 +2,7 @@
 !> run.
 module fw_remarks
    use fw_case, only: case_type
+   use fw_force_law, only: law_facts
    use fw_joint_modes, only: held_stiffness
    use fw_joint_modes, only: joint_mode_type
    use fw_joint_modes, only: most_dofs
@@ -9,6 +10,7 @@ module fw_remarks
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dpotrf
+   use fw_laws, only: facts_of
    use fw_laws, only: law_words
    use fw_peak, only: found_bound
    use fw_peak, only: found_unresolved
@@ -84,7 +86,45 @@ contains
       if (.not. acts) call remarks%add('no load', 'no vibratory load acts: the response is '// &
          'that at rest; set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       call remark_harmonics(case, remarks)
+      call remark_tail(case, remarks)
    end subroutine remark_input
+
+   !> Where a law that follows the motion above the harmonics cannot.
+   subroutine remark_tail(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      type(law_facts) :: facts
+      logical :: impacts
+      integer :: i, dof(2)
+
+      associate (contact => case%contact)
+         if (contact%n_pairs == 0) return
+         facts = facts_of(contact%law)
+         if (.not. facts%has_tail) return
+         if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1))) then
+            call remarks%add('two directions', 'slip in two directions is solved with the '// &
+                             'stiffness that the structure has above the harmonics, and '// &
+                             'without its mass there: not of high order on masses')
+         end if
+         impacts = .false.
+         do i = 1, contact%n_pairs
+            dof = abs([contact%side_1(3, i), contact%side_2(3, i)])
+            impacts = impacts .or. has_mass(case, dof(1)) .or. has_mass(case, dof(2))
+         end do
+         if (impacts) call remarks%add('impact on mass', 'a normal dof has mass: where it '// &
+            'lifts off and lands, errors fall with 1/H only, as impacts of masses have a tail '// &
+            "that the law does not follow; law = 'penalty' has it in its springs")
+      end associate
+   end subroutine remark_tail
+
+   !> The ground, dof 0, has none.
+   pure logical function has_mass(case, dof)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: dof
+
+      has_mass = .false.
+      if (dof > 0) has_mass = case%model%mass(dof, dof) > 0.0_wp
+   end function has_mass
 
    !> One harmonic says little of a joint.
    subroutine remark_harmonics(case, remarks)

@@ -111,3 +111,21 @@ def test_what_it_does_not_go_with(tmp_path, changes, words):
     del case["harmonics"]["n_time"]
     done = cases.run(tmp_path, cases.merged(case, changes), status=(3,))
     assert words in done.stderr
+
+
+@pytest.mark.parametrize(("side", "name"), [([1, 2, 0], "two directions"),
+                                            ([1, 0, 2], "impact on mass"), ([1, 0, 0], None)])
+def test_what_it_does_not_follow_is_said(tmp_path, side, name):
+    """In a remark, and nothing is said where it does."""
+    case = {"case": {"analysis": "point", "threads": 1},
+            "model": {"n_dof": 2, "mass": np.eye(2), "stiffness": np.eye(2),
+                      "damping": 0.1 * np.eye(2)},
+            "contact": {"n_pairs": 1, "law": "rigid", "side_1": side, "mu": 0.5},
+            "load": {"static": [0.0, -1.0], "cosine": [0.4, 0.1]},
+            "harmonics": {"n_harmonics": 5}, "sweep": {"start": 0.7}}
+    if side[2] == 0:
+        case["contact"]["normal_load"] = 0.3
+    cases.run(tmp_path, case)
+    names = [text.decode() for text in cases.read(tmp_path / "case.h5").get("remarks/name", [])]
+    wanted = {"two directions", "impact on mass"} & set(names)
+    assert wanted == ({name} if name else set())
