@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare paper
-.PHONY: stress long faults peaks rest scars slow verify
+.PHONY: stress long faults peaks bifurcations rest scars slow verify
 
 BUILD := build/release
 RUN := build/run
@@ -152,6 +152,9 @@ scars: build ## steady states of wear against a march of cycles, also of a progr
 peaks: build ## reported peaks of random sweeps, also of a program BEFORE, written to docs/robustness.md
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/peaks.py \
 	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
+
+bifurcations: build ## bifurcations of 200 random branches against shooting, in docs/robustness.md
+	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/bifurcations/bifurcations.py -o
 
 faults: build ## kills, signals, full disks, two runs at a time, written to docs/robustness.md
 	$(OVERVIEW) PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \

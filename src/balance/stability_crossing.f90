@@ -11,6 +11,7 @@ module fw_stability_crossing
    private
 
    public :: signature_of, crossing_between, test_value, critical_multiplier, multiplier_track
+   public :: movement_between, may_hide
    public :: crossing_none, crossing_plus, crossing_minus, crossing_pair, crossing_several
 
    !> One multiplier passes 1; one passes -1; a complex pair passes; more than one of these.
@@ -18,6 +19,9 @@ module fw_stability_crossing
                          crossing_pair = 3, crossing_several = 4
    !> Part of its modulus below which an imaginary part is that of round-off.
    real(wp), parameter :: on_axis = 1.0e-9_wp
+   !> Multipliers up to which a look is taken at what two solutions may hide: those of large
+   !> structures are near everything.
+   integer, parameter :: most_looked_at = 24
 
    !> The solutions of a branch, as far as verdicts need them.
    type :: multiplier_track
@@ -61,6 +65,40 @@ contains
          crossing = crossing_several
       end if
    end function crossing_between
+
+   !> How far the multipliers that are nearest to 1 and to -1 move from one solution to the next.
+   pure function movement_between(a, b) result(movement)
+      complex(wp), intent(in) :: a(:), b(:)
+      real(wp) :: movement(2)
+      integer :: crossing
+
+      do crossing = crossing_plus, crossing_minus
+         movement(crossing) = max(minval(abs(b - critical_multiplier(a, crossing))), &
+                                  minval(abs(a - critical_multiplier(b, crossing))))
+      end do
+   end function movement_between
+
+   !> Whether a multiplier may pass 1 or -1 and come back between two solutions of equal counts: it
+   !> is nearer to that than it moves from solution to solution.
+   pure logical function may_hide(a, b, movement_before, has_fold)
+      complex(wp), intent(in) :: a(:), b(:)
+      !> From the solution before to `a`.
+      real(wp), intent(in) :: movement_before(2)
+      !> Whether the branch turns between the two, which a multiplier passes 1 for.
+      logical, intent(in) :: has_fold
+      real(wp) :: movement(2), distance(2)
+      integer :: crossing
+
+      may_hide = .false.
+      if (size(a) > most_looked_at) return
+      movement = max(movement_between(a, b), movement_before)
+      do crossing = crossing_plus, crossing_minus
+         if (crossing == crossing_plus .and. has_fold) cycle
+         distance = [distance_to(critical_multiplier(a, crossing), crossing), &
+                     distance_to(critical_multiplier(b, crossing), crossing)]
+         may_hide = may_hide .or. minval(distance) < movement(crossing)
+      end do
+   end function may_hide
 
    !> Distance of the multiplier that passes from the circle, with the sign of the side: that of
    !> `before` is negative.

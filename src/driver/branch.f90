@@ -34,9 +34,8 @@ module fw_branch
    use fw_recovery, only: recover_point
    use fw_solution, only: is_lasting
    use fw_stability_crossing, only: critical_multiplier
-   use fw_stability_crossing, only: crossing_between
-   use fw_stability_crossing, only: crossing_none
    use fw_stability_crossing, only: crossing_plus
+   use fw_stability_crossing, only: movement_between
    use fw_stability_crossing, only: multiplier_track
    use fw_stability_crossing, only: signature_of
    use fw_stability_solver, only: stability_solver
@@ -83,6 +82,8 @@ module fw_branch
       type(branch_point), private :: last
       type(point_type), private :: last_point
       logical, private :: has_fold = .false.
+      !> Of its multipliers since the point before it.
+      real(wp), private :: movement(2) = 0.0_wp
    contains
       procedure :: begin
       procedure :: next
@@ -317,18 +318,24 @@ contains
       type(branch_point), intent(in) :: found
       type(point_type), intent(in) :: point
       type(error_type), allocatable, intent(out) :: error
-      integer :: signature(3)
 
       call note_peak(self, case, found, point, error)
       if (allocated(error)) return
       if (point%fold) then
-         call add_fold(self, point)
+         ! One just beyond a bound belongs to no point of the sweep.
+         if ((point%omega - case%sweep%start)*(point%omega - case%sweep%end) <= 0.0_wp) then
+            call add_fold(self, point)
+         end if
+         self%has_fold = .true.
          return
       end if
       if (.not. allocated(point%multipliers)) return
-      signature = signature_of(point%multipliers)
-      call self%track%add(signature, point%verdict /= verdict_undecided)
-      if (self%track%n > 1) call look_between(self, case, found, point, error)
+      call self%track%add(signature_of(point%multipliers), point%verdict /= verdict_undecided)
+      if (self%track%n > 1) then
+         call look_between(self, case, found, point, error)
+         if (allocated(error)) return
+         self%movement = movement_between(self%last_point%multipliers, point%multipliers)
+      end if
       self%last = found
       self%last_point = point
       self%has_fold = .false.
@@ -373,7 +380,6 @@ contains
       type(point_type), intent(in) :: point
       type(bifurcation_type) :: fold
 
-      self%has_fold = .true.
       fold%kind = kind_fold
       fold%found_by = way_turn
       fold%omega = point%omega
@@ -393,18 +399,14 @@ contains
       type(point_type), intent(in) :: point
       type(error_type), allocatable, intent(out) :: error
       type(branch_probe) :: probe
-      integer :: before(3), after(3)
 
-      before = signature_of(self%last_point%multipliers)
-      after = signature_of(point%multipliers)
-      if (crossing_between(before, after) == crossing_none) return
       probe%branch => self
       probe%case => case
       probe%first = self%last
       probe%second = found
       probe%has_fold = self%has_fold
-      call search_crossings(probe, self%last_point, point, self%track%n - 1, .true., &
-                            self%bifurcations, error)
+      call search_crossings(probe, self%last_point, point, self%movement, self%track%n - 1, &
+                            .true., self%bifurcations, error)
       self%n_solved = self%n_solved + probe%n_solved
       self%iterations = self%iterations + probe%iterations
    end subroutine look_between

@@ -25,6 +25,8 @@ module fw_crossing_search
    use fw_stability_crossing, only: crossing_pair
    use fw_stability_crossing, only: crossing_plus
    use fw_stability_crossing, only: crossing_several
+   use fw_stability_crossing, only: may_hide
+   use fw_stability_crossing, only: movement_between
    use fw_stability_crossing, only: signature_of
    use fw_stability_crossing, only: test_value
    implicit none (type, external)
@@ -63,6 +65,8 @@ module fw_crossing_search
 
    !> Solutions for one place, and halvings of an interval that holds more than one.
    integer, parameter :: most_trials = 30, most_halvings = 6
+   !> Halvings of an interval that may hide two places.
+   integer, parameter :: most_looks = 3
    !> A multiplier this near to the circle is on it.
    real(wp), parameter :: on_circle = 1.0e-8_wp
    !> Share of the way below which a bracket is a place.
@@ -79,9 +83,11 @@ module fw_crossing_search
 contains
 
    !> Add all changes of stability between two solutions to a list.
-   subroutine search_crossings(probe, first, second, after, on_branch, list, error)
+   subroutine search_crossings(probe, first, second, movement, after, on_branch, list, error)
       class(probe_type), intent(inout) :: probe
       type(point_type), intent(in) :: first, second
+      !> Of the multipliers towards the first, see movement_between.
+      real(wp), intent(in) :: movement(2)
       !> Number of the first among the solutions with multipliers.
       integer, intent(in) :: after
       !> Whether they lie on one branch, of which folds are known.
@@ -89,35 +95,43 @@ contains
       type(bifurcation_list), intent(inout) :: list
       type(error_type), allocatable, intent(out) :: error
 
-      call split(probe, end_type(0.0_wp, first), end_type(1.0_wp, second), most_halvings, after, &
+      call split(probe, end_type(0.0_wp, first), end_type(1.0_wp, second), movement, 0, after, &
                  on_branch, list, error)
    end subroutine search_crossings
 
    !> One place at a time.
-   recursive subroutine split(probe, low, high, halvings, after, on_branch, list, error)
+   recursive subroutine split(probe, low, high, movement, halvings, after, on_branch, list, error)
       class(probe_type), intent(inout) :: probe
       type(end_type), intent(in) :: low, high
+      real(wp), intent(in) :: movement(2)
+      !> Of the first interval, so far.
       integer, intent(in) :: halvings, after
       logical, intent(in) :: on_branch
       type(bifurcation_list), intent(inout) :: list
       type(error_type), allocatable, intent(out) :: error
       type(end_type) :: middle
       integer :: crossing
+      logical :: is_none
 
-      crossing = crossing_between(signature_of(low%point%multipliers), &
-                                  signature_of(high%point%multipliers))
-      if (crossing == crossing_none .or. crossing == crossing_plus .and. probe%has_fold) return
-      if (crossing == crossing_several .and. halvings > 0) then
-         middle%share = 0.5_wp*(low%share + high%share)
-         call probe%at(middle%share, middle%point, error)
-         if (allocated(error)) return
-         if (is_known(middle%point)) then
-            call split(probe, low, middle, halvings - 1, after, on_branch, list, error)
+      associate (a => low%point%multipliers, b => high%point%multipliers)
+         crossing = crossing_between(signature_of(a), signature_of(b))
+         is_none = crossing == crossing_none .or. crossing == crossing_plus .and. probe%has_fold
+         if (crossing == crossing_several .and. halvings < most_halvings .or. is_none .and. &
+             halvings < most_looks .and. may_hide(a, b, movement, probe%has_fold)) then
+            middle%share = 0.5_wp*(low%share + high%share)
+            call probe%at(middle%share, middle%point, error)
             if (allocated(error)) return
-            call split(probe, middle, high, halvings - 1, after, on_branch, list, error)
+         end if
+         if (is_known(middle%point)) then
+            call split(probe, low, middle, movement_between(a, middle%point%multipliers), &
+                       halvings + 1, after, on_branch, list, error)
+            if (allocated(error)) return
+            call split(probe, middle, high, movement_between(a, middle%point%multipliers), &
+                       halvings + 1, after, on_branch, list, error)
             return
          end if
-      end if
+      end associate
+      if (is_none) return
       call locate(probe, low, high, crossing, after, on_branch, list, error)
    end subroutine split
 

@@ -13,6 +13,8 @@ module fw_sweep_bifurcations
    use fw_sinks, only: point_sink
    use fw_stability_crossing, only: crossing_between
    use fw_stability_crossing, only: crossing_none
+   use fw_stability_crossing, only: may_hide
+   use fw_stability_crossing, only: movement_between
    use fw_stability_crossing, only: multiplier_track
    use fw_stability_crossing, only: signature_of
    use fw_stability_verdict, only: verdict_undecided
@@ -25,10 +27,12 @@ module fw_sweep_bifurcations
 
    public :: sweep_bifurcations
 
-   !> Two rows of different stability.
+   !> Two rows of different stability, or that may hide changes of it.
    type :: change_type
       type(point_type) :: first, second
       type(solver_memory) :: memory
+      !> Of the multipliers towards the first.
+      real(wp) :: movement(2) = 0.0_wp
       !> Number of the first among the rows with multipliers.
       integer :: after = 0
    end type change_type
@@ -45,6 +49,8 @@ module fw_sweep_bifurcations
       !> The last row with multipliers, and from where to go on.
       type(point_type), private :: last
       type(solver_memory), private :: memory
+      !> Of its multipliers since the row before it.
+      real(wp), private :: movement(2) = 0.0_wp
       logical, private :: is_active = .false.
    contains
       procedure :: start
@@ -88,26 +94,37 @@ contains
       class(sweep_bifurcations), intent(inout) :: self
       type(point_type), intent(in) :: point
       type(error_type), allocatable, intent(out) :: error
-      type(change_type), allocatable :: longer(:)
-      integer :: signature(3), k
+      integer :: signature(3)
 
       if (.not. self%is_active .or. .not. allocated(point%multipliers)) return
       signature = signature_of(point%multipliers)
       call self%track%add(signature, point%verdict /= verdict_undecided)
       if (self%track%n > 1) then
-         if (crossing_between(signature_of(self%last%multipliers), signature) /= &
-             crossing_none) then
-            allocate (longer(size(self%changes) + 1))
-            do k = 1, size(self%changes)
-               longer(k) = self%changes(k)
-            end do
-            longer(size(longer)) = change_type(self%last, point, self%memory, self%track%n - 1)
-            call move_alloc(longer, self%changes)
-         end if
+         associate (a => self%last%multipliers, b => point%multipliers)
+            if (crossing_between(signature_of(a), signature) /= crossing_none .or. &
+                may_hide(a, b, self%movement, .false.)) call keep(self, point)
+            self%movement = movement_between(a, b)
+         end associate
       end if
       self%last = point
       call self%source%remember(self%memory)
    end subroutine take
+
+   !> Remember the last row and this one.
+   subroutine keep(self, point)
+      class(sweep_bifurcations), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      type(change_type), allocatable :: longer(:)
+      integer :: k
+
+      allocate (longer(size(self%changes) + 1))
+      do k = 1, size(self%changes)
+         longer(k) = self%changes(k)
+      end do
+      longer(size(longer)) = change_type(self%last, point, self%memory, self%movement, &
+                                         self%track%n - 1)
+      call move_alloc(longer, self%changes)
+   end subroutine keep
 
    !> Locate what the rows enclose.
    subroutine search(self, case, error)
@@ -129,8 +146,8 @@ contains
             probe%memory = change%memory
             probe%share = 0.0_wp
             probe%before = signature_of(change%first%multipliers)
-            call search_crossings(probe, change%first, change%second, change%after, .false., &
-                                  self%found, error)
+            call search_crossings(probe, change%first, change%second, change%movement, &
+                                  change%after, .false., self%found, error)
          end associate
          if (allocated(error)) return
       end do
