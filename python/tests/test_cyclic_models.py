@@ -79,7 +79,7 @@ def test_what_is_refused():
 
 
 def test_results_without_sectors():
-    result = fw.run(fw.Case(fw.Model(np.eye(1), None, np.eye(1), cosine=[1.0]), case={"analysis": "point"},
-                            sweep={"start": 2.0}))
+    structure = fw.Model(np.eye(1), None, np.eye(1), cosine=[1.0])
+    result = fw.run(fw.Case(structure, case={"analysis": "point"}, sweep={"start": 2.0}))
     with pytest.raises(fw.AbsentError, match="engine_order"):
         result.sector(1)
