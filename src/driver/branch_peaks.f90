@@ -1,6 +1,6 @@
-!> The maxima of a response along its branch. A row knows whether the amplitude rises or falls there,
-!> from its tangent: between one where it rises and the next where it falls lies a maximum, which is
-!> solved for on the branch.
+!> The maxima of a response along its branch. A row knows whether the amplitude rises or falls
+!> there, from its tangent: between one where it rises and the next where it falls lies a maximum,
+!> which is solved for on the branch.
 module fw_branch_peaks
    use fw_error, only: error_type
    use fw_kinds, only: wp
