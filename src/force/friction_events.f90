@@ -1,6 +1,7 @@
 !> Coulomb friction with a unilateral normal force, its paths followed from event to event
 !> (fw_event_contact): the instants only isolate the events, and the forces are exact integrals over
-!> the pieces between them. The same laws as fw_friction.
+!> the pieces between them. The same laws as fw_friction, and what laws build on that follow some of
+!> their pairs in another way.
 module fw_friction_events
    use fw_event_contact, only: event_contact_type
    use fw_event_contact, only: new_event_contact
@@ -15,7 +16,7 @@ module fw_friction_events
    implicit none (type, external)
    private
 
-   public :: friction_by_events, follow_events
+   public :: friction_by_events, event_room, follow_events
 
    type, extends(pair_law) :: friction_by_events
    contains
@@ -58,7 +59,7 @@ contains
       call work%reserve(self%n_elements, self%n_components, fourier)
       allocate (event_room :: work%room)
       select type (room => work%room)
-      type is (event_room)
+      class is (event_room)
          call new_event_contact(self%mu, self%present, self%facts%remembers, fourier, room%paths)
       end select
    end subroutine reserve
@@ -70,7 +71,7 @@ contains
 
       if (self%n_elements == 0) return
       select type (room => work%room)
-      type is (event_room)
+      class is (event_room)
          ! Rates leave the mean position open: for pairs that come to rest it goes along.
          if (any(self%prediction%order > 0) .and. fourier%has_constant()) then
             call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
@@ -134,7 +135,7 @@ contains
       nc = fourier%n_coefficients
       if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
       select type (room => work%room)
-      type is (event_room)
+      class is (event_room)
          ! Where slip is not measured, the derivative of it is not allocated: not present.
          call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, &
                                    work%jacobian, work%slip_derivative)
@@ -148,7 +149,7 @@ contains
 
       if (self%n_elements == 0) return
       select type (room => work%room)
-      type is (event_room)
+      class is (event_room)
          call room%paths%values(work%force_time)
       end select
    end subroutine sample
@@ -164,7 +165,7 @@ contains
 
       if (self%n_elements == 0) return
       select type (room => work%room)
-      type is (event_room)
+      class is (event_room)
          call room%paths%coefficients(fourier, computed%harmonic, force)
       end select
    end subroutine coefficients
@@ -178,7 +179,7 @@ contains
       share = 0.0_wp
       if (self%n_elements == 0) return
       select type (room => work%room)
-      type is (event_room)
+      class is (event_room)
          call room%paths%fractions(share)
       end select
    end subroutine fractions

@@ -9,16 +9,16 @@
 !> Pairs with one tangential direction where that mass matters follow it (fw_oscillator_pair). All
 !> others, and all normal directions, keep the displacement law with the stiffness k alone.
 module fw_rigid_law
-   use fw_event_contact, only: event_contact_type
    use fw_event_contact, only: new_event_contact
    use fw_force_law, only: force_workspace
    use fw_force_law, only: law_facts
-   use fw_force_law, only: law_room
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_open
    use fw_force_law, only: pair_stuck
    use fw_force_law, only: prediction_type
    use fw_fourier, only: fourier_type
+   use fw_friction_events, only: event_room
+   use fw_friction_events, only: friction_by_events
    use fw_kinds, only: wp
    use fw_oscillator, only: new_oscillator
    use fw_oscillator_pair, only: oscillator_pair_type
@@ -29,7 +29,7 @@ module fw_rigid_law
 
    public :: rigid_law, friction_of_high_order
 
-   type, extends(pair_law) :: rigid_law
+   type, extends(friction_by_events) :: rigid_law
    contains
       procedure :: reserve
       procedure :: evaluate
@@ -41,9 +41,8 @@ module fw_rigid_law
       procedure :: located
    end type rigid_law
 
-   type, extends(law_room) :: rigid_room
-      !> All pairs, without the tangential directions that have mass.
-      type(event_contact_type) :: paths
+   !> `paths` are those of all pairs, without the tangential directions that have mass.
+   type, extends(event_room) :: rigid_room
       !> Pairs with mass: their numbers, tangential directions and paths.
       integer :: n_massive = 0
       integer, allocatable :: pair(:), direction(:)
@@ -119,45 +118,26 @@ contains
       type(force_workspace), intent(inout) :: work
 
       if (self%n_elements == 0) return
+      call self%friction_by_events%evaluate(fourier, work)
       select type (room => work%room)
       type is (rigid_room)
-         call room%paths%evaluate(fourier, work%prediction, work%offset, work%x_start, &
-                                  work%force, work%x)
-         work%turns = 1
-         work%drift = room%paths%drift
-         call work%measure_scale()
-         call classify(room, work)
-         if (room%n_massive > 0) call evaluate_massive(self, fourier, work, room)
+         if (room%n_massive == 0) return
+         call evaluate_massive(self, fourier, work, room)
          if (work%measures_slip) call measure_paths(room, work%slip)
       end select
    end subroutine evaluate
 
-   !> int N |dx| of every pair, x in units of force.
+   !> int N |dx| of pairs with mass, x in units of force.
    subroutine measure_paths(room, slip)
       type(rigid_room), intent(inout) :: room
       real(wp), intent(inout) :: slip(:)
       integer :: j
 
-      call room%paths%friction_path(slip)
       do j = 1, room%n_massive
          slip(room%pair(j)) = room%massive(j)%friction_path()
       end do
    end subroutine measure_paths
 
-   !> Of the pressure, only whether it ever vanishes is known.
-   pure subroutine classify(room, work)
-      type(rigid_room), intent(in) :: room
-      type(force_workspace), intent(inout) :: work
-      integer :: i
-
-      do i = 1, size(work%state)
-         ! What asks for the pressure compares it with zero.
-         work%pressure(i) = merge(1.0_wp, 0.0_wp, room%paths%closed(i))
-         work%state(i) = state_of(room%paths%open(i), room%paths%closed(i), room%paths%moved(i))
-      end do
-   end subroutine classify
-
-   !> Over the whole period: never closed, or always closed without slip; anything else is mixed.
    elemental integer function state_of(open, closed, moved) result(state)
       logical, intent(in) :: open, closed, moved
 
@@ -166,7 +146,6 @@ contains
       if (closed .and. .not. moved) state = pair_stuck
    end function state_of
 
-   !> Grids of all pairs with mass by one transform, then each along its own path.
    subroutine evaluate_massive(self, fourier, work, room)
       class(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -275,12 +254,9 @@ contains
       class(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
-      integer :: nc
 
-      work%linear_state = work%state
+      call self%friction_by_events%linearize(fourier, work)
       if (.not. any(work%state == pair_mixed)) return
-      nc = fourier%n_coefficients
-      if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
       select type (room => work%room)
       type is (rigid_room)
          call linearize_pairs(self, fourier, room, work)
@@ -296,9 +272,6 @@ contains
       integer :: j, nc
 
       nc = fourier%n_coefficients
-      ! Where slip is not measured, the derivative of it is not allocated: not present.
-      call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, work%jacobian, &
-                                work%slip_derivative)
       !$omp parallel do default(none) shared(self, fourier, work, room, nc) private(j) &
       !$omp schedule(dynamic) if(room%n_massive >= pairs_for_threads)
       do j = 1, room%n_massive
@@ -357,9 +330,9 @@ contains
       integer :: j
 
       if (self%n_elements == 0) return
+      call self%friction_by_events%sample(work)
       select type (room => work%room)
       type is (rigid_room)
-         call room%paths%values(work%force_time)
          allocate (out(size(work%force_time, 3), 2))
          do j = 1, room%n_massive
             call room%massive(j)%values_at(size(out, 1), out(:, 1), out(:, 2))
@@ -379,9 +352,9 @@ contains
       integer :: j, n
 
       if (self%n_elements == 0) return
+      call self%friction_by_events%coefficients(work, computed, fourier, force)
       select type (room => work%room)
       type is (rigid_room)
-         call room%paths%coefficients(fourier, computed%harmonic, force)
          do j = 1, room%n_massive
             out = 0.0_wp
             n = count(fourier%harmonic <= room%massive(j)%curves%degree)
@@ -418,11 +391,10 @@ contains
       real(wp), intent(out) :: share(:, :)
       integer :: j
 
-      share = 0.0_wp
+      call self%friction_by_events%fractions(work, share)
       if (self%n_elements == 0) return
       select type (room => work%room)
       type is (rigid_room)
-         call room%paths%fractions(share)
          do j = 1, room%n_massive
             share(:, room%pair(j)) = room%massive(j)%shares()
          end do

@@ -14,6 +14,7 @@ is within the accuracy asked for.
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -172,8 +173,11 @@ def judge_of(folder, kind, judge, structure):
         harmonics = {"n_harmonics": 41, "sampling": "events"}
     elif kind == "penalty, sampled":
         harmonics = {"n_harmonics": BEYOND, "sampling": "events"}
-    coefficients, converged, _ = run(folder, cases.merged(judge, {"harmonics": {
-        "n_time": None, **harmonics}}), PROGRAM)
+    try:
+        coefficients, converged, _ = run(folder, cases.merged(judge, {"harmonics": {
+            "n_time": None, **harmonics}}), PROGRAM)
+    except subprocess.TimeoutExpired:
+        return None
     motion = synthesis(coefficients, COMPARED)
     moves = np.ptp(motion, axis=1)
     return motion if converged and moves.min() > AT_REST * moves.max() else None
