@@ -63,8 +63,9 @@ module fw_crossing_search
       type(point_type) :: point
    end type end_type
 
-   !> Solutions for one place, and halvings of an interval that holds more than one.
-   integer, parameter :: most_trials = 30, most_halvings = 6
+   !> Solutions for one place, of which so many before there is nothing but bisection: roots take
+   !> fewer, a jump takes the others. Halvings of an interval that holds more than one place.
+   integer, parameter :: most_trials = 40, most_secants = 12, most_halvings = 6
    !> Halvings of an interval that may hide two places.
    integer, parameter :: most_looks = 3
    !> A multiplier this near to the circle is on it.
@@ -161,7 +162,8 @@ contains
       do k = 1, most_trials
          if (high%share - low%share <= narrow) exit
          middle%share = low%share + (high%share - low%share)* &
-                        next_share(at_low, at_high, bisect=modulo(k, 4) == 0)
+                        next_share(at_low, at_high, &
+                                   bisect=modulo(k, 4) == 0 .or. k > most_secants)
          call probe%at(middle%share, middle%point, error)
          if (allocated(error)) return
          if (.not. is_known(middle%point)) exit

@@ -259,7 +259,8 @@ class Branch:
                     high, at_high, at_low = share, value, 0.5 * at_low
             if point is None:
                 continue
-            if kind == BRANCH and point.is_symmetric():
+            # At the place itself the response across the tangent is free.
+            if kind == BRANCH and a.is_symmetric():
                 kind = SYMMETRY
             if min(self.start, self.finish) < point.omega < max(self.start, self.finish):
                 self.bifurcations.append(Bifurcation(kind, point.omega, point.amplitude))
