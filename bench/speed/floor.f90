@@ -254,8 +254,8 @@ contains
       middle = processor_time()
       nc = self%problem%fourier%n_coefficients
       do i = 1, self%problem%n_pairs
-         if (self%work(self%problem%forces%pairs)%linear_state(i) == pair_mixed) &
-            call derive(self, i, nc)
+         if (self%work(self%problem%forces%pairs)%linear_state(i) /= pair_mixed) cycle
+         call derive(self, i, nc)
       end do
       call add(self, part_linearize, start, middle)
       self%n_products = 0

@@ -1,5 +1,5 @@
-!> Functions of arrays for the Python module fretwear._core, beside the sessions of wrapper.f90 and in
-!> their style: transforms, condensation, contact forces.
+!> Functions of arrays for the Python module fretwear._core, beside the sessions of wrapper.f90 and
+!> in their style: transforms, condensation, contact forces.
 module fw_python_functions
    use fw_error, only: error_type
    use fw_error, only: status_ok

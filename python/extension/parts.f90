@@ -1,5 +1,5 @@
-!> What Python asks of input: the structure of a case as it is computed, with what the namelist adds,
-!> scales and overrides, and the keys of a namelist that need not be a valid case any more.
+!> What Python asks of input: the structure of a case as it is computed, with what the namelist
+!> adds, scales and overrides, and the keys of a namelist that need not be a valid case any more.
 module fw_python_parts
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -20,7 +20,8 @@ module fw_python_parts
 
    character(*), parameter :: names = 'mass, stiffness, damping, load/static, load/cosine, '// &
                               'load/sine, contact/side_1, contact/side_2, contact/gap, '// &
-                              'contact/depth, contact/mu, observe/matrix, n_springs, solver_tolerance'
+                              'contact/depth, contact/mu, observe/matrix, n_springs, '// &
+                              'solver_tolerance'
 
 contains
 

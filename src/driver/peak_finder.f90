@@ -258,6 +258,7 @@ contains
                        sample%fraction(open) < mostly
       case (state_free)
          is_in_state = sample%fraction(open) + sample%fraction(slip) >= mostly
+      case default ! there is no joint
       end select
    end function is_in_state
 
@@ -452,7 +453,9 @@ contains
       !> Where to solve for it [rad/s].
       real(wp), intent(out) :: omega
       logical, intent(out) :: found
-      real(wp) :: best, candidate, promise, highest
+      !> Of the highest sample: more than that is not told apart.
+      real(wp), parameter :: endless = 1.0e30_wp
+      real(wp) :: best, candidate, promise, highest, share
       integer :: i, k
       logical :: done
 
@@ -463,12 +466,15 @@ contains
       if (self%samples%n < 3) return
       do i = 1, size(self%samples%item(1)%at%amplitude)
          highest = highest_of(self%samples, i)
+         if (.not. highest > 0.0_wp) cycle
          do k = 2, self%samples%n - 1
             if (.not. is_maximum(self%samples, k, i)) cycle
             if (self%samples%item(k)%at%n_failed >= most_failures) cycle
             call find_next(self%samples, k, i, candidate, promise, done)
-            if (done .or. promise/highest <= best) cycle
-            best = promise/highest
+            ! A promise without height is `huge`, and would overflow.
+            share = min(promise, endless*highest)/highest
+            if (done .or. share <= best) cycle
+            best = share
             associate (at => self%samples%item(k)%at)
                omega = at%omega + (candidate - at%omega)*0.5_wp**at%n_failed
             end associate

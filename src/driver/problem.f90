@@ -69,8 +69,8 @@ contains
       type(harmonics_options), intent(in), optional :: of_level
       !> Laws of another problem of the case, with the stiffness that its structure gave them.
       type(force_list), intent(in), optional :: forces
-      !> Modes of the structure with its contact held: taken where they are known, else found and left
-      !> for other problems of the case.
+      !> Modes of the structure with its contact held: taken where they are known, else found and
+      !> left for other problems of the case.
       type(held_basis), intent(inout), optional :: held
       class(structure_state), allocatable :: stand
 

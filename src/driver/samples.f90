@@ -201,12 +201,14 @@ contains
       swing = swing_of(middle, i, middle%mean(i))
       ! Steps from the middle.
       s = [left%omega, right%omega]**2 - middle%omega**2
-      g = 1.0_wp/[swing_of(left, i, middle%mean(i)), swing_of(right, i, middle%mean(i))]**2 &
-          - 1.0_wp/swing**2
+      g = [swing_of(left, i, middle%mean(i)), swing_of(right, i, middle%mean(i))]
       omega = middle%omega
       amplitude = swing
       curvature = 0.0_wp
       if (.not. all(abs(s) > 0.0_wp)) return
+      ! What hardly moves has no maximum, and the inverse of its square no number.
+      if (.not. min(swing, minval(g))**2 > tiny(1.0_wp)) return
+      g = 1.0_wp/g**2 - 1.0_wp/swing**2
       curvature = (g(2)/s(2) - g(1)/s(1))/(s(2) - s(1))
       slope = g(1)/s(1) - curvature*s(1)
       if (.not. curvature > 0.0_wp) return

@@ -55,10 +55,10 @@ module fw_contact_data
       integer :: n_springs = 0
       !> Signed dof numbers, 0 for ground (n_springs).
       integer, allocatable :: side_1(:), side_2(:)
-      !> As of contact_type (n_springs).
-      integer, allocatable :: sector_2(:)
       real(wp), allocatable :: coefficient(:)
       integer, allocatable :: power(:)
+      !> As of contact_type (n_springs).
+      integer, allocatable :: sector_2(:)
    end type spring_type
 
 end module fw_contact_data

@@ -27,7 +27,9 @@ contains
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: coefficients(:, :), width(:)
+      ! Components of the peaks side by side: a write of `peaks%omega` would copy them unseen.
+      real(wp), allocatable :: coefficients(:, :), omega(:), amplitude(:), width(:)
+      integer, allocatable :: observed(:), found_by(:)
       type(string_type) :: words(size(found_words))
       integer :: k, n
 
@@ -41,21 +43,25 @@ contains
          ! Adaptive runs carry fewer harmonics at some peaks.
          coefficients(:size(peaks(k)%coefficients), k) = peaks(k)%coefficients
       end do
+      omega = peaks%omega
+      amplitude = peaks%amplitude
+      found_by = peaks%found_by
+      ! Places count from 0 in a file, from 1 here.
+      observed = peaks%observed - 1
       ! Negative stands for unknown inside the program, NaN in a file.
       width = peaks%bandwidth
       where (width < 0.0_wp) width = ieee_value(1.0_wp, ieee_quiet_nan)
-      call write_dataset(file, '/peak/omega', peaks%omega, error)
+      call write_dataset(file, '/peak/omega', omega, error)
       if (allocated(error)) return
-      call write_dataset(file, '/peak/amplitude', peaks%amplitude, error)
+      call write_dataset(file, '/peak/amplitude', amplitude, error)
       if (allocated(error)) return
       call write_dataset(file, '/peak/bandwidth', width, error)
       if (allocated(error)) return
       call write_dataset(file, '/peak/coefficients', coefficients, error)
       if (allocated(error)) return
-      ! Places count from 0 in a file, from 1 here.
-      call write_dataset(file, '/peak/observed', peaks%observed - 1, error)
+      call write_dataset(file, '/peak/observed', observed, error)
       if (allocated(error)) return
-      call write_dataset(file, '/peak/found_by', peaks%found_by, error)
+      call write_dataset(file, '/peak/found_by', found_by, error)
       if (allocated(error)) return
       do k = 1, size(words)
          words(k)%text = trim(found_words(k - 1))

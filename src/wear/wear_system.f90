@@ -426,8 +426,8 @@ contains
       end associate
    end subroutine multiply_block
 
-   !> rows = rows - C z for displacements z of one harmonic, active coordinates; where the pairs take
-   !> the balance, Z_n z is in `balance`.
+   !> rows = rows - C z for displacements z of one harmonic, active coordinates; where the pairs
+   !> take the balance, Z_n z is in `balance`.
    subroutine subtract_harmonic(self, h, n_right, z, rows)
       class(wear_system), intent(in) :: self
       integer, intent(in) :: h, n_right

@@ -39,7 +39,7 @@ module support_models
       type(kept_problem), pointer :: before => null()
    end type kept_problem
 
-   type(kept_problem), pointer, save :: problems => null()
+   type(kept_problem), pointer :: problems => null()
 
    !> Laws by their words.
    integer, parameter :: law_dlft = findloc(law_words, 'dlft', dim=1)
