@@ -23,6 +23,9 @@ __all__ = ["Cycle", "read_cycle"]
 
 Floats = NDArray[np.float64]
 
+#: Under an accuracy, the tail of the contact forces corrects an answer by no more than this; the
+#: period that is shown is the one before the correction, in which forces and motion belong together.
+_CORRECTION = 0.03
 #: Largest difference of a point that is solved again, over the largest value, and in multiples of
 #: the tolerance of the solver: a solution known to this tolerance is off by it times the condition
 #: of the problem, and another solution is far away. The greater one holds.
@@ -101,7 +104,7 @@ def _again(result: Result, point: int) -> Point:
             for before in range(first, point):
                 steps.solve(result.omega[before])
             solved = steps.solve(result.omega[point])
-        if _is_same(result, point, solved, tolerance):
+        if _is_same(result, point, solved, tolerance, "error_estimate" in result):
             return solved
     raise AbsentError(_excuse(result, point, "solving it again leads to another solution"))
 
@@ -133,14 +136,17 @@ def _settings(result: Result, point: int) -> dict[str, Any]:
     return groups
 
 
-def _is_same(result: Result, point: int, solved: Point, tolerance: float) -> bool:
+def _is_same(result: Result, point: int, solved: Point, tolerance: float,
+             corrected: bool) -> bool:
+    """Whether a solution is that of a point, where it may have been `corrected` by its tail."""
     if not solved.converged:
         return False
-    limit = max(_SAME, _SAME_OF_SOLVER * tolerance)
+    limit = max(_SAME, _SAME_OF_SOLVER * tolerance, _CORRECTION if corrected else 0.0)
     for name, stored in (("coefficients", result.coefficients[point]),
                          ("contact/force", result.force[point])):
         found = np.zeros_like(stored)
         found[:len(solved[name])] = solved[name][:len(stored)]
-        if np.abs(found - stored).max() > limit * np.abs(stored).max():
+        known = slice(len(solved[name])) if corrected else slice(None)
+        if np.abs(found - stored)[known].max() > limit * np.abs(stored).max():
             return False
     return True

@@ -19,6 +19,7 @@ PROPERTIES = sorted(name for name, value in PUBLIC.items() if isinstance(value, 
 #: Methods, with arguments that fit any result.
 METHODS: dict[str, tuple[Any, ...]] = {
     "index": (), "amplitude_of": (), "harmonic": (1,), "peak": (), "maximum": (), "cycle": (0,),
+    "sector": (1,),
     "declared": ("omega",), "units": ("omega",), "to_xarray": ()}
 #: Neither is asked for data.
 OTHERS = {"open", "save", "from_bytes"}
@@ -54,7 +55,7 @@ def test_every_accessor_is_asked() -> None:
 def test_an_empty_file_has_none_of_it(empty: fw.Result, name: str) -> None:
     if name == "to_xarray":
         pytest.importorskip("xarray")
-    with pytest.raises(fw.AbsentError, match=r"empty\.h5: (holds no dataset /|has no attribute )"):
+    with pytest.raises(fw.AbsentError, match=r"empty\.h5: (holds no dataset /|has no (attribute|sectors))"):
         ask(empty, name)
 
 

@@ -114,8 +114,10 @@ contains
       class(range_type), intent(in) :: self
       real(wp), intent(in) :: number
 
-      holds = ieee_is_finite(number) .and. number > self%above .and. number >= self%least &
-              .and. number <= self%most
+      ! By itself: comparisons with what is no number may trap.
+      holds = ieee_is_finite(number)
+      if (.not. holds) return
+      holds = number > self%above .and. number >= self%least .and. number <= self%most
       ! Tested only where it binds: huge(1.0) itself is a number below no bound.
       if (self%below < huge(1.0_wp)) holds = holds .and. number < self%below
    end function holds

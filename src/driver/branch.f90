@@ -32,6 +32,7 @@ module fw_branch
    use fw_recovery, only: observed_coefficients
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
+   use fw_slip_gap, only: lacks_friction
    use fw_solution, only: is_lasting
    use fw_stability_crossing, only: critical_multiplier
    use fw_stability_crossing, only: crossing_plus
@@ -500,7 +501,8 @@ contains
       call self%system%residual(coefficients, self%r)
       point%omega = found%p
       point%converged = found%report%converged
-      if (point%converged) point%converged = is_lasting(self%system)
+      if (point%converged) point%converged = is_lasting(self%system) .and. .not. &
+                                             lacks_friction(self%system, coefficients)
       if (point%converged) point%served_by = served_by_arclength
       point%iterations = found%report%iterations
       point%residual = found%report%residual

@@ -21,8 +21,9 @@ module fw_one_level
 
    !> Points without a solution in a row after which no other balance is looked at.
    integer, parameter :: most_failures = 2
+   !> Stick-slip that no balance of few harmonics follows is no trouble to an integration in time.
    character(*), parameter :: in_time = &
-      "; analysis = 'time' integrates what no balance converges to, such as slow stick-slip"
+      '; analysis = ''time'' integrates what no balance converges to, such as slow stick-slip'
 
    !> The strategy of a given number of harmonics: one system and one solver serve all points.
    type, extends(point_strategy) :: one_level
@@ -115,24 +116,18 @@ contains
          ! Costs solutions of its own: worth it only where the run gave nothing at all.
          if (state%n_converged == 0) call explain_failure(system, solver%method, message)
          if (solver%method%rippled) then
-            message = message//"; some were solved with friction that is ripple, not slip "// &
+            message = message//'; some were solved with friction that is ripple, not slip '// &
                       "(dissipation short of mu N |v| by more than 1/H): take "// &
                       "contact%law = 'rigid' where friction acts on mass"
          end if
-         message = 'not converged: '//message//advice_in_time(system%problem%forces%entry( &
-                   system%problem%forces%pairs)%law%facts%is_integrated .and. &
-                   case%contact%n_pairs > 0)
+         message = 'not converged: '//message
+         associate (pairs => system%problem%forces%entry(system%problem%forces%pairs)%law)
+            if (pairs%facts%is_integrated .and. case%contact%n_pairs > 0) then
+               message = message//in_time
+            end if
+         end associate
       end associate
    end subroutine describe
-
-   !> Stick-slip that no balance of few harmonics follows is no trouble to an integration in time.
-   pure function advice_in_time(is_integrated) result(advice)
-      !> Whether the integration knows the law of the pairs.
-      logical, intent(in) :: is_integrated
-      character(len=merge(len(in_time), 0, is_integrated)) :: advice
-
-      advice = in_time
-   end function advice_in_time
 
    !> The last converged solution, so that points of a search start from it.
    subroutine remember(self, memory)

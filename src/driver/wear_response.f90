@@ -465,7 +465,7 @@ contains
    !> Contact forces and rates that the next step starts from.
    subroutine stand_at(system, x)
       type(wear_system), intent(inout) :: system
-      real(wp), intent(in) :: x(:)
+      real(wp), intent(in), contiguous :: x(:)
       real(wp), allocatable :: r(:)
 
       allocate (r(system%n))

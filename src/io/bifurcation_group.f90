@@ -30,6 +30,9 @@ contains
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: coefficients(:, :, :), multiplier(:, :), amplitude(:, :), width(:)
+      ! Components of the list side by side: a write of `list%item%omega` would copy them unseen.
+      real(wp), allocatable :: omega(:)
+      integer, allocatable :: kind(:), found_by(:)
       integer :: k, n, n_observed
 
       if (list%n == 0) return
@@ -52,7 +55,10 @@ contains
                ieee_quiet_nan)
          end associate
       end do
-      call write_dataset(file, '/bifurcation/omega', list%item(:list%n)%omega, error)
+      omega = list%item(:list%n)%omega
+      kind = list%item(:list%n)%kind
+      found_by = list%item(:list%n)%found_by
+      call write_dataset(file, '/bifurcation/omega', omega, error)
       if (allocated(error)) return
       call write_dataset(file, '/bifurcation/error', width, error)
       if (allocated(error)) return
@@ -62,10 +68,9 @@ contains
       if (allocated(error)) return
       call write_dataset(file, '/bifurcation/multiplier', multiplier, error)
       if (allocated(error)) return
-      call write_words(file, '/bifurcation/kind', list%item(:list%n)%kind, kind_words, error)
+      call write_words(file, '/bifurcation/kind', kind, kind_words, error)
       if (allocated(error)) return
-      call write_words(file, '/bifurcation/found_by', list%item(:list%n)%found_by, way_words, &
-                       error)
+      call write_words(file, '/bifurcation/found_by', found_by, way_words, error)
       if (allocated(error)) return
       call label_all(file, unit_system, error)
    end subroutine write_bifurcations
@@ -74,7 +79,7 @@ contains
    subroutine write_words(file, name, places, words, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name
-      integer, intent(in) :: places(:)
+      integer, intent(in), contiguous :: places(:)
       character(*), intent(in) :: words(0:)
       type(error_type), allocatable, intent(out) :: error
       type(string_type) :: names(size(words))

@@ -126,7 +126,8 @@ def judge(case, done, path):
     with h5py.File(path) as file:
         omega, converged = file["omega"][()], file["converged"][()].astype(bool)
         values = {key: file[key][()] for key in ("coefficients", "amplitude", "contact/force",
-                                                 "contact/dissipation", "wear/depth", "wear/rate")
+                                                 "contact/dissipation", "wear/depth", "wear/rate",
+                                                 "residual")
                   if key in file}
         saved = []
         if "served_by" in file:  # a sweep or a point
@@ -163,8 +164,15 @@ def verify_points(case, omega, converged, values):
             if (depth < 0).any() or (k and (depth < values["wear/depth"][k - 1] - 1e-12).any()):
                 complaints.append(f"row {k + 1}: the depth falls")
         complaints += [f"omega = {omega[k]:g}: {c}"
-                       for c in check.verify(point, omega[k], u, force, dissipation)]
+                       for c in check.verify(point, omega[k], u, force, dissipation,
+                                             lag_of(case, values, k))]
     return complaints
+
+
+def lag_of(case, values, row):
+    """The residual that a row of wear by pseudo-time states, by which its vibration lags."""
+    by_pseudo_time = case.groups.get("wear", {}).get("scheme") == "pseudo_time"
+    return float(values["residual"][row]) if by_pseudo_time else 0.0
 
 
 def in_words(text):
