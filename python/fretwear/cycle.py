@@ -23,9 +23,10 @@ __all__ = ["Cycle", "read_cycle"]
 
 Floats = NDArray[np.float64]
 
-#: Under an accuracy, the tail of the contact forces corrects an answer by no more than this; the
-#: period that is shown is the one before the correction, in which forces and motion belong together.
+#: Under an accuracy, the tail of the contact forces corrects an answer by no more than this.
+#: The period that is shown is the one before it, in which forces and motion belong together.
 _CORRECTION = 0.03
+_RIGID_WORDS = ("dlft", "dlft_velocity")
 #: Largest difference of a point that is solved again, over the largest value, and in multiples of
 #: the tolerance of the solver: a solution known to this tolerance is off by it times the condition
 #: of the problem, and another solution is far away. The greater one holds.
@@ -97,9 +98,13 @@ def _again(result: Result, point: int) -> Point:
     finer = {**settings, "harmonics": {**settings["harmonics"], "n_time": _INSTANTS}}
     # Located events are exact whatever the instants, in one tangential direction.
     by_events = result.attributes.get("sampling") == "events"
-    for groups, first in ((finer, point), (settings, point), (settings, max(0, point - _BEFORE))):
-        if groups is finer and not by_events:
-            continue
+    tried = [(finer, point)] if by_events else []
+    tried += [(settings, point), (settings, max(0, point - _BEFORE))]
+    if "error_estimate" in result and values.get("contact%law", ["dlft"])[0] in _RIGID_WORDS:
+        # Under an accuracy, friction in one direction is solved as by the law of high order.
+        rigid = {**finer, "contact": {**settings.get("contact", {}), "law": "rigid"}}
+        tried.insert(0, (rigid, point))
+    for groups, first in tried:
         with Steps(result.case.replace(**groups)) as steps:
             for before in range(first, point):
                 steps.solve(result.omega[before])

@@ -55,7 +55,8 @@ def test_every_accessor_is_asked() -> None:
 def test_an_empty_file_has_none_of_it(empty: fw.Result, name: str) -> None:
     if name == "to_xarray":
         pytest.importorskip("xarray")
-    with pytest.raises(fw.AbsentError, match=r"empty\.h5: (holds no dataset /|has no (attribute|sectors))"):
+    absent = r"empty\.h5: (holds no dataset /|has no (attribute|sectors))"
+    with pytest.raises(fw.AbsentError, match=absent):
         ask(empty, name)
 
 
