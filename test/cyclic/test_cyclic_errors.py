@@ -21,6 +21,8 @@ REFUSED = {
     "no sectors": ({"cyclic": {"n_sectors": None}}, ["n_sectors", "missing"]),
     "zero sectors": ({"cyclic": {"n_sectors": 0}}, ["n_sectors", "1"]),
     "too few on the right": ({"cyclic": {"n_interface": len(LEFT) + 1}}, ["left"]),
+    "interfaces without their number": ({"cyclic": {"n_interface": None}},
+                                        ["n_interface", "missing"]),
     "out of range": ({"cyclic": {"left": [N + 1, *LEFT[1:]]}}, ["left", str(N)]),
     "sign on the left": ({"cyclic": {"left": [-1, *LEFT[1:]]}}, ["left", "-1"]),
     "on both": ({"cyclic": {"right": [LEFT[0], *RIGHT[1:]]}}, ["twice"]),
