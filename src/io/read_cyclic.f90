@@ -47,10 +47,10 @@ contains
       end if
       call bind_interfaces(reader, cyclic, n_interface, n_file == 0)
       ! As n_pairs and n_springs: sectors would come apart without a word.
-      if (n_file == 0 .and. .not. (reader%failed() .or. reader%given('cyclic', 'n_interface')) &
-          .and. (reader%given('cyclic', 'left') .or. reader%given('cyclic', 'right'))) then
-         call reader%refuse('cyclic', 'n_interface', 'is missing: must be the number of dofs '// &
-                            'of an interface')
+      if (n_interface == 0 .and. .not. reader%failed() .and. &
+          (reader%given('cyclic', 'left') .or. reader%given('cyclic', 'right'))) then
+         call reader%refuse('cyclic', 'n_interface', 'is missing or 0: must be the number of '// &
+                            'dofs of an interface, or leave out left and right')
       end if
       if (.not. reader%failed()) call check_interfaces(reader, parts, n_dof, n_file, cyclic)
       if (.not. cyclic%is_cyclic) cyclic%n_sectors = 1

@@ -23,6 +23,7 @@ REFUSED = {
     "too few on the right": ({"cyclic": {"n_interface": len(LEFT) + 1}}, ["left"]),
     "interfaces without their number": ({"cyclic": {"n_interface": None}},
                                         ["n_interface", "missing"]),
+    "no interface, with its dofs": ({"cyclic": {"n_interface": 0}}, ["n_interface", "0"]),
     "out of range": ({"cyclic": {"left": [N + 1, *LEFT[1:]]}}, ["left", str(N)]),
     "sign on the left": ({"cyclic": {"left": [-1, *LEFT[1:]]}}, ["left", "-1"]),
     "on both": ({"cyclic": {"right": [LEFT[0], *RIGHT[1:]]}}, ["twice"]),
