@@ -39,6 +39,7 @@ module fw_law_constants
       procedure :: get
       procedure :: has
       procedure :: first_of_others
+      procedure :: is_of_law
    end type law_constants
 
 contains
@@ -168,6 +169,18 @@ contains
       has = .false.
       if (k > 0) has = allocated(self%constant(k)%values)
    end function has
+
+   !> Whether a law of a number declares a constant, of those whose keys were asked for first.
+   pure logical function is_of_law(self, law, name)
+      class(law_constants), intent(in) :: self
+      integer, intent(in) :: law
+      character(*), intent(in) :: name
+      integer :: k
+
+      is_of_law = .false.
+      k = place_of(self%constant, name)
+      if (k > 0) is_of_law = self%constant(k)%law == law
+   end function is_of_law
 
    !> A constant that was given but that only other laws than `law` declare, and the first of
    !> these; law 0 where there is none.

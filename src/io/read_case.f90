@@ -238,7 +238,7 @@ contains
       call read_springs(reader, case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
       call read_loads(reader, options, raw)
-      call finish_model(reader, options, raw, case%model, error)
+      call finish_model(reader, options, raw, case%model, error, [integer ::])
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)
          if (allocated(raw%title)) case%title = raw%title

@@ -10,6 +10,7 @@ module fw_read_model
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type, read_model_hdf5
+   use fw_model_changes, only: find_changes
    use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads
    use fw_model_keys, only: source_words, source_inline, source_hdf5, source_matrix_market, &
                             source_memory
@@ -176,12 +177,14 @@ contains
    end subroutine read_loads
 
    !> Check the parts and put them together: rotation, damping, scales.
-   subroutine finish_model(reader, options, raw, model, error)
+   subroutine finish_model(reader, options, raw, model, error, wanted)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
       type(file_model_type), intent(inout) :: raw
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
+      !> Parameters of fw_parameters by which responses are to be differentiated.
+      integer, intent(in) :: wanted(:)
 
       if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
       if (allocated(raw%cyclic%nodal)) then
@@ -215,6 +218,9 @@ contains
          call add_modal_damping(model%mass, model%stiffness, options%modal_damping, model%damping, &
                                 error)
       end if
+      model%rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)
+      if (model%cyclic%is_cyclic .or. allocated(error)) return
+      call find_changes(options, raw, wanted, model, error)
    end subroutine finish_model
 
    !> Centrifugal stiffness and load grow with the square of the speed.

@@ -7,7 +7,15 @@ module fw_model
    implicit none (type, external)
    private
 
-   public :: model_type
+   public :: model_type, matrix_change
+
+   !> Derivative of the structure by a parameter of fw_parameters, at the values of the case.
+   type :: matrix_change
+      !> Which parameter.
+      integer :: parameter = 0
+      !> Of stiffness and damping (n_dof, n_dof), and of the static load (n_dof).
+      real(wp), allocatable :: stiffness(:, :), damping(:, :), load_static(:)
+   end type matrix_change
 
    type :: model_type
       integer :: n_dof = 0
@@ -23,6 +31,10 @@ module fw_model
       type(cyclic_type) :: cyclic
       !> Names of the units, 'length-mass-time-force', for labels; not allocated if not known.
       character(:), allocatable :: unit_system
+      !> Whether something of it depends on the rotation speed.
+      logical :: rotates = .false.
+      !> What parameters change, of those that were asked for; not allocated where none was.
+      type(matrix_change), allocatable :: changes(:)
    end type model_type
 
 end module fw_model
