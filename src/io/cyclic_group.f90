@@ -39,9 +39,9 @@ contains
    !> Natural frequencies of the nodal diameters, NaN where there are fewer.
    subroutine write_modes(file, nodal_diameter, open, closed, unit_system, error)
       type(hdf5_file), intent(in) :: file
-      integer, intent(in) :: nodal_diameter(:)
+      integer, intent(in), contiguous :: nodal_diameter(:)
       !> Without contact, and with every pair closed (n_modes, n_diameters) [rad/s].
-      real(wp), intent(in) :: open(:, :), closed(:, :)
+      real(wp), intent(in), contiguous :: open(:, :), closed(:, :)
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error

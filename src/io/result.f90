@@ -178,9 +178,9 @@ contains
    !> Natural frequencies of the nodal diameters.
    subroutine add_modes(self, nodal_diameter, open, closed, unit_system, error)
       class(result_writer), intent(inout) :: self
-      integer, intent(in) :: nodal_diameter(:)
+      integer, intent(in), contiguous :: nodal_diameter(:)
       !> (n_modes, n_diameters) [rad/s].
-      real(wp), intent(in) :: open(:, :), closed(:, :)
+      real(wp), intent(in), contiguous :: open(:, :), closed(:, :)
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
