@@ -45,11 +45,12 @@ contains
       call linear_solution(system, closed, x, tension)
    end subroutine free_guess
 
-   !> Whether the structure holds a static load without its contact. (Without a static harmonic
-   !> there is no static position to lose.)
+   !> Whether the structure, with every law but that of its contact, holds a static load where it
+   !> was evaluated last. (Without a static harmonic there is no static position to lose.)
    logical function held_without_contact(system) result(held)
       type(balance_state), intent(in) :: system
       complex(wp), allocatable :: stiffness(:, :)
+      integer :: k
 
       held = .true.
       if (.not. system%problem%fourier%has_constant()) return
@@ -57,8 +58,36 @@ contains
                           system%problem%structure%n_coordinates))
       ! Harmonic 0 is the first of those retained.
       call system%problem%structure%block(system%structure_state, 1, stiffness)
+      do k = 1, system%problem%forces%n_laws
+         if (k /= system%problem%forces%pairs) call add_law(system, k, stiffness)
+      end do
       held = is_positive_definite(real(stiffness, wp))
    end function held_without_contact
+
+   !> Stiffness of a law of one component at rest, as of a linear spring, and what it gains on
+   !> average over the motion: a spring that hardens holds, too, what has gone off far enough.
+   subroutine add_law(system, k, stiffness)
+      type(balance_state), intent(in) :: system
+      integer, intent(in) :: k
+      !> Of harmonic 0 (n_coordinates, n_coordinates).
+      complex(wp), intent(inout) :: stiffness(:, :)
+      real(wp) :: slope, at_rest
+      integer :: i, row
+
+      associate (law => system%problem%forces%entry(k)%law, work => system%work(k))
+         if (law%n_components > 1 .or. law%prediction%order(1) > 0) return
+         do i = 1, law%n_elements
+            row = system%problem%forces%entry(k)%row(1, i)
+            if (row == 0) cycle
+            at_rest = law%slope_at(i, 0.0_wp)
+            slope = sum(law%slope_at(i, work%prediction_time(i, 1, :)))/ &
+                    size(work%prediction_time, 3)
+            slope = at_rest + max(0.0_wp, slope - at_rest)
+            call system%problem%incidence%add_block( &
+               row, 1, cmplx(slope*law%prediction%stiffness(i, 1), kind=wp), stiffness)
+         end do
+      end associate
+   end subroutine add_law
 
    !> Whether the structure holds a static load with its pairs closed but free of friction.
    logical function held_without_friction(system) result(held)

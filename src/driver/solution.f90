@@ -93,19 +93,13 @@ contains
    end subroutine solve
 
    !> Whether the point that was evaluated last can last: its forces repeat from period to period,
-   !> and something holds the structure. (Linear springs count among what holds it.)
+   !> and something holds the structure.
    logical function is_lasting(system)
       type(balance_state), intent(in) :: system
-
-      integer :: k
 
       associate (contact => system%work(system%problem%forces%pairs))
          is_lasting = contact%all_periodic()
          if (system%problem%n_pairs == 0) return
-         ! A law that holds even what is unloaded, such as a linear spring, keeps the structure.
-         do k = 1, system%problem%forces%n_laws
-            if (system%problem%forces%entry(k)%law%facts%holds_unloaded) return
-         end do
          if (is_lasting .and. contact%all_open()) is_lasting = held_without_contact(system)
       end associate
    end function is_lasting

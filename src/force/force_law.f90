@@ -57,12 +57,8 @@ module fw_force_law
       logical :: is_odd = .true.
       !> The force depends on the past of the period.
       logical :: remembers = .false.
-      !> Elements may stick (derivative identity) or stay open (zero) through the period.
-      logical :: can_stick = .false., can_open = .false.
       !> Forces are determined only where no displacement follows from that of other elements.
       logical :: needs_independent = .false.
-      !> It holds the structure even where it transmits no force (a linear part).
-      logical :: holds_unloaded = .false.
       !> Its paths can be followed from event to event, without instants.
       logical :: has_events = .false.
       !> They are followed so: forces at the instants are there after `sample` only.

@@ -77,9 +77,8 @@ contains
    !> Friction of rigid pairs, predicted from positions.
    pure type(friction_law) function rigid_friction() result(law)
       law%prediction = prediction_type(takes_balance=.true.)
-      law%facts = law_facts(remembers=.true., can_stick=.true., can_open=.true., &
-                            needs_independent=.true., has_events=.true., measures_slip=.true., &
-                            is_integrated=.true.)
+      law%facts = law_facts(remembers=.true., needs_independent=.true., has_events=.true., &
+                            measures_slip=.true., is_integrated=.true.)
    end function rigid_friction
 
    !> Friction of rigid pairs, predicted from velocities, which need no memory.

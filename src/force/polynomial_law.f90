@@ -46,7 +46,7 @@ contains
       self%power = power
       if (highest_harmonic > 0) self%highest_harmonic = highest_harmonic
       self%facts = law_facts(is_odd=all(modulo(power, 2) == 1), has_multipliers=.true., &
-                             is_integrated=.true., holds_unloaded=any(power == 1))
+                             is_integrated=.true.)
       ! From (power + 1) H + 1 instants on, polynomials are sampled without any error.
       self%facts%fewest_instants = 0
       self%facts%instants_per_harmonic = maxval([0, power]) + 1

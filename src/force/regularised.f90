@@ -47,7 +47,7 @@ contains
    pure type(regularised_law) function regularised_friction() result(law)
       law%prediction%order = [1, 1, 0]
       law%prediction%by_time = .true.
-      law%facts = law_facts(can_open=.true., fewest_instants=256, instants_per_harmonic=32, &
+      law%facts = law_facts(fewest_instants=256, instants_per_harmonic=32, &
                             instants_with_separation=64)
    end function regularised_friction
 

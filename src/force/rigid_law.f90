@@ -58,10 +58,9 @@ contains
    !> Events are needed: above H the motion has kinks that no number of instants resolves.
    pure type(rigid_law) function friction_of_high_order() result(law)
       law%prediction = prediction_type(takes_balance=.true., has_inertia=.true.)
-      law%facts = law_facts(remembers=.true., can_stick=.true., can_open=.true., &
-                            needs_independent=.true., has_events=.true., follows_events=.true., &
-                            needs_projection=.true., has_tail=.true., measures_slip=.true., &
-                            is_integrated=.true.)
+      law%facts = law_facts(remembers=.true., needs_independent=.true., has_events=.true., &
+                            follows_events=.true., needs_projection=.true., has_tail=.true., &
+                            measures_slip=.true., is_integrated=.true.)
    end function friction_of_high_order
 
    !> Room; the masses are known.
