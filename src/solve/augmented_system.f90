@@ -12,6 +12,9 @@
 !> inner system, bordered:
 !>
 !>   [ M  R_z; g_q  g_z ]  through the complement  g_z - g_q M^-1 R_z,  of the order of z.
+!>
+!> Where that is singular M helps alone and dz is left as it is: what is regular all the same is
+!> solved, more slowly, and what is not is a step that fails, with numbers in it.
 module fw_augmented_system
    use fw_error, only: error_type
    use fw_kinds, only: wp
@@ -32,6 +35,7 @@ module fw_augmented_system
       !> Preconditioner: M^-1 R_z (n_linear_inner, n_linear_extra), factors of the complement.
       real(wp), allocatable, private :: columns(:, :)
       type(lu_type), private :: complement
+      logical, private :: is_bordered = .false.
       !> Scratch (n_extra), (inner%n).
       real(wp), allocatable, private :: unit(:), adjusted(:), term(:)
       !> The two parts of a vector (inner%n, 1), (n_extra, 1).
@@ -301,6 +305,7 @@ contains
       end do
       call self%subtract_rows(self%columns, self%complement%matrix(:n, :n), is_built=.false.)
       call self%complement%factor(singular)
+      self%is_bordered = .not. singular
    end subroutine build_preconditioner
 
    subroutine reserve_columns(self)
@@ -329,7 +334,7 @@ contains
       k = self%n_linear_inner
       n = self%n_linear_extra
       call self%inner%precondition(vector(:k))
-      if (n == 0) return
+      if (n == 0 .or. .not. self%is_bordered) return
       self%inner_part(:k, 1) = vector(:k)
       self%extra_part(:n, 1) = vector(k + 1:)
       call self%subtract_rows(self%inner_part(:k, :), self%extra_part(:n, :), is_built=.true.)

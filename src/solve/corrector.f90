@@ -445,7 +445,8 @@ contains
          call system%assemble(lu%matrix)
          call lu%factor(singular)
          self%linear%factorizations = self%linear%factorizations + 1
-         point%orientation = lu%determinant_sign()
+         point%orientation = 0
+         if (.not. singular) point%orientation = lu%determinant_sign()
       end if
       if (point%t_p < 0.0_wp) point%orientation = -point%orientation
    end subroutine find_orientation
