@@ -272,7 +272,8 @@ contains
          tail%is_better = .false.
          told = .not. self%planar .and. is_like_structure(level%system)
          if (.not. told) return
-         call tail%start(self%case, level%harmonics, level%system, level%solver%x, told, error)
+         call tail%start(self%case, level%harmonics, level%system, level%solver%x, told, error, &
+                         self%held)
          if (allocated(error) .or. .not. told) return
          ! The derivative at the solution: as much work as another iteration.
          iterations = iterations + 1

@@ -23,6 +23,7 @@ module fw_known_tail
    use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
    use fw_problem, only: build_system
+   use fw_reduction, only: held_basis
    use fw_recovery, only: carry_solution
    use fw_recovery, only: largest_magnitude
    use fw_recovery, only: recover_point
@@ -68,7 +69,7 @@ module fw_known_tail
 contains
 
    !> Take a solution of H harmonics, where `system` was evaluated last, and give it its tail.
-   subroutine start(self, case, harmonics, system, x, done, error)
+   subroutine start(self, case, harmonics, system, x, done, error, held)
       class(known_tail), intent(inout) :: self
       type(case_type), intent(in) :: case
       !> Of the system.
@@ -78,10 +79,12 @@ contains
       !> False where the structure is singular, or the instants resolve no tail.
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
+      !> Modes of the structure with its contact held, see new_reduction.
+      type(held_basis), intent(inout), optional :: held
 
       done = .false.
       if (.not. self%is_built) then
-         call build(self, case, harmonics, system, error)
+         call build(self, case, harmonics, system, error, held)
          if (allocated(error)) return
       end if
       if (self%n_total <= self%n_kept) return
@@ -102,12 +105,13 @@ contains
    end subroutine start
 
    !> The balance of N harmonics with the very law of the given one.
-   subroutine build(self, case, harmonics, system, error)
+   subroutine build(self, case, harmonics, system, error, held)
       class(known_tail), intent(inout), target :: self
       type(case_type), intent(in) :: case
       type(harmonics_options), intent(in) :: harmonics
       type(balance_state), intent(in) :: system
       type(error_type), allocatable, intent(out) :: error
+      type(held_basis), intent(inout), optional :: held
       type(harmonics_options) :: finer
       logical :: at_instants
       integer :: n
@@ -130,7 +134,7 @@ contains
       allocate (self%problem)
       ! With the same laws: E is chosen by H, and with another one a solution would not be one.
       call build_system(case, self%problem, self%finer, error, of_level=finer, &
-                        forces=system%problem%forces)
+                        forces=system%problem%forces, held=held)
       if (allocated(error)) return
       self%finer%depth = system%depth
       self%linear%kind = case%solver%linear

@@ -105,6 +105,9 @@ contains
       elapsed = real(clock_end - clock, wp)/real(rate, wp)
       outcome%status = state%status()
       outcome%out_of_time = observer%run_out
+      if (.not. allocated(error) .and. summary%remarks%count() > 0) then
+         call writer%add_remarks(summary%remarks%name, summary%remarks%text, error)
+      end if
       if (allocated(error)) then
          if (state%n_points == 0) then
             ! A result without points is none.
@@ -115,10 +118,6 @@ contains
             if (present(image)) call move_alloc(writer%image, image)
          end if
          return
-      end if
-      if (summary%remarks%count() > 0) then
-         call writer%add_remarks(summary%remarks%name, summary%remarks%text, error)
-         if (allocated(error)) return
       end if
       if (observer%run_out) call observer%on_message('time limit: the run ended after case'// &
          '%max_seconds = '//to_text(case%max_seconds)//' s')

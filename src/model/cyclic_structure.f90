@@ -284,6 +284,8 @@ contains
       if (abs(omega - state%omega) <= 0.0_wp .and. &
           abs(self_excitation - state%self_excitation) <= 0.0_wp) return
       n_failed = 0
+      ! Nowhere until it has come there: what a failure leaves belongs to no frequency.
+      state%omega = -1.0_wp
       select type (state)
       type is (cyclic_state)
          state%point%s = self%harmonic*omega

@@ -153,6 +153,8 @@ contains
       if (abs(omega - state%omega) <= 0.0_wp .and. &
           abs(self_excitation - state%self_excitation) <= 0.0_wp) return
       n_failed = 0
+      ! Nowhere until it has come there: what a failure leaves belongs to no frequency.
+      state%omega = -1.0_wp
       select type (state)
       type is (plain_state)
          call go_to(self, state, omega, self_excitation, n_failed)
