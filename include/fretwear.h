@@ -91,11 +91,14 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
                   "contact/tangential_stiffness", "contact/normal_stiffness"
-   3 * n_pairs:   "contact/position", pair after pair */
+   3 * n_pairs:   "contact/position", pair after pair
+   m * n_dof:     "load/harmonic_cosine", "load/harmonic_sine", a load of m harmonics each, harmonic
+                  after harmonic */
 int fw_put_reals(fw_handle handle, const char *name, size_t n, const double *values);
 
 /* 3 * n_pairs: "contact/side_1" (required where there are pairs), "contact/side_2"; the signed
-   numbers, from 1, of the dofs (t1, t2, n) of a pair, 0 for none or the ground. */
+   numbers, from 1, of the dofs (t1, t2, n) of a pair, 0 for none or the ground.
+   m: "load/harmonic", the harmonics 0, 1, .. of the loads above. */
 int fw_put_integers(fw_handle handle, const char *name, size_t n, const int *values);
 
 /* Observe a linear combination of the dofs (n = n_dof). Without any, every dof is observed. */

@@ -19,7 +19,8 @@ module fw_python_parts
    public :: case_part, namelist_words, quantity_lines
 
    character(*), parameter :: names = 'mass, stiffness, damping, load/static, load/cosine, '// &
-                              'load/sine, contact/side_1, contact/side_2, contact/gap, '// &
+                              'load/sine, load/wave_harmonic, load/wave_power, load/wave, '// &
+                              'contact/side_1, contact/side_2, contact/gap, '// &
                               'contact/depth, contact/mu, observe/matrix, n_springs, '// &
                               'solver_tolerance'
 
@@ -48,6 +49,12 @@ contains
             if (allocated(model%load_cosine)) values = model%load_cosine
          case ('load/sine')
             if (allocated(model%load_sine)) values = model%load_sine
+         case ('load/wave_harmonic')
+            if (allocated(model%waves%harmonic)) values = real(model%waves%harmonic, wp)
+         case ('load/wave_power')
+            if (allocated(model%waves%power)) values = real(model%waves%power, wp)
+         case ('load/wave')
+            if (allocated(model%load_wave)) values = flat(model%load_wave)
          case ('observe/matrix')
             if (allocated(model%observe_matrix)) values = flat(transpose(model%observe_matrix))
          case ('contact/side_1')

@@ -166,6 +166,9 @@ class Model:
         Stiffness per square of the rotation speed [force/length/(rad/s)^2].
     static_rotation : (n_dof,), optional
         Static load per square of the rotation speed [force/(rad/s)^2].
+    harmonic : mapping, optional
+        Harmonic of further loads, 0, 1, .., with the parts in phase with its cosine and its sine,
+        a pair of (n_dof,) [force].
     sectors : Sectors, optional
         Makes the model one of equal sectors around an axis.
     observe : mapping, optional
@@ -187,6 +190,7 @@ class Model:
                  sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
                  static_rotation: ArrayLike | None = None, sectors: Sectors | None = None,
                  observe: Mapping[str, Observation] | None = None,
+                 harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
                  title: str = "", unit_system: str = "") -> None:
         n = self.n_dof = _order(M, C, K)
         if n == 0:
@@ -202,6 +206,7 @@ class Model:
             name: array(name, value, (n,)) for name, value in (
                 ("static", static), ("cosine", cosine), ("sine", sine),
                 ("static_rotation", static_rotation)) if value is not None}
+        self._harmonic = _waves({} if harmonic is None else harmonic, n)
         if contact is not None and not isinstance(contact, ContactPairs):
             raise InputError(f"contact: is a {type(contact).__name__}, must be ContactPairs")
         self.contact = None if contact is None else contact.checked(n)
@@ -261,6 +266,12 @@ class Model:
     def sine(self) -> Floats:
         """Load in phase with sin(omega t) (n_dof,), read-only [force]."""
         return self._load("sine")
+
+    @property
+    def harmonic(self) -> dict[int, tuple[Floats, Floats]]:
+        """Cosine and sine parts (n_dof,) of further loads by their harmonic, read-only [force]."""
+        return {n: (_read_only(cosine), _read_only(sine))
+                for n, (cosine, sine) in self._harmonic.items()}
 
     @property
     def static_rotation(self) -> Floats:
@@ -324,7 +335,7 @@ class Model:
                 return cls(
                     found["mass"], found.get("damping"), found["stiffness"],
                     contact=_contact_of(found), observe=_observed_of(file), **loads,
-                    sectors=_sectors_of(file),
+                    sectors=_sectors_of(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
@@ -364,6 +375,11 @@ class Model:
         found: dict[str, NDArray[Any]] = dict(self._matrices)
         found.update((name, self._loads[argument]) for name, argument in _LOADS.items()
                      if argument in self._loads)
+        if self._harmonic:
+            found["load/harmonic"] = np.array(list(self._harmonic), dtype=np.int64)
+            for i, name in enumerate(("cosine", "sine")):
+                found[f"load/harmonic_{name}"] = np.array(
+                    [parts[i] for parts in self._harmonic.values()])
         if self.contact is not None:
             for name in _CONTACT:
                 value = getattr(self.contact, name.split("/")[1])
@@ -434,6 +450,38 @@ def _order(M: ArrayLike, C: ArrayLike | None, K: ArrayLike) -> int:
     if C is None and mass != stiffness:
         raise InputError(f"M and K: are of order {mass} and {stiffness}, must be the same")
     return stiffness if C is not None and np.shape(C) == (stiffness, stiffness) else mass
+
+
+def _waves(harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]],
+           n_dof: int) -> dict[int, tuple[Floats, Floats]]:
+    if not isinstance(harmonic, Mapping):
+        raise InputError(f"harmonic: is a {type(harmonic).__name__}, must be a dictionary of "
+                         "harmonics")
+    found = {}
+    for n, parts in harmonic.items():
+        if not isinstance(n, (int, np.integer)) or n < 0:
+            raise InputError(f"harmonic, a key: is {n!r}, must be 0, 1, 2, ..")
+        if not isinstance(parts, (tuple, list, np.ndarray)) or len(parts) != 2:
+            raise InputError(f"harmonic[{n}]: must be a pair of loads, cosine and sine")
+        cosine, sine = parts
+        found[int(n)] = (array(f"harmonic[{n}], cosine", cosine, (n_dof,)),
+                         array(f"harmonic[{n}], sine", sine, (n_dof,)))
+    return found
+
+
+def _waves_of(file: h5py.File) -> dict[int, tuple[ArrayLike, ArrayLike]] | None:
+    if "load/harmonic" not in file:
+        return None
+    harmonics = file["load/harmonic"][()]
+    zero = np.zeros((len(harmonics), len(file["mass"])))
+    cosine, sine = (file[name][()] if (name := f"load/harmonic_{part}") in file else zero
+                    for part in ("cosine", "sine"))
+    found: dict[int, tuple[ArrayLike, ArrayLike]] = {}
+    for n, *parts in zip(harmonics, cosine, sine):
+        # The same harmonic may stand in the file more than once.
+        before = found.get(int(n), (0.0, 0.0))
+        found[int(n)] = (np.asarray(before[0]) + parts[0], np.asarray(before[1]) + parts[1])
+    return found
 
 
 def _rows(observe: Mapping[str, Observation], n_dof: int) -> tuple[tuple[str, ...], Floats]:

@@ -151,6 +151,21 @@ class Load(TypedDict, total=False):
     cosine: ArrayLike
     #: [F] sine part of the first harmonic (default: of the file, else 0)
     sine: ArrayLike
+    #: loads on single dofs in any harmonic, added to the others (default: 0)
+    n_terms: int
+    #: dof; negative: with its sign turned (required with n_terms)
+    term_dof: ArrayLike
+    #: harmonic, 0 to n_harmonics (default: 1, or by term_order)
+    term_harmonic: ArrayLike
+    #: engine orders in place of harmonics: the frequency of the sweep is their greatest common
+    #: divisor times the speed (default: term_harmonic)
+    term_order: ArrayLike
+    #: [F] amplitude, over the frequency to term_power (required with n_terms)
+    term_amplitude: ArrayLike
+    #: [degrees] of cos(n omega t + phase) (default: 0)
+    term_phase: ArrayLike
+    #: times the frequency of the term [rad/s] to this power; 2: an unbalance (default: 0)
+    term_power: ArrayLike
     #: multiplies the static load, that of rotation included (default: 1)
     static_scale: float
     #: multiplies cosine and sine (default: 1)

@@ -142,7 +142,7 @@ contains
          moving(1:) = .true.
          return
       end if
-      moving(1:) = abs(model%load_static) + abs(model%load_cosine) + abs(model%load_sine) > 0.0_wp
+      moving(1:) = sum(abs(model%load_columns()), dim=2) > 0.0_wp
       do i = 1, contact%n_pairs
          ! An interference pushes both sides.
          if (contact%gap(i) < 0.0_wp) moving(abs([contact%side_1(3, i), contact%side_2(3, i)])) &
@@ -185,8 +185,9 @@ contains
 
    end subroutine find_moving_dofs
 
-   !> Half-wave symmetry is exact where nothing static acts, normal loads are constant, springs
-   !> are odd, and no pair carries a static force over from an earlier point of the sweep.
+   !> Half-wave symmetry is exact where nothing static acts, nor a load of an even harmonic, normal
+   !> loads are constant, springs are odd, and no pair carries a static force over from an earlier
+   !> point of the sweep.
    logical function symmetric(model, contact, springs, joint)
       type(model_type), intent(in) :: model
       type(contact_type), intent(in) :: contact
@@ -195,6 +196,8 @@ contains
       type(law_facts) :: facts
 
       symmetric = all(abs(model%load_static) <= 0.0_wp)
+      if (model%waves%n_waves() > 0) symmetric = symmetric .and. &
+         all(modulo(model%waves%harmonic, 2) == 1)
       if (contact%n_pairs > 0) then
          facts = facts_of(contact%law)
          symmetric = symmetric .and. facts%is_odd .and. all(joint%row(3, :) == 0) .and. &

@@ -113,7 +113,8 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
-      self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics)
+      self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics, &
+                                         case%model%waves%highest())
       allocate (self%level(size(self%n_harmonics), fewest:most))
       allocate (self%tail(size(self%n_harmonics), fewest:most))
       allocate (self%by_instants(size(self%n_harmonics), fewest:most), source=unknown/safety)

@@ -51,7 +51,8 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
-      self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics)
+      self%n_harmonics = harmonic_levels(case%harmonics%n_harmonics, &
+                                         case%model%waves%highest())
       allocate (self%level(size(self%n_harmonics)))
       call self%level(1)%build(case, self%n_harmonics(1), error, held=self%held)
    end subroutine start

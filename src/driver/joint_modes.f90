@@ -2,6 +2,7 @@
 !> (held along the normals) and stuck (held in every direction).
 module fw_joint_modes
    use fw_case, only: case_type
+   use fw_formed_stiffness, only: harmonic_load
    use fw_kinds, only: wp
    use fw_modes, only: find_modes
    use fw_laws, only: new_law
@@ -40,26 +41,57 @@ contains
       !> [rad/s]
       real(wp), intent(in) :: range(2)
       type(joint_mode_type), allocatable, intent(out) :: modes(:)
-      real(wp), allocatable :: stiffness(:, :), load(:, :)
-      type(mode_type), allocatable :: found(:)
-      integer :: state
+      real(wp), allocatable :: stiffness(:, :)
+      integer :: n, state
 
       allocate (modes(0))
       if (case%model%n_dof > most_dofs) return
-      load = reshape([case%model%load_cosine, case%model%load_sine], [case%model%n_dof, 2])
       do state = state_free, state_stuck
          if (.not. differs(case, state)) cycle
-         if (case%model%cyclic%is_cyclic) then
-            call find_sector_modes(case, first_held(state), range, found)
-            call join(found, state, modes)
-            cycle
-         end if
-         call held_stiffness(case, state, stiffness)
-         call find_modes(case%model%mass, case%model%damping, stiffness, load, &
-                         case%model%observe_matrix, range, found)
-         call join(found, state, modes)
+         if (.not. case%model%cyclic%is_cyclic) call held_stiffness(case, state, stiffness)
+         ! A load of harmonic n hits a mode at an n-th of its frequency.
+         do n = 1, case%model%waves%highest()
+            if (n > 1 .and. .not. any_of(case, n)) cycle
+            call add_modes_of(case, state, n, stiffness, range, modes)
+         end do
       end do
    end subroutine find_joint_modes
+
+   pure logical function any_of(case, n)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: n
+
+      any_of = any(case%model%waves%harmonic == n)
+   end function any_of
+
+   !> Modes that the load of a harmonic hits, at the frequencies of the first harmonic where it
+   !> does.
+   subroutine add_modes_of(case, state, n, stiffness, range, modes)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: state, n
+      !> Of a structure that is not cyclic.
+      real(wp), allocatable, intent(in) :: stiffness(:, :)
+      real(wp), intent(in) :: range(2)
+      type(joint_mode_type), allocatable, intent(inout) :: modes(:)
+      type(mode_type), allocatable :: found(:)
+      complex(wp) :: load(case%model%n_dof)
+      integer :: i
+
+      if (case%model%cyclic%is_cyclic) then
+         call find_sector_modes(case, n, first_held(state), real(n, wp)*range, found)
+      else
+         load = harmonic_load(case%model%load_columns(), case%model%waves, n, &
+                              0.5_wp*n*sum(range))
+         call find_modes(case%model%mass, case%model%damping, stiffness, &
+                         reshape([real(load, wp), -aimag(load)], [size(load), 2]), &
+                         case%model%observe_matrix, real(n, wp)*range, found)
+      end if
+      do i = 1, size(found)
+         found(i)%omega = found(i)%omega/n
+         found(i)%width = found(i)%width/n
+      end do
+      call join(found, state, modes)
+   end subroutine add_modes_of
 
    !> Add the modes of a state. Element by element: gfortran 12 loses allocatable components of an
    !> array constructor in places.

@@ -43,9 +43,12 @@ module fw_level
 
 contains
 
-   !> Numbers of harmonics to choose from, ascending: 1, 3, 5, 9, 15, ... and the most.
-   pure function harmonic_levels(most) result(levels)
+   !> Numbers of harmonics to choose from, ascending: 1, 3, 5, 9, 15, ... and the most. Those that
+   !> would leave out a load are no choice, but that two are left where there are two.
+   pure function harmonic_levels(most, least) result(levels)
       integer, intent(in) :: most
+      !> The highest harmonic of the loads.
+      integer, intent(in) :: least
       integer, allocatable :: levels(:)
       integer :: h
 
@@ -56,6 +59,9 @@ contains
          h = max(h + 2, 2*(nint(growth*h)/2) + 1)
       end do
       levels = [levels, most]
+      do while (size(levels) > 2 .and. levels(1) < least)
+         levels = levels(2:)
+      end do
    end function harmonic_levels
 
    !> The work of all levels, with the unknowns of the largest that was needed.

@@ -72,7 +72,7 @@ contains
       lower = 0
       done = .false.
       most = case%harmonics%n_harmonics
-      ladder = harmonic_levels(most)
+      ladder = harmonic_levels(most, case%model%waves%highest())
       do k = 1, size(ladder) - 1
          if (work >= most_work) exit
          allocate (next)

@@ -195,8 +195,9 @@ contains
          end if
          if (.not. joint%half_wave_symmetric) then
             call fatal_error(error, '&harmonics parity = ''odd'': the response has even '// &
-                             'harmonics, because of a static load, a normal dof or an even '// &
-                             'spring power; use ''auto'' or ''all''', status_input)
+                             'harmonics, because of a static load, a load of an even '// &
+                             'harmonic, a normal dof or an even spring power; use '// &
+                             '''auto'' or ''all''', status_input)
             return
          end if
          if (modulo(n_time, 2) == 1) then

@@ -83,6 +83,9 @@ contains
       end if
       acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
              any(abs(case%model%load_sine) > 0.0_wp)
+      if (allocated(case%model%load_wave)) then
+         acts = acts .or. any(abs(case%model%load_wave) > 0.0_wp)
+      end if
       if (.not. acts) call remarks%add('no load', 'no vibratory load acts: the response is '// &
          'that at rest; set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       call remark_harmonics(case, remarks)

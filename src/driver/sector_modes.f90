@@ -24,8 +24,10 @@ module fw_sector_modes
 contains
 
    !> The modes with frequencies within a range; none where the pencil has no solution.
-   subroutine find_sector_modes(case, first_component, range, modes)
+   subroutine find_sector_modes(case, harmonic, first_component, range, modes)
       type(case_type), intent(in) :: case
+      !> Of which the loads act, in its nodal diameter.
+      integer, intent(in) :: harmonic
       !> Components of the pairs from this one on are held; 4: none.
       integer, intent(in) :: first_component
       !> Lowest and highest frequency [rad/s].
@@ -42,7 +44,7 @@ contains
 
       allocate (modes(0))
       allocate (in_range(0))
-      k = abs(case%model%cyclic%nodal_diameter(1))
+      k = abs(case%model%cyclic%nodal_diameter(harmonic))
       if (.not. case%model%cyclic%holds(k)) return
       call sector_at(case%model, k, nodal, error)
       if (allocated(error)) return
@@ -61,7 +63,8 @@ contains
          if (square < range(1)**2 .or. square > range(2)**2 .or. square <= 0.0_wp) cycle
          in_range = [in_range, j]
       end do
-      load = nodal%load(:, 2) - (0.0_wp, 1.0_wp)*nodal%load(:, 3)
+      load = load_in(nodal, harmonic, case%model%cyclic%nodal_diameter(harmonic) < 0, &
+                     0.5_wp*sum(range))
       deallocate (modes)
       allocate (modes(size(in_range)))
       do i = 1, size(in_range)
@@ -70,6 +73,26 @@ contains
                        modes(i))
       end do
    end subroutine find_sector_modes
+
+   !> The load of a harmonic as it acts on the matrices of 0 to N/2: where the harmonic takes their
+   !> conjugates, the conjugate of its own.
+   pure function load_in(nodal, harmonic, conjugated, s) result(load)
+      type(nodal_matrices), intent(in) :: nodal
+      integer, intent(in) :: harmonic
+      logical, intent(in) :: conjugated
+      !> Its frequency [rad/s].
+      real(wp), intent(in) :: s
+      complex(wp) :: load(size(nodal%load, 1)), i
+      integer :: w
+
+      i = merge((0.0_wp, -1.0_wp), (0.0_wp, 1.0_wp), conjugated)
+      load = (0.0_wp, 0.0_wp)
+      if (harmonic == 1) load = nodal%load(:, 2) - i*nodal%load(:, 3)
+      do w = 1, nodal%waves%n_waves()
+         load = load + nodal%waves%factor(w, harmonic, s)* &
+                (nodal%load(:, 2*w + 2) - i*nodal%load(:, 2*w + 3))
+      end do
+   end function load_in
 
    !> Linear springs, and what the contact holds.
    subroutine hold_joint(case, k, first_component, stiffness)

@@ -46,10 +46,25 @@ contains
       if (.not. allocated(error)) call check_adaptive(case, error)
       if (.not. allocated(error)) call check_accuracy(case, error)
       if (.not. allocated(error)) call check_stability(case, error)
+      if (.not. allocated(error)) call check_loads(case, error)
       if (.not. allocated(error)) call check_cyclic(case, error)
       if (.not. allocated(error)) call check_law(case, error)
       if (.not. allocated(error)) call check_wear(case, error)
    end subroutine check_combinations
+
+   !> A load of a harmonic that is left out would not act.
+   subroutine check_loads(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (highest => case%model%waves%highest())
+         if (highest <= case%harmonics%n_harmonics .or. case%analysis == analysis_modes) return
+         call fatal_error(error, 'harmonics%n_harmonics = '// &
+                          to_text(case%harmonics%n_harmonics)//', but &load (or /load/harmonic '// &
+                          'of the model file) acts in harmonic '//to_text(highest)//': must be '// &
+                          'at least '//to_text(highest), status_input)
+      end associate
+   end subroutine check_loads
 
    !> What waves around a cyclic structure cannot do.
    subroutine check_cyclic(case, error)

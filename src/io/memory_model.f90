@@ -28,11 +28,13 @@ module fw_memory_model
       [character(28) :: 'mass', 'stiffness', 'damping', 'stiffness_rotation']
    character(*), parameter :: load_names(*) = &
       [character(28) :: 'load/static', 'load/cosine', 'load/sine', 'load/static_rotation']
+   character(*), parameter :: wave_names(*) = &
+      [character(28) :: 'load/harmonic_cosine', 'load/harmonic_sine']
    character(*), parameter :: pair_names(*) = &
       [character(28) :: 'contact/mu', 'contact/gap', 'contact/area', 'contact/normal_load', &
        'contact/tangential_stiffness', 'contact/normal_stiffness', 'contact/position']
    character(*), parameter :: integer_names(*) = &
-      [character(20) :: 'contact/side_1', 'contact/side_2']
+      [character(20) :: 'contact/side_1', 'contact/side_2', 'load/harmonic']
    character(*), parameter :: text_names(*) = &
       [character(20) :: 'title', 'unit_system', 'contact/patch']
 
@@ -91,8 +93,12 @@ contains
          rows = 1
          columns = self%n_pairs
          if (name == 'contact/position') rows = 3
+      else if (any(wave_names == name)) then
+         ! As many as there are harmonics, which may be given later.
+         columns = size(values)/rows
       else if (.not. any(matrix_names == name) .and. .not. any(load_names == name)) then
-         call unknown_name(name, [matrix_names, load_names, pair_names], 'real', error)
+         call unknown_name(name, [matrix_names, load_names, wave_names, &
+                                 pair_names], 'real', error)
          return
       end if
       ! The product in 64 bits: n_dof**2 passes the range of 32.
@@ -116,6 +122,10 @@ contains
             parts%load_sine = values
          case ('load/static_rotation')
             parts%load_static_rotation = values
+         case ('load/harmonic_cosine')
+            parts%harmonic_cosine = reshape(values, [rows, columns])
+         case ('load/harmonic_sine')
+            parts%harmonic_sine = reshape(values, [rows, columns])
          case ('contact/mu')
             parts%mu = values
          case ('contact/gap')
@@ -134,7 +144,8 @@ contains
       end associate
    end subroutine put_reals
 
-   !> An integer part: the signed dof numbers (t1, t2, n) of a side, pair after pair.
+   !> An integer part: the signed dof numbers (t1, t2, n) of a side, pair after pair, or the
+   !> harmonics of loads.
    subroutine put_integers(self, name, values, error)
       class(memory_model_type), intent(inout) :: self
       character(*), intent(in) :: name
@@ -143,6 +154,15 @@ contains
 
       if (.not. any(integer_names == name)) then
          call unknown_name(name, integer_names, 'integer', error)
+         return
+      end if
+      if (name == 'load/harmonic') then
+         if (any(values < 0)) then
+            call fatal_error(error, name//' has '//to_text(minval(values))//': must be 0, 1, ..', &
+                             status_input)
+            return
+         end if
+         self%parts%load_harmonic = values
          return
       end if
       call check_size(name, size(values, kind=i8), 3, self%n_pairs, error)
@@ -233,7 +253,34 @@ contains
          ! Everything against the ground.
          allocate (self%parts%side_2(3, self%n_pairs), source=0)
       end if
+      if (.not. allocated(error)) call check_waves(self%parts, error)
    end subroutine check
+
+   !> Loads of harmonics have one column for each of these.
+   subroutine check_waves(parts, error)
+      type(file_model_type), intent(in) :: parts
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n
+
+      n = 0
+      if (allocated(parts%load_harmonic)) n = size(parts%load_harmonic)
+      call check_one('load/harmonic_cosine', parts%harmonic_cosine)
+      if (.not. allocated(error)) call check_one('load/harmonic_sine', parts%harmonic_sine)
+
+   contains
+
+      subroutine check_one(name, columns)
+         character(*), intent(in) :: name
+         real(wp), allocatable, intent(in) :: columns(:, :)
+
+         if (.not. allocated(columns)) return
+         if (size(columns, 2) == n) return
+         call fatal_error(error, name//' has loads of '//to_text(size(columns, 2))// &
+                          ' harmonics: must be '//to_text(n)//', as many as load/harmonic', &
+                          status_input)
+      end subroutine check_one
+
+   end subroutine check_waves
 
    !> Column by column, since reshape would copy the whole once more; n_dof**2 values were checked.
    subroutine take_matrix(name, values, order, matrix, error)

@@ -32,6 +32,9 @@ module fw_model_file
    character(*), parameter :: format_name = 'fretwear-model'
    integer, parameter :: known_version = 1
 
+   character(*), parameter :: wave_names(*) = &
+      [character(21) :: '/load/harmonic_cosine', '/load/harmonic_sine']
+
    !> What a model file holds; a component is not allocated where the file has none.
    type :: file_model_type
       character(:), allocatable :: title, unit_system
@@ -58,6 +61,9 @@ module fw_model_file
       real(wp), allocatable :: observe_matrix(:, :)
       !> What makes the model a sector of a cyclic structure.
       type(cyclic_parts) :: cyclic
+      !> Harmonics that loads act in (m), and their cosine and sine parts (n_dof, m) [force].
+      integer, allocatable :: load_harmonic(:)
+      real(wp), allocatable :: harmonic_cosine(:, :), harmonic_sine(:, :)
    contains
       procedure :: order
    end type file_model_type
@@ -198,7 +204,52 @@ contains
       call read_vector(file, '/load/sine', n, model%load_sine, error)
       if (allocated(error)) return
       call read_vector(file, '/load/static_rotation', n, model%load_static_rotation, error)
+      if (.not. allocated(error)) call read_harmonic_loads(file, n, model, error)
    end subroutine read_loads
+
+   !> Loads of other harmonics than the first.
+   subroutine read_harmonic_loads(file, n, model, error)
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: n
+      type(file_model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+      integer :: j, m
+
+      if (.not. file%exists('/load/harmonic')) then
+         do j = 1, size(wave_names)
+            if (.not. file%exists(trim(wave_names(j)))) cycle
+            call dataset_failure(file, trim(wave_names(j)), 'needs /load/harmonic, the '// &
+                                 'harmonics of its rows', error)
+            return
+         end do
+         return
+      end if
+      call read_dataset(file, '/load/harmonic', model%load_harmonic, error)
+      if (allocated(error)) return
+      m = size(model%load_harmonic)
+      if (any(model%load_harmonic < 0)) then
+         call dataset_failure(file, '/load/harmonic', 'holds '// &
+                              to_text(minval(model%load_harmonic))//', expected 0, 1, ..', error)
+         return
+      end if
+      if (m == 0) return
+      ! Rows of the file are columns here: `read_matrix` turns them, for it takes matrices.
+      call read_rows(trim(wave_names(1)), model%harmonic_cosine)
+      if (.not. allocated(error)) call read_rows(trim(wave_names(2)), model%harmonic_sine)
+
+   contains
+
+      subroutine read_rows(name, columns)
+         character(*), intent(in) :: name
+         real(wp), allocatable, intent(inout) :: columns(:, :)
+         real(wp), allocatable :: rows(:, :)
+
+         if (.not. file%exists(name)) return
+         call read_matrix(file, name, n, rows, error, n_rows=m)
+         if (.not. allocated(error)) columns = transpose(rows)
+      end subroutine read_rows
+
+   end subroutine read_harmonic_loads
 
    !> Observed quantities: by dof numbers, or by a matrix of factors.
    subroutine read_observed(file, model, error)

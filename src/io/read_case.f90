@@ -6,6 +6,7 @@ module fw_read_case
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
    use fw_kinds, only: wp
+   use fw_load_terms, only: load_terms
    use fw_model_file, only: file_model_type
    use fw_model_keys, only: model_options
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
@@ -221,6 +222,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(file_model_type), intent(in), optional :: memory_model
       type(model_options) :: options
+      type(load_terms) :: terms
       character(:), allocatable :: worn
       integer :: n_dof
 
@@ -237,8 +239,8 @@ contains
       end if
       call read_springs(reader, case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
-      call read_loads(reader, options, raw)
-      call finish_model(reader, options, raw, case%model, error, [integer ::])
+      call read_loads(reader, options, raw, terms)
+      call finish_model(reader, options, raw, terms, case%model, error, [integer ::])
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)
          if (allocated(raw%title)) case%title = raw%title

@@ -6,6 +6,7 @@
 module fw_read_model
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_load_terms, only: load_terms
    use fw_matrix_checks, only: check_matrix, check_vector
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
@@ -17,6 +18,8 @@ module fw_read_model
    use fw_damping, only: add_modal_damping
    use fw_paths, only: resolve_path
    use fw_read_nodal, only: finish_nodal
+   use fw_read_waves, only: gather_waves
+   use fw_read_waves, only: read_terms
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_trial, only: trial_type
@@ -167,28 +170,36 @@ contains
    end subroutine read_matrices
 
    !> Group &load: replaces the loads of a model file, then scales.
-   subroutine read_loads(reader, options, raw)
+   subroutine read_loads(reader, options, raw, terms)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(inout) :: options
       type(file_model_type), intent(inout) :: raw
+      !> Loads in any harmonic.
+      type(load_terms), intent(inout) :: terms
 
       call bind_loads(reader, raw%load_static, raw%load_cosine, raw%load_sine)
+      call read_terms(reader, terms)
       call options%bind_scales(reader)
    end subroutine read_loads
 
    !> Check the parts and put them together: rotation, damping, scales.
-   subroutine finish_model(reader, options, raw, model, error, wanted)
+   subroutine finish_model(reader, options, raw, terms, model, error, wanted)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
       type(file_model_type), intent(inout) :: raw
+      type(load_terms), intent(in) :: terms
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
       !> Parameters of fw_parameters by which responses are to be differentiated.
       integer, intent(in) :: wanted(:)
+      real(wp) :: static(raw%order())
 
       if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
+      call gather_waves(reader, raw, terms, model%cyclic, size(static), model%waves, &
+                        model%load_wave, static)
+      if (allocated(model%load_wave)) model%load_wave = options%harmonic_scale*model%load_wave
       if (allocated(raw%cyclic%nodal)) then
-         call finish_nodal(reader, options, raw, model, error)
+         call finish_nodal(reader, options, raw, static, model, error)
          return
       end if
       call check_parts(reader, raw, options%source == source_inline)
@@ -196,7 +207,7 @@ contains
       model%n_dof = size(raw%stiffness, 1)
       model%mass = raw%mass
       model%stiffness = raw%stiffness
-      model%load_static = raw%load_static
+      model%load_static = raw%load_static + static
       model%load_cosine = options%harmonic_scale*raw%load_cosine
       model%load_sine = options%harmonic_scale*raw%load_sine
       ! Rotation comes before damping, which takes the stiffness at speed, and before the static

@@ -23,10 +23,12 @@ module fw_read_nodal
 contains
 
    !> Check the parts of every nodal diameter and put them together.
-   subroutine finish_nodal(reader, options, raw, model, error)
+   subroutine finish_nodal(reader, options, raw, static, model, error)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
       type(file_model_type), intent(inout) :: raw
+      !> Static loads beside those of the file (n_physical).
+      real(wp), intent(in) :: static(:)
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
       integer :: k, n
@@ -42,10 +44,30 @@ contains
             if (reader%failed()) return
             call put_together(reader, options, raw, parts, model%cyclic%nodal(k + 1), error)
             if (allocated(error)) return
+            call add_waves(options, static, model, model%cyclic%nodal(k + 1))
          end associate
       end do
       call stand_in(options, raw, model)
    end subroutine finish_nodal
+
+   !> Loads of other harmonics, on the displacements in front.
+   pure subroutine add_waves(options, static, model, nodal)
+      type(model_options), intent(in) :: options
+      real(wp), intent(in) :: static(:)
+      type(model_type), intent(in) :: model
+      type(nodal_matrices), intent(inout) :: nodal
+      complex(wp), allocatable :: load(:, :)
+      integer :: n
+
+      n = size(static)
+      nodal%load(:n, 1) = nodal%load(:n, 1) + options%static_scale*static
+      nodal%waves = model%waves
+      if (nodal%waves%n_waves() == 0) return
+      allocate (load(size(nodal%load, 1), nodal%waves%n_columns()), source=(0.0_wp, 0.0_wp))
+      load(:, :3) = nodal%load
+      load(:n, 4:) = model%load_wave
+      call move_alloc(load, nodal%load)
+   end subroutine add_waves
 
    !> Hermitian, and real where waves stand.
    subroutine check_diameter(reader, parts, k, n_sectors)

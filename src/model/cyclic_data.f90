@@ -6,6 +6,7 @@ module fw_cyclic_data
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: pi
    use fw_kinds, only: wp
+   use fw_load_waves, only: load_waves
    implicit none (type, external)
    private
 
@@ -15,10 +16,13 @@ module fw_cyclic_data
    type :: nodal_matrices
       !> Hermitian (n, n); the damping is not allocated where there is none.
       complex(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
-      !> Static, cosine and sine loads in columns (n, 3); of a higher wave than N/2, conjugates.
+      !> Static, cosine and sine loads, then those of the waves, in columns (n, n_columns); of a
+      !> nodal diameter above N/2, conjugates.
       complex(wp), allocatable :: load(:, :)
       !> Observed quantities (n_observed, n).
       complex(wp), allocatable :: observe(:, :)
+      !> What the columns of the loads are.
+      type(load_waves) :: waves
    end type nodal_matrices
 
    type :: cyclic_type

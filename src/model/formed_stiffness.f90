@@ -7,12 +7,13 @@ module fw_formed_stiffness
    use fw_kinds, only: wp
    use fw_lapack, only: zgemm
    use fw_lapack, only: zgemv
+   use fw_load_waves, only: load_waves
    use fw_reduction, only: reduction_type
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
 
-   public :: formed_stiffness, form_block, harmonic_load
+   public :: formed_stiffness, form_block, harmonic_load, load_slope
 
    type :: formed_stiffness
       !> Z_r (n_coordinates, n_coordinates, n_retained) [force/length].
@@ -81,9 +82,10 @@ contains
 
       call internal%factor(basis, theta, s, failed)
       if (failed) n_failed = n_failed + 1
-      load = harmonic_load(basis%load_q, n)
+      load = harmonic_load(basis%load_q, basis%waves, n, s)
       call form_block(basis, theta, s, internal, basis%n_coordinates, &
-                      [(j, j=1, basis%n_coordinates)], matrix, harmonic_load(basis%load_i, n), load)
+                      [(j, j=1, basis%n_coordinates)], matrix, &
+                      harmonic_load(basis%load_i, basis%waves, n, s), load)
    end subroutine form_harmonic
 
    !> Z_r of one harmonic, rows in use and the first of them as columns, Z_qq - Z_qi D^-1 Z_iq;
@@ -175,14 +177,18 @@ contains
                  solved, n_i, one, z(n_active + 1, 1), n_used)
    end subroutine subtract_product
 
-   !> Complex load of a harmonic from the static, cosine and sine parts in columns.
-   pure function harmonic_load(parts, n) result(load)
-      !> Static, cosine and sine part (n, 3).
+   !> Complex load of a harmonic from its parts in columns.
+   pure function harmonic_load(parts, waves, n, s) result(load)
+      !> Static, cosine and sine part, then those of the waves (n_rows, n_columns).
       real(wp), intent(in) :: parts(:, :)
+      type(load_waves), intent(in) :: waves
       integer, intent(in) :: n
+      !> n omega.
+      real(wp), intent(in) :: s
       complex(wp) :: load(size(parts, 1))
+      integer :: w
 
-      ! Loads act in harmonics 0 and 1 only; an amplitude is U = uc - i us.
+      ! An amplitude is U = uc - i us.
       select case (n)
       case (0)
          load = cmplx(parts(:, 1), kind=wp)
@@ -191,7 +197,28 @@ contains
       case default
          load = zero
       end select
+      do w = 1, waves%n_waves()
+         if (waves%harmonic(w) /= n) cycle
+         load = load + waves%factor(w, n, s)*cmplx(parts(:, 2*w + 2), -parts(:, 2*w + 3), wp)
+      end do
    end function harmonic_load
+
+   !> d F_n/dp of loads that grow with their frequency, at a rate ds/dp.
+   pure function load_slope(parts, waves, n, s, rate) result(slope)
+      real(wp), intent(in) :: parts(:, :)
+      type(load_waves), intent(in) :: waves
+      integer, intent(in) :: n
+      real(wp), intent(in) :: s, rate
+      complex(wp) :: slope(size(parts, 1))
+      integer :: w
+
+      slope = zero
+      do w = 1, waves%n_waves()
+         if (waves%harmonic(w) /= n) cycle
+         slope = slope + waves%slope(w, n, s, rate)* &
+                 cmplx(parts(:, 2*w + 2), -parts(:, 2*w + 3), wp)
+      end do
+   end function load_slope
 
    !> product = Z q.
    subroutine multiply(self, harmonic, column, m, q, product)

@@ -3,6 +3,7 @@
 module fw_model
    use fw_cyclic_data, only: cyclic_type
    use fw_kinds, only: wp
+   use fw_load_waves, only: load_waves
    use fw_text, only: string_type
    implicit none (type, external)
    private
@@ -35,6 +36,23 @@ module fw_model
       logical :: rotates = .false.
       !> What parameters change, of those that were asked for; not allocated where none was.
       type(matrix_change), allocatable :: changes(:)
+      !> Loads beside those of the first harmonic: what they are, and their cosine and sine parts
+      !> (n_dof, 2 n_waves).
+      type(load_waves) :: waves
+      real(wp), allocatable :: load_wave(:, :)
+   contains
+      procedure :: load_columns
    end type model_type
+
+contains
+
+   !> Static, cosine and sine loads, then those of the waves (n_dof, 3 + 2 n_waves).
+   pure function load_columns(self) result(columns)
+      class(model_type), intent(in) :: self
+      real(wp), allocatable :: columns(:, :)
+
+      columns = self%waves%with_columns(self%load_static, self%load_cosine, self%load_sine, &
+                                        self%load_wave)
+   end function load_columns
 
 end module fw_model

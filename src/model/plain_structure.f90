@@ -24,6 +24,7 @@ module fw_plain_structure
    use fw_formed_stiffness, only: form_block
    use fw_formed_stiffness, only: formed_stiffness
    use fw_formed_stiffness, only: harmonic_load
+   use fw_formed_stiffness, only: load_slope
    use fw_internal_block, only: internal_block
    use fw_model, only: model_type
    use fw_real_products, only: harmonic_factors
@@ -207,8 +208,10 @@ contains
       n_i = self%basis%n_internal
       do h = 1, size(factors%harmonic)
          ! F_q here, F_i in the place of the amplitudes of the internal modes.
-         load(:, h) = harmonic_load(self%basis%load_q, factors%harmonic(h))
-         products%amplitudes(:, h) = harmonic_load(self%basis%load_i, factors%harmonic(h))
+         associate (b => self%basis, n => factors%harmonic(h), s => factors%s(h))
+            load(:, h) = harmonic_load(b%load_q, b%waves, n, s)
+            products%amplitudes(:, h) = harmonic_load(b%load_i, b%waves, n, s)
+         end associate
       end do
       if (n_i == 0) return
       call coefficients_of(factors%harmonic, factors%column, m, m, load, coefficients)
@@ -415,16 +418,18 @@ contains
                  k_iq => b%blocks(m + 1:, :, 1), m_iq => b%blocks(m + 1:, :, 2), &
                  c_iq => damping(m + 1:, :))
          derivative = n*matmul(cmplx(-2.0_wp*s*m_qq, c_qq, wp), q)
+         if (b%waves%acts()) derivative = derivative - load_slope(b%load_q, b%waves, harmonic, s, n)
          if (b%n_internal == 0) return
          coupling = cmplx(k_iq - s**2*m_iq, s*c_iq, wp)
          slope = n*cmplx(-2.0_wp*s*m_iq, c_iq, wp)
       end associate
       call internal%factor(b, cmplx(s**2, kind=wp), s, failed)
       ! x, recovered; then D^-1 (Z'_iq q + D' x).
-      xi(:, 1) = harmonic_load(b%load_i, harmonic) - matmul(coupling, q)
+      xi(:, 1) = harmonic_load(b%load_i, b%waves, harmonic, s) - matmul(coupling, q)
       call internal%solve(1, xi)
       derivative = derivative + matmul(xi(:, 1), slope)
       xi(:, 1) = matmul(slope, q) + n*internal_slope(b, cmplx(2.0_wp*s, kind=wp), 1.0_wp, xi(:, 1))
+      if (b%waves%acts()) xi(:, 1) = xi(:, 1) - load_slope(b%load_i, b%waves, harmonic, s, n)
       call internal%solve(1, xi)
       derivative = derivative - matmul(xi(:, 1), coupling)
    end subroutine derive_harmonic
@@ -465,12 +470,17 @@ contains
          call recover_modes(self, f, work, q, x)
          call work%multiply_blocks(b, slopes, q)
          call take_rows(m, n_i, self%n_coefficients, work%products, slope, work%modes)
+         if (b%waves%acts()) call subtract_load_slopes(self, f, slopes, slope)
          if (n_i > 0) then
             ! D^-1 (Z'_iq q + D' x)
             call amplitudes_of(f%harmonic, f%column, n_i, work%modes, n_i, work%amplitudes)
             do h = 1, size(f%harmonic)
                work%amplitudes(:, h) = work%amplitudes(:, h) + &
                                        internal_slope(b, slopes%theta(h), slopes%s(h), x(:, h))
+               if (.not. b%waves%acts()) cycle
+               work%amplitudes(:, h) = work%amplitudes(:, h) - &
+                                       load_slope(b%load_i, b%waves, f%harmonic(h), f%s(h), &
+                                                  slopes%s(h))
             end do
             call coefficients_of(f%harmonic, f%column, n_i, n_i, work%amplitudes, work%modes)
             call work%solve_internal(f)
@@ -481,6 +491,24 @@ contains
          end if
       end associate
    end subroutine derive
+
+   !> dF_q/dp of loads that grow with their frequency.
+   subroutine subtract_load_slopes(self, f, slopes, slope)
+      class(plain_structure), intent(in) :: self
+      type(harmonic_factors), intent(in) :: f, slopes
+      real(wp), intent(inout) :: slope(*)
+      real(wp) :: loads(self%n_coordinates*self%n_coefficients)
+      complex(wp) :: amplitude(self%n_coordinates, size(self%harmonic))
+      integer :: h, m
+
+      m = self%n_coordinates
+      do h = 1, size(self%harmonic)
+         amplitude(:, h) = load_slope(self%basis%load_q, self%basis%waves, f%harmonic(h), f%s(h), &
+                                      slopes%s(h))
+      end do
+      call coefficients_of(f%harmonic, f%column, m, m, amplitude, loads)
+      slope(:size(loads)) = slope(:size(loads)) - loads
+   end subroutine subtract_load_slopes
 
    !> Rows of the coordinates and of the internal modes of a product with the blocks.
    pure subroutine take_rows(m, n_i, n_columns, products, rows, modes)
@@ -527,7 +555,8 @@ contains
          call amplitudes_of(factors%harmonic, factors%column, b%n_internal, work%modes, &
                             b%n_internal, x)
          do h = 1, size(factors%harmonic)
-            x(:, h) = harmonic_load(b%load_i, factors%harmonic(h)) - x(:, h)
+            x(:, h) = harmonic_load(b%load_i, b%waves, factors%harmonic(h), factors%s(h)) - &
+                      x(:, h)
             call work%internal(h)%solve(1, x(:, h:h))
          end do
       end associate

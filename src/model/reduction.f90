@@ -2,6 +2,7 @@
 !> q and modes xi of the structure with q held; all matrices, loads and observations in it.
 module fw_reduction
    use fw_kinds, only: wp
+   use fw_load_waves, only: load_waves
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -31,10 +32,11 @@ module fw_reduction
       real(wp), allocatable :: k_i(:), m_i(:), c_i(:)
       !> Internal damping, only where it is not diagonal (n_internal, n_internal).
       real(wp), allocatable :: c_ii(:, :)
-      !> Static, cosine and sine loads in columns (n_coordinates, 3), (n_internal, 3).
+      !> Loads in columns (n_coordinates, n_columns), (n_internal, n_columns), and what these are.
       real(wp), allocatable :: load_q(:, :), load_i(:, :)
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       real(wp), allocatable :: observe_q(:, :), observe_i(:, :)
+      type(load_waves) :: waves
    end type reduction_type
 
    !> What asks for the eigenproblem, and neither depends on harmonics nor on frequencies: balances
@@ -200,7 +202,8 @@ contains
          end do
          self%c_ii = damping
       end if
-      loads = reshape([model%load_static, model%load_cosine, model%load_sine], [model%n_dof, 3])
+      loads = model%load_columns()
+      self%waves = model%waves
       self%load_q = matmul(transpose(t_q), loads)
       self%load_i = matmul(transpose(t_i), loads)
       self%observe_q = product_of(model%observe_matrix, t_q)

@@ -100,14 +100,16 @@ contains
       complex(wp), intent(in) :: turn(:)
       integer, intent(in) :: n
       type(nodal_matrices), intent(inout) :: nodal
+      real(wp), allocatable :: loads(:, :)
       integer :: i
 
-      allocate (nodal%load(n, 3), nodal%observe(size(model%observe_matrix, 1), n), &
+      loads = model%load_columns()
+      nodal%waves = model%waves
+      allocate (nodal%load(n, size(loads, 2)), nodal%observe(size(model%observe_matrix, 1), n), &
                 source=(0.0_wp, 0.0_wp))
       do i = 1, model%n_dof
          associate (f => nodal%load(place(i), :), row => nodal%observe(:, place(i)))
-            f = f + conjg(turn(i))* &
-                [model%load_static(i), model%load_cosine(i), model%load_sine(i)]
+            f = f + conjg(turn(i))*loads(i, :)
             row = row + turn(i)*model%observe_matrix(:, i)
          end associate
       end do

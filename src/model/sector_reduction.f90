@@ -16,6 +16,7 @@ module fw_sector_reduction
    use fw_hermitian, only: solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_lapack, only: zpotrs
+   use fw_load_waves, only: load_waves
    use fw_sector_relative, only: sector_relative
    use fw_text, only: to_text
    implicit none (type, external)
@@ -36,8 +37,9 @@ module fw_sector_reduction
       real(wp), allocatable :: k_i(:), m_i(:), c_i(:)
       !> Internal damping, only where it is not diagonal (n_internal, n_internal).
       complex(wp), allocatable :: c_ii(:, :)
-      !> Static, cosine and sine loads in columns (n_coordinates, 3), (n_internal, 3).
+      !> Loads in columns (n_coordinates, n_columns), (n_internal, n_columns), and what these are.
       complex(wp), allocatable :: load_q(:, :), load_i(:, :)
+      type(load_waves) :: waves
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       complex(wp), allocatable :: observe_q(:, :), observe_i(:, :)
       !> Coordinates that this nodal diameter does not have (n_coordinates).
@@ -188,7 +190,7 @@ contains
       class(sector_reduction), intent(in) :: self
       type(nodal_matrices), intent(in) :: nodal
       real(wp), parameter :: round_off = 1.0e-9_wp
-      complex(wp) :: load(self%n_internal, 3)
+      complex(wp) :: load(self%n_internal, size(nodal%load, 2))
 
       load = matmul(conjg(transpose(self%t_i)), nodal%load)
       pushes = any(abs(self%k_i) <= 0.0_wp .and. abs(load(:, 1)) > 0.0_wp .and. &
@@ -220,6 +222,7 @@ contains
          if (self%padded(j)) self%blocks(j, j, 1) = cmplx(pad_stiffness(self, slot), kind=wp)
       end do
       call take_damping(self, nodal)
+      self%waves = nodal%waves
       self%load_q = matmul(conjg(transpose(self%t_q)), nodal%load)
       self%load_i = matmul(conjg(transpose(self%t_i)), nodal%load)
       self%observe_q = product_of(nodal%observe, self%t_q)

@@ -52,14 +52,14 @@ contains
       n = basis%n_internal
       call factor_internal(basis, point, internal, failed)
       call combine_rows(basis, point, 1, m, .false., matrix)
-      load = load_of(basis%load_q, point)
+      load = load_of(basis, basis%load_q, point)
       if (n == 0) return
       allocate (z_iq(n, m), z_qi(n, m), solved(n, m + 1))
       call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
       ! The transpose of Z_qi.
       call combine_rows(basis, point, m + 1, m + n, .true., z_qi)
       solved(:, :m) = z_iq
-      solved(:, m + 1) = load_of(basis%load_i, point)
+      solved(:, m + 1) = load_of(basis, basis%load_i, point)
       call solve_internal(internal, m + 1, solved)
       call zgemm('T', 'N', m, m, n, -one, z_qi, n, solved, n, one, matrix, m)
       load = load - matmul(transpose(z_qi), solved(:, m + 1))
@@ -83,6 +83,7 @@ contains
       allocate (block(m, m))
       call combine_rows(basis, slopes, 1, m, .false., block)
       derivative = matmul(block, q)
+      if (basis%waves%acts()) derivative = derivative - slope_of(basis, basis%load_q, point, slopes)
       if (n == 0) return
       call factor_internal(basis, point, internal, failed)
       allocate (x(n, 1))
@@ -93,6 +94,7 @@ contains
       derivative = derivative + matmul(x(:, 1), block)
       call combine_rows(basis, slopes, m + 1, m + n, .false., block)
       x(:, 1) = matmul(block, q) + internal_slope(basis, slopes, x(:, 1))
+      if (basis%waves%acts()) x(:, 1) = x(:, 1) - slope_of(basis, basis%load_i, point, slopes)
       call solve_internal(internal, 1, x)
       call combine_rows(basis, point, m + 1, m + n, .true., block)
       derivative = derivative - matmul(x(:, 1), block)
@@ -126,7 +128,7 @@ contains
       associate (m => basis%n_coordinates, n => basis%n_internal)
          allocate (z_iq(n, m), rhs(n, 1))
          call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
-         rhs(:, 1) = load_of(basis%load_i, point) - matmul(z_iq, q)
+         rhs(:, 1) = load_of(basis, basis%load_i, point) - matmul(z_iq, q)
          call solve_internal(internal, 1, rhs)
          x = rhs(:, 1)
       end associate
@@ -229,25 +231,57 @@ contains
    end function internal_slope
 
    !> Complex load of a harmonic: G_c - i G_s, of a conjugated basis from the conjugates of both.
-   pure function load_of(parts, point) result(load)
+   pure function load_of(basis, parts, point) result(load)
+      type(sector_reduction), intent(in) :: basis
+      !> Of the coordinates or of the internal modes.
       complex(wp), intent(in) :: parts(:, :)
       type(harmonic_point), intent(in) :: point
       complex(wp) :: load(size(parts, 1))
-      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+      integer :: w
 
       select case (point%harmonic)
       case (0)
          load = cmplx(real(parts(:, 1), wp), kind=wp)
       case (1)
-         if (point%conjugated) then
-            load = conjg(parts(:, 2)) - i*conjg(parts(:, 3))
-         else
-            load = parts(:, 2) - i*parts(:, 3)
-         end if
+         load = joined(parts(:, 2:3), point)
       case default
          load = (0.0_wp, 0.0_wp)
       end select
+      do w = 1, basis%waves%n_waves()
+         if (basis%waves%harmonic(w) /= point%harmonic) cycle
+         load = load + basis%waves%factor(w, point%harmonic, point%s)* &
+                joined(parts(:, 2*w + 2:2*w + 3), point)
+      end do
    end function load_of
+
+   !> dF/dp of loads that grow with their frequency.
+   pure function slope_of(basis, parts, point, slopes) result(slope)
+      type(sector_reduction), intent(in) :: basis
+      complex(wp), intent(in) :: parts(:, :)
+      type(harmonic_point), intent(in) :: point, slopes
+      complex(wp) :: slope(size(parts, 1))
+      integer :: w
+
+      slope = (0.0_wp, 0.0_wp)
+      do w = 1, basis%waves%n_waves()
+         slope = slope + basis%waves%slope(w, point%harmonic, point%s, slopes%s)* &
+                 joined(parts(:, 2*w + 2:2*w + 3), point)
+      end do
+   end function slope_of
+
+   !> Cosine and sine part of a wave as its complex amplitude.
+   pure function joined(parts, point) result(load)
+      complex(wp), intent(in) :: parts(:, :)
+      type(harmonic_point), intent(in) :: point
+      complex(wp) :: load(size(parts, 1))
+      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+
+      if (point%conjugated) then
+         load = conjg(parts(:, 1)) - i*conjg(parts(:, 2))
+      else
+         load = parts(:, 1) - i*parts(:, 2)
+      end if
+   end function joined
 
    !> A matrix of the basis as the harmonic takes it.
    pure function turned(matrix, point) result(as_taken)

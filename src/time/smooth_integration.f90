@@ -41,6 +41,7 @@ module fw_smooth_integration
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
+   use fw_load_waves, only: load_waves
    use fw_period_record, only: new_period_record
    use fw_period_record, only: period_record
    use fw_periodic_state, only: period_map
@@ -62,11 +63,13 @@ module fw_smooth_integration
    !> divided by the mass and omega**2, so that both halves of the state have one unit.
    type :: acceleration_type
       integer :: n = 0
-      !> Stiffness and damping (n, n), loads (n, 3) and rows of springs (n, n_springs).
+      !> Stiffness and damping (n, n), loads (n, n_columns) and rows of springs (n, n_springs).
       real(wp), allocatable :: stiffness(:, :), damping(:, :), load(:, :), springs(:, :)
       !> Springs as they are: rows of B (n, n_springs), coefficients and powers.
       real(wp), allocatable :: rows(:, :), coefficient(:)
       integer, allocatable :: power(:)
+      !> What the loads behind the third are; their frequency is in them.
+      type(load_waves) :: waves
    end type acceleration_type
 
    type, extends(period_map) :: smooth_integration
@@ -124,6 +127,7 @@ contains
       type(acceleration_type), intent(out) :: acceleration
       type(lu_type) :: mass
       logical :: singular
+      integer :: w
 
       acceleration%n = structure%n_dof
       call mass%reserve(structure%n_dof)
@@ -132,6 +136,12 @@ contains
       acceleration%stiffness = structure%stiffness
       acceleration%damping = structure%damping
       acceleration%load = structure%load
+      acceleration%waves = structure%waves
+      do w = 1, structure%waves%n_waves()
+         associate (f => acceleration%load(:, 2*w + 2:2*w + 3), n => structure%waves%harmonic(w))
+            f = structure%waves%factor(w, n, n*omega)*f
+         end associate
+      end do
       acceleration%rows = structure%rows
       acceleration%springs = structure%rows
       acceleration%coefficient = structure%coefficient
@@ -175,6 +185,10 @@ contains
       n = a%n
       slope(:n) = y(n + 1:2*n)
       slope(n + 1:2*n) = a%load(:, 1) + cos(t)*a%load(:, 2) + sin(t)*a%load(:, 3)
+      do i = 1, a%waves%n_waves()
+         slope(n + 1:2*n) = slope(n + 1:2*n) + cos(a%waves%harmonic(i)*t)*a%load(:, 2*i + 2) + &
+                            sin(a%waves%harmonic(i)*t)*a%load(:, 2*i + 3)
+      end do
       ! Column by column, as the matrices lie in memory.
       do i = 1, n
          slope(n + 1:2*n) = slope(n + 1:2*n) - y(i)*a%stiffness(:, i) - y(n + i)*a%damping(:, i)

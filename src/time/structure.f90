@@ -1,6 +1,6 @@
 !> A structure with contact pairs and springs, prepared for integration in time:
 !>
-!>   M u'' + C u' + K u + B^T lambda = f_0 + f_c cos(omega t) + f_s sin(omega t)
+!>   M u'' + C u' + K u + B^T lambda = f_0 + f_c cos(omega t) + f_s sin(omega t) + ..
 !>
 !> Rows of B are the relative displacements u(side_1) - u(side_2) of the components in use, pair by
 !> pair, then of the springs. The mass may be singular: its massless directions are separated by
@@ -15,6 +15,7 @@ module fw_time_structure
    use fw_lapack, only: dgemm
    use fw_lapack, only: dsyevd
    use fw_laws, only: new_law
+   use fw_load_waves, only: load_waves
    use fw_model, only: model_type
    use fw_pair_law, only: pair_law
    implicit none (type, external)
@@ -35,8 +36,9 @@ module fw_time_structure
       integer :: n_rows = 0
       !> Matrices (n_dof, n_dof); the stiffness is without springs and contact.
       real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :)
-      !> Static, cosine and sine loads in columns (n_dof, 3) [force].
+      !> Loads in columns (n_dof, n_columns) [force], and what these are.
       real(wp), allocatable :: load(:, :)
+      type(load_waves) :: waves
       !> B transposed (n_dof, n_rows), entries 0 and +-1.
       real(wp), allocatable :: rows(:, :)
       !> Row of each component of each pair, 0 where it is absent (3, n_pairs).
@@ -74,7 +76,8 @@ contains
       self%mass = model%mass
       self%damping = model%damping
       self%stiffness = model%stiffness
-      self%load = reshape([model%load_static, model%load_cosine, model%load_sine], [model%n_dof, 3])
+      self%load = model%load_columns()
+      self%waves = model%waves
       call take_pairs(contact, present, self)
       call take_springs(springs, self)
       call find_massless(self, error)

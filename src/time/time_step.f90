@@ -41,12 +41,19 @@ contains
       !> Force on the dofs (n_dof).
       real(wp), intent(out) :: load(:)
       real(wp) :: middle, share
+      integer :: n, w
 
       ! The mean of both ends of a wave is its middle times this.
       share = cos(0.5_wp*self%omega*duration)
       middle = 2.0_wp*pi*instant + 0.5_wp*self%omega*duration
       load = self%structure%load(:, 1) + share*cos(middle)*self%structure%load(:, 2) + &
              share*sin(middle)*self%structure%load(:, 3)
+      do w = 1, self%structure%waves%n_waves()
+         n = self%structure%waves%harmonic(w)
+         share = cos(0.5_wp*n*self%omega*duration)*self%structure%waves%factor(w, n, n*self%omega)
+         load = load + share*cos(n*middle)*self%structure%load(:, 2*w + 2) + &
+                share*sin(n*middle)*self%structure%load(:, 2*w + 3)
+      end do
    end subroutine mean_load
 
    !> B x of a vector of dofs.

@@ -113,6 +113,11 @@ class Annulus:
         whole["load"] = {"static": sum(t.T @ load["static"] for t in self.maps).tolist()}
         delayed = sum(t.T @ (force * np.exp(-1j * j * phase)) for j, t in enumerate(self.maps))
         whole["load"] |= {"cosine": delayed.real.tolist(), "sine": (-delayed.imag).tolist()}
+        if "waves" in case:
+            whole["waves"] = {
+                h: sum(t.T @ (np.asarray(f) * np.exp(-1j * h * j * phase))
+                       for j, t in enumerate(self.maps))
+                for h, f in case["waves"].items()}
         pairs = case["contact"]
         contact = {key: values * n for key, values in pairs.items()
                    if key not in ("side_1", "side_2", "sector_2")}

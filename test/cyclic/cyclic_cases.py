@@ -18,6 +18,16 @@ def read_reference(name):
     return json.loads(path.read_text())
 
 
+def term_keys(waves):
+    """Loads of any harmonic, complex amplitudes of the dofs by harmonic, as keys of &load."""
+    terms = [(dof + 1, n, force) for n, forces in waves.items()
+             for dof, force in enumerate(np.asarray(forces)) if force != 0.0]
+    return {"n_terms": len(terms), "term_dof": [t[0] for t in terms],
+            "term_harmonic": [t[1] for t in terms],
+            "term_amplitude": [float(abs(t[2])) for t in terms],
+            "term_phase": [float(np.degrees(np.angle(t[2]))) for t in terms]}
+
+
 def model_groups(case):
     """Groups of the structure, its contact, springs and loads, of a sector or not."""
     model, contact = case["model"], case.get("contact", {})
@@ -26,7 +36,7 @@ def model_groups(case):
         "model": {"n_dof": n, "mass": model["mass"], "stiffness": model["stiffness"],
                   "damping": model["damping"],
                   "modal_damping": model.get("modal_damping", 0.0)},
-        "load": case["load"]}
+        "load": case["load"] | (term_keys(case["waves"]) if "waves" in case else {})}
     if case.get("n_sectors"):
         groups["cyclic"] = {"n_sectors": case["n_sectors"], "engine_order": case["engine_order"]}
         if model.get("left"):

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from .._native import namelist_values
+from .._native import Session, namelist_values
 from ..errors import AbsentError, InputError
 from ..result import Result
 
@@ -46,6 +46,8 @@ class Structure:
         Initial gap [length].
     observe : (n_observed, n)
         Rows of the quantities that the result observes.
+    waves : tuple
+        Further loads: harmonic, power of its frequency, cosine and sine part (n,) of each.
     """
 
     mass: Floats
@@ -57,6 +59,7 @@ class Structure:
     contact: Floats
     gap: Floats
     observe: Floats
+    waves: tuple[tuple[int, int, Floats, Floats], ...] = ()
 
 
 def read_structure(result: Result) -> Structure:
@@ -80,7 +83,13 @@ def read_structure(result: Result) -> Structure:
         return Structure(
             mass, stiffness, damping, static, session.part("load/cosine"),
             session.part("load/sine"), first - second, session.part("contact/gap"),
-            session.part("observe/matrix").reshape(-1, n))
+            session.part("observe/matrix").reshape(-1, n), _waves(session, n))
+
+
+def _waves(session: Session, n: int) -> tuple[tuple[int, int, Floats, Floats], ...]:
+    parts = session.part("load/wave").reshape(-1, 2, n)
+    return tuple((int(harmonic), int(power), cosine, sine) for harmonic, power, (cosine, sine)
+                 in zip(session.part("load/wave_harmonic"), session.part("load/wave_power"), parts))
 
 
 def recover_displacement(result: Result, structure: Structure | None = None,
@@ -112,6 +121,10 @@ def recover_displacement(result: Result, structure: Structure | None = None,
     load[0] = s.static
     load[1], load[2] = s.cosine, s.sine
     right = np.broadcast_to(load, (result.n_points, n_coefficients, n)).copy()
+    for harmonic, power, cosine, sine in s.waves:
+        grows = ((harmonic * result.omega) ** power)[:, None]
+        right[:, 2 * harmonic - 1] += grows * cosine
+        right[:, 2 * harmonic] += grows * sine
     if len(s.contact):
         if "contact/force" not in result:
             raise AbsentError(f"{result.name}: holds no contact forces; run with output%contact = "

@@ -1,0 +1,174 @@
+!> Loads on single dofs in harmonics of the response, as the keys term_... of group &load give them:
+!>
+!>   amplitude (n omega)**power cos(n omega t + phase)   on a dof,
+!>
+!> n being the harmonic, or an engine order over the greatest common divisor of all orders: omega is
+!> that divisor times the speed then.
+module fw_load_terms
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: dof_numbers
+   use fw_key_range, only: from_to
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   use fw_load_waves, only: load_waves
+   implicit none (type, external)
+   private
+
+   public :: load_terms, add_wave
+
+   !> More terms, a higher harmonic or a higher power are taken for a mistake.
+   integer, parameter :: most_terms = 1000000, most_harmonic = 100000, most_power = 9
+
+   type :: load_terms
+      integer :: n_terms = 0
+      !> Signed dofs; harmonics or orders, and powers of the frequency (n_terms).
+      integer, allocatable :: dof(:), harmonic(:), order(:), power(:)
+      !> Amplitudes [force s**power] and phases [degrees] (n_terms).
+      real(wp), allocatable :: amplitude(:), phase(:)
+      !> Greatest common divisor of the orders; 0 where there are none.
+      integer :: fundamental = 0
+   contains
+      procedure :: bind_keys
+      procedure :: take_orders
+      procedure :: add_to
+   end type load_terms
+
+contains
+
+   !> Within group &load. The order of a term takes the place of its harmonic.
+   subroutine bind_keys(self, keys, by_order)
+      class(load_terms), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+      !> Whether orders are given.
+      logical, intent(in) :: by_order
+      logical :: needed
+
+      call keys%bind(key('n_terms', 'loads on single dofs in any harmonic, added to the others', &
+                         from_to(0, most_terms)), self%n_terms)
+      call keys%set_size('n_terms', self%n_terms)
+      needed = self%n_terms > 0
+      call keys%bind(key('term_dof', 'dof; negative: with its sign turned', dof_numbers(), &
+                         shape='n_terms', absent='required with n_terms'), self%dof, needed)
+      call keys%bind(key('term_harmonic', 'harmonic, 0 to n_harmonics', &
+                         from_to(0, most_harmonic), shape='n_terms', &
+                         absent='1, or by term_order'), self%harmonic)
+      call keys%bind(key('term_order', 'engine orders in place of harmonics: the frequency of '// &
+                         'the sweep is their greatest common divisor times the speed', &
+                         from_to(1, most_harmonic), shape='n_terms', absent='term_harmonic'), &
+                     self%order, needed .and. by_order)
+      call keys%bind(key('term_amplitude', 'amplitude, over the frequency to term_power', &
+                         unit='F', shape='n_terms', absent='required with n_terms'), &
+                     self%amplitude, needed)
+      call keys%bind(key('term_phase', 'of cos(n omega t + phase)', unit='degrees', &
+                         shape='n_terms'), self%phase, default=0.0_wp)
+      call keys%bind(key('term_power', 'times the frequency of the term [rad/s] to this power; '// &
+                         '2: an unbalance', from_to(0, most_power), shape='n_terms'), &
+                     self%power, default=0)
+   end subroutine bind_keys
+
+   !> Harmonics from orders, or 1 where neither is given.
+   pure subroutine take_orders(self)
+      class(load_terms), intent(inout) :: self
+      integer :: i
+
+      self%fundamental = 0
+      if (allocated(self%order)) then
+         do i = 1, size(self%order)
+            self%fundamental = common_divisor(self%fundamental, self%order(i))
+         end do
+         self%harmonic = self%order/max(self%fundamental, 1)
+      else if (.not. allocated(self%harmonic)) then
+         allocate (self%harmonic(self%n_terms), source=1)
+      end if
+   end subroutine take_orders
+
+   pure integer function common_divisor(a, b) result(divisor)
+      integer, intent(in) :: a, b
+      integer :: other, rest
+
+      divisor = a
+      other = b
+      do while (other > 0)
+         rest = modulo(divisor, other)
+         divisor = other
+         other = rest
+      end do
+   end function common_divisor
+
+   !> Add the terms to the static load and to the waves.
+   pure subroutine add_to(self, static, waves, columns)
+      class(load_terms), intent(in) :: self
+      !> (n_dof).
+      real(wp), intent(inout) :: static(:)
+      type(load_waves), intent(inout) :: waves
+      !> Cosine and sine parts of the waves (n_dof, 2 n_waves).
+      real(wp), allocatable, intent(inout) :: columns(:, :)
+      real(wp) :: part(2)
+      integer :: i, w
+
+      do i = 1, self%n_terms
+         associate (j => abs(self%dof(i)))
+            part = sign(1, self%dof(i))*self%amplitude(i)*turned(self%phase(i))
+            if (self%harmonic(i) == 0) then
+               static(j) = static(j) + part(1)
+               cycle
+            end if
+            w = waves%place(self%harmonic(i), self%power(i))
+            if (w == 0) then
+               call add_wave(self%harmonic(i), self%power(i), size(static), waves, columns)
+               w = waves%n_waves()
+            end if
+            columns(j, 2*w - 1:2*w) = columns(j, 2*w - 1:2*w) + part
+         end associate
+      end do
+   end subroutine add_to
+
+   !> One wave more, without load.
+   pure subroutine add_wave(harmonic, power, n_dof, waves, columns)
+      integer, intent(in) :: harmonic, power, n_dof
+      type(load_waves), intent(inout) :: waves
+      real(wp), allocatable, intent(inout) :: columns(:, :)
+      real(wp), allocatable :: wider(:, :)
+      integer :: n
+
+      n = waves%n_waves()
+      if (n == 0) then
+         waves%harmonic = [harmonic]
+         waves%power = [power]
+         if (allocated(columns)) deallocate (columns)
+         allocate (columns(n_dof, 2), source=0.0_wp)
+         return
+      end if
+      waves%harmonic = [waves%harmonic, harmonic]
+      waves%power = [waves%power, power]
+      allocate (wider(n_dof, 2*n + 2), source=0.0_wp)
+      wider(:, :2*n) = columns
+      call move_alloc(wider, columns)
+   end subroutine add_wave
+
+   !> Cosine and sine part of cos(tau + phase), exact at right angles.
+   pure function turned(phase) result(part)
+      !> [degrees]
+      real(wp), intent(in) :: phase
+      real(wp) :: part(2)
+      real(wp) :: angle
+
+      angle = modulo(phase, 360.0_wp)
+      if (abs(modulo(angle, 90.0_wp)) <= 0.0_wp) then
+         select case (nint(angle/90.0_wp))
+         case (1)
+            part = [0.0_wp, -1.0_wp]
+         case (2)
+            part = [-1.0_wp, 0.0_wp]
+         case (3)
+            part = [0.0_wp, 1.0_wp]
+         case default ! a whole turn
+            part = [1.0_wp, 0.0_wp]
+         end select
+         return
+      end if
+      part = [cos(angle*pi/180.0_wp), -sin(angle*pi/180.0_wp)]
+   end function turned
+
+end module fw_load_terms
