@@ -10,7 +10,7 @@ SHELL := /bin/bash
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare paper
-.PHONY: stress long faults peaks bifurcations rest scars slow verify
+.PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
 BUILD := build/release
 RUN := build/run
@@ -155,6 +155,12 @@ peaks: build ## reported peaks of random sweeps, also of a program BEFORE, writt
 
 bifurcations: build ## bifurcations of 200 random branches against shooting, in docs/robustness.md
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/bifurcations/bifurcations.py -o
+
+# Goes on where it was stopped; a changed program starts anew.
+sectors: build ## 300 random sectors against whole annuli, written to docs/robustness.md
+	@if [ $(BUILD)/fw_run -nt build/sectors.jsonl ]; then rm -f build/sectors.jsonl; fi
+	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/cyclic/family.py --count 300 \
+	   --state build/sectors.jsonl -o docs/robustness.md
 
 faults: build ## kills, signals, full disks, two runs at a time, written to docs/robustness.md
 	$(OVERVIEW) PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \

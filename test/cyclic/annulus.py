@@ -55,7 +55,10 @@ def random_case(rng, *, law="penalty", planar=False, engine_order=None, n_sector
         contact["gap"].append(float(-rng.uniform(0.03, 0.1)))
     if law == "penalty":
         contact["tangential_stiffness"] = rng.uniform(1.0, 4.0, n_pairs).tolist()
+    if law in ("penalty", "regularised"):
         contact["normal_stiffness"] = rng.uniform(2.0, 6.0, n_pairs).tolist()
+    if law == "regularised":
+        contact["slip_speed"] = rng.uniform(0.1, 0.3, n_pairs).tolist()
     load = {key: np.zeros(n) for key in ("static", "cosine", "sine")}
     load["static"][first - 1] = 0.03
     for key in ("cosine", "sine"):

@@ -8,8 +8,11 @@ from cases import run
 from cyclic_cases import TIGHT, difference, read, read_reference, run_at
 from nodal_file import tied, write_nodal_file
 
-#: Solutions of the same equations, to residuals of 1e-12.
-SAME = 1e-10
+#: Solutions of the same equations, which are formed in another order: round-off of 1e-16 times the
+#: condition of these sectors, below 1e3 (measured 5e-15 at most with three kernels of OpenBLAS).
+SAME = 1e-12
+#: Work of the load against what is dissipated: residuals of 1e-12 times quotients of both.
+BALANCE = 1e-10
 OMEGAS = [0.8, 1.7]
 
 
@@ -29,16 +32,21 @@ def assert_same(a, b):
     assert difference(a["contact/force"], b["contact/force"]) < SAME
 
 
+def assert_bit_for_bit(a, b):
+    for name in ("coefficients", "contact/force", "contact/fraction", "contact/dissipation"):
+        assert np.array_equal(a[name], b[name]), name
+
+
 @pytest.mark.parametrize("shift", [1, -3])
 def test_engine_orders_that_differ_by_the_sectors(tmp_path, shift):
     case = some_case(1, n_sectors=7, engine_order=2)
     other = {**case, "engine_order": 2 + 7 * shift}
-    assert_same(*run_both(tmp_path, case, other))
+    assert_bit_for_bit(*run_both(tmp_path, case, other))
 
 
 def test_fewer_sectors_with_the_same_wave(tmp_path):
     case = some_case(2, n_sectors=12, engine_order=-9, n_pairs=1)
-    assert_same(*run_both(tmp_path, case, {**case, "n_sectors": 4, "engine_order": -3}))
+    assert_bit_for_bit(*run_both(tmp_path, case, {**case, "n_sectors": 4, "engine_order": -3}))
 
 
 @pytest.mark.parametrize("law", ["penalty", "dlft"])
@@ -51,7 +59,7 @@ def test_a_pair_from_its_other_sector(tmp_path, law):
     contact["sector_2"] = [-s for s in contact["sector_2"]]
     a, b = run_both(tmp_path, case, other)
     assert difference(a["coefficients"], b["coefficients"]) < SAME
-    assert np.allclose(a["contact/dissipation"], b["contact/dissipation"], rtol=1e-8)
+    assert np.allclose(a["contact/dissipation"], b["contact/dissipation"], rtol=SAME)
 
 
 def test_sectors_numbered_backwards(tmp_path):
@@ -107,12 +115,7 @@ def test_reference_of_reduced_nodal_diameters(tmp_path):
     case = read_reference("v6")
     model, contact = case["model"], case["contact"]
     n = model["n_physical"]
-    diameters = {
-        parts["nodal_diameter"]: {
-            key: np.array(parts[key]["real"]) + 1j * np.array(parts[key]["imag"])
-            for key in ("mass", "stiffness", "damping")}
-        for parts in model["nodal_diameters"]}
-    write_nodal_file(tmp_path / "model.h5", case["n_sectors"], n, diameters,
+    write_nodal_file(tmp_path / "model.h5", case["n_sectors"], n, v6_diameters(case),
                      load={key: values[:n] for key, values in case["load"].items()},
                      contact={key: contact[key] for key in ("side_1", "side_2", "sector_2", "mu",
                                                             "gap")})
@@ -132,6 +135,32 @@ def test_reference_of_reduced_nodal_diameters(tmp_path):
             expected = np.array(point[sampling]["u"])
             assert difference(found["coefficients"][i], expected[:, :n]) < 1e-8
             assert difference(found["contact/force"][i], point[sampling]["force"]) < 1e-8
+
+
+def v6_diameters(case):
+    """Complex matrices of every nodal diameter of the reference."""
+    return {parts["nodal_diameter"]: {
+        key: np.array(parts[key]["real"]) + 1j * np.array(parts[key]["imag"])
+        for key in ("mass", "stiffness", "damping")}
+        for parts in case["model"]["nodal_diameters"]}
+
+
+def test_frequencies_of_reduced_nodal_diameters(tmp_path):
+    case = read_reference("v6")
+    write_nodal_file(tmp_path / "model.h5", case["n_sectors"], case["model"]["n_physical"],
+                     v6_diameters(case), contact={key: case["contact"][key] for key in (
+                         "side_1", "side_2", "sector_2", "mu", "gap")})
+    run(tmp_path, {
+        "case": {"analysis": "modes"}, "model": {"source": "hdf5", "file": "model.h5"},
+        "cyclic": {"n_modes": 20}, "contact": {"law": "penalty", **{
+            key: case["contact"][key] for key in ("tangential_stiffness", "normal_stiffness")}}})
+    found = read(tmp_path / "case.h5")
+    for k, linear in enumerate(case["linear"]):
+        assert found["modes/nodal_diameter"][k] == linear["nodal_diameter"]
+        for state in ("open", "closed"):
+            frequencies = found[f"modes/{state}"][k]
+            assert np.allclose(frequencies[np.isfinite(frequencies)], linear[state], rtol=1e-9,
+                               atol=0.0), (k, state)
 
 
 def test_the_way_of_the_wave_matters(tmp_path):
@@ -157,7 +186,7 @@ def test_work_of_the_load_is_dissipated_in_one_sector(tmp_path, law):
         viscous = np.pi * omega * np.sum(n**2 * np.array(
             [u @ damping @ u + v @ damping @ v for u, v in zip(c, s)]))
         friction = found["contact/dissipation"][i].sum()
-        assert abs(work - viscous - friction) < 1e-9 * abs(work)
+        assert abs(work - viscous - friction) < BALANCE * abs(work)
 
 
 @pytest.mark.parametrize("law", ["penalty", "dlft", "dlft_velocity", "rigid"])
@@ -174,7 +203,7 @@ def test_linear_solvers_threads_and_derivatives(tmp_path, law):
                               solver={"linear": "lu", "tolerance": 1e-11})
     assert np.array_equal(found["threads"]["coefficients"], found["lu"]["coefficients"])
     for name in ("krylov", "difference"):
-        assert difference(found[name]["coefficients"], found["lu"]["coefficients"]) < 1e-8
+        assert difference(found[name]["coefficients"], found["lu"]["coefficients"]) < 1e-10
     # Newton's method on the exact derivative is as fast as on differences.
     assert np.all(found["lu"]["iterations"] <= found["difference"]["iterations"] + 2)
 
