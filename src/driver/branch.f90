@@ -6,6 +6,8 @@ module fw_branch
    use fw_bifurcation, only: bifurcation_list
    use fw_bifurcation, only: bifurcation_type
    use fw_bifurcation, only: kind_fold
+   use fw_bifurcation, only: kind_undecided
+   use fw_bifurcation, only: way_bracket
    use fw_bifurcation, only: way_turn
    use fw_branch_peaks, only: branch_peaks
    use fw_branch_peaks, only: branch_segment
@@ -43,6 +45,7 @@ module fw_branch
    use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: new_request
    use fw_strategy, only: note_time_limit
+   use fw_remarks, only: is_undamped
    use fw_response_view, only: response_view
    use fw_sweep, only: point_source
    implicit none (type, external)
@@ -78,6 +81,8 @@ module fw_branch
       !> Where it turns and where its stability changes, and the solutions made to find out.
       type(bifurcation_list) :: bifurcations
       integer :: n_solved = 0, iterations = 0
+      !> The whole structure was small enough, and had no solution where the branch begins.
+      logical :: is_condensed = .false.
       type(multiplier_track), private :: track
       !> The last point with multipliers, and whether a fold lies behind it.
       type(branch_point), private :: last
@@ -191,7 +196,7 @@ contains
       if (.not. self%has_begun .or. self%has_no_start) return
       call self%level%solver%method%newton%linear%add_work(self%branch%curve%corrector%linear)
       call self%branch%bifurcations%doubt(self%branch%track)
-      call self%branch%closing_words(case, words)
+      call self%branch%closing_words(case, observer%run_out, words)
       call observer%on_message(words)
    end subroutine finish
 
@@ -266,10 +271,12 @@ contains
       call self%curve%corrector%linear%add_work(newton%linear)
       if (report%interrupted) call stop_run(system%interrupt, error)
       if (allocated(error)) return
+      self%is_condensed = .not. report%converged
       if (report%converged) then
          self%system => self%whole
       else
          whole_x = x
+         deallocate (self%whole, self%whole_problem)
       end if
    end subroutine build_whole
 
@@ -325,7 +332,7 @@ contains
       if (point%fold) then
          ! One just beyond a bound belongs to no point of the sweep.
          if ((point%omega - case%sweep%start)*(point%omega - case%sweep%end) <= 0.0_wp) then
-            call add_fold(self, point)
+            call add_fold(self, found, point)
          end if
          self%has_fold = .true.
          return
@@ -376,13 +383,20 @@ contains
       self%iterations = self%iterations + point%iterations
    end subroutine solve_peak
 
-   subroutine add_fold(self, point)
+   !> A place that would not settle may be one of round-off: it is left open.
+   subroutine add_fold(self, found, point)
       type(branch_type), intent(inout) :: self
+      type(branch_point), intent(in) :: found
       type(point_type), intent(in) :: point
       type(bifurcation_type) :: fold
 
       fold%kind = kind_fold
       fold%found_by = way_turn
+      if (found%unsettled > 0.0_wp) then
+         fold%kind = kind_undecided
+         fold%found_by = way_bracket
+         fold%error = found%unsettled
+      end if
       fold%omega = point%omega
       fold%amplitude = point%amplitude
       fold%coefficients = point%coefficients
@@ -447,13 +461,16 @@ contains
    end subroutine solve_between
 
    !> Why the branch ended, once it has.
-   subroutine closing_words(self, case, words)
+   subroutine closing_words(self, case, out_of_time, words)
       class(branch_type), intent(in) :: self
       type(case_type), intent(in) :: case
+      !> Whether a limit of time stopped it.
+      logical, intent(in) :: out_of_time
       character(:), allocatable, intent(out) :: words
 
       if (.not. self%curve%ended) then
          words = 'branch: stopped by the user'
+         if (out_of_time) words = 'branch: not at its end when the time of the run was over'
          return
       end if
       words = 'branch: '//self%curve%ending
@@ -461,6 +478,9 @@ contains
          words = words//': from this frequency on the contact no longer holds the structure '// &
                  'in place: all of it slips, and no periodic response exists without a support '// &
                  'in that direction'
+      else if (self%curve%runs_away .and. is_undamped(case)) then
+         words = words//': nothing damps the structure, and a resonance without damping has no '// &
+                 'height; set model%damping or model%modal_damping'
       end if
    end subroutine closing_words
 

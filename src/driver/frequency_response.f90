@@ -15,6 +15,9 @@ module fw_frequency_response
    use fw_one_level, only: one_level
    use fw_peak, only: peak_type
    use fw_peak_finder, only: peak_finder
+   use fw_remarks, only: is_shaken
+   use fw_remarks, only: is_undamped
+   use fw_remarks, only: remark_condensed
    use fw_remarks, only: remark_peaks
    use fw_remarks, only: remark_range
    use fw_remarks, only: remark_stability
@@ -88,6 +91,10 @@ contains
       ! Points in their order; searches between them come after the last.
       call run_sweep(case, source, sinks, observer, state, error)
       call observer%on_end()
+      select type (source)
+      type is (branch_source)
+         if (source%branch%is_condensed) call remark_condensed(summary%remarks)
+      end select
       call remark_stability(summary%verdicts(verdict_undecided), sum(summary%verdicts), &
                             summary%remarks)
       ! Rows that are still to come count with the others.
@@ -204,7 +211,7 @@ contains
          call finder%peaks(peaks)
          call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
       end select
-      call remark_peaks(peaks, case%model%observe_name, summary%remarks)
+      call remark_peaks(peaks, case%model%observe_name, is_undamped(case), summary%remarks)
       call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, error)
    end subroutine find_peaks
 
@@ -238,9 +245,11 @@ contains
       along_branch = .false.
       select type (strategy)
       type is (one_level)
-         ! A linear structure leaves no unknowns, and no branch that could turn back.
+         ! A linear structure leaves no unknowns, and no branch that could turn back; nor does a
+         ! structure at rest.
          along_branch = case%analysis == analysis_frf .and. strategy%level%system%n > 0 .and. &
                         case%sweep%continuation == continuation_arclength
+         if (along_branch) along_branch = is_shaken(case)
          if (along_branch) then
             allocate (branch)
             branch%level => strategy%level

@@ -9,6 +9,7 @@ module fw_one_level
    use fw_level, only: level_type
    use fw_other_starts, only: start_elsewhere
    use fw_point, only: point_type
+   use fw_remarks, only: is_undamped
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
@@ -111,6 +112,8 @@ contains
          if (case%model%cyclic%is_cyclic .and. case%solver%fallback) call summary%leave_fallback()
          ! What cannot help in this case is left out.
          message = 'try a finer sweep, the other direction'
+         if (is_undamped(case)) message = 'nothing but contact damps the structure: an undamped '// &
+            'resonance needs damping (model%damping, model%modal_damping); else '//message
          if (takes_scale(system)) message = message//', another penalty_scale (0.3 or 3)'
          message = message//' or '//trim(finer(system))//' for the points above'
          ! Costs solutions of its own: worth it only where the run gave nothing at all.

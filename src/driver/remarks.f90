@@ -22,6 +22,7 @@ module fw_remarks
    private
 
    public :: remark_list, remark_input, remark_range, remark_peaks, remark_stability
+   public :: remark_condensed, is_shaken, is_undamped
 
    !> Friction coefficients above it are no dry friction of metals.
    real(wp), parameter :: highest_friction = 2.0_wp
@@ -62,7 +63,6 @@ contains
       type(remark_list), intent(inout) :: remarks
       character(24) :: name
       real(wp), allocatable :: stiffness(:, :)
-      logical :: acts
 
       ! A part that its contact holds may well be softened by rotation.
       call held_stiffness(case, state_sliding, stiffness)
@@ -81,16 +81,32 @@ contains
             "the model gives contact%"//trim(name)//", which contact%law = '"// &
             trim(law_words(case%contact%law))//"' does not take")
       end if
-      acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
-             any(abs(case%model%load_sine) > 0.0_wp)
-      if (allocated(case%model%load_wave)) then
-         acts = acts .or. any(abs(case%model%load_wave) > 0.0_wp)
-      end if
-      if (.not. acts) call remarks%add('no load', 'no vibratory load acts: the response is '// &
+      if (.not. is_shaken(case)) call remarks%add('no load', 'no vibratory load acts: the response is '// &
          'that at rest; set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       call remark_harmonics(case, remarks)
       call remark_tail(case, remarks)
    end subroutine remark_input
+
+   !> Whether a vibratory load acts.
+   pure logical function is_shaken(case)
+      type(case_type), intent(in) :: case
+
+      is_shaken = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
+                  any(abs(case%model%load_sine) > 0.0_wp)
+      if (allocated(case%model%load_wave)) then
+         is_shaken = is_shaken .or. any(abs(case%model%load_wave) > 0.0_wp)
+      end if
+   end function is_shaken
+
+   !> Whether nothing but its contact could damp the structure.
+   pure logical function is_undamped(case)
+      type(case_type), intent(in) :: case
+
+      is_undamped = .not. case%model%cyclic%is_cyclic
+      if (is_undamped .and. allocated(case%model%damping)) then
+         is_undamped = .not. any(abs(case%model%damping) > 0.0_wp)
+      end if
+   end function is_undamped
 
    !> Where a law that follows the motion above the harmonics cannot.
    subroutine remark_tail(case, remarks)
@@ -165,13 +181,15 @@ contains
    end subroutine remark_range
 
    !> Of what was found.
-   subroutine remark_peaks(peaks, names, remarks)
+   subroutine remark_peaks(peaks, names, undamped, remarks)
       type(peak_type), intent(in) :: peaks(:)
       !> Observed quantities.
       type(string_type), intent(in) :: names(:)
+      !> Whether the structure has no damping of its own.
+      logical, intent(in) :: undamped
       type(remark_list), intent(inout) :: remarks
       integer :: i, k, best, n_bound, n_open
-      character(:), allocatable :: first
+      character(:), allocatable :: first, remedy
 
       n_bound = 0
       do i = 1, size(names)
@@ -190,10 +208,22 @@ contains
       if (n_bound > 0) call remarks%add('peak at the end', 'the largest amplitude of '//first// &
          trim(others(n_bound - 1))//' is at an end of the sweep: it may rise further outside')
       n_open = count(peaks%found_by == found_unresolved)
+      remedy = 'take more points around them (/peak/omega), or continuation = ''arclength'''
+      if (undamped) remedy = 'nothing but contact damps the structure, and a resonance without '// &
+                             'damping has no height: set model%damping or model%modal_damping'
       if (n_open > 0) call remarks%add('peak not resolved', to_text(n_open)// &
-         ' of '//to_text(size(peaks))//' maxima are not resolved: take more points around them '// &
-         '(/peak/omega), or continuation = ''arclength''')
+         ' of '//to_text(size(peaks))//' maxima are not resolved: '//remedy)
    end subroutine remark_peaks
+
+   !> Of a branch of a small structure that could not be taken whole.
+   subroutine remark_condensed(remarks)
+      type(remark_list), intent(inout) :: remarks
+
+      call remarks%add('branch condensed', 'the structure without condensation did not converge '// &
+         'where the branch begins: it was followed by the unknowns of its joint, and a '// &
+         'resonance that these do not show may be stepped over; loosen solver%tolerance, or '// &
+         'compare with a natural sweep')
+   end subroutine remark_condensed
 
    !> Of verdicts on stability that nothing stands behind.
    subroutine remark_stability(n_undecided, n_points, remarks)

@@ -15,7 +15,7 @@ module fw_branch_mark
    implicit none (type, external)
    private
 
-   public :: find_fold, land
+   public :: find_fold, land, share_at
 
    !> A fold is located when p changes by less than this part of itself.
    real(wp), parameter :: fold_tolerance = 1.0e-10_wp
@@ -31,7 +31,7 @@ contains
       type(corrector_type), intent(inout) :: corrector
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(in) :: here, next
-      !> `fold` is false where it is not found.
+      !> `fold` is false where it is not found; `unsettled` is not 0 where p did not come to rest.
       type(branch_point), intent(out) :: fold
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: low, high, at_low, at_high, share, p_before, ds
@@ -50,7 +50,8 @@ contains
          if (allocated(error)) return
          if (.not. fold%report%converged) return
          ! p is stationary at the fold: it settles with the square of the error along the branch.
-         if (abs(fold%p - p_before) <= fold_tolerance*abs(fold%p)) exit
+         fold%unsettled = abs(fold%p - p_before)
+         if (fold%unsettled <= fold_tolerance*abs(fold%p)) exit
          p_before = fold%p
          if (fold%t_p*at_low > 0.0_wp) then
             low = share
@@ -63,6 +64,7 @@ contains
          end if
       end do
       fold%fold = .true.
+      if (fold%unsettled <= fold_tolerance*abs(fold%p)) fold%unsettled = 0.0_wp
    end subroutine find_fold
 
    !> The branch leaves the interval between two points: its last point lies exactly on the bound.
@@ -128,7 +130,7 @@ contains
    end subroutine land
 
    !> The share of the way at which the cubic between two points has a value of p, by bisection.
-   !> Where the cubic takes the value several times, one of them: `next` lies beyond the bound, so
+   !> Where the cubic takes the value several times, one of them: `next` lies beyond the value, so
    !> that there is one.
    pure real(wp) function share_at(corrector, here, next, p)
       type(corrector_type), intent(in) :: corrector

@@ -23,6 +23,8 @@ module fw_branch_point
       logical :: fold = .false.
       !> Sign of det(dR/dx) dp/ds; 0 where it is not known.
       integer :: orientation = 0
+      !> Interval of p that such a turn was brought down to, where it did not settle; else 0.
+      real(wp) :: unsettled = 0.0_wp
    end type branch_point
 
    !> Lengths: y over the size it has about here and p over the length of its interval, so that a

@@ -18,13 +18,14 @@ module fw_branch_turn
    implicit none (type, external)
    private
 
-   public :: leap, turn_at_corner, all_around, far_ahead
+   public :: leap, turn_at_corner, all_around, far_ahead, only_ahead
 
    !> A step in p alone: from the longest, a part of the interval, divided by two to this power.
    real(wp), parameter :: longest_leap = 0.02_wp
    integer, parameter :: max_halvings = 7
-   !> Leaps of all lengths on either side, or of the longest ahead.
-   integer, parameter :: all_around = 1, far_ahead = 2
+   !> Leaps of all lengths on either side, or of the longest ahead; or of all lengths ahead,
+   !> whatever the orientation there.
+   integer, parameter :: all_around = 1, far_ahead = 2, only_ahead = 3
    !> How far it may take y, over the size of y.
    real(wp), parameter :: furthest = 0.3_wp
 
@@ -75,29 +76,37 @@ contains
       type(corrector_type), intent(inout) :: corrector
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(inout) :: here
-      !> all_around or far_ahead.
+      !> all_around, far_ahead or only_ahead.
       integer, intent(in) :: reach
       type(branch_point), intent(inout) :: next
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: dp
       integer :: k, side, first
 
-      first = merge(-max_halvings, -2, reach == all_around)
+      first = merge(-2, -max_halvings, reach == far_ahead)
       do side = 1, merge(-1, 1, corrector%oriented .and. reach == all_around), -2
          do k = first, 0
             dp = side*sign(2.0_wp**k*longest_leap*corrector%metric%p_scale, here%t_p)
-            call leap_to(corrector, system, here, dp, next, error)
+            call leap_to(corrector, system, here, dp, reach /= only_ahead, 0.0_wp, next, error)
+            if (allocated(error) .or. next%report%converged) return
+            if (reach /= only_ahead .or. corrector%stands(here)) cycle
+            ! From where the piece behind leads to.
+            call leap_to(corrector, system, here, dp, .false., dp/here%t_p, next, error)
             if (allocated(error) .or. next%report%converged) return
          end do
       end do
    end subroutine leap
 
    !> The point at p + dp, if the branch goes on there in the direction of dp.
-   subroutine leap_to(corrector, system, here, dp, next, error)
+   subroutine leap_to(corrector, system, here, dp, keeps_side, along, next, error)
       type(corrector_type), intent(inout) :: corrector
       class(parameter_system), intent(inout) :: system
       type(branch_point), intent(inout) :: here
       real(wp), intent(in) :: dp
+      !> Whether the orientation has to stay.
+      logical, intent(in) :: keeps_side
+      !> How far along the tangent it starts.
+      real(wp), intent(in) :: along
       type(branch_point), intent(inout) :: next
       type(error_type), allocatable, intent(out) :: error
       type(newton_solver) :: newton
@@ -105,6 +114,7 @@ contains
 
       newton%options = corrector%options
       next = here
+      next%x = here%x + along*here%t
       next%p = here%p + dp
       call system%set_parameter(next%p, error)
       if (allocated(error)) return
@@ -118,6 +128,7 @@ contains
       if (.not. next%report%converged) return
       ! Beyond a sharp turn the angle with the last tangent says nothing.
       if (next%t_p*dp < 0.0_wp) call reverse(next)
+      if (.not. keeps_side) return
       call corrector%find_orientation(system, here, error)
       if (allocated(error)) return
       call corrector%find_orientation(system, next, error)

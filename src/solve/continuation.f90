@@ -12,6 +12,7 @@ module fw_continuation
    use fw_branch_mark, only: land
    use fw_branch_point, only: branch_point
    use fw_branch_point, only: reverse
+   use fw_branch_retrace, only: branch_trail
    use fw_branch_step, only: allowed_error
    use fw_branch_step, only: extrapolate
    use fw_branch_step, only: interpolate
@@ -22,6 +23,7 @@ module fw_continuation
    use fw_branch_turn, only: all_around
    use fw_branch_turn, only: far_ahead
    use fw_branch_turn, only: leap
+   use fw_branch_turn, only: only_ahead
    use fw_branch_turn, only: turn_at_corner
    use fw_corrector, only: corrector_type
    use fw_corrector, only: differ
@@ -66,6 +68,9 @@ module fw_continuation
       logical :: waits = .false., knows_ahead = .false.
       real(wp) :: ds = 0.0_wp
       integer :: n_points = 0, n_constant = 0, n_failed = 0
+      ! The last points, and how far p has been.
+      type(branch_trail) :: trail
+      real(wp) :: furthest = 0.0_wp
    contains
       procedure :: begin
       procedure :: next
@@ -135,6 +140,7 @@ contains
       self%x_scale = max(self%x_scale, tiny(1.0_wp))
       self%corrector%least_x = self%x_scale
       self%n_points = 1
+      self%furthest = self%start
       self%n_constant = 0
       self%ended = .false.
       self%waits = .false.
@@ -187,6 +193,8 @@ contains
       if (.not. more) return
       call advance(self, system, ahead, done, error)
       if (allocated(error)) return
+      if (done) call leave_own_way(self, system, ahead, done, error)
+      if (allocated(error)) return
       if (.not. done) then
          call end_branch(self, 'no continuation was found at '//to_text(self%here%p))
          more = .false.
@@ -194,6 +202,62 @@ contains
       end if
       call settle(self, system, ahead, point, error)
    end subroutine next
+
+   !> Where a corner leads back along the branch itself, a step in p alone goes on, if there is one.
+   subroutine leave_own_way(self, system, ahead, done, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(inout) :: ahead
+      !> Whether `ahead` is a new point.
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: r(system%n)
+      logical :: retraced
+
+      done = .true.
+      call self%trail%keep(self%corrector%metric, self%here)
+      if (self%here%t_p*ahead%t_p >= 0.0_wp .and. .not. self%trail%has_turned) return
+      if (self%corrector%metric%chord(self%here, ahead) > corner) return
+      call self%trail%is_retraced(self%corrector, system, ahead, retraced, error)
+      if (allocated(error)) return
+      if (retraced) then
+         call pass_over(self, system, ahead, done, error)
+         self%knows_ahead = .false.
+      end if
+      if (allocated(error) .or. .not. done) return
+      ! What follows takes the system and its factors at the point.
+      call system%set_parameter(ahead%p, error)
+      if (allocated(error)) return
+      call system%residual(ahead%x, r)
+      call self%corrector%linear%prepare(system, done)
+   end subroutine leave_own_way
+
+   !> Step over a corner in p alone: from the point before it, and from some further back, whose
+   !> pieces lead elsewhere.
+   subroutine pass_over(self, system, ahead, done, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(inout) :: ahead
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: most_back = 12, every = 3
+      type(branch_point) :: from
+      real(wp) :: corner_p
+      integer :: k
+
+      done = .false.
+      call self%trail%back(0, from)
+      corner_p = from%p
+      do k = 0, min(most_back, self%trail%n_kept() - 1), every
+         call self%trail%back(k, from)
+         call leap(self%corrector, system, from, only_ahead, ahead, error)
+         if (allocated(error)) return
+         ! Beyond the corner, not beside the points before it.
+         done = ahead%report%converged .and. (ahead%p - corner_p)*from%t_p > 0.0_wp
+         if (done) exit
+      end do
+      if (done) call self%trail%forget()
+   end subroutine pass_over
 
    !> A step has come to `ahead`: it is the next point, unless a fold or a bound lies before it.
    !> A fold between the two is given out first and `ahead` waits: `next` gives it out afterwards.
@@ -235,6 +299,7 @@ contains
       type(branch_point), intent(in) :: point
 
       self%n_points = self%n_points + 1
+      if (abs(point%p - self%start) > abs(self%furthest - self%start)) self%furthest = point%p
       self%n_constant = merge(self%n_constant + 1, 0, self%corrector%stands(point))
       self%runs_away = self%n_constant >= max_constant .and. .not. self%ended
       if (self%runs_away) call end_branch(self, 'its points run away at a constant parameter')
@@ -250,13 +315,27 @@ contains
       if (abs(bound - self%start) > 0.0_wp) then
          self%complete = point%report%converged
          call end_branch(self, 'followed to the end of the sweep')
-      else if (self%corrector%metric%length(point%y - self%first%y, 0.0_wp) <= same) then
-         call end_branch(self, 'it closed on itself at its first point')
+      else if (is_first(self, point)) then
+         ! A curve that began at the bound cannot come back there as another part of itself.
+         call end_branch(self, 'it turned back on itself, no further from the start than '// &
+                         to_text(self%furthest)//', and came to its first point again; the '// &
+                         'end was not reached')
       else
          call end_branch(self, 'it returned to the start of the sweep with another response; '// &
                          'the end was not reached')
       end if
    end subroutine end_at_bound
+
+   !> Whether a point is the first, by the size of what is measured there.
+   pure logical function is_first(self, point)
+      class(arclength_type), intent(in) :: self
+      type(branch_point), intent(in) :: point
+
+      associate (metric => self%corrector%metric)
+         is_first = metric%size(point%y - self%first%y) <= &
+                    same*max(metric%size(point%y), metric%size(self%first%y))
+      end associate
+   end function is_first
 
    !> The first reason is the one that counts.
    subroutine end_branch(self, reason)
@@ -295,6 +374,9 @@ contains
       self%corrector%careful = .false.
       call leap(self%corrector, system, self%here, all_around, ahead, error)
       done = ahead%report%converged
+      if (allocated(error) .or. done) return
+      call self%trail%keep(self%corrector%metric, self%here)
+      call pass_over(self, system, ahead, done, error)
    end subroutine advance
 
    !> Attempts from the present step on, each shorter than the one before.

@@ -250,3 +250,72 @@ def test_a_small_stuck_joint_has_the_resonances_of_what_it_holds(fw_run) -> None
     # Rows stand within a fifth of the width of the resonance.
     assert amplitude[:, 0].max() == pytest.approx(np.abs(held[:, 0, 0]).max(), rel=0.02)
     assert len(amplitude) < 120
+
+
+# Ways to go over the last kinks of the locked sector differ by round-off: kernels stand for that.
+KERNELS = ("Prescott", "Haswell")
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_no_branch_comes_back_along_itself_without_a_word(fw_run, monkeypatch, kernel) -> None:
+    """Where a branch that turned at a kink ends at its first point, it says so, with the place."""
+    monkeypatch.setenv("OPENBLAS_CORETYPE", kernel)
+    case, ends = SECTOR.with_name("frf_2000rpm.nml"), []
+    for harmonics, load, n_points, _ in LOCKED:
+        done = fw_run("-o", "locked.h5", "--set", f"sweep%n_points={n_points}", "--set",
+                      f"harmonics%n_harmonics={harmonics}", "--set",
+                      f"load%harmonic_scale={load}", case)
+        words = done.stderr + done.stdout
+        assert "closed on itself" not in words
+        ends.append(done.returncode == 0)
+        if done.returncode:
+            assert "turned back on itself" in words or "no continuation was found at" in words
+    assert sum(ends) >= len(LOCKED) - 1
+
+
+def test_a_branch_whose_time_is_over_says_so(fw_run) -> None:
+    """Nobody stopped it."""
+    done = fw_run("-o", "x.h5", "--set", "case%max_seconds=0.3", "--set",
+                  "sweep%continuation='arclength'", "--set", "harmonics%n_harmonics=31",
+                  SECTOR.with_name("frf_48.nml"))
+    assert done.returncode == 6
+    assert "stopped by the user" not in done.stderr
+    assert "time limit: the run ended" in done.stderr
+
+
+# A spring without a load: there is nothing to follow.
+AT_REST = """
+&case analysis = 'frf' /
+&model n_dof = 1 mass = 1 stiffness = 1 damping = 0.02 /
+&spring n_springs = 1 side_1 = 1 coefficient = 0.3 /
+&sweep start = 0.6 end = 1.6 n_points = 11 continuation = 'arclength' /
+&harmonics n_harmonics = 3 /
+"""
+
+
+def test_a_branch_without_a_load_is_a_list_of_rest(fw_run) -> None:
+    (fw_run.directory / "rest.nml").write_text(AT_REST)
+    done = fw_run("-o", "rest.h5", "rest.nml")
+    assert done.returncode == 0, done.stderr
+    assert "no vibratory load acts" in done.stdout
+    with h5py.File(fw_run.directory / "rest.h5") as file:
+        assert np.allclose(file["omega"][:], np.linspace(0.6, 1.6, 11), rtol=1e-12)
+        assert not file["amplitude"][:].any()
+
+
+UNDAMPED = """
+&case analysis = 'frf' /
+&model n_dof = 2 mass = 1, 0, 0, 1 stiffness = 2, -1, -1, 2 damping = 4*0 /
+&load cosine = 1, 0 /
+&harmonics n_harmonics = 3 /
+&sweep start = 0.6 end = 1.4 n_points = 11 {along} /
+"""
+
+
+@pytest.mark.parametrize("along", ["", "continuation = 'arclength'"])
+def test_a_resonance_without_damping_is_told_to_get_some(fw_run, along) -> None:
+    (fw_run.directory / "undamped.nml").write_text(UNDAMPED.format(along=along))
+    done = fw_run("-o", "undamped.h5", "undamped.nml")
+    assert done.returncode == 4
+    assert "model%damping" in done.stdout + done.stderr
+    assert "take more points around them" not in done.stdout
