@@ -112,7 +112,7 @@ contains
          if (case%model%cyclic%is_cyclic .and. case%solver%fallback) call summary%leave_fallback()
          ! What cannot help in this case is left out.
          message = 'try a finer sweep, the other direction'
-         if (is_undamped(case)) message = 'nothing but contact damps the structure: an undamped '// &
+         if (is_undamped(case)) message = 'nothing but contact damps the structure: a '// &
             'resonance needs damping (model%damping, model%modal_damping); else '//message
          if (takes_scale(system)) message = message//', another penalty_scale (0.3 or 3)'
          message = message//' or '//trim(finer(system))//' for the points above'

@@ -81,8 +81,9 @@ contains
             "the model gives contact%"//trim(name)//", which contact%law = '"// &
             trim(law_words(case%contact%law))//"' does not take")
       end if
-      if (.not. is_shaken(case)) call remarks%add('no load', 'no vibratory load acts: the response is '// &
-         'that at rest; set load%cosine or load%sine (with a model file, load%harmonic_scale)')
+      if (.not. is_shaken(case)) call remarks%add('no load', 'no vibratory load acts: the '// &
+         'response is that at rest; set load%cosine or load%sine (with a model file, '// &
+         'load%harmonic_scale)')
       call remark_harmonics(case, remarks)
       call remark_tail(case, remarks)
    end subroutine remark_input
@@ -219,9 +220,9 @@ contains
    subroutine remark_condensed(remarks)
       type(remark_list), intent(inout) :: remarks
 
-      call remarks%add('branch condensed', 'the structure without condensation did not converge '// &
-         'where the branch begins: it was followed by the unknowns of its joint, and a '// &
-         'resonance that these do not show may be stepped over; loosen solver%tolerance, or '// &
+      call remarks%add('branch condensed', 'the structure without condensation did not '// &
+         'converge where the branch begins: it was followed by the unknowns of its joint, '// &
+         'and a resonance that these do not show may be stepped over; loosen solver%tolerance, or '// &
          'compare with a natural sweep')
    end subroutine remark_condensed
 

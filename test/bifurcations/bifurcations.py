@@ -35,6 +35,8 @@ SMOOTH_PLACE = 5e-4
 HEIGHT = 2e-2
 OPEN = ("undecided", "nonsmooth")
 SECONDS = 120
+# Status of a run that takes longer: unfinished.
+OUT_OF_TIME = -1
 
 
 @dataclass
@@ -50,9 +52,12 @@ def named(program, sample):
     """Status, and (kind, omega, amplitude) of everything that the program names."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "case.nml").write_text(sample.case())
-        done = subprocess.run([program, "-q", "-o", "case.h5", "case.nml"], cwd=folder,
-                              env={**PATIENT, "OMP_NUM_THREADS": "1"}, capture_output=True,
-                              text=True, timeout=limit(SECONDS), check=False)
+        try:
+            done = subprocess.run([program, "-q", "-o", "case.h5", "case.nml"], cwd=folder,
+                                  env={**PATIENT, "OMP_NUM_THREADS": "1"}, capture_output=True,
+                                  text=True, timeout=limit(SECONDS), check=False)
+        except subprocess.TimeoutExpired:
+            return OUT_OF_TIME, []
         with h5py.File(Path(folder) / "case.h5") as file:
             if "bifurcation" not in file:
                 return done.returncode, []
