@@ -10,12 +10,11 @@ module fw_peak_finder
    use fw_case, only: case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
+   use fw_hidden_resonance, only: hides_mode
+   use fw_hidden_resonance, only: hides_resonance
+   use fw_hidden_resonance, only: turns_back
    use fw_joint_modes, only: find_joint_modes
    use fw_joint_modes, only: joint_mode_type
-   use fw_joint_modes, only: state_free
-   use fw_joint_modes, only: state_sliding
-   use fw_joint_modes, only: state_stuck
-   use fw_kinds, only: pi
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_peak, only: found_bound
@@ -26,14 +25,15 @@ module fw_peak_finder
    use fw_peak, only: peak_type
    use fw_peak_rules, only: find_edge
    use fw_peak_rules, only: find_next
+   use fw_peak_rules, only: highest_of
+   use fw_peak_rules, only: is_bound
    use fw_peak_rules, only: is_maximum
    use fw_peak_rules, only: lies_on_jump
-   use fw_peak_rules, only: negligible
+   use fw_peak_rules, only: place_of_highest
    use fw_peak_rules, only: width_of
    use fw_point, only: point_type
    use fw_samples, only: balance_point
    use fw_samples, only: new_sample
-   use fw_samples, only: phase_step
    use fw_samples, only: sample_list
    use fw_samples, only: sample_type
    use fw_session_points, only: point_list
@@ -47,14 +47,6 @@ module fw_peak_finder
 
    public :: peak_finder
 
-   !> Phase that an interval turns back by where it is taken for a skipped resonance.
-   real(wp), parameter :: turn = 0.6_wp*pi
-   !> Mode whose resonance is wider than this many intervals shows in the rows.
-   real(wp), parameter :: intervals_of_width = 3.0_wp
-   !> Linear response at a mode, over the present vibration, below which it hides no maximum.
-   real(wp), parameter :: least_part = 0.1_wp
-   !> Mean share of the period in one state from which the joint counts as in it.
-   real(wp), parameter :: mostly = 0.9_wp
    !> Solutions for the resonance of an interval, and failures next to a maximum that end its
    !> search; each halves the way that is tried.
    integer, parameter :: most_trials = 6, most_failures = 5
@@ -200,67 +192,6 @@ contains
          end associate
       end do
    end subroutine suspect_all
-
-   !> Whether a resonance may lie between two rows that does not show in either.
-   pure logical function hides_resonance(modes, below, above)
-      type(joint_mode_type), intent(in) :: modes(:)
-      type(sample_type), intent(in) :: below, above
-      integer :: i
-
-      hides_resonance = .false.
-      do i = 1, size(below%amplitude)
-         hides_resonance = hides_resonance .or. turns_back(below, above, i)
-      end do
-      do i = 1, size(modes)
-         hides_resonance = hides_resonance .or. hides_mode(modes(i), below, above)
-      end do
-   end function hides_resonance
-
-   !> Whether the first harmonic turns back by about pi, as it does over a resonance.
-   pure logical function turns_back(below, above, i)
-      type(sample_type), intent(in) :: below, above
-      integer, intent(in) :: i
-
-      ! What is round-off beside the other quantities has no phase.
-      turns_back = min(below%first(i), above%first(i)) > &
-                   negligible*max(maxval(below%first), maxval(above%first)) .and. &
-                   phase_step(below, above, i) < -turn
-   end function turns_back
-
-   pure logical function hides_mode(mode, below, above)
-      type(joint_mode_type), intent(in) :: mode
-      type(sample_type), intent(in) :: below, above
-
-      ! In the interval, and so narrow that rows may pass it by.
-      hides_mode = mode%omega > below%omega .and. mode%omega < above%omega .and. &
-                   intervals_of_width*(above%omega - below%omega) > mode%width
-      if (.not. hides_mode) return
-      ! High enough to make a maximum of what vibrates here, and of a joint that is as the mode
-      ! needs it.
-      hides_mode = any(mode%amplitude > least_part*max(below%amplitude - below%mean, &
-                                                       above%amplitude - above%mean)) .and. &
-                   (is_in_state(mode%state, below) .or. is_in_state(mode%state, above))
-   end function hides_mode
-
-   !> Whether the joint is in a state for most of the period, as far as that is known.
-   pure logical function is_in_state(state, sample)
-      integer, intent(in) :: state
-      type(sample_type), intent(in) :: sample
-      integer, parameter :: stick = 1, slip = 2, open = 3
-
-      is_in_state = .true.
-      if (sample%fraction(stick) < 0.0_wp) return
-      select case (state)
-      case (state_stuck)
-         is_in_state = sample%fraction(stick) >= mostly
-      case (state_sliding)
-         is_in_state = sample%fraction(slip) >= 1.0_wp - mostly .and. &
-                       sample%fraction(open) < mostly
-      case (state_free)
-         is_in_state = sample%fraction(open) + sample%fraction(slip) >= mostly
-      case default ! there is no joint
-      end select
-   end function is_in_state
 
    !> Look for every maximum that the rows leave open.
    subroutine search(self, case, error)
@@ -433,17 +364,6 @@ contains
       end do
    end subroutine measure_widths
 
-   pure integer function place_of_highest(samples, i) result(place)
-      type(sample_list), intent(in) :: samples
-      integer, intent(in) :: i
-      integer :: k
-
-      place = 1
-      do k = 2, samples%n
-         if (samples%item(k)%at%amplitude(i) > samples%item(place)%at%amplitude(i)) place = k
-      end do
-   end function place_of_highest
-
    !> The maximum that is not known well enough and may be the highest, relative to what is known of
    !> its quantity.
    pure subroutine find_summit(self, place, omega, found)
@@ -483,17 +403,6 @@ contains
          end do
       end do
    end subroutine find_summit
-
-   pure real(wp) function highest_of(samples, i) result(highest)
-      type(sample_list), intent(in) :: samples
-      integer, intent(in) :: i
-      integer :: k
-
-      highest = tiny(1.0_wp)
-      do k = 1, samples%n
-         highest = max(highest, samples%item(k)%at%amplitude(i))
-      end do
-   end function highest_of
 
    !> One more solution, started from the sample given, else from the nearest that can be.
    subroutine solve_at(self, case, omega, budget, error, from)
@@ -581,18 +490,6 @@ contains
          list(k) = found(k)
       end do
    end subroutine peaks
-
-   !> Whether the amplitude rises towards an end of the range, which this sample stands on.
-   pure logical function is_bound(samples, k, i)
-      type(sample_list), intent(in) :: samples
-      integer, intent(in) :: k, i
-      integer :: inside
-
-      is_bound = (k == 1 .or. k == samples%n) .and. samples%item(k)%at%amplitude(i) > 0.0_wp
-      if (.not. is_bound .or. samples%n == 1) return
-      inside = merge(2, samples%n - 1, k == 1)
-      is_bound = samples%item(k)%at%amplitude(i) >= samples%item(inside)%at%amplitude(i)
-   end function is_bound
 
    !> What is known of a maximum.
    function describe(self, k, i) result(peak)

@@ -9,7 +9,8 @@ module fw_peak_rules
    implicit none (type, external)
    private
 
-   public :: is_maximum, find_next, width_of, find_edge, lies_on_jump, negligible
+   public :: is_maximum, is_bound, highest_of, place_of_highest
+   public :: find_next, width_of, find_edge, lies_on_jump, negligible
 
    !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
    real(wp), parameter :: round_off = 1.0e-7_wp
@@ -186,5 +187,41 @@ contains
       share = (1.0_wp - inner(2))/(outer(2) - inner(2))
       omega = sqrt(inner(1) + share*(outer(1) - inner(1)))
    end subroutine find_edge
+
+   !> The sample with the largest amplitude of a quantity.
+   pure integer function place_of_highest(samples, i) result(place)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: i
+      integer :: k
+
+      place = 1
+      do k = 2, samples%n
+         if (samples%item(k)%at%amplitude(i) > samples%item(place)%at%amplitude(i)) place = k
+      end do
+   end function place_of_highest
+
+   !> The largest amplitude of a quantity, never 0: others are divided by it.
+   pure real(wp) function highest_of(samples, i) result(highest)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: i
+      integer :: k
+
+      highest = tiny(1.0_wp)
+      do k = 1, samples%n
+         highest = max(highest, samples%item(k)%at%amplitude(i))
+      end do
+   end function highest_of
+
+   !> Whether the amplitude rises towards an end of the range, which this sample stands on.
+   pure logical function is_bound(samples, k, i)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      integer :: inside
+
+      is_bound = (k == 1 .or. k == samples%n) .and. samples%item(k)%at%amplitude(i) > 0.0_wp
+      if (.not. is_bound .or. samples%n == 1) return
+      inside = merge(2, samples%n - 1, k == 1)
+      is_bound = samples%item(k)%at%amplitude(i) >= samples%item(inside)%at%amplitude(i)
+   end function is_bound
 
 end module fw_peak_rules

@@ -1,29 +1,22 @@
 !> Analysis 'wear': the joint wears over the cycles at the first frequency of the sweep.
 module fw_wear_response
-   use, intrinsic :: iso_fortran_env, only: int64
    use fw_combinations, only: is_linear_euler
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
    use fw_error, only: error_type
    use fw_error, only: status_stopped
-   use fw_finer_wear, only: finer_wear
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
-   use fw_patches, only: patch_volumes
    use fw_point, only: point_type
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
-   use fw_recovery, only: recover_histories
-   use fw_recovery, only: recover_point
    use fw_hdf5, only: hdf5_file
    use fw_resonance, only: resonance_type
    use fw_restart_file, only: restart_type
    use fw_restart_rows, only: c_noted
-   use fw_restart_rows, only: restart_row_set
    use fw_result, only: result_writer
-   use fw_solution, only: is_lasting
    use fw_run_state, only: run_state
    use fw_strategy, only: new_request
    use fw_strategy, only: note_time_limit
@@ -37,10 +30,11 @@ module fw_wear_response
    use fw_wear_options, only: wear_energy
    use fw_wear_options, only: wear_explicit
    use fw_wear_options, only: wear_pseudo_time
+   use fw_wear_recorder, only: friction_energy
+   use fw_wear_recorder, only: wear_recorder
    use fw_wear_rows, only: start_wear
    use fw_wear_rows, only: state_halved
    use fw_wear_rows, only: state_outcome
-   use fw_wear_step, only: largest_lag
    use fw_wear_step, only: new_wear_stepper
    use fw_wear_step, only: wear_state
    use fw_wear_system, only: new_wear_system
@@ -64,27 +58,6 @@ module fw_wear_response
    contains
       procedure :: take => pass_by
    end type silent_observer
-
-   !> Turns the states of a march into rows of the result.
-   type, extends(wear_observer) :: wear_recorder
-      type(case_type), pointer :: case => null()
-      class(observer_type), pointer :: observer => null()
-      type(result_writer), pointer :: writer => null()
-      type(summary_type), pointer :: summary => null()
-      type(run_state), pointer :: state => null()
-      type(restart_row_set) :: restart_rows
-      !> Rows written so far, and the clock at the last of them.
-      !> What twice the harmonics say.
-      type(finer_wear) :: finer
-      !> Friction energy up to the last row (n_pairs) [force*length], and the depths there.
-      real(wp), allocatable :: energy(:), depth(:)
-      integer :: n_rows = 0
-      integer(int64) :: clock = 0_int64
-   contains
-      procedure :: take
-      procedure :: begin_slip
-      procedure :: allowed_residual
-   end type wear_recorder
 
    !> Everything between the start of a run and its end.
    type :: wear_run
@@ -322,7 +295,7 @@ contains
       call copy_rows(restart, recorder, error)
       if (allocated(error)) return
       do i = 1, restart%n_rows
-         call count_point(recorder, restart%points(i))
+         call recorder%count_point(restart%points(i))
       end do
       recorder%n_rows = restart%n_rows
       recorder%depth = restart%state%x(system%n_vibration() + 1:)
@@ -472,133 +445,5 @@ contains
       call system%begin_step(x(system%n_vibration() + 1:), 0.0_wp)
       call system%residual(x, r)
    end subroutine stand_at
-
-   !> A state of the march becomes a row of the result.
-   subroutine take(self, march, system, state, iterations, go_on, error)
-      class(wear_recorder), intent(inout) :: self
-      class(wear_march), intent(in) :: march
-      type(wear_system), intent(inout) :: system
-      type(wear_state), intent(in) :: state
-      integer, intent(in) :: iterations
-      logical, intent(out) :: go_on
-      type(error_type), allocatable, intent(out) :: error
-      type(point_type) :: point
-      integer(int64) :: clock, rate
-      integer :: n
-
-      go_on = .false.
-      n = system%n_vibration()
-      point%omega = system%vibration%frequency()
-      point%cycles = state%cycles
-      point%depth = state%x(n + 1:)
-      point%wear_rate = state%rate
-      point%wear_volume = patch_volumes(self%case%contact, point%depth)
-      point%iterations = iterations
-      point%residual = state%residual
-      ! A state of the march is judged as any point is.
-      point%converged = is_lasting(system%vibration)
-      point%converged = point%converged .and. state%residual <= self%allowed_residual()
-      call recover_point(system%vibration, state%x(:n), self%case%harmonics%n_harmonics, &
-                         .true., point)
-      call add_energy(self, state, point%dissipation)
-      point%wear_energy = self%energy
-      if (.not. self%case%output%contact) then
-         deallocate (point%force, point%fraction, point%dissipation)
-      end if
-      ! The pairs that slip before anything is worn.
-      if (self%n_rows == 0) call self%finer%look(self%case, march, system, state, &
-                                                 state%rate > 0.0_wp)
-      if (self%case%output%histories) then
-         call recover_histories(system%vibration, size(system%vibration%balance, 1), state%x(:n), &
-                                self%case%harmonics%n_harmonics, point)
-      end if
-      call system_clock(clock, rate)
-      point%seconds = real(clock - self%clock, wp)/real(rate, wp)
-      self%clock = clock
-      call self%restart_rows%append(self%writer%file, march, state%x(:n), point%converged, &
-                                    self%finer%notes(), error)
-      if (allocated(error)) return
-      call self%writer%add_point(point, error)
-      if (allocated(error)) return
-      self%n_rows = self%n_rows + 1
-      call count_point(self, point)
-      call self%observer%on_point(self%n_rows, 0, point)
-      go_on = .not. self%observer%stop_requested
-   end subroutine take
-
-   !> Pairs begin to slip: only for want of harmonics?
-   subroutine begin_slip(self, march, system, state, error)
-      class(wear_recorder), intent(inout) :: self
-      class(wear_march), intent(in) :: march
-      type(wear_system), intent(inout) :: system
-      type(wear_state), intent(in) :: state
-      type(error_type), allocatable, intent(out) :: error
-
-      call self%finer%look(self%case, march, system, state, march%begins)
-   end subroutine begin_slip
-
-   !> Residual of a row that counts as converged: steps of pseudo-time are accepted with what their
-   !> vibration lags behind the depths, which /residual holds.
-   pure real(wp) function allowed_residual(self) result(residual)
-      class(wear_recorder), intent(in) :: self
-
-      residual = self%case%solver%tolerance
-      if (self%case%wear%scheme == wear_pseudo_time) residual = max(residual, largest_lag)
-   end function allowed_residual
-
-   !> Add the friction energy of a step. Its cycles are weighted as its scheme weights them for the
-   !> depth: the growth of a pair times its energy over its depth of a cycle, which are two measures
-   !> of the same slip, that of forces and displacements and that of the march.
-   subroutine add_energy(self, state, dissipation)
-      class(wear_recorder), intent(inout) :: self
-      type(wear_state), intent(in) :: state
-      !> Energy per cycle (n_pairs).
-      real(wp), intent(in) :: dissipation(:)
-      !> Of a rate, as a part of the largest: below it both are round-off, and the law's own measure
-      !> stands in.
-      real(wp), parameter :: measurable = 1.0e-6_wp
-      real(wp) :: growth(size(dissipation))
-      integer :: n
-
-      n = size(state%x) - size(dissipation)
-      if (.not. allocated(self%depth)) then
-         self%depth = state%x(n + 1:)
-         allocate (self%energy(size(dissipation)), source=0.0_wp)
-         return
-      end if
-      growth = state%x(n + 1:) - self%depth
-      where (state%rate > measurable*maxval(state%rate))
-         self%energy = self%energy + growth*dissipation/state%rate
-      else where
-         self%energy = self%energy + friction_energy(self%case, growth + self%case%contact%depth)
-      end where
-      self%depth = state%x(n + 1:)
-   end subroutine add_energy
-
-   !> States on the way of pseudo-time need not be in equilibrium.
-   subroutine count_point(self, point)
-      class(wear_recorder), intent(inout) :: self
-      type(point_type), intent(in) :: point
-
-      if (self%case%wear%scheme == wear_pseudo_time .and. .not. point%converged) then
-         call self%summary%add_transient(point)
-      else
-         call self%summary%add(point)
-         call self%state%note(point)
-      end if
-   end subroutine count_point
-
-   !> Friction energy that the depth worn by this run stands for: both laws wear in proportion
-   !> to it.
-   pure function friction_energy(case, depth) result(energy)
-      type(case_type), intent(in) :: case
-      real(wp), intent(in) :: depth(:)
-      real(wp) :: energy(size(depth))
-
-      ! A w/k_w is the friction energy under the law of energy; under Archard's the energy is mu of
-      ! it.
-      energy = case%contact%area*(depth - case%contact%depth)/case%wear%coefficient
-      if (case%wear%law /= wear_energy) energy = case%contact%mu*energy
-   end function friction_energy
 
 end module fw_wear_response

@@ -1,4 +1,4 @@
-!> Reading datasets of real numbers and integers, rank 0 to 4.
+!> Reading datasets of real numbers, rank 0 to 4, and of integers, rank 0 to 2.
 !>
 !> The ranks differ in their allocation alone. Files come from others: type, rank and size are
 !> checked before anything is allocated (fw_hdf5_dataset), and arrays have the reversed order of
@@ -34,8 +34,6 @@ module fw_hdf5_read
       module procedure read_integer_0
       module procedure read_integer_1
       module procedure read_integer_2
-      module procedure read_integer_3
-      module procedure read_integer_4
    end interface read_dataset
 
 contains
@@ -151,32 +149,6 @@ contains
       allocate (values(dataset%dims(1), dataset%dims(2)))
       call fill_integer(file, name, dataset, size(values), values, error)
    end subroutine read_integer_2
-
-   subroutine read_integer_3(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, allocatable, intent(out) :: values(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
-      type(dataset_type) :: dataset
-
-      call open_dataset(file, name, kind_integer, 3, dataset, error)
-      if (allocated(error)) return
-      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3)))
-      call fill_integer(file, name, dataset, size(values), values, error)
-   end subroutine read_integer_3
-
-   subroutine read_integer_4(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, allocatable, intent(out) :: values(:, :, :, :)
-      type(error_type), allocatable, intent(out) :: error
-      type(dataset_type) :: dataset
-
-      call open_dataset(file, name, kind_integer, 4, dataset, error)
-      if (allocated(error)) return
-      allocate (values(dataset%dims(1), dataset%dims(2), dataset%dims(3), dataset%dims(4)))
-      call fill_integer(file, name, dataset, size(values), values, error)
-   end subroutine read_integer_4
 
    !> Fill an array of any rank, passed by its first element, and close the dataset.
    subroutine fill_real(file, name, dataset, n, values, error)

@@ -1,4 +1,4 @@
-!> Writing datasets of real numbers and integers, rank 0 to 4.
+!> Writing datasets of real numbers, rank 0 to 4, and of integers, rank 0 to 2.
 !>
 !> A dataset is written once and whole; what grows point by point is fw_hdf5_append's.
 module fw_hdf5_write
@@ -41,8 +41,6 @@ module fw_hdf5_write
       module procedure write_integer_0
       module procedure write_integer_1
       module procedure write_integer_2
-      module procedure write_integer_3
-      module procedure write_integer_4
    end interface write_dataset
 
 contains
@@ -181,24 +179,6 @@ contains
 
       call put_integer(file, name, shape(values), values, error)
    end subroutine write_integer_2
-
-   subroutine write_integer_3(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(in), contiguous :: values(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_integer(file, name, shape(values), values, error)
-   end subroutine write_integer_3
-
-   subroutine write_integer_4(file, name, values, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      integer, intent(in), contiguous :: values(:, :, :, :)
-      type(error_type), allocatable, intent(out) :: error
-
-      call put_integer(file, name, shape(values), values, error)
-   end subroutine write_integer_4
 
    !> All elements in their order in memory, whatever the rank.
    subroutine put_real(file, name, dims, values, error)
