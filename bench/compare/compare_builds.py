@@ -2,6 +2,7 @@
 """Two builds side by side: the same numbers, the same work, and paired times.
 
     compare_builds.py [--of FW_RUN] --with OTHER_FW_RUN [--group GROUP ...] [--times N]
+                      [--instructions]
 
 Runs the cases of comparison_cases.py (every example, the paper's tables, the sweeps of
 docs/benchmarks.md, wear, a case for every other feature) with both programs and compares every
@@ -11,8 +12,11 @@ end, may differ by a tenth of the tolerance that they are held to. Datasets that
 writes are named; one that is gone counts as a difference, one that is new does not.
 
 With --times the sweeps are run N times by each build in turn: medians of the ratios of processor
-time and of peak memory, which other programs on the machine disturb little. Ends with status 1
-where numbers or counts differ.
+time and of peak memory, which other programs on the machine disturb little. With --instructions
+each sweep is run once by each build under callgrind, and the instructions are counted: nothing
+disturbs these, and those of the search for peaks between the points, which is work of its own, are
+told apart. (Valgrind has to know the instructions: builds for older processors than the newest,
+such as CMAKE_Fortran_FLAGS=-march=x86-64-v3.) Ends with status 1 where numbers or counts differ.
 """
 
 from __future__ import annotations
@@ -42,6 +46,8 @@ TOLERANCE = 1e-12
 RESIDUAL_TOLERANCE = 1e-9
 #: What the clock makes.
 CLOCK = ("seconds",)
+#: What looks for peaks between the points, by its name in a program of gfortran.
+SEARCH = "__fw_peak_finder_MOD_search"
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
@@ -165,6 +171,33 @@ def compare_times(cases: list[Case], programs: tuple[Path, Path], repeats: int,
               f"| {statistics.median(memory):.3f} |", flush=True)
 
 
+def count_instructions(program: Path, case: Case, folder: Path) -> tuple[float, float]:
+    """Instructions of a run, and those of them in the search for peaks."""
+    profile = folder / "callgrind.out"
+    subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", program,
+                    "-q", "-o", folder / "result.h5", *case.arguments],
+                   env=ENVIRONMENT, capture_output=True, check=True)
+    listing = subprocess.run(["callgrind_annotate", "--inclusive=yes", "--threshold=100", profile],
+                             text=True, capture_output=True, check=True).stdout
+
+    def read(pattern: str) -> float:
+        found = re.search(rf"^ *([\d,]+) .*{pattern}", listing, re.MULTILINE)
+        return float(found[1].replace(",", "")) if found else 0.0
+
+    return read("PROGRAM TOTALS"), read(SEARCH)
+
+
+def compare_instructions(cases: list[Case], programs: tuple[Path, Path], folder: Path) -> None:
+    """Print the table of instructions."""
+    print("\n| case | instructions [1e9] | ratio | in the search for peaks | ratio without it "
+          "|\n|---|---|---|---|---|")
+    for case in cases:
+        (ours, searching), (other, before) = (
+            count_instructions(program, case, folder) for program in programs)
+        print(f"| {case.name} | {1e-9*ours:.3f} | {ours/other:.3f} | {searching/ours:.1%} "
+              f"| {(ours - searching)/(other - before):.3f} |", flush=True)
+
+
 def pair(case: Case, programs: tuple[Path, Path], swapped: bool,
          folder: Path) -> list[tuple[float, float]]:
     """One run of each, the second first where swapped."""
@@ -192,15 +225,22 @@ def main() -> int:
     parser.add_argument("--group", nargs="+", choices=list(GROUPS), default=list(GROUPS))
     parser.add_argument("--times", type=int, default=0, metavar="N",
                         help="also N paired runs of each sweep")
+    parser.add_argument("--instructions", action="store_true",
+                        help="also the instructions of each sweep, under callgrind")
     parser.add_argument("--only-times", action="store_true", help="no numbers")
+    parser.add_argument("--case", default="", help="only cases with this in their name")
     options = parser.parse_args()
     programs = options.of.absolute(), options.other.absolute()
+    timed = [case for case in GROUPS["sweeps"]() if options.case in case.name]
     good = True
     with tempfile.TemporaryDirectory(prefix="fw_compare_") as name:
         if not options.only_times:
-            good = compare_numbers(list(chosen(options.group)), *programs, Path(name))
+            good = compare_numbers([case for case in chosen(options.group)
+                                    if options.case in case.name], *programs, Path(name))
         if options.times:
-            compare_times(list(GROUPS["sweeps"]()), programs, options.times, Path(name))
+            compare_times(timed, programs, options.times, Path(name))
+        if options.instructions:
+            compare_instructions(timed, programs, Path(name))
     return 0 if good else 1
 
 
