@@ -95,6 +95,9 @@ def _again(result: Result, point: int) -> Point:
                                   "solve"))
     tolerance = float(values.get("solver%tolerance", ["1e-8"])[0])
     settings = _settings(result, point)
+    if "contact%law" in values:
+        # Left to the program, histories would ask for another one.
+        settings["contact"] = {"law": values["contact%law"][0], **settings.get("contact", {})}
     finer = {**settings, "harmonics": {**settings["harmonics"], "n_time": _INSTANTS}}
     # Located events are exact whatever the instants, in one tangential direction.
     by_events = result.attributes.get("sampling") == "events"

@@ -82,7 +82,7 @@ class Contact(TypedDict, total=False):
     #: required with side_1; 0 switches the contact of a file off (default: of the file, else 0)
     n_pairs: int
     #: rigid, rigid at velocity level, elastic, rigid of high order (friction on dofs with mass), or
-    #: smooth in the velocity (default: 'dlft')
+    #: smooth in the velocity (default: 'rigid' where it goes, else 'dlft', else 'dlft')
     law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised"]
     #: dofs of t1, t2, n on one side; 0: none, negative: with its sign turned (default: of the file,
     #: else required)

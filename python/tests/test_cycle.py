@@ -121,6 +121,7 @@ def test_another_solution_is_not_drawn_for_that_of_the_result(tmp_path: Path) ->
 
 def test_a_point_that_failed_has_no_period() -> None:
     result = fw.run(fw.Case(RUBBING, harmonics={"n_harmonics": 9},
+                            contact={"law": "dlft"},
                             solver={"max_iterations": 1, "fallback": False},
                             sweep={"start": 9, "end": 11, "n_points": 3}), check=False)
     failed = int(np.flatnonzero(~result.converged)[0])

@@ -75,6 +75,8 @@ module fw_point
       !> Contact forces and relative displacements over one period, only when asked for
       !> (3, n_pairs, n_time).
       real(wp), allocatable :: force_history(:, :, :), slip_history(:, :, :)
+      !> Instants of a period that its forces ask for, where they had fewer; else 0.
+      integer :: instants_wanted = 0
    end type point_type
 
 end module fw_point

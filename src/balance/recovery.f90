@@ -32,6 +32,10 @@ contains
       call observed_coefficients(system, x, n_harmonics, point%coefficients)
       point%amplitude = [(largest_magnitude(point%coefficients(:, i)), &
                           i=1, system%problem%structure%n_observed)]
+      associate (pairs => system%problem%forces%pairs)
+         i = system%problem%forces%entry(pairs)%law%instants_wanted(system%work(pairs))
+      end associate
+      if (i > system%problem%fourier%n_time) point%instants_wanted = i
       if (with_contact .and. system%problem%n_pairs > 0) call recover_contact(system, x, &
          n_harmonics, point)
    end subroutine recover_point

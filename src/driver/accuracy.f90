@@ -30,7 +30,7 @@ module fw_accuracy
    use fw_known_tail, only: relative_distance
    use fw_known_tail, only: unknown
    use fw_laws, only: is_rigid
-   use fw_laws, only: law_with_tail
+   use fw_laws, only: law_under_accuracy
    use fw_level, only: describe_levels
    use fw_level, only: harmonic_levels
    use fw_level, only: level_type
@@ -120,7 +120,8 @@ contains
       allocate (self%by_instants(size(self%n_harmonics), fewest:most), source=unknown/safety)
       if (case%contact%n_pairs > 0) self%factor_time = factor_instants
       self%case = case
-      call take_oscillator(self%case)
+      self%case%contact%law = law_under_accuracy(case%contact, &
+                                                 case%harmonics%sampling == sampling_uniform)
       call need(self, self%current, self%doublings, error)
       if (allocated(error)) return
       associate (system => self%level(self%current, self%doublings)%system)
@@ -132,22 +133,6 @@ contains
          end if
       end associate
    end subroutine start
-
-   !> Friction of dofs, each in one direction, by the law that knows its tail.
-   subroutine take_oscillator(case)
-      type(case_type), intent(inout) :: case
-      logical :: planar(case%contact%n_pairs)
-
-      if (case%contact%n_pairs == 0) return
-      if (.not. is_rigid(case%contact%law)) return
-      associate (c => case%contact)
-         planar = (c%side_1(1, :) /= 0 .or. c%side_2(1, :) /= 0) .and. &
-                  (c%side_1(2, :) /= 0 .or. c%side_2(2, :) /= 0)
-      end associate
-      ! It follows events, and two directions by the displacement law only.
-      if (any(planar) .or. case%harmonics%sampling == sampling_uniform) return
-      case%contact%law = law_with_tail(case%contact%law)
-   end subroutine take_oscillator
 
    !> Build a level if it is not there.
    subroutine need(self, k, doublings, error)

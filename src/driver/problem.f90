@@ -12,7 +12,6 @@ module fw_problem
    use fw_cyclic_structure, only: cyclic_structure
    use fw_cyclic_structure, only: means_none
    use fw_cyclic_structure, only: means_split
-   use fw_cyclic_structure, only: means_static
    use fw_cyclic_structure, only: new_cyclic_structure
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -157,8 +156,8 @@ contains
       end if
       associate (p => forces%entry(forces%pairs)%law%prediction)
          means = means_none
-         if (p%takes_balance) means = means_static
-         if (p%has_inertia) means = means_split
+         ! Also what mass a pair has: friction that is ripple on it is no solution.
+         if (p%takes_balance) means = means_split
       end associate
       allocate (cyclic)
       call new_cyclic_structure(case%model, joint%cyclic, fourier%harmonic, range, means, cyclic, &

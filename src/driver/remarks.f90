@@ -10,7 +10,10 @@ module fw_remarks
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dpotrf
+   use fw_harmonics_options, only: sampling_uniform
    use fw_laws, only: facts_of
+   use fw_laws, only: law_number
+   use fw_laws, only: law_under_accuracy
    use fw_laws, only: law_words
    use fw_peak, only: found_bound
    use fw_peak, only: found_unresolved
@@ -85,6 +88,7 @@ contains
          'response is that at rest; set load%cosine or load%sine (with a model file, '// &
          'load%harmonic_scale)')
       call remark_harmonics(case, remarks)
+      call remark_law(case, remarks)
       call remark_tail(case, remarks)
    end subroutine remark_input
 
@@ -108,6 +112,38 @@ contains
          is_undamped = .not. any(abs(case%model%damping) > 0.0_wp)
       end if
    end function is_undamped
+
+   !> Where another law than the word of the user is solved.
+   subroutine remark_law(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      character(:), allocatable :: word
+      integer :: solved
+
+      associate (contact => case%contact)
+         word = "'"//trim(law_words(contact%law))//"'"
+         if (contact%law_is_chosen) then
+            call remarks%add('law chosen', 'nothing was said of contact%law: rigid friction '// &
+               'is taken, by '//word//trim(why_not_rigid(contact%law)))
+            return
+         end if
+         if (.not. case%harmonics%accuracy > 0.0_wp) return
+         solved = law_under_accuracy(contact, case%harmonics%sampling == sampling_uniform)
+         if (solved /= contact%law) call remarks%add('law under accuracy', 'with '// &
+            "harmonics%accuracy contact%law = "//word//" is solved as '"// &
+            trim(law_words(solved))//"', the same friction, whose error is known")
+      end associate
+   end subroutine remark_law
+
+   !> Why the law that was chosen is not the one of high order.
+   pure function why_not_rigid(law) result(words)
+      integer, intent(in) :: law
+      character(140) :: words
+
+      words = ''
+      if (law /= law_number('rigid')) words = ", as 'rigid' goes with one tangential "// &
+         'direction, located events and positive damping: not of high order on masses'
+   end function why_not_rigid
 
    !> Where a law that follows the motion above the harmonics cannot.
    subroutine remark_tail(case, remarks)

@@ -105,6 +105,7 @@ contains
       elapsed = real(clock_end - clock, wp)/real(rate, wp)
       outcome%status = state%status()
       outcome%out_of_time = observer%run_out
+      call summary%remark_instants()
       if (.not. allocated(error) .and. summary%remarks%count() > 0) then
          call writer%add_remarks(summary%remarks%name, summary%remarks%text, error)
       end if

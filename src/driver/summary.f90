@@ -58,9 +58,12 @@ module fw_summary
       type(string_type), allocatable :: skipped(:)
       !> How contact was sampled; not allocated where the work is not described.
       integer, allocatable :: sampling
+      !> Converged points whose forces ask for more instants than they had, and the most of these.
+      integer :: n_coarse = 0, instants_wanted = 0
    contains
       procedure :: add
       procedure :: add_transient
+      procedure :: remark_instants
       procedure :: describe_work
       procedure :: describe_peaks
       procedure :: describe_bifurcations
@@ -98,6 +101,11 @@ contains
                         max(self%harmonics(2), point%n_harmonics)]
       self%instants = [min(self%instants(1), point%n_time), max(self%instants(2), point%n_time)]
       if (.not. point%converged) return
+      ! What instants leave out is a part of the estimate of an error.
+      if (point%instants_wanted > 0 .and. .not. point%error_estimate > 0.0_wp) then
+         self%n_coarse = self%n_coarse + 1
+         self%instants_wanted = max(self%instants_wanted, point%instants_wanted)
+      end if
       if (allocated(point%multipliers)) then
          self%verdicts(point%verdict) = self%verdicts(point%verdict) + 1
       end if
@@ -115,6 +123,17 @@ contains
 
       self%iterations = self%iterations + point%iterations
    end subroutine add_transient
+
+   !> Where forces turn round between two instants. Of all points.
+   subroutine remark_instants(self)
+      class(summary_type), intent(inout) :: self
+
+      if (self%n_coarse == 0) return
+      call self%remarks%add('few instants', 'friction turns round between two instants at '// &
+         to_text(self%n_coarse)//' points, where velocities are many times '// &
+         'contact%slip_speed: take harmonics%n_time = '//to_text(self%instants_wanted)// &
+         ' or more (8 max|v|/slip_speed), or set harmonics%accuracy')
+   end subroutine remark_instants
 
    !> What the linear solver did, and what the case did not need.
    subroutine describe_work(self, system, linear, kind, all_converged)

@@ -48,6 +48,8 @@ module fw_contact_data
       !> Coordinates of the pairs, for pictures (3, n_pairs), and the names of their patches.
       real(wp), allocatable :: position(:, :)
       type(string_type), allocatable :: patch(:)
+      !> No law was given, and the program took one; no input.
+      logical :: law_is_chosen = .false.
    end type contact_type
 
    !> Nonlinear springs: force coefficient * u_r**power (group &spring).

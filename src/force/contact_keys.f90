@@ -46,7 +46,9 @@ contains
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
 
-      call keys%bind_word(key('law', law_help), contact%law, law_words)
+      ! Without a word fw_usual_law takes one.
+      call keys%bind_word(key('law', law_help, absent="'rigid' where it goes, else 'dlft'"), &
+                          contact%law, law_words)
    end subroutine bind_law
 
    !> Dofs of both sides; a pair between one side and the ground has no side 2.

@@ -164,6 +164,7 @@ module fw_force_law
       procedure :: slope_at
       procedure :: n_parameters
       procedure :: by_parameter
+      procedure :: instants_wanted
    end type force_law
 
    abstract interface
@@ -275,6 +276,17 @@ contains
          end do
       end associate
    end subroutine set_offset
+
+   !> Instants that the forces at the last evaluation ask for: none where the law is content with
+   !> what `facts` say.
+   pure integer function instants_wanted(self, work) result(n)
+      class(force_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+
+      n = 0
+      associate (unused => self, unused_work => work)
+      end associate
+   end function instants_wanted
 
    !> Room for evaluations of this law.
    subroutine reserve(self, fourier, work)

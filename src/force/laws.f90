@@ -1,6 +1,7 @@
 !> The laws of contact pairs by their words: a new law is a word and a line here, and a file of its
 !> own.
 module fw_laws
+   use fw_contact_data, only: contact_type
    use fw_force_law, only: law_facts
    use fw_friction, only: elastic_friction
    use fw_friction, only: rigid_friction
@@ -12,6 +13,7 @@ module fw_laws
    private
 
    public :: law_words, law_help, law_number, law_with_tail, new_law, facts_of, is_rigid
+   public :: law_under_accuracy
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
@@ -71,6 +73,20 @@ contains
          if (facts%has_tail) same = k
       end do
    end function law_with_tail
+
+   !> The law that is solved where an accuracy is to be kept: friction of dofs, each in one
+   !> direction, by the law that knows its tail.
+   integer function law_under_accuracy(contact, by_instants) result(number)
+      type(contact_type), intent(in) :: contact
+      !> Whether forces are wanted at instants: that law follows events.
+      logical, intent(in) :: by_instants
+
+      number = contact%law
+      if (contact%n_pairs == 0 .or. by_instants) return
+      ! Two directions are solved by the displacement law only.
+      if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1))) return
+      number = law_with_tail(number)
+   end function law_under_accuracy
 
    !> Where a word stands among `law_words`; 0 where it does not.
    pure integer function law_number(word)

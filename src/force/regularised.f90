@@ -35,8 +35,11 @@ module fw_regularised
       procedure :: slope_at_rest
       procedure :: n_parameters
       procedure :: by_parameter
+      procedure :: instants_wanted
    end type regularised_law
 
+   !> Instants while a velocity of full swing passes from -v_0 to v_0, times pi: one in each half.
+   real(wp), parameter :: instants_of_turn = 8.0_wp
    !> Square of |v|/v_0 below which tanh(s)/s is 1 - s**2/3 to the last bit.
    real(wp), parameter :: negligible = 1.0e-9_wp
 
@@ -106,6 +109,22 @@ contains
          end do
       end do
    end subroutine evaluate
+
+   !> A velocity v cos tau is within v_0 for 2 v_0/v of the angle, where friction turns round.
+   pure integer function instants_wanted(self, work) result(n)
+      class(regularised_law), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      real(wp) :: fastest
+      integer :: i
+
+      fastest = 0.0_wp
+      do i = 1, self%n_elements
+         if (.not. self%mu(i) > 0.0_wp .or. work%state(i) == pair_open) cycle
+         fastest = max(fastest, norm2(maxval(abs(work%prediction_time(i, 1:2, :)), dim=2)) &
+                       /self%slip_speed(i))
+      end do
+      n = ceiling(min(instants_of_turn*fastest, real(huge(n)/2, wp)))
+   end function instants_wanted
 
    !> Forces at the instants, and the smallest pressure of each pair.
    pure subroutine rub(n_pairs, n_time, mu, slip_speed, y, lambda, pressure)

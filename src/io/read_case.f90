@@ -22,6 +22,7 @@ module fw_read_case
    use fw_solver_options, only: continuation_natural
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
+   use fw_usual_law, only: choose_law
    use fw_values, only: number_text, quoted_text
    implicit none (type, external)
    private
@@ -110,6 +111,7 @@ contains
       reader%tries_files = input%tries_files
       call read_keys(reader, input%path, case, error, memory_model)
       if (allocated(error)) return
+      call choose_law(reader, case)
       call choose_harmonics(reader, case)
       call reader%finish(error)
       if (allocated(error)) return

@@ -34,7 +34,7 @@ DAMPING = np.array([[1.88e-4, -2.29e-5, 3.21e-5, 5.13e-8], [-2.29e-5, 9.07e-3, 4
 LOAD = np.array([-0.0111, 0.0114, 0.0133, 0])
 STUCK = """
 &model n_dof = 4 mass = {mass} stiffness = {stiffness} damping = {damping} /
-&contact n_pairs = 1 side_1 = 4, 0, 0 mu = 0.3 normal_load = 0.00444 /
+&contact law = 'dlft' n_pairs = 1 side_1 = 4, 0, 0 mu = 0.3 normal_load = 0.00444 /
 &load cosine = {load} /
 &harmonics n_harmonics = 1 /
 &sweep start = 47.9 end = 16.5 n_points = 31 continuation = 'arclength' /

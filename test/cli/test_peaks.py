@@ -143,7 +143,8 @@ def test_a_peak_at_the_end_of_the_sweep_is_said(tmp_path):
 #: A slider that nothing is wrong with, and a change to it with the remark that it draws.
 PLAIN = {"case": {"analysis": "frf"},
          "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.05},
-         "contact": {"n_pairs": 1, "side_1": [1, 0, 0], "mu": 0.3, "normal_load": 1.0},
+         "contact": {"n_pairs": 1, "law": "dlft", "side_1": [1, 0, 0], "mu": 0.3,
+                     "normal_load": 1.0},
          "load": {"cosine": 1.0}, "harmonics": {"n_harmonics": 3},
          "sweep": {"start": 0.5, "end": 1.5, "n_points": 11}}
 REMARKS = {"negative stiffness": {"model": {"stiffness": -1.0}},
@@ -153,6 +154,7 @@ REMARKS = {"negative stiffness": {"model": {"stiffness": -1.0}},
            "one harmonic": {"harmonics": {"n_harmonics": 1}},
            "accuracy chosen": {"harmonics": {"n_harmonics": None},
                                "contact": {"law": "penalty", "tangential_stiffness": 1.0}},
+           "law chosen": {"contact": {"law": None}},
            "no mode": {"sweep": {"start": 3.0, "end": 4.0}},
            "peak at the end": {"sweep": {"start": 0.2, "end": 0.5}}}
 

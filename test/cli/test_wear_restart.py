@@ -17,6 +17,8 @@ CASES = {
     "fixed depth steps": shared_load(scheme="implicit", max_depth_step=0.004),
     "pseudo-time": shared_load(scheme="pseudo_time", max_depth_step=0.004),
     "following": oscillator(7, error_tolerance=1e-3, n_cycles=100.0, follow_resonance=True),
+    "oscillator law": merged(oscillator(7, "rigid", error_tolerance=1e-3, n_cycles=100.0),
+                             {"harmonics": {"n_time": None}}),
     "carried memory": merged(shared_load(error_tolerance=1e-4, n_cycles=300.0),
                              {"contact": {"memory": "carried"}}),
     "histories": merged(prescribed_slip(error_tolerance=1e-4, n_cycles=300.0),

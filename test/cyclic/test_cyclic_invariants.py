@@ -105,7 +105,7 @@ def test_matrices_of_nodal_diameters(tmp_path, phase):
     sector = run_at(tmp_path / "sector", case, OMEGAS)
     run(tmp_path, {"case": {"analysis": "frf"},
                    "model": {"source": "hdf5", "file": "model.h5"},
-                   "cyclic": {"engine_order": case["engine_order"]},
+                   "cyclic": {"engine_order": case["engine_order"]}, "contact": {"law": "dlft"},
                    "harmonics": {"n_harmonics": case["n_harmonics"], "sampling": "events"},
                    "sweep": {"frequencies": OMEGAS}, "solver": {"tolerance": TIGHT}})
     assert_same(read(tmp_path / "case.h5"), sector)
