@@ -11,7 +11,8 @@ import fretwear as fw
 from fretwear.settings import Groups
 
 SECTOR: Groups = {
-    "structure": {"modal_damping": 1e-3, "rotation_speed": 460.8}, "contact": {"mu": 0.5},
+    "structure": {"modal_damping": 1e-3, "rotation_speed": 460.8},
+    "contact": {"mu": 0.5, "law": "dlft"},
     "load": {"harmonic_scale": 0.5}, "harmonics": {"n_harmonics": 3, "n_time": 128},
     "output": {"observe": ["tip"]}}
 # Rubbing oscillator: one dof, one pair without a normal direction.
