@@ -51,18 +51,21 @@ contains
          if (.not. case%model%cyclic%is_cyclic) call held_stiffness(case, state, stiffness)
          ! A load of harmonic n hits a mode at an n-th of its frequency.
          do n = 1, case%model%waves%highest()
-            if (n > 1 .and. .not. any_of(case, n)) cycle
+            if (.not. is_loaded(case, n)) cycle
             call add_modes_of(case, state, n, stiffness, range, modes)
          end do
       end do
    end subroutine find_joint_modes
 
-   pure logical function any_of(case, n)
+   !> Whether loads of a harmonic are looked at: the first always, others where some act.
+   pure logical function is_loaded(case, n)
       type(case_type), intent(in) :: case
       integer, intent(in) :: n
 
-      any_of = any(case%model%waves%harmonic == n)
-   end function any_of
+      is_loaded = n == 1
+      if (is_loaded .or. .not. allocated(case%model%waves%harmonic)) return
+      is_loaded = any(case%model%waves%harmonic == n)
+   end function is_loaded
 
    !> Modes that the load of a harmonic hits, at the frequencies of the first harmonic where it
    !> does.

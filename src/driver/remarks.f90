@@ -12,9 +12,9 @@ module fw_remarks
    use fw_lapack, only: dpotrf
    use fw_harmonics_options, only: sampling_uniform
    use fw_laws, only: facts_of
-   use fw_laws, only: law_number
    use fw_laws, only: law_under_accuracy
    use fw_laws, only: law_words
+   use fw_laws, only: usual_law
    use fw_peak, only: found_bound
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
@@ -141,7 +141,7 @@ contains
       character(140) :: words
 
       words = ''
-      if (law /= law_number('rigid')) words = ", as 'rigid' goes with one tangential "// &
+      if (law /= usual_law(.true.)) words = ", as 'rigid' goes with one tangential "// &
          'direction, located events and positive damping: not of high order on masses'
    end function why_not_rigid
 

@@ -13,7 +13,7 @@ module fw_laws
    private
 
    public :: law_words, law_help, law_number, law_with_tail, new_law, facts_of, is_rigid
-   public :: law_under_accuracy
+   public :: law_under_accuracy, usual_law
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
@@ -87,6 +87,14 @@ contains
       if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1))) return
       number = law_with_tail(number)
    end function law_under_accuracy
+
+   !> The law of a case that names none: rigid friction, of high order where that serves.
+   pure integer function usual_law(of_high_order) result(number)
+      logical, intent(in) :: of_high_order
+
+      number = law_number('dlft')
+      if (of_high_order) number = law_number('rigid')
+   end function usual_law
 
    !> Where a word stands among `law_words`; 0 where it does not.
    pure integer function law_number(word)

@@ -10,8 +10,8 @@ module fw_usual_law
    use fw_harmonics_options, only: method_hbm
    use fw_harmonics_options, only: sampling_uniform
    use fw_kinds, only: wp
-   use fw_laws, only: law_number
    use fw_laws, only: law_words
+   use fw_laws, only: usual_law
    use fw_reader, only: reader_type
    use fw_values, only: quoted_text
    implicit none (type, external)
@@ -28,8 +28,7 @@ contains
 
       if (reader%given('contact', 'law') .or. case%contact%n_pairs == 0) return
       associate (contact => case%contact)
-         contact%law = law_number('dlft')
-         if (goes_with_events(case)) contact%law = law_number('rigid')
+         contact%law = usual_law(goes_with_events(case))
          ! Integrated in time, the rigid laws are one, and nothing was chosen.
          contact%law_is_chosen = case%analysis /= analysis_time
          call reader%amend('contact', 'law', quoted_text(trim(law_words(contact%law))))

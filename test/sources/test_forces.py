@@ -52,7 +52,7 @@ def law_words() -> list[str]:
 
 def law_modules() -> set[str]:
     """Modules of laws that nobody outside of the laws needs: multipliers follow `fw_friction`."""
-    return uses(LAWS) - {"fw_force_law", "fw_pair_law", "fw_friction"}
+    return uses(LAWS) - {"fw_contact_data", "fw_force_law", "fw_pair_law", "fw_friction"}
 
 
 #: Outside of the laws a law is known by its facts and its prediction. A name of one, or a question
