@@ -16,7 +16,7 @@ NAMES = sorted(
     ".".join(("fretwear", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
         ".__init__") for path in PACKAGE.rglob("*.py"))
 #: What optional packages some modules need at once.
-NEEDS = {"fretwear.sector": "skfem"}
+NEEDS = {"fretwear.disk": "skfem", "fretwear.sector": "skfem"}
 
 
 def imports(name: str) -> set[str]:

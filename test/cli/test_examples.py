@@ -26,6 +26,9 @@ NUMBERS = {
                                   ("contact/dissipation", 0.9, 0, 2.830244154, 2e-5)],
     "bladed_disk/disk.nml": [("amplitude", 2.1885, 5, 0.3722907832442835, 1e-7),
                              ("contact/dissipation", 2.1885, 0, 0.09091664838734204, 1e-6)],
+    "shrouded_disk/wave.nml": [("amplitude", 2.0 * np.pi * 1261.0, 0, 0.01940509147, 1e-7)],
+    # Depth after 13 steps whose sizes follow from an estimate of their error.
+    "shrouded_disk/wear.nml": [("wear/depth", None, 3, 9.36634942e-4, 1e-5)],
     "wear/two_pairs.nml": [("wear/depth", None, 0, 0.2, 1e-5),
                            ("wear/depth", None, 1, 0.0, 0.0)],
     "wear/oscillator.nml": [("wear/depth", None, 0, 0.294758, 2e-6),

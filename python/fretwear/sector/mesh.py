@@ -15,7 +15,7 @@ from skfem import MeshHex1
 
 from .parameters import Discretisation, Geometry, SectorParameters
 
-__all__ = ["BLADE", "DISK", "SectorMesh", "build_mesh"]
+__all__ = ["BLADE", "DISK", "HEX_CORNERS", "SectorMesh", "build_mesh"]
 
 BLADE, DISK = 0, 1
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ Ints = NDArray[np.int64]
 
 # Corners of the quadrilateral (0..3, counter-clockwise from the local origin) and layer
 # (0 below, 1 above) in the vertex order of scikit-fem's reference hexahedron.
-_HEX_CORNERS = ((2, 1), (2, 0), (1, 1), (3, 1), (1, 0), (3, 0), (0, 1), (0, 0))
+HEX_CORNERS = ((2, 1), (2, 0), (1, 1), (3, 1), (1, 0), (3, 0), (0, 1), (0, 0))
 _DECIMALS = 7  # nodes of neighbouring blocks agree to round-off (1e-13 mm); elements are > 0.1 mm
 
 
@@ -142,7 +142,7 @@ def _extrude(points: Floats, quads: Ints, z: Floats) -> tuple[Floats, Ints]:
     """Sweep a cross-section along z: vertices (n * len(z), 3) and hexahedra (m * steps, 8)."""
     n = len(points)
     xyz = np.column_stack((np.tile(points, (len(z), 1)), np.repeat(z, n)))
-    layer = np.column_stack([quads[:, corner] + n * up for corner, up in _HEX_CORNERS])
+    layer = np.column_stack([quads[:, corner] + n * up for corner, up in HEX_CORNERS])
     return xyz, np.vstack([layer + n * k for k in range(len(z) - 1)])
 
 

@@ -10,13 +10,13 @@ from .contact import flank_facets
 from .mesh import BLADE, DISK
 from .model import FullModel, observed_rows, reduced_system
 
-__all__ = ["recovery_mesh"]
+__all__ = ["VTK_ORDER", "cyclic_corners", "recovery_mesh"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Corners of scikit-fem's hexahedron in the order of VTK: round the bottom, then round the top.
-_VTK_ORDER = (7, 4, 1, 5, 6, 2, 0, 3)
+VTK_ORDER = (7, 4, 1, 5, 6, 2, 0, 3)
 
 
 def recovery_mesh(full: FullModel) -> tuple[RecoveryMesh, Floats]:
@@ -38,13 +38,13 @@ def recovery_mesh(full: FullModel) -> tuple[RecoveryMesh, Floats]:
     basis[full.free[at_vertex]] = reduction.basis[at_vertex]
     facets, pairs = zip(*(flank_facets(full.sector, full.parameters, body)
                           for body in (BLADE, DISK)), strict=True)
-    corners = _cyclic(mesh.p.T, mesh.facets[:, np.concatenate(facets)].T)
-    found = RecoveryMesh(mesh.p.T.copy(), mesh.t[list(_VTK_ORDER)].T.copy(), full.sector.body,
+    corners = cyclic_corners(mesh.p.T, mesh.facets[:, np.concatenate(facets)].T)
+    found = RecoveryMesh(mesh.p.T.copy(), mesh.t[list(VTK_ORDER)].T.copy(), full.sector.body,
                          corners, np.concatenate(pairs), basis)
     return found, reduction.row(observed_rows(full))
 
 
-def _cyclic(points: Floats, facets: Ints) -> Ints:
+def cyclic_corners(points: Floats, facets: Ints) -> Ints:
     """Vertices of flat quadrilaterals (n, 4) sorted by the angle around their centre."""
     offset = points[facets] - points[facets].mean(axis=1, keepdims=True)
     first = offset[:, 0]
