@@ -9,7 +9,7 @@ SHELL := /bin/bash
 .PHONY: help deps build debug run test lint keys docs clean
 .PHONY: fuzz wheel ways
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
-.PHONY: bench-peers bench-full compare paper
+.PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
 
 BUILD := build/release
@@ -135,6 +135,9 @@ compare: build ## numbers and work of OTHER (another fw_run) and of this build, 
 
 paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) -m bench.paper.gallery
+
+disk: build ## tables and pictures of docs/shrouded_disk.md
+	PYTHONPATH=python MPLBACKEND=Agg $(PYTHON) -m bench.disk --build $(BUILD)
 
 BEFORE ?=
 rest: build ## where pairs of the velocity law come to rest, also of a program BEFORE

@@ -6,9 +6,11 @@
 `fretwear plot` is in `fretwear.plot.command`.
 """
 
+from .campaigns import plot_campbell, plot_damping, read_damping
 from .command import add_arguments, main
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
+from .disks import plot_nodal_diameters, plot_safe, plot_wave
 from .flanks import plot_flanks
 from .kinds import KINDS, Choices, Kind, fitting
 from .response import (
@@ -23,6 +25,8 @@ from .together import plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
-           "half_power_damping", "main", "plot_convergence", "plot_cycle", "plot_flanks",
-           "plot_harmonics", "plot_hysteresis", "plot_response", "plot_responses", "plot_table",
-           "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps", "read_response"]
+           "half_power_damping", "main", "plot_campbell", "plot_convergence", "plot_cycle",
+           "plot_damping", "plot_flanks", "plot_harmonics", "plot_hysteresis",
+           "plot_nodal_diameters", "plot_response", "plot_responses", "plot_safe", "plot_table",
+           "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps", "read_damping",
+           "read_response"]

@@ -12,6 +12,7 @@ from ..errors import AbsentError, InputError, OutputError
 from ..result import Result
 from ..rows import choose_point
 from ..study.table import is_table
+from .campaigns import plot_campbell, plot_damping
 from .kinds import KINDS, Choices, fitting
 from .table import plot_table
 from .together import plot_responses
@@ -29,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "kinds FILE_kind.png and so on (default: RESULT_kind.png in the "
                              "current folder)")
     parser.add_argument("--kind", metavar="KIND,...",
-                        help=f"what to draw: {', '.join(KINDS)} (default: all that fits)")
+                        help=f"what to draw: {', '.join(KINDS)} (default: all that fits); of "
+                             f"several results {', '.join(TOGETHER)}")
     parser.add_argument("--point", type=int, metavar="N",
                         help="solution point or wear step, from 1; -1 is the last (default: the "
                              "largest amplitude, or the last wear step)")
@@ -42,14 +44,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="modal mass at the observed quantity: damping from the dissipation")
 
 
+    parser.add_argument("--speed", type=float, metavar="OMEGA",
+                        help="rotation speed [rad/s] of the line in a SAFE diagram")
+    parser.add_argument("--nodal-diameter", type=int, metavar="K",
+                        help="of a Campbell diagram (default: 0)")
+
+
+#: What is drawn of several results.
+TOGETHER = ("response", "campbell", "damping")
+
+
 def main(options: argparse.Namespace) -> int:
     """Run `fretwear plot`."""
     if len(options.result) > 1:
-        _only(options, "several results", "kind", "observe")
-        if options.kind not in (None, "response"):
-            raise InputError(f"--kind {options.kind}: of several results the response is drawn")
-        stem = f"{Path(options.result[0]).stem}_together"
-        return _save(plot_responses(options.result, options.observe), options.output, stem)
+        return _draw_together(options)
     source = options.result[0]
     if is_table(source):
         _only(options, "the table of a study")
@@ -57,12 +65,32 @@ def main(options: argparse.Namespace) -> int:
     return _draw_kinds(Result(source), options)
 
 
+def _draw_together(options: argparse.Namespace) -> int:
+    """The picture of several results."""
+    kind = options.kind or "response"
+    if kind not in TOGETHER:
+        raise InputError(f"--kind {options.kind}: of several results one of "
+                         f"{', '.join(TOGETHER)} is drawn")
+    _only(options, "several results", "kind",
+          "nodal_diameter" if kind == "campbell" else "observe")
+    stem = f"{Path(options.result[0]).stem}_{'together' if kind == 'response' else kind}"
+    if kind == "campbell":
+        figure = plot_campbell(options.result, options.nodal_diameter)
+    else:
+        draw = plot_responses if kind == "response" else plot_damping
+        figure = draw(options.result, options.observe)
+    return _save(figure, options.output, stem)
+
+
 def _draw_kinds(result: Result, options: argparse.Namespace) -> int:
     """Every kind of picture that was asked for, or that fits."""
+    if options.nodal_diameter is not None:
+        raise InputError("--nodal-diameter goes with several results and --kind campbell")
     kinds = _kinds(result, options.kind)
     choices = Choices(
         None if options.point is None else choose_point(result, options.point),
-        _numbers(options.pairs), options.observe, options.linear, options.modal_mass)
+        _numbers(options.pairs), options.observe, options.linear, options.modal_mass,
+        options.speed)
     target = _target(options.output, Path(result.name).stem)
     for name in kinds:
         alone = len(kinds) == 1 and options.output is not None
@@ -80,7 +108,8 @@ def _draw_kinds(result: Result, options: argparse.Namespace) -> int:
 
 def _only(options: argparse.Namespace, what: str, *served: str) -> None:
     """Refuse options that a picture of several results or of a study does not take."""
-    for name in ("kind", "point", "pairs", "observe", "linear", "modal_mass"):
+    for name in ("kind", "point", "pairs", "observe", "linear", "modal_mass", "speed",
+                 "nodal_diameter"):
         if name not in served and getattr(options, name) is not None:
             raise InputError(f"--{name.replace('_', '-')} does not go with {what}")
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ..result import Result
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
+from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
 from .response import plot_response
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
@@ -33,6 +34,8 @@ class Choices:
         Result with every pair stuck.
     modal_mass : float or None
         See ``friction_damping``.
+    speed : float or None
+        Rotation speed [rad/s] of the line in a SAFE diagram.
     """
 
     point: int | None = None
@@ -40,6 +43,7 @@ class Choices:
     observe: str | None = None
     linear: str | None = None
     modal_mass: float | None = None
+    speed: float | None = None
 
 
 @dataclass(frozen=True)
@@ -64,10 +68,15 @@ def _has_cycle(result: Result) -> bool:
     return "wear/depth" not in result or len(result.depth) == result.n_points
 
 
+def _has_diameters(result: Result) -> bool:
+    return "modes/open" in result and len(result["modes/open"]) > 1
+
+
 #: Every kind of picture, in the order in which a report shows them.
 KINDS: dict[str, Kind] = {
     "response": Kind(
-        "Frequency response", lambda r: r.n_points > 1 and "wear/depth" not in r,
+        "Frequency response",
+        lambda r: "omega" in r and r.n_points > 1 and "wear/depth" not in r,
         lambda r, c: plot_response(r, c.observe, linear=c.linear, modal_mass=c.modal_mass)),
     "cycle": Kind(
         "One cycle", lambda r: "coefficients" in r and r.n_points > 0 and (
@@ -85,7 +94,15 @@ KINDS: dict[str, Kind] = {
                       lambda r, c: plot_wear_bars(r, c.point)),
     "wear_evolution": Kind("Wear over the cycles", _has("wear/depth", "wear/cycles"),
                            lambda r, c: plot_wear_evolution(r)),
-    "convergence": Kind("Convergence", lambda r: r.n_points > 0 and "iterations" in r,
+    "wave": Kind("Wave over the sectors", lambda r: (
+        "coefficients" in r and r.n_points > 0 and "engine_order" in r.attributes
+        and bool(r.converged.any())), lambda r, c: plot_wave(r, c.point, c.observe)),
+    "nodal_diameters": Kind("Frequencies over the nodal diameter", _has_diameters,
+                            lambda r, c: plot_nodal_diameters(r)),
+    "safe": Kind("Engine orders at a speed",
+                 lambda r: _has_diameters(r) and rotation_speed(r) > 0.0,
+                 lambda r, c: plot_safe(r, c.speed)),
+    "convergence": Kind("Convergence", lambda r: "iterations" in r and r.n_points > 0,
                         lambda r, c: plot_convergence(r)),
 }
 

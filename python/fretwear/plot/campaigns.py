@@ -1,0 +1,157 @@
+"""Pictures of several runs: frequencies over the speed, and peaks over the load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ..errors import AbsentError, InputError
+from ..result import Result
+from .disks import rotation_speed
+from .style import CURVE, PALETTE, Floats, Source, as_result, label, new_figure, tidy, units_of
+
+__all__ = ["plot_campbell", "plot_damping", "read_damping"]
+
+#: Lines of engine orders in a Campbell diagram without an order of the case.
+_ORDERS = (1, 2, 3, 4, 5, 6)
+#: Frequencies of a nodal diameter that are drawn.
+_FAMILIES = 4
+
+
+def plot_campbell(sources: Sequence[Source], nodal_diameter: int | None = None) -> Figure:
+    """Frequencies of a nodal diameter over the rotation speed, with lines of engine orders.
+
+    Parameters
+    ----------
+    sources : sequence of Result or path
+        Results of ``analysis = 'modes'`` of one structure at several `model%rotation_speed`.
+    nodal_diameter : int, optional
+        The first of the results without it.
+
+    Raises
+    ------
+    InputError
+        The results hold no frequencies, or have one speed.
+    """
+    results = sorted((as_result(source) for source in sources), key=rotation_speed)
+    speeds = np.array([rotation_speed(result) for result in results])
+    for result in results:
+        if "modes/open" not in result:
+            raise AbsentError(f"{result.name}: holds no frequencies: run with case%analysis = "
+                              "'modes'")
+    if len(np.unique(speeds)) < 2:
+        raise InputError("the results have one rotation speed; run case%analysis = 'modes' with "
+                         "several model%rotation_speed")
+    known = results[0]["modes/nodal_diameter"].astype(int).tolist()
+    chosen = known[0] if nodal_diameter is None else nodal_diameter
+    if chosen not in known:
+        raise InputError(f"nodal diameter {chosen}: must be among {known[0]} to {known[-1]}")
+    rpm = 30.0 / np.pi * speeds
+    figure = new_figure(8.0, 5.2)
+    axes = figure.subplots()
+    for state, style, colour in (("open", "o--", PALETTE[5]), ("closed", "o-", CURVE)):
+        if all(f"modes/{state}" in result for result in results):
+            rows = np.array([result[f"modes/{state}"][known.index(chosen), :_FAMILIES]
+                             for result in results]) / (2.0 * np.pi)
+            axes.plot(rpm, rows, style, color=colour, markersize=3.5, linewidth=1.2)
+            axes.plot([], [], style, color=colour, markersize=3.5, label=f"pairs {state}")
+    n_sectors = int(results[0].attributes.get("n_sectors", 1))
+    lowest = float(min(result["modes/open"][known.index(chosen), 0] for result in results)
+                   / (2.0 * np.pi))
+    orders = sorted({*_ORDERS, *(o for o in (chosen, n_sectors - chosen) if 0 < o <= 40)})
+    # Families far above all crossings would leave no room for these.
+    top = 1.08 * max(2.5 * lowest, orders[-1] * rpm[-1] / 60.0)
+    _draw_orders(axes, orders, chosen, n_sectors, float(rpm[-1]), top)
+    axes.set_xlim(0.0, rpm[-1])
+    axes.set_ylim(0.0, top)
+    axes.set_xlabel("rotation speed [rpm]")
+    axes.set_ylabel("frequency [Hz]")
+    tidy(axes)
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    figure.suptitle(f"Campbell diagram of nodal diameter {chosen}", fontsize=11)
+    return figure
+
+
+def _draw_orders(axes: Axes, orders: Sequence[int], chosen: int, n_sectors: int, fastest: float,
+                 top: float) -> None:
+    """Lines of engine orders up to a speed [rpm]; bold where they excite the nodal diameter."""
+    named = -np.inf
+    for order in orders:
+        meets = n_sectors == 1 or (order - chosen) % n_sectors == 0 or \
+            (order + chosen) % n_sectors == 0
+        end = order * fastest / 60.0
+        axes.plot([0.0, fastest], [0.0, end], "-", linewidth=1.4 if meets else 0.7,
+                  color=PALETTE[1] if meets else "0.7", zorder=1)
+        if end <= top and (end - named > 0.04 * top or (meets and n_sectors > 1)):
+            axes.annotate(f"EO {order}", (fastest, end), xytext=(3, -2), fontsize=8,
+                          textcoords="offset points", annotation_clip=False)
+            named = end
+
+
+def read_damping(sources: Sequence[Source], observe: str | None = None) -> NDArray[np.float64]:
+    """Peaks of sweeps that differ in their load, by the load.
+
+    Returns
+    -------
+    (n_results, 4) array
+        Amplitude of the load [F], mean interference of the pairs [L] (0: none), largest amplitude
+        of harmonic 1 of the observed quantity over the load [L/F], where it is [Hz].
+    """
+    rows = []
+    for result in (as_result(source) for source in sources):
+        if "omega" not in result or result.n_points < 2:
+            raise AbsentError(f"{result.name}: is no sweep, which has a peak")
+        with result.case.open() as session:
+            load = float(np.hypot(session.part("load/cosine"), session.part("load/sine")).max())
+            gap: Floats = session.part("contact/gap")
+        if load == 0.0:
+            raise InputError(f"{result.name}: has no load that vibrates")
+        size = np.where(result.converged, np.abs(result.harmonic(1, observe)), -np.inf)
+        at = int(np.argmax(size))
+        if not np.isfinite(size[at]):
+            raise InputError(f"{result.name}: no point converged")
+        rows.append((load, -float(gap.mean()) if len(gap) else 0.0, size[at] / load,
+                     result.frequency[at]))
+    return np.array(sorted(rows))
+
+
+def plot_damping(sources: Sequence[Source], observe: str | None = None) -> Figure:
+    """Peak amplitude over the load, and its frequency, against the load: where friction damps best.
+
+    Against the load over the interference, where pairs have one: only that counts for an elastic
+    law. The amplitude is that of harmonic 1, without the static displacement.
+
+    Parameters
+    ----------
+    sources : sequence of Result or path
+        Sweeps of one structure that differ in `load%harmonic_scale`, or in `contact%gap`.
+    observe : str, optional
+        Observed quantity; the first one without it.
+    """
+    results: list[Result] = [as_result(source) for source in sources]
+    found = read_damping(results, observe)
+    length, force = units_of(results[0], "amplitude"), units_of(results[0], "contact/force")
+    preloaded = bool((found[:, 1] > 0.0).all())
+    abscissa = found[:, 0] / found[:, 1] if preloaded else found[:, 0]
+    order = np.argsort(abscissa)
+    figure = new_figure(7.6, 5.8)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.loglog(abscissa[order], found[order, 2], "o-", color=CURVE, markersize=4.0)
+    name = results[0].observed[results[0].index(observe)]
+    upper.set_ylabel(label(f"peak of {name} over load", _ratio(length, force)))
+    lower.semilogx(abscissa[order], found[order, 3], "o-", color=PALETTE[1], markersize=4.0)
+    lower.set_ylabel("frequency of the peak [Hz]")
+    lower.set_xlabel(label("load over interference", _ratio(force, length)) if preloaded
+                     else label("load", force))
+    for axes in (upper, lower):
+        tidy(axes)
+    figure.suptitle("Damping curve", fontsize=11)
+    return figure
+
+
+def _ratio(over: str, under: str) -> str:
+    return f"{over}/{under}" if over and under else ""

@@ -1,0 +1,146 @@
+"""Pictures of bladed disks show the numbers of their results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import run
+
+from fretwear import AbsentError, InputError, Result
+from fretwear.cli import main
+from fretwear.plot import (
+    KINDS,
+    Choices,
+    fitting,
+    plot_campbell,
+    plot_damping,
+    plot_nodal_diameters,
+    plot_safe,
+    plot_wave,
+    read_damping,
+)
+from fretwear.plot.disks import folded
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "example"
+DISK = EXAMPLE / "bladed_disk" / "disk.nml"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("disks")
+
+
+@pytest.fixture(scope="module")
+def modes(folder: Path) -> Result:
+    return run(EXAMPLE / "shrouded_disk" / "wave.nml", folder / "modes.h5", "case%analysis=modes",
+               "model%rotation_speed=250")
+
+
+@pytest.fixture(scope="module")
+def wave(folder: Path) -> Result:
+    return run(DISK, folder / "wave.h5", "sweep%n_points=3")
+
+
+def test_engine_orders_fold_at_half_of_the_sectors() -> None:
+    assert folded(np.arange(-9, 15), 7).tolist() == [
+        2, 1, 0, 1, 2, 3, 3, 2, 1, 0, 1, 2, 3, 3, 2, 1, 0, 1, 2, 3, 3, 2, 1, 0]
+    assert folded(np.array([18, 19, 36, 40]), 36).tolist() == [18, 17, 0, 4]
+
+
+def test_kinds_that_fit(modes: Result, wave: Result, folder: Path) -> None:
+    assert fitting(modes) == ["nodal_diameters", "safe"]
+    assert "wave" in fitting(wave) and "safe" not in fitting(wave)
+    still = run(DISK, folder / "still.h5", "case%analysis=modes")
+    assert fitting(still) == ["nodal_diameters"]
+    plain = run(EXAMPLE / "duffing" / "duffing.nml", folder / "plain.h5", "sweep%n_points=2")
+    assert not {"wave", "nodal_diameters", "safe"} & set(fitting(plain))
+    for result in (modes, wave, still):
+        for name in fitting(result):
+            figure = KINDS[name].draw(result, Choices())
+            assert any(axes.has_data() for axes in figure.axes), name
+
+
+def test_frequencies_over_the_nodal_diameter(modes: Result) -> None:
+    (axes,) = plot_nodal_diameters(modes).axes
+    first = axes.lines[0]
+    assert first.get_xdata() == pytest.approx(np.arange(19))
+    assert first.get_ydata() == pytest.approx(modes["modes/open"][:, 0] / (2.0 * np.pi))
+    assert axes.get_xlabel() == "nodal diameter" and axes.get_ylabel() == "frequency [Hz]"
+
+
+def test_line_of_the_speed(modes: Result) -> None:
+    """Squares are engine orders: at their frequency, and at the nodal diameter that they excite."""
+    (axes,) = plot_safe(modes).axes
+    squares = next(line for line in axes.lines if line.get_marker() == "s")
+    order = np.asarray(squares.get_ydata()) / (250.0 / (2.0 * np.pi))
+    assert order == pytest.approx(np.arange(len(order)))
+    assert np.asarray(squares.get_xdata())[[4, 18, 32, 40]].tolist() == [4, 18, 4, 4]
+    fast = next(line for line in plot_safe(modes, 500.0).axes[0].lines
+                if line.get_marker() == "s")
+    assert np.asarray(fast.get_ydata())[1] == pytest.approx(500.0 / (2.0 * np.pi))
+
+
+def test_wave_over_the_sectors(wave: Result) -> None:
+    (axes,) = plot_wave(wave, 1, "u6").axes
+    first = axes.lines[0]
+    column = wave.index("u6")
+    expected = [wave.sector(j)[1, :, column] for j in range(8)]
+    # At phase 0 the cosines add up.
+    assert first.get_ydata() == pytest.approx([c[0] + c[1::2].sum() for c in expected])
+    assert np.asarray(first.get_ydata())[7] == pytest.approx(np.asarray(first.get_ydata())[0])
+    assert "towards lower sectors" in axes.get_title()  # engine order 5 of 7 sectors
+
+
+def test_campbell_diagram(modes: Result, folder: Path) -> None:
+    slow = run(EXAMPLE / "shrouded_disk" / "wave.nml", folder / "slow.h5", "case%analysis=modes")
+    (axes,) = plot_campbell([modes, slow], 4).axes
+    first = axes.lines[0]
+    assert first.get_xdata() == pytest.approx([0.0, 250.0 * 30.0 / np.pi])
+    assert first.get_ydata() == pytest.approx(
+        [r["modes/open"][4, 0] / (2.0 * np.pi) for r in (slow, modes)])
+    # The blades stiffen as they are pulled.
+    assert first.get_ydata()[1] > 1.003 * first.get_ydata()[0]
+    with pytest.raises(InputError, match="one rotation speed"):
+        plot_campbell([slow, slow])
+    with pytest.raises(InputError, match="among 0 to 18"):
+        plot_campbell([modes, slow], 19)
+
+
+def test_damping_curve(wave: Result, folder: Path) -> None:
+    double = run(DISK, folder / "double.h5", "sweep%n_points=3", "load%harmonic_scale=2")
+    found = read_damping([double, wave], "u6")
+    load = 0.5 * np.hypot(1.0, 0.2)  # cosine 0.5 and sine -0.1, at dof 5
+    assert found[:, 0] == pytest.approx([load, 2.0 * load])
+    assert found[:, 1] == pytest.approx(0.08)
+    largest = np.abs(wave.harmonic(1, "u6")).max()
+    assert found[0, 2] == pytest.approx(largest / load)
+    upper, _ = plot_damping([double, wave], "u6").axes
+    assert upper.lines[0].get_xdata() == pytest.approx(found[:, 0] / 0.08)
+
+
+def test_what_cannot_be_drawn(modes: Result, wave: Result, folder: Path) -> None:
+    with pytest.raises(AbsentError, match="analysis = 'modes'"):
+        plot_nodal_diameters(wave)
+    with pytest.raises(AbsentError, match="cyclic"):
+        plot_wave(run(EXAMPLE / "duffing" / "duffing.nml", folder / "a.h5", "sweep%n_points=2"))
+    with pytest.raises(AbsentError, match="rotation_speed"):
+        plot_safe(run(DISK, folder / "b.h5", "case%analysis=modes"))
+    with pytest.raises(AbsentError, match="no sweep"):
+        plot_damping([modes, modes])
+
+
+def test_command_line(modes: Result, wave: Result, folder: Path, monkeypatch: pytest.MonkeyPatch,
+                      capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(folder)
+    paths = [str(modes.path), str(folder / "slow2.h5")]
+    run(EXAMPLE / "shrouded_disk" / "wave.nml", Path(paths[1]), "case%analysis=modes")
+    assert main(["plot", paths[0]]) == 0
+    assert {"modes_nodal_diameters.png", "modes_safe.png"} <= {p.name for p in folder.iterdir()}
+    assert main(["plot", *paths, "--kind", "campbell", "--nodal-diameter", "4"]) == 0
+    assert (folder / "modes_campbell.png").exists()
+    assert main(["plot", *paths, "--kind", "safe"]) == 3
+    assert "response, campbell, damping" in capsys.readouterr().err
+    assert main(["plot", *paths, "--kind", "campbell", "--observe", "tip"]) == 3
+    assert main(["plot", paths[0], "--nodal-diameter", "4"]) == 3
