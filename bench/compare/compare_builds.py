@@ -46,8 +46,8 @@ TOLERANCE = 1e-12
 RESIDUAL_TOLERANCE = 1e-9
 #: What the clock makes.
 CLOCK = ("seconds",)
-#: What looks for peaks between the points, by its name in a program of gfortran.
-SEARCH = "__fw_peak_finder_MOD_search"
+#: What looks for peaks between the points, by its names in a program of gfortran.
+SEARCH = "__fw_peak_finder_MOD_search", "__fw_joint_modes_MOD_find_joint_modes"
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
@@ -184,7 +184,7 @@ def count_instructions(program: Path, case: Case, folder: Path) -> tuple[float, 
         found = re.search(rf"^ *([\d,]+) .*{pattern}", listing, re.MULTILINE)
         return float(found[1].replace(",", "")) if found else 0.0
 
-    return read("PROGRAM TOTALS"), read(SEARCH)
+    return read("PROGRAM TOTALS"), sum(map(read, SEARCH))
 
 
 def compare_instructions(cases: list[Case], programs: tuple[Path, Path], folder: Path) -> None:

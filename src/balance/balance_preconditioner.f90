@@ -149,8 +149,9 @@ contains
                   mean = mean_block(work%jacobian(:, :, i), self%problem%fourier%harmonic(h), &
                                     (c_in - 1)*nc + k, (c_out - 1)*nc + k)
                else
-                  ! Stuck: each direction transmits what is predicted for it.
-                  mean = merge(one, zero, c_in == c_out)
+                  ! Stuck: each direction transmits what is predicted for it, and nothing else.
+                  if (c_in /= c_out) cycle
+                  mean = one
                end if
                call add_rows(self, entry, h, i, c_out, c_in, work%linear_rests(i), &
                              scale*mean, stiffness, m)

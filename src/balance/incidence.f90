@@ -162,7 +162,8 @@ contains
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: factor
       real(wp), intent(in) :: q(n_mapped, *)
-      real(wp), intent(out) :: values(:)
+      real(wp), intent(out), contiguous :: values(:)
+      real(wp) :: weight
       integer :: e, k, place
 
       values = 0.0_wp
@@ -173,8 +174,10 @@ contains
             call add_turned(self, e, .false., size(values), factor, q(place, :size(values)), values)
             cycle
          end if
+         ! The same for all coefficients: the product is taken from the left.
+         weight = factor*self%weight(e)
          do k = 1, size(values)
-            values(k) = values(k) + factor*self%weight(e)*q(place, k)
+            values(k) = values(k) + weight*q(place, k)
          end do
       end do
    end subroutine gather_row
@@ -189,6 +192,7 @@ contains
       real(wp), intent(in) :: factor
       real(wp), intent(in) :: values(:)
       real(wp), intent(inout) :: q(n_stored, *)
+      real(wp) :: weight
       integer :: e, k, place
 
       do e = self%first(row), self%first(row + 1) - 1
@@ -198,8 +202,9 @@ contains
             call add_turned(self, e, .true., size(values), factor, values, q(place, :size(values)))
             cycle
          end if
+         weight = factor*self%weight(e)
          do k = 1, size(values)
-            q(place, k) = q(place, k) + factor*self%weight(e)*values(k)
+            q(place, k) = q(place, k) + weight*values(k)
          end do
       end do
    end subroutine scatter_row

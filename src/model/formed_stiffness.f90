@@ -107,14 +107,22 @@ contains
       complex(wp), intent(inout), optional :: load(:)
       complex(wp), allocatable :: z_iq(:, :), solved(:, :), part(:)
       integer :: j, n_i, n_right, n_used
+      logical :: in_order
 
       n_i = basis%n_internal
       n_used = size(used)
       n_right = n_active
       if (present(load)) n_right = n_active + 1
+      ! A vector subscript copies what it selects: not where that is everything in its order.
+      in_order = all([(used(j) == j, j=1, n_used)])
       do j = 1, n_active
-         call combine(n_used, basis%n_blocks, theta, s, basis%blocks(used, used(j), :), &
-                      matrix(:, j))
+         if (in_order) then
+            call combine(n_used, basis%n_blocks, theta, s, basis%blocks(:n_used, j, :), &
+                         matrix(:, j))
+         else
+            call combine(n_used, basis%n_blocks, theta, s, basis%blocks(used, used(j), :), &
+                         matrix(:, j))
+         end if
       end do
       if (n_i == 0) return
       allocate (z_iq(n_i, n_used), solved(n_i, n_right), part(n_used))
