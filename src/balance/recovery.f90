@@ -13,7 +13,7 @@ module fw_recovery
    private
 
    public :: observe, observed_coefficients, recover_point, recover_histories
-   public :: largest_magnitude, carry_solution
+   public :: largest_magnitude, carry_solution, peak_angles
 
 contains
 
@@ -254,6 +254,52 @@ contains
          largest = max(largest, abs(value))
       end do
    end function largest_magnitude
+
+   !> Where |u(tau)| is largest, as largest_magnitude finds it, and where a second peak is as high;
+   !> of more than two the first and the last.
+   pure subroutine peak_angles(coefficients, largest, n_peaks, angle, side)
+      real(wp), intent(in) :: coefficients(:)
+      real(wp), intent(out) :: largest
+      !> 1, or 2 where peaks are alike.
+      integer, intent(out) :: n_peaks
+      !> Angles of the peaks and signs of u there.
+      real(wp), intent(out) :: angle(2), side(2)
+      integer, parameter :: points_per_wave = 16, newton_steps = 8
+      !> Peaks that differ by less are alike: beyond it one of the two decides.
+      real(wp), parameter :: alike = 1.0e-9_wp
+      real(wp) :: value, slope, curvature, tau, spacing
+      real(wp), allocatable :: grid(:)
+      integer :: k, i, n_grid
+
+      n_grid = points_per_wave*max(1, (size(coefficients) - 1)/2)
+      spacing = 2.0_wp*pi/real(n_grid, wp)
+      largest = largest_magnitude(coefficients)
+      allocate (grid(0:n_grid + 1))
+      do k = 0, n_grid + 1
+         call evaluate(coefficients, k*spacing, grid(k), slope, curvature)
+      end do
+      n_peaks = 0
+      angle = 0.0_wp
+      side = 0.0_wp
+      do k = 1, n_grid
+         if (abs(grid(k)) < max(abs(grid(k - 1)), abs(grid(k + 1)))) cycle
+         tau = k*spacing
+         do i = 1, newton_steps
+            call evaluate(coefficients, tau, value, slope, curvature)
+            if (abs(curvature) <= 0.0_wp) exit
+            tau = tau - max(-spacing, min(spacing, slope/curvature))
+         end do
+         call evaluate(coefficients, tau, value, slope, curvature)
+         if (abs(value) < (1.0_wp - alike)*largest) cycle
+         ! Two points of the grid that are as high share a peak.
+         if (n_peaks > 0) then
+            if (minval(1.0_wp - cos(tau - angle(:n_peaks))) < spacing**2/8.0_wp) cycle
+         end if
+         n_peaks = min(2, n_peaks + 1)
+         angle(n_peaks) = tau
+         side(n_peaks) = sign(1.0_wp, value)
+      end do
+   end subroutine peak_angles
 
    !> u, u' and u'' at an angle, by turning a unit vector from harmonic to harmonic.
    pure subroutine evaluate(coefficients, tau, value, slope, curvature)

@@ -30,6 +30,7 @@ module fw_linalg
       procedure :: reserve => reserve_real
       procedure :: factor => factor_real
       procedure :: solve => solve_real
+      procedure :: solve_transposed
       procedure :: determinant_sign
    end type lu_type
 
@@ -79,6 +80,15 @@ contains
 
       call dgetrs('N', self%n, 1, self%matrix, size(self%matrix, 1), self%pivot, b, size(b), info)
    end subroutine solve_real
+
+   !> Solve in place with the transposed matrix (n).
+   subroutine solve_transposed(self, b)
+      class(lu_type), intent(in) :: self
+      real(wp), intent(inout), contiguous :: b(:)
+      integer :: info
+
+      call dgetrs('T', self%n, 1, self%matrix, size(self%matrix, 1), self%pivot, b, size(b), info)
+   end subroutine solve_transposed
 
    !> Sign of the determinant of the factored matrix: -1, 1, or 0 where it is singular.
    pure integer function determinant_sign(self)

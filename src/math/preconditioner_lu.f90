@@ -29,6 +29,7 @@ module fw_preconditioner_lu
       procedure :: reserve
       procedure :: factor
       procedure :: solve
+      procedure :: solve_transposed
    end type preconditioner_lu_type
 
 contains
@@ -80,5 +81,23 @@ contains
       ! x = A^-1 b = scale largest (scale A)^-1 (b/largest).
       b = self%scale*largest*cmplx(self%rhs(:self%n), kind=wp)
    end subroutine solve
+
+   !> As `solve`, with the transposed matrix.
+   subroutine solve_transposed(self, b)
+      class(preconditioner_lu_type), intent(inout) :: self
+      complex(wp), intent(inout), contiguous :: b(:)
+      real(wp) :: largest
+      integer :: ld
+
+      largest = max(maxval(abs(real(b, wp))), maxval(abs(aimag(b))))
+      if (.not. largest > 0.0_wp) return
+      ld = size(self%matrix, 1)
+      self%rhs(:self%n) = cmplx(b/largest, kind=sp)
+      ! (P L U)^T = U^T L^T P^T: the other way round, and the swaps last.
+      call ctrsv('U', 'T', 'N', self%n, self%matrix, ld, self%rhs, 1)
+      call ctrsv('L', 'T', 'U', self%n, self%matrix, ld, self%rhs, 1)
+      call claswp(1, self%rhs, ld, 1, self%n, self%pivot, -1)
+      b = self%scale*largest*cmplx(self%rhs(:self%n), kind=wp)
+   end subroutine solve_transposed
 
 end module fw_preconditioner_lu

@@ -40,6 +40,8 @@ module fw_plain_structure
    use fw_structure_operator, only: structure_operator
    use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
+   use fw_whole_field, only: complete_harmonic
+   use fw_whole_field, only: condense_harmonic
    implicit none (type, external)
    private
 
@@ -67,6 +69,12 @@ module fw_plain_structure
       procedure :: mass
       procedure :: held_modes
       procedure :: magnitudes
+      procedure :: whole_size
+      procedure :: condense_field
+      procedure :: complete_field
+      procedure :: observe_field
+      procedure :: observe_back
+      procedure :: change_field
    end type plain_structure
 
    type, extends(structure_state) :: plain_state
@@ -107,6 +115,7 @@ contains
       call new_reduction(model, relative, harmonic, omega_range, self%basis, error, keep_all, &
                          held)
       if (allocated(error)) return
+      self%knows_field = .true.
       self%n_coordinates = self%basis%n_coordinates
       self%n_relative = relative%n_coordinates
       self%kept = self%basis%kept
@@ -653,5 +662,95 @@ contains
                         theta*abs(self%basis%blocks(:m, j, 2)))*amplitude(j)
       end do
    end subroutine magnitudes
+
+   pure integer function whole_size(self)
+      class(plain_structure), intent(in) :: self
+
+      whole_size = self%n_coordinates + self%basis%n_internal
+   end function whole_size
+
+   subroutine condense_field(self, state, field, load)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: load(:, :)
+      integer :: h
+
+      select type (state)
+      type is (plain_state)
+         do h = 1, size(self%harmonic)
+            call condense_harmonic(self%basis, state%factors%theta(h), state%factors%s(h), &
+                                   field(:, h), load(:, h))
+         end do
+      end select
+   end subroutine condense_field
+
+   subroutine complete_field(self, state, q, load, field)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp), intent(in), optional :: load(:, :)
+      complex(wp), intent(out) :: field(:, :)
+      complex(wp) :: own(self%basis%n_internal)
+      integer :: h, m
+
+      m = self%n_coordinates
+      select type (state)
+      type is (plain_state)
+         do h = 1, size(self%harmonic)
+            if (present(load)) then
+               own = load(m + 1:, h)
+            else
+               own = harmonic_load(self%basis%load_i, self%basis%waves, self%harmonic(h), &
+                                   state%factors%s(h))
+            end if
+            field(:m, h) = q(:, h)
+            call complete_harmonic(self%basis, state%factors%theta(h), state%factors%s(h), &
+                                   q(:, h), own, field(m + 1:, h))
+         end do
+      end select
+   end subroutine complete_field
+
+   pure subroutine observe_field(self, field, observed)
+      class(plain_structure), intent(in) :: self
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: observed(:, :)
+
+      associate (m => self%n_coordinates, b => self%basis)
+         observed = matmul(b%observe_q, field(:m, :)) + matmul(b%observe_i, field(m + 1:, :))
+      end associate
+   end subroutine observe_field
+
+   pure subroutine observe_back(self, observed, field)
+      class(plain_structure), intent(in) :: self
+      complex(wp), intent(in) :: observed(:, :)
+      complex(wp), intent(out) :: field(:, :)
+
+      associate (m => self%n_coordinates, b => self%basis)
+         field(:m, :) = matmul(transpose(b%observe_q), observed)
+         field(m + 1:, :) = matmul(transpose(b%observe_i), observed)
+      end associate
+   end subroutine observe_back
+
+   pure subroutine change_field(self, state, number, field, slope)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: number
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: slope(:, :)
+      integer :: h
+
+      associate (b => self%basis)
+         slope = matmul(b%change_k(:, :, number), field)
+         do h = 1, size(self%harmonic)
+            if (self%harmonic(h) == 0) then
+               slope(:, h) = slope(:, h) - b%change_load(:, number)
+            else
+               slope(:, h) = slope(:, h) + cmplx(0.0_wp, self%harmonic(h)*state%omega, wp)* &
+                             matmul(b%change_c(:, :, number), field(:, h))
+            end if
+         end do
+      end associate
+   end subroutine change_field
 
 end module fw_plain_structure

@@ -37,6 +37,10 @@ module fw_reduction
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       real(wp), allocatable :: observe_q(:, :), observe_i(:, :)
       type(load_waves) :: waves
+      !> Changes of K and C by parameters of the model, rows and columns of the coordinates, then of
+      !> the internal modes (n, n, n_changes), and of the static load (n, n_changes); not allocated
+      !> where none was asked for.
+      real(wp), allocatable :: change_k(:, :, :), change_c(:, :, :), change_load(:, :)
    end type reduction_type
 
    !> What asks for the eigenproblem, and neither depends on harmonics nor on frequencies: balances
@@ -98,7 +102,31 @@ contains
          call transform(model, t_q, t_i, self)
       end if
       self%kept = pack([(j, j=1, size(keep))], keep)
+      if (allocated(model%changes)) call transform_changes(model, t_q, t_i, self)
    end subroutine new_reduction
+
+   !> What parameters change, in the basis. It spans all motions, so that its own dependence on the
+   !> parameters changes no solution.
+   subroutine transform_changes(model, t_q, t_i, self)
+      type(model_type), intent(in) :: model
+      real(wp), intent(in) :: t_q(:, :), t_i(:, :)
+      type(reduction_type), intent(inout) :: self
+      real(wp), allocatable :: t(:, :)
+      integer :: k, m, n
+
+      m = size(t_q, 2)
+      n = m + size(t_i, 2)
+      allocate (t(size(t_q, 1), n))
+      t(:, :m) = t_q
+      t(:, m + 1:) = t_i
+      allocate (self%change_k(n, n, size(model%changes)), self%change_load(n, size(model%changes)))
+      allocate (self%change_c, mold=self%change_k)
+      do k = 1, size(model%changes)
+         self%change_k(:, :, k) = congruence(t, model%changes(k)%stiffness, t)
+         self%change_c(:, :, k) = congruence(t, model%changes(k)%damping, t)
+         self%change_load(:, k) = matmul(model%changes(k)%load_static, t)
+      end do
+   end subroutine transform_changes
 
    pure logical function is_known(self)
       class(held_basis), intent(in) :: self

@@ -43,6 +43,9 @@ module fw_structure_operator
       !> Harmonics in use and the columns of their coefficients (n_retained).
       integer, allocatable :: harmonic(:), column(:)
       integer :: n_coefficients = 0
+      !> Whether the Z_n are symmetric, and the procedures of the whole field answer: those from
+      !> `whole_size` on.
+      logical :: knows_field = .false.
    contains
       procedure(make_state), deferred :: new_state
       procedure(stand_at), deferred :: at
@@ -59,6 +62,12 @@ module fw_structure_operator
       procedure(read_mass), deferred :: mass
       procedure(list_modes), deferred :: held_modes
       procedure(sum_magnitudes), deferred :: magnitudes
+      procedure :: whole_size
+      procedure :: condense_field
+      procedure :: complete_field
+      procedure :: observe_field
+      procedure :: observe_back
+      procedure :: change_field
    end type structure_operator
 
    abstract interface
@@ -207,5 +216,79 @@ contains
          self%n_coefficients = self%n_coefficients + merge(1, 2, harmonic(h) == 0)
       end do
    end subroutine lay_out_coefficients
+
+   ! The whole field: the coordinates and what is condensed behind them, complex amplitudes
+   ! (whole_size, n_retained). Structures without it leave these as they are.
+
+   !> Coordinates and condensed unknowns of one harmonic.
+   pure integer function whole_size(self)
+      class(structure_operator), intent(in) :: self
+
+      whole_size = self%n_coordinates
+   end function whole_size
+
+   !> Loads of the whole field as loads of the coordinates: F_q - Z_qi D^-1 F_i.
+   subroutine condense_field(self, state, field, load)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: field(:, :)
+      !> (n_coordinates, n_retained)
+      complex(wp), intent(out) :: load(:, :)
+
+      load = field(:self%n_coordinates, :)
+      associate (unused => state)
+      end associate
+   end subroutine condense_field
+
+   !> The condensed part from the coordinates and its own load: x = D^-1 (F_i - Z_iq q).
+   subroutine complete_field(self, state, q, load, field)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      !> Loads of the whole field, or those of the structure itself where it is not given.
+      complex(wp), intent(in), optional :: load(:, :)
+      complex(wp), intent(out) :: field(:, :)
+
+      field = q
+      associate (unused => self, unused_state => state, unused_load => load)
+      end associate
+   end subroutine complete_field
+
+   !> Observed quantities of a field (n_observed, n_retained).
+   pure subroutine observe_field(self, field, observed)
+      class(structure_operator), intent(in) :: self
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: observed(:, :)
+
+      observed = (0.0_wp, 0.0_wp)
+      associate (unused => self, unused_field => field)
+      end associate
+   end subroutine observe_field
+
+   !> The transpose of `observe_field`.
+   pure subroutine observe_back(self, observed, field)
+      class(structure_operator), intent(in) :: self
+      complex(wp), intent(in) :: observed(:, :)
+      complex(wp), intent(out) :: field(:, :)
+
+      field = (0.0_wp, 0.0_wp)
+      associate (unused => self, unused_observed => observed)
+      end associate
+   end subroutine observe_back
+
+   !> Slope of the equations of the whole field by a change of the model (`changes` of model_type):
+   !> (dK + i n omega dC) u - dF.
+   pure subroutine change_field(self, state, number, field, slope)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: number
+      complex(wp), intent(in) :: field(:, :)
+      complex(wp), intent(out) :: slope(:, :)
+
+      slope = (0.0_wp, 0.0_wp)
+      associate (unused => self, unused_state => state, unused_number => number, &
+                 unused_field => field)
+      end associate
+   end subroutine change_field
 
 end module fw_structure_operator
