@@ -146,6 +146,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    (n_pairs):             "contact/dissipation", energy per cycle
    "history/observed", "history/force", "history/relative_displacement",
    "floquet/multipliers", "floquet/stable": where the case asks for them.
+   "sensitivity/QUANTITY/PARAMETER" ([n_observed][, n_pairs]), "sensitivity/deviation/QUANTITY":
+   derivatives, with group &sensitivity.
    "wear/cycles" (1), "wear/depth", "wear/rate" and "wear/energy" (n_pairs), "wear/volume"
    (n_patches): of the steps of a wear run. */
 int fw_size(fw_handle handle, const char *name, int point, size_t *n);

@@ -13,7 +13,7 @@ from typing import Literal, TypedDict
 from numpy.typing import ArrayLike
 
 __all__ = ["CaseGroup", "Contact", "Cyclic", "Groups", "Harmonics", "Load", "Output", "PseudoTime",
-           "Solver", "Spring", "Structure", "Sweep", "Time", "Wear"]
+           "Sensitivity", "Solver", "Spring", "Structure", "Sweep", "Time", "Wear"]
 
 
 class CaseGroup(TypedDict, total=False):
@@ -28,6 +28,20 @@ class CaseGroup(TypedDict, total=False):
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
     max_seconds: float
+
+
+class Sensitivity(TypedDict, total=False):
+    """Group &sensitivity: derivatives of the response by parameters of the case."""
+
+    #: what the response is differentiated by: 'contact%mu', 'load%harmonic_scale', ...; only:
+    #: analysis = 'frf', 'point' (default: none: no derivatives)
+    parameters: str | int | Sequence[str | int]
+    #: what is differentiated: first_harmonic, largest, dissipation, wear_volume; only: parameters
+    #: (default: all that the case has)
+    quantities: str | int | Sequence[str | int]
+    #: standard deviation of each parameter over its value, for that of the quantities; only:
+    #: parameters (default: none)
+    deviation: ArrayLike
 
 
 class Structure(TypedDict, total=False):
@@ -334,6 +348,7 @@ class Groups(TypedDict, total=False):
     """All groups; `model` is the one that `structure` stands for where a model is an argument."""
 
     case: CaseGroup
+    sensitivity: Sensitivity
     structure: Structure
     cyclic: Cyclic
     contact: Contact

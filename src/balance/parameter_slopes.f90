@@ -71,6 +71,8 @@ module fw_parameter_slopes
       !> Observed quantities where all coordinates rest (n_observed, n_retained), and the field of
       !> the solution (whole_size, n_retained), where the structure knows it.
       complex(wp), allocatable :: at_rest(:, :), field(:, :)
+      !> The motion (n_coordinates * n_coefficients).
+      real(wp), allocatable :: x(:)
    contains
       procedure :: start
       procedure :: prepare
@@ -110,6 +112,7 @@ contains
       real(wp) :: rest(size(x))
       complex(wp), allocatable :: q(:, :)
 
+      self%x = x
       rest = 0.0_wp
       call observe(state, rest, self%at_rest)
       associate (problem => state%problem, m => state%problem%structure%n_coordinates)
@@ -239,20 +242,22 @@ contains
       presses = state%problem%forces%entry(state%problem%forces%pairs)%row(3, pair) > 0
    end function presses
 
-   !> Relative displacement of a component, in the columns of the twin: the input over its
-   !> stiffness, where that is one.
+   !> Relative displacement of a component, in the columns of the twin.
    subroutine elongation(self, state, pair, component, values)
       class(slope_finder), intent(in) :: self
       type(balance_state), intent(in) :: state
       integer, intent(in) :: pair, component
       real(wp), intent(out) :: values(:)
+      real(wp) :: own(size(self%column))
 
       values = 0.0_wp
-      associate (k => self%law%prediction%stiffness(pair, component))
-         if (state%problem%forces%entry(state%problem%forces%pairs)%row(component, pair) == 0) return
-         ! A pair whose stiffness is 0 gives way to one beside it, and has no derivative of its own.
-         if (k > 0.0_wp) values = self%work%prediction(pair, component, :)/k
+      associate (p => state%problem, &
+                 row => state%problem%forces%entry(state%problem%forces%pairs)%row)
+         if (row(component, pair) == 0) return
+         call p%incidence%gather_row(row(component, pair), p%incidence%identity, &
+                                     p%structure%n_coordinates, 1.0_wp, self%x, own)
       end associate
+      values(self%column) = own
    end subroutine elongation
 
    !> output = G input of one pair of the twin.

@@ -5,7 +5,7 @@ module fw_point
    implicit none (type, external)
    private
 
-   public :: point_type
+   public :: point_type, point_sensitivity
    public :: served_words, served_by_none, served_by_newton, served_by_other_guess, &
              served_by_smaller_steps, served_by_raised_load, served_by_pseudo_time, &
              served_by_free_guess, served_by_powell, served_by_kinsol, served_by_arclength, &
@@ -23,6 +23,15 @@ module fw_point
                          served_by_raised_load = 5, served_by_free_guess = 6, &
                          served_by_powell = 7, served_by_kinsol = 8, served_by_arclength = 9, &
                          served_by_other_balance = 10
+
+   !> Derivatives of one quantity by one parameter, or the deviation of the quantity.
+   type :: point_sensitivity
+      !> As in quantity_words and parameter_words; parameter 0: standard deviation.
+      integer :: quantity = 0
+      integer :: parameter = 0
+      !> The pair or spring runs faster than what is observed.
+      real(wp), allocatable :: values(:)
+   end type point_sensitivity
 
    type :: point_type
       !> Angular frequency of the excitation [rad/s].
@@ -77,6 +86,8 @@ module fw_point
       real(wp), allocatable :: force_history(:, :, :), slip_history(:, :, :)
       !> Instants of a period that its forces ask for, where they had fewer; else 0.
       integer :: instants_wanted = 0
+      !> Derivatives by parameters, only when asked for; NaN where there is none, as at a fold.
+      type(point_sensitivity), allocatable :: sensitivity(:)
    end type point_type
 
 end module fw_point

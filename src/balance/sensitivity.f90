@@ -54,11 +54,14 @@ module fw_sensitivity
       !> Work so far.
       type(linear_step_type) :: linear
       integer :: n_direct = 0, n_adjoint = 0
-      type(slope_finder), private :: slopes
+      type(slope_finder), pointer, private :: slopes => null()
       type(balance_state), pointer, private :: state => null()
+      !> Of the last motion; another one takes another state.
+      type(balance_problem), pointer, private :: problem => null()
    contains
       procedure :: find
       procedure :: clear
+      final :: release
    end type sensitivity_finder
 
 contains
@@ -106,8 +109,10 @@ contains
       real(wp) :: r(size(x))
       integer :: k
 
+      if (associated(self%state) .and. .not. associated(self%problem, problem)) call self%clear()
       if (.not. associated(self%state)) then
-         allocate (self%state)
+         self%problem => problem
+         allocate (self%state, self%slopes)
          call new_balance_state(problem, self%state)
          self%state%reduced = .false.
          call self%slopes%start(self%state)
@@ -296,7 +301,14 @@ contains
       class(sensitivity_finder), intent(inout) :: self
 
       if (associated(self%state)) deallocate (self%state)
-      nullify (self%state)
+      if (associated(self%slopes)) deallocate (self%slopes)
+      nullify (self%state, self%slopes, self%problem)
    end subroutine clear
+
+   subroutine release(self)
+      type(sensitivity_finder), intent(inout) :: self
+
+      call self%clear()
+   end subroutine release
 
 end module fw_sensitivity

@@ -172,7 +172,9 @@ contains
                end if
                ! Backwards through what makes an input of a displacement.
                if (p%has_inertia) call turn_back(state, p, i, c, h)
-               if (p%order(c) > 0) call take_back(state, work%linear_rests(i), state%rate_unit(p), h)
+               if (p%order(c) > 0) then
+                  call take_back(state, work%linear_rests(i), state%rate_unit(p), h)
+               end if
                call state%problem%incidence%scatter_row(entry%row(c, i), &
                                                         state%problem%incidence%identity, m, &
                                                         size(product, 1), p%stiffness(i, c), h, &

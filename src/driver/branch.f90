@@ -41,6 +41,7 @@ module fw_branch
    use fw_stability_crossing, only: movement_between
    use fw_stability_crossing, only: multiplier_track
    use fw_stability_crossing, only: signature_of
+   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_stability_solver, only: stability_solver
    use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: new_request
@@ -70,6 +71,8 @@ module fw_branch
       type(formulation_type) :: formulation
       class(parameter_system), pointer :: solved => null()
       type(stability_solver) :: stability
+      !> That of the level whose points come first.
+      type(sensitivity_solver), pointer :: sensitivity => null()
       !> What a condensed structure is measured by.
       type(response_view), pointer :: view => null()
       integer(int64) :: clock = 0
@@ -169,6 +172,7 @@ contains
       self%has_no_start = .not. point%converged
       if (point%converged) then
          self%level%system%interrupt => observer
+         self%branch%sensitivity => self%level%solver%sensitivity
          call self%branch%begin(case, self%level%system, self%level%solver%x, error)
          if (.not. allocated(error)) call self%branch%point_along(case, self%branch%curve%here, &
                                                                   point, error)
@@ -535,6 +539,9 @@ contains
       end if
       if (point%converged .and. with_stability) then
          call self%stability%find(case, self%system, coefficients, point, error)
+      end if
+      if (point%converged .and. case%sensitivity%is_wanted() .and. .not. allocated(error)) then
+         call self%sensitivity%find(case, self%system, coefficients, point, error)
       end if
       if (.not. allocated(error)) call self%point_along(case, found, point, error)
    end subroutine describe

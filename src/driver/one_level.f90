@@ -101,11 +101,15 @@ contains
       type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
+      character(:), allocatable :: derivatives
 
       message = ''
       associate (system => self%level%system, solver => self%level%solver)
          call summary%describe_work(system, solver%method%newton%linear, case%solver%kind, &
                                     state%all_converged())
+         call solver%sensitivity%describe(derivatives)
+         call summary%describe_sensitivity(derivatives)
+         call solver%sensitivity%remark(case, system, summary%remarks)
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
          if (self%n_elsewhere > 0) call summary%note_elsewhere(self%n_elsewhere, self%way)
          if (state%was_stopped .or. state%all_converged()) return

@@ -25,6 +25,7 @@ module fw_point_solver
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_tail, only: recover_tail
+   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution, only: solution_method
    use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request
@@ -58,6 +59,7 @@ module fw_point_solver
       !> The solver of the case, and pseudo-time where it fails.
       type(solution_method) :: method
       type(stability_solver) :: stability
+      type(sensitivity_solver) :: sensitivity
       !> The present solution, and the last two converged ones with their frequencies.
       real(wp), allocatable :: x(:), last(:), before(:), r(:)
       !> The point to be solved, and the best that was found of it where nothing converged.
@@ -142,6 +144,10 @@ contains
       end if
       if (report%converged .and. request%stability) then
          call self%stability%find(case, system, self%x, point, error)
+         if (allocated(error)) return
+      end if
+      if (report%converged .and. request%sensitivity) then
+         call self%sensitivity%find(case, system, self%x, point, error)
          if (allocated(error)) return
       end if
       if (report%converged .and. case%contact%memory == memory_carried) then

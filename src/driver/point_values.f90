@@ -41,7 +41,8 @@ contains
       call fatal_error(error, "the point holds no '"//name//"': histories need "// &
                        'output%histories = .true., contact values contact pairs and '// &
                        'output%contact = .true., Floquet multipliers sweep%stability = '// &
-                       ".true., error estimates harmonics%accuracy, wear case%analysis = 'wear'", &
+                       ".true., error estimates harmonics%accuracy, derivatives &sensitivity, "// &
+                       "wear case%analysis = 'wear'", &
                        status_usage)
    end subroutine get_point_values
 
@@ -55,8 +56,11 @@ contains
 
       names = trim(list(1)%name)
       do i = 2, size(list)
+         ! Too many to name each.
+         if (list(i)%sensitivity(1) > 0) cycle
          names = names//', '//trim(list(i)%name)
       end do
+      names = names//', sensitivity/QUANTITY/PARAMETER'
       call fatal_error(error, "there is no result '"//name//"': must be one of "//names, &
                        status_usage)
    end subroutine unknown_name

@@ -24,6 +24,8 @@ module fw_strategy
       logical :: stability = .false., contact = .false., histories = .false.
       !> What may end the work on it; null where nothing does.
       class(interrupt_type), pointer :: interrupt => null()
+      !> Derivatives by parameters.
+      logical :: sensitivity = .false.
    end type point_request
 
    !> A solution to go on from, wherever the points have gone since.
@@ -145,6 +147,7 @@ contains
       request%stability = case%sweep%stability
       request%contact = case%output%contact
       request%histories = case%output%histories
+      request%sensitivity = case%sensitivity%is_wanted()
    end function new_request
 
 end module fw_strategy

@@ -65,6 +65,7 @@ module fw_summary
       procedure :: add_transient
       procedure :: remark_instants
       procedure :: describe_work
+      procedure :: describe_sensitivity
       procedure :: describe_peaks
       procedure :: describe_bifurcations
       procedure :: note_fallback
@@ -184,6 +185,14 @@ contains
                    ' linear problems: the joint stays stuck')
       end if
    end subroutine describe_work
+
+   !> How derivatives were found.
+   subroutine describe_sensitivity(self, text)
+      class(summary_type), intent(inout) :: self
+      character(*), intent(in) :: text
+
+      if (len(text) > 0) call add_line(self%work, 'derivatives', text)
+   end subroutine describe_sensitivity
 
    !> The maxima between the points, which stand for those of the points.
    subroutine describe_peaks(self, peaks, n_solved, iterations)

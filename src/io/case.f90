@@ -9,6 +9,7 @@ module fw_case
    use fw_model, only: model_type
    use fw_contact_data, only: contact_type, spring_type
    use fw_harmonics_options, only: harmonics_options
+   use fw_sensitivity_options, only: sensitivity_options
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options
    use fw_text, only: string_type
    use fw_wear_options, only: wear_options
@@ -65,6 +66,7 @@ module fw_case
       !> Result file of a wear run that is to be continued; not allocated to start anew. No key of
       !> the namelist.
       character(:), allocatable :: restart
+      type(sensitivity_options) :: sensitivity
    contains
       procedure :: bind_keys => bind_case_keys
    end type case_type

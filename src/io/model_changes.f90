@@ -57,13 +57,17 @@ contains
       select case (parameter)
       case (rayleigh_mass)
          change%damping = model%mass
+         change%value = options%rayleigh_mass
       case (rayleigh_stiffness)
          change%damping = model%stiffness
+         change%value = options%rayleigh_stiffness
       case (modal_damping)
          ! The damping of all modes is proportional to the ratio.
          call add_modal_damping(model%mass, model%stiffness, 1.0_wp, change%damping, error)
+         change%value = options%modal_damping
       case (rotation_speed)
          call change_by_speed(options, raw, model, change, error)
+         change%value = options%rotation_speed
       case default ! changes no matrix
       end select
    end subroutine find_change

@@ -7,6 +7,7 @@ module fw_parameter_checks
    use fw_kinds, only: wp
    use fw_laws, only: is_rigid
    use fw_laws, only: law_words
+   use fw_model, only: model_type
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
                             is_per_pair, is_per_spring, normal_load, normal_stiffness, &
                             parameter_key, parameter_words, rotation_speed, static_scale, &
@@ -35,16 +36,39 @@ contains
          if (case%springs%n_springs == 0) reason = 'there are no springs: give group &spring'
       else if (is_of_matrices(number)) then
          call check_of_matrices(case, number, reason)
-      else if (number == harmonic_scale) then
-         if (.not. any(abs(case%model%load_cosine) > 0.0_wp) .and. &
-             .not. any(abs(case%model%load_sine) > 0.0_wp)) reason = 'there is no vibratory load'
-      else if (number == static_scale) then
-         if (.not. any(abs(case%model%load_static) > 0.0_wp)) reason = 'there is no static load'
+      else
+         call check_of_loads(case%model, number, reason)
       end if
       if (.not. allocated(reason)) return
       call fatal_error(error, asked_by//" = '"//trim(parameter_words(number))//"': "//reason// &
                        '; leave it out', status_input)
    end subroutine check_parameter
+
+   !> A factor of nothing; of waves the loads are not in these columns alone.
+   subroutine check_of_loads(model, number, reason)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: number
+      character(:), allocatable, intent(out) :: reason
+
+      if (number == harmonic_scale) then
+         if (.not. abs(model%harmonic_scale) > 0.0_wp) reason = 'load%harmonic_scale is 0'
+         if (model%cyclic%is_cyclic) return
+         if (.not. (acts(model%load_cosine) .or. acts(model%load_sine))) then
+            if (.not. allocated(model%load_wave)) reason = 'there is no vibratory load'
+         end if
+      else if (number == static_scale) then
+         if (.not. abs(model%static_scale) > 0.0_wp) reason = 'load%static_scale is 0'
+         if (model%cyclic%is_cyclic) return
+         if (.not. acts(model%load_static)) reason = 'there is no static load'
+      end if
+   end subroutine check_of_loads
+
+   pure logical function acts(load)
+      real(wp), allocatable, intent(in) :: load(:)
+
+      acts = .false.
+      if (allocated(load)) acts = any(abs(load) > 0.0_wp)
+   end function acts
 
    !> What pairs do not have, or their law does not.
    subroutine check_of_pairs(contact, number, reason)

@@ -14,9 +14,16 @@ module fw_point_quantities
    use fw_hdf5, only: growing_logical
    use fw_hdf5, only: growing_real
    use fw_kinds, only: wp
+   use fw_parameters, only: is_per_pair
+   use fw_parameters, only: is_per_spring
+   use fw_parameters, only: n_parameter_words
+   use fw_parameters, only: parameter_dataset
+   use fw_parameters, only: parameter_words
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_point, only: served_words
+   use fw_response_rows, only: is_of_pairs
+   use fw_response_rows, only: quantity_words
    use fw_solver_options, only: continuation_arclength
    use fw_text, only: string_type
    use fw_text_list, only: words_of
@@ -30,7 +37,7 @@ module fw_point_quantities
 
    type :: quantity_type
       !> Name of the dataset, without the slash in front.
-      character(32) :: name
+      character(64) :: name
       !> Kind of the elements: growing_real, growing_integer or growing_logical.
       integer :: kind_of = growing_real
       !> A unit, or the quantity (in angle brackets) whose unit is that of the model.
@@ -46,9 +53,12 @@ module fw_point_quantities
       !> Its numbers in a point, and whether the result of a case has it at all.
       procedure(get_values), pointer, nopass :: get => null()
       procedure(is_wanted), pointer, nopass :: exists => null()
+      !> Of derivatives: the quantity, and the parameter (0: deviation), which no name tells.
+      integer :: sensitivity(2) = 0
    contains
       procedure :: row_shape
       procedure :: row
+      procedure :: is_there
    end type quantity_type
 
    abstract interface
@@ -125,8 +135,41 @@ contains
                wear_energy, wears)
       call add('wear/volume', r, '<volume>', 'step patch', 'worn volume of the patch', &
                wear_volume, wears)
+      call add_sensitivities()
 
    contains
+
+      !> Derivatives of every quantity by every parameter, and its deviation.
+      subroutine add_sensitivities()
+         character(32) :: name
+         character(16) :: of
+         integer :: p, q
+
+         do q = 1, size(quantity_words)
+            of = merge('         ', ' observed', is_of_pairs(q))
+            do p = 1, n_parameter_words
+               call parameter_dataset(p, name)
+               call add('sensitivity/'//trim(quantity_words(q))//'/'//trim(name), r, '', &
+                        'point'//trim(of)//trim(elements_of(p)), 'derivative of '// &
+                        trim(quantity_words(q))//' by '//trim(parameter_words(p)), nothing, always)
+               list(size(list))%sensitivity = [q, p]
+            end do
+            call add('sensitivity/deviation/'//trim(quantity_words(q)), r, '', &
+                     'point'//trim(of), 'standard deviation of '//trim(quantity_words(q)), &
+                     nothing, always)
+            list(size(list))%sensitivity = [q, 0]
+         end do
+      end subroutine add_sensitivities
+
+      !> The dimension of the elements that a parameter has a value for each of.
+      pure function elements_of(parameter) result(dimension)
+         integer, intent(in) :: parameter
+         character(8) :: dimension
+
+         dimension = ''
+         if (is_per_pair(parameter)) dimension = ' pair'
+         if (is_per_spring(parameter)) dimension = ' spring'
+      end function elements_of
 
       !> A line of the table.
       subroutine add(name, kind_of, unit, dimensions, long_name, get, exists)
@@ -179,6 +222,8 @@ contains
          n = 2*max(case%harmonics%n_harmonics, case%output%tail) + 1
       case ('pair')
          n = case%contact%n_pairs
+      case ('spring')
+         n = case%springs%n_springs
       case ('patch')
          n = count_patches(case%contact)
       case ('direction', 'state')
@@ -200,7 +245,11 @@ contains
       real(wp), allocatable :: carried(:)
       integer :: n
 
-      call self%get(point, carried)
+      if (self%sensitivity(1) > 0) then
+         call find_sensitivity(point, self%sensitivity, carried)
+      else
+         call self%get(point, carried)
+      end if
       if (.not. allocated(carried)) return
       n = size(carried)
       ! Points with fewer harmonics have shorter rows: those of a result are all alike.
@@ -208,6 +257,42 @@ contains
       allocate (values(n), source=0.0_wp)
       values(:size(carried)) = carried
    end subroutine row
+
+   !> Whether the result of a case has the quantity.
+   pure logical function is_there(self, case)
+      class(quantity_type), intent(in) :: self
+      type(case_type), intent(in) :: case
+
+      if (self%sensitivity(1) > 0) then
+         is_there = case%sensitivity%has(self%sensitivity(1), self%sensitivity(2))
+      else
+         is_there = self%exists(case)
+      end if
+   end function is_there
+
+   !> The block of a quantity and a parameter, where the point has it.
+   pure subroutine find_sensitivity(point, place, values)
+      type(point_type), intent(in) :: point
+      integer, intent(in) :: place(2)
+      real(wp), allocatable, intent(out) :: values(:)
+      integer :: k
+
+      if (.not. allocated(point%sensitivity)) return
+      do k = 1, size(point%sensitivity)
+         if (point%sensitivity(k)%quantity /= place(1)) cycle
+         if (point%sensitivity(k)%parameter == place(2)) values = point%sensitivity(k)%values
+      end do
+   end subroutine find_sensitivity
+
+   !> Of a quantity that is found in another way.
+   subroutine nothing(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(values)) deallocate (values)
+      associate (unused => point)
+      end associate
+   end subroutine nothing
 
    ! ---------------------------------------------------------------- when a result holds it
 

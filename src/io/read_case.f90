@@ -15,6 +15,7 @@ module fw_read_case
    use fw_read_model, only: read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_sweep
    use fw_read_output, only: read_output, read_observed
+   use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
    use fw_read_worn, only: read_worn
    use fw_reader, only: reader_type, new_reader
    use fw_reader_text, only: printable
@@ -113,10 +114,12 @@ contains
       if (allocated(error)) return
       call choose_law(reader, case)
       call choose_harmonics(reader, case)
+      call finish_sensitivity(reader, case)
       call reader%finish(error)
       if (allocated(error)) return
       case%namelist = reader%effective()
       call check_combinations(case, error)
+      if (.not. allocated(error)) call check_sensitivity(case, error)
    end subroutine read_groups
 
    !> Where nothing is said of the harmonics, an accuracy chooses them, if the rest of the case goes
@@ -127,6 +130,7 @@ contains
 
       if (reader%given('harmonics', 'n_harmonics')) return
       if (reader%given('harmonics', 'accuracy')) return
+      if (case%sensitivity%is_wanted()) return
       if (.not. has_nonlinear(case) .or. .not. goes_with_accuracy(case)) return
       case%harmonics%accuracy = usual_accuracy
       case%harmonics%n_harmonics = most_for_accuracy
@@ -170,6 +174,7 @@ contains
 
       ! Sizes (n_dof, n_pairs, n_springs) are told before the arrays whose shapes name them.
       call case%bind_keys(reader)
+      call read_sensitivity(reader, case%sensitivity)
       call read_structure(reader, path, case, raw, error, memory_model)
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)
@@ -242,7 +247,7 @@ contains
       call read_springs(reader, case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
       call read_loads(reader, options, raw, terms)
-      call finish_model(reader, options, raw, terms, case%model, error, [integer ::])
+      call finish_model(reader, options, raw, terms, case%model, error, case%sensitivity%parameters)
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)
          if (allocated(raw%title)) case%title = raw%title

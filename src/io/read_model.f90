@@ -197,6 +197,8 @@ contains
       if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
       call gather_waves(reader, raw, terms, model%cyclic, size(static), model%waves, &
                         model%load_wave, static)
+      model%harmonic_scale = options%harmonic_scale
+      model%static_scale = options%static_scale
       if (allocated(model%load_wave)) model%load_wave = options%harmonic_scale*model%load_wave
       if (allocated(raw%cyclic%nodal)) then
          call finish_nodal(reader, options, raw, static, model, error)

@@ -16,7 +16,7 @@ module fw_result_labels
    public :: label_dataset, label_quantity, unit_of
 
    type :: label_type
-      character(32) :: name
+      character(64) :: name
       !> A unit, or the quantity (in angle brackets) whose unit is that of the model.
       character(16) :: quantity
       !> Names of the dimensions in the order of h5py, separated by blanks.

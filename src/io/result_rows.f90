@@ -72,7 +72,7 @@ contains
       call take_sizes(case, self%case)
       self%expected = expected_rows(case)
       call point_quantities(list)
-      list = pack(list, [(list(i)%exists(case), i=1, size(list))])
+      list = pack(list, [(list(i)%is_there(case), i=1, size(list))])
       allocate (self%columns(size(list)))
       do i = 1, size(list)
          associate (column => self%columns(i))
@@ -94,6 +94,7 @@ contains
       ! Matrices of thousands of dofs must not be held a second time.
       sizes%harmonics = case%harmonics
       sizes%contact%n_pairs = case%contact%n_pairs
+      sizes%springs%n_springs = case%springs%n_springs
       if (allocated(case%model%unit_system)) sizes%model%unit_system = case%model%unit_system
       if (allocated(case%model%observe_matrix)) then
          allocate (sizes%model%observe_matrix(size(case%model%observe_matrix, 1), 0))
@@ -127,7 +128,7 @@ contains
       call point_quantities(list)
       allocate (is_there(size(list)))
       do i = 1, size(list)
-         is_there(i) = list(i)%exists(case) .and. all(list(i)%row_shape(case) /= unknown_size)
+         is_there(i) = list(i)%is_there(case) .and. all(list(i)%row_shape(case) /= unknown_size)
       end do
       list = pack(list, is_there)
       allocate (names(size(list)))

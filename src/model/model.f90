@@ -16,6 +16,8 @@ module fw_model
       integer :: parameter = 0
       !> Of stiffness and damping (n_dof, n_dof), and of the static load (n_dof).
       real(wp), allocatable :: stiffness(:, :), damping(:, :), load_static(:)
+      !> The parameter in the case.
+      real(wp) :: value = 0.0_wp
    end type matrix_change
 
    type :: model_type
@@ -40,6 +42,8 @@ module fw_model
       !> (n_dof, 2 n_waves).
       type(load_waves) :: waves
       real(wp), allocatable :: load_wave(:, :)
+      !> Factors that are in the vibratory and in the static loads.
+      real(wp) :: harmonic_scale = 1.0_wp, static_scale = 1.0_wp
    contains
       procedure :: load_columns
    end type model_type

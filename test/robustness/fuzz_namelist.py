@@ -7,6 +7,7 @@ from fuzz_bases import namelists
 #: alone, not on the program. Names that belong nowhere come on top.
 KEYS = {
     "case": ["title", "analysis", "threads", "max_seconds"],
+    "sensitivity": ["parameters", "quantities", "deviation"],
     "model": ["source", "file", "n_dof", "mass", "stiffness", "damping", "rayleigh_mass",
               "rayleigh_stiffness", "modal_damping", "rotation_speed"],
     "cyclic": ["n_sectors", "engine_order", "n_modes", "n_interface", "left", "right"],

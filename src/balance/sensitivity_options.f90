@@ -1,0 +1,47 @@
+!> By what a response is differentiated, and what of it (group &sensitivity).
+module fw_sensitivity_options
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: sensitivity_options
+
+   type :: sensitivity_options
+      !> Numbers in parameter_words; not allocated, or empty, where nothing is asked for.
+      integer, allocatable :: parameters(:)
+      !> Numbers in quantity_words: all that the case has, unless some are given.
+      integer, allocatable :: quantities(:)
+      !> Standard deviation of each parameter over its value; not allocated where none was given.
+      real(wp), allocatable :: deviation(:)
+   contains
+      procedure :: is_wanted
+      procedure :: has
+   end type sensitivity_options
+
+contains
+
+   !> Whether derivatives are asked for at all.
+   pure logical function is_wanted(self)
+      class(sensitivity_options), intent(in) :: self
+
+      is_wanted = .false.
+      if (allocated(self%parameters)) is_wanted = size(self%parameters) > 0
+   end function is_wanted
+
+   !> Whether a quantity is differentiated by a parameter; parameter 0: whether its deviation is
+   !> asked for.
+   pure logical function has(self, quantity, parameter)
+      class(sensitivity_options), intent(in) :: self
+      integer, intent(in) :: quantity, parameter
+
+      has = self%is_wanted() .and. allocated(self%quantities)
+      if (.not. has) return
+      has = any(self%quantities == quantity)
+      if (parameter > 0) then
+         has = has .and. any(self%parameters == parameter)
+      else
+         has = has .and. allocated(self%deviation)
+      end if
+   end function has
+
+end module fw_sensitivity_options

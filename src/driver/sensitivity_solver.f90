@@ -1,0 +1,276 @@
+!> Derivatives of a point by the parameters of its case, laid out for the result; what there is to
+!> say of them over a run.
+module fw_sensitivity_solver
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use fw_balance_state, only: balance_state
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_stuck
+   use fw_kinds, only: wp
+   use fw_parameter_slopes, only: parameter_entry
+   use fw_parameters, only: friction_coefficient
+   use fw_parameters, only: gap
+   use fw_parameters, only: harmonic_scale
+   use fw_parameters, only: is_of_matrices
+   use fw_parameters, only: is_per_pair
+   use fw_parameters, only: is_per_spring
+   use fw_parameters, only: normal_load
+   use fw_parameters, only: normal_stiffness
+   use fw_parameters, only: static_scale
+   use fw_parameters, only: tangential_stiffness
+   use fw_point, only: point_sensitivity
+   use fw_point, only: point_type
+   use fw_remarks, only: remark_list
+   use fw_sensitivity, only: sensitivity_finder
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: sensitivity_solver
+
+   !> A pair within this of the cone that never slips, or that slips for no longer than this part
+   !> of the period, is at the onset of slip.
+   real(wp), parameter :: onset = 1.0e-3_wp
+
+   type :: sensitivity_solver
+      type(sensitivity_finder) :: finder
+      !> Points that were asked for, and of them those at a fold, with peaks alike, and with a pair
+      !> at the onset of slip or of contact.
+      integer :: n_points = 0
+      integer :: n_singular = 0, n_tied = 0, n_onset = 0
+      logical, private :: is_started = .false.
+   contains
+      procedure :: find
+      procedure :: describe
+      procedure :: remark
+   end type sensitivity_solver
+
+contains
+
+   !> Fill the derivatives of a point; x is the solution, where the system was evaluated last.
+   subroutine find(self, case, system, x, point, error)
+      class(sensitivity_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      type(point_type), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+      logical :: done
+
+      if (.not. self%is_started) call start(self, case)
+      call self%finder%find(system%problem, system, x, done, error)
+      if (allocated(error)) return
+      self%n_points = self%n_points + 1
+      if (.not. done) then
+         ! At a fold quantities have no derivative: NaN, and a remark.
+         self%n_singular = self%n_singular + 1
+         if (.not. allocated(self%finder%derivative)) then
+            allocate (self%finder%derivative(size(self%finder%rows), size(self%finder%parameters)))
+         end if
+         self%finder%derivative = ieee_value(1.0_wp, ieee_quiet_nan)
+      end if
+      if (any(self%finder%rows%is_tied)) self%n_tied = self%n_tied + 1
+      if (is_at_onset(case, system)) self%n_onset = self%n_onset + 1
+      call lay_out(self, case, point)
+   end subroutine find
+
+   !> The numbers that the words of the case stand for.
+   subroutine start(self, case)
+      type(sensitivity_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer :: i, k
+
+      associate (finder => self%finder, options => case%sensitivity)
+         finder%quantities = options%quantities
+         allocate (finder%parameters(0))
+         do k = 1, size(options%parameters)
+            associate (number => options%parameters(k))
+               do i = 1, max(1, count_elements(case, number))
+                  finder%parameters = [finder%parameters, entry_of(case, number, i)]
+               end do
+            end associate
+         end do
+         allocate (finder%mu(case%contact%n_pairs), source=0.0_wp)
+         if (case%contact%n_pairs > 0) finder%mu = case%contact%mu
+         finder%wear_coefficient = max(case%wear%coefficient, 0.0_wp)
+      end associate
+      self%is_started = .true.
+   end subroutine start
+
+   !> Values that a parameter has; 0 where it is one.
+   pure integer function count_elements(case, number) result(n)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: number
+
+      n = 0
+      if (is_per_pair(number)) n = case%contact%n_pairs
+      if (is_per_spring(number)) n = case%springs%n_springs
+   end function count_elements
+
+   pure type(parameter_entry) function entry_of(case, number, element) result(entry)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: number, element
+      integer :: k
+
+      entry%number = number
+      if (count_elements(case, number) > 0) entry%element = element
+      associate (c => case%contact)
+         select case (number)
+         case (friction_coefficient); entry%value = c%mu(element)
+         case (normal_load); entry%value = c%normal_load(element)
+         case (gap); entry%value = c%gap(element)
+         case (tangential_stiffness); entry%value = c%tangential_stiffness(element)
+         case (normal_stiffness); entry%value = c%normal_stiffness(element)
+         case (harmonic_scale); entry%value = case%model%harmonic_scale
+         case (static_scale); entry%value = case%model%static_scale
+         case default
+            if (is_per_spring(number)) entry%value = case%springs%coefficient(element)
+            if (.not. is_of_matrices(number)) return
+            do k = 1, size(case%model%changes)
+               if (case%model%changes(k)%parameter /= number) cycle
+               entry%change = k
+               entry%value = case%model%changes(k)%value
+            end do
+         end select
+      end associate
+   end function entry_of
+
+   !> From the table of derivatives to blocks of the point, one for each quantity and parameter.
+   subroutine lay_out(self, case, point)
+      type(sensitivity_solver), intent(in) :: self
+      type(case_type), intent(in) :: case
+      type(point_type), intent(inout) :: point
+      type(point_sensitivity) :: block
+      integer :: k, p, q
+
+      allocate (point%sensitivity(0))
+      associate (options => case%sensitivity, finder => self%finder)
+         do q = 1, size(options%quantities)
+            do p = 1, size(options%parameters)
+               block%quantity = options%quantities(q)
+               block%parameter = options%parameters(p)
+               block%values = [real(wp) ::]
+               do k = 1, size(finder%rows)
+                  if (finder%rows(k)%quantity /= options%quantities(q)) cycle
+                  block%values = [block%values, pack(finder%derivative(k, :), &
+                                                     finder%parameters%number == &
+                                                     options%parameters(p))]
+               end do
+               point%sensitivity = [point%sensitivity, block]
+            end do
+            if (.not. allocated(options%deviation)) cycle
+            block%quantity = options%quantities(q)
+            block%parameter = 0
+            block%values = [real(wp) ::]
+            do k = 1, size(finder%rows)
+               if (finder%rows(k)%quantity /= options%quantities(q)) cycle
+               block%values = [block%values, deviation_of(case, finder, k)]
+            end do
+            point%sensitivity = [point%sensitivity, block]
+         end do
+      end associate
+   end subroutine lay_out
+
+   !> To first order, parameters being independent of each other; all pairs (springs) share the
+   !> deviation of theirs, as parts of one lot do.
+   pure real(wp) function deviation_of(case, finder, row) result(deviation)
+      type(case_type), intent(in) :: case
+      type(sensitivity_finder), intent(in) :: finder
+      integer, intent(in) :: row
+      integer :: p
+
+      deviation = 0.0_wp
+      do p = 1, size(case%sensitivity%parameters)
+         deviation = deviation + (case%sensitivity%deviation(p)* &
+                                  sum(finder%parameters%value*finder%derivative(row, :), &
+                                      mask=finder%parameters%number == &
+                                      case%sensitivity%parameters(p)))**2
+      end do
+      deviation = sqrt(deviation)
+   end function deviation_of
+
+   !> Whether a pair just slips or just does not, or just touches: derivatives are one-sided there.
+   logical function is_at_onset(case, system)
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(inout) :: system
+      real(wp), allocatable :: share(:, :)
+      real(wp) :: used
+      integer :: i, k
+
+      is_at_onset = .false.
+      if (case%contact%n_pairs == 0) return
+      allocate (share(3, case%contact%n_pairs))
+      call system%pair_shares(share)
+      associate (pairs => system%problem%forces%pairs, work => &
+                 system%work(system%problem%forces%pairs))
+         call system%problem%forces%entry(pairs)%law%sample(work)
+         do i = 1, case%contact%n_pairs
+            if (work%state(i) == pair_stuck) then
+               do k = 1, size(work%force_time, 3)
+                  used = norm2(work%force_time(i, 1:2, k))
+                  is_at_onset = is_at_onset .or. used > -(1.0_wp - onset)*case%contact%mu(i)* &
+                                work%force_time(i, 3, k) .and. used > 0.0_wp
+               end do
+            else if (work%state(i) == pair_mixed) then
+               is_at_onset = is_at_onset .or. any(share(:, i) > 0.0_wp .and. share(:, i) < onset)
+            end if
+         end do
+      end associate
+   end function is_at_onset
+
+   !> How derivatives were found, for the summary; blank where none were.
+   subroutine describe(self, text)
+      class(sensitivity_solver), intent(in) :: self
+      character(:), allocatable, intent(out) :: text
+
+      text = ''
+      if (self%n_points == 0) return
+      text = to_text(size(self%finder%parameters))//' parameters of '// &
+             to_text(size(self%finder%rows))//' quantities, '
+      if (self%finder%n_adjoint > 0) then
+         text = text//'adjoint: '//to_text(self%finder%n_adjoint)
+      else
+         text = text//'direct: '//to_text(self%finder%n_direct)
+      end if
+      text = text//' solutions at '//to_text(self%n_points)//' points, '// &
+             to_text(self%finder%linear%factorizations)//' factorizations'
+      if (self%finder%linear%krylov_iterations > 0) then
+         text = text//', '//to_text(self%finder%linear%krylov_iterations)//' of GMRES'
+      end if
+   end subroutine describe
+
+   !> What makes derivatives less than they seem.
+   subroutine remark(self, case, system, remarks)
+      class(sensitivity_solver), intent(in) :: self
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(in) :: system
+      type(remark_list), intent(inout) :: remarks
+
+      if (self%n_points == 0) return
+      associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
+         if (case%contact%n_pairs > 0 .and. law%facts%has_events .and. &
+             .not. law%facts%follows_events) then
+            call remarks%add('derivatives of instants', 'contact is decided at instants: '// &
+                             'derivatives are those of the discretised response, which jumps '// &
+                             "between instants (1 % off is usual); take harmonics%sampling = "// &
+                             "'events'")
+         end if
+         if (law%prediction%takes_balance .and. any(is_of_matrices(case%sensitivity%parameters))) &
+            call remarks%add('derivatives at held eps', 'the eps of a rigid law follows the '// &
+                             'matrices; derivatives by them hold it, as solutions of many '// &
+                             'harmonics do not depend on it')
+      end associate
+      if (self%n_onset > 0) call remarks%add('one-sided derivatives', 'at '// &
+         to_text(self%n_onset)//' of '//to_text(self%n_points)//' points a pair is at the '// &
+         'onset of slip or contact: derivatives are those of one side')
+      if (self%n_tied > 0) call remarks%add('tied peaks', 'at '//to_text(self%n_tied)//' of '// &
+         to_text(self%n_points)//' points two peaks of a period are alike: the derivative '// &
+         "of 'largest' is the mean of both sides")
+      if (self%n_singular > 0) call remarks%add('no derivatives', 'at '// &
+         to_text(self%n_singular)//' of '//to_text(self%n_points)//' points the response has '// &
+         'no derivative (a fold): NaN')
+   end subroutine remark
+
+end module fw_sensitivity_solver

@@ -1,0 +1,206 @@
+!> Group &sensitivity: which derivatives are wanted, and whether the case has them.
+module fw_read_sensitivity
+   use fw_case, only: case_type, analysis_frf, analysis_point
+   use fw_contact_data, only: memory_carried
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_harmonics_options, only: method_hbm
+   use fw_key, only: key
+   use fw_key_range, only: at_least
+   use fw_kinds, only: wp
+   use fw_parameter_checks, only: check_parameter
+   use fw_parameters, only: friction_coefficient, normal_load, parameter_words
+   use fw_reader, only: reader_type
+   use fw_reader_text, only: did_you_mean
+   use fw_response_rows, only: dissipation, first_harmonic, is_of_pairs, largest, &
+                               quantity_words, wear_volume
+   use fw_sensitivity_options, only: sensitivity_options
+   use fw_solver_options, only: solver_newton
+   use fw_text, only: lower_case, string_type
+   use fw_values, only: quoted_text
+   implicit none (type, external)
+   private
+
+   public :: read_sensitivity, finish_sensitivity, check_sensitivity
+
+   character(*), parameter :: group = 'sensitivity'
+
+contains
+
+   !> The keys, read before the model, which keeps what its matrices change by.
+   subroutine read_sensitivity(reader, options)
+      type(reader_type), intent(inout) :: reader
+      type(sensitivity_options), intent(inout) :: options
+      type(string_type), allocatable :: words(:)
+      logical, allocatable :: is_text(:)
+
+      call reader%open(group, 'derivatives of the response by parameters of the case')
+      call reader%bind_list(key('parameters', 'what the response is differentiated by: '// &
+                                "'contact%mu', 'load%harmonic_scale', ...", &
+                                absent='none: no derivatives', only="analysis = 'frf', 'point'"), &
+                            'names of parameters, such as contact%mu', size(parameter_words), &
+                            words, is_text)
+      call find_words(reader, 'parameters', words, parameter_words, options%parameters)
+      call reader%bind_list(key('quantities', 'what is differentiated: first_harmonic, '// &
+                                'largest, dissipation, wear_volume', &
+                                absent='all that the case has', only='parameters'), 'quantities', size(quantity_words), words, &
+                            is_text)
+      call find_words(reader, 'quantities', words, quantity_words, options%quantities)
+      ! One deviation for each parameter, or one for all.
+      call reader%set_size('n_parameters', size(options%parameters))
+      call reader%bind(key('deviation', 'standard deviation of each parameter over its value, '// &
+                           'for that of the quantities', at_least(0.0_wp), &
+                           shape='n_parameters', absent='none', only='parameters'), &
+                       options%deviation)
+      if (size(options%parameters) > 0 .or. reader%failed()) return
+      if (size(options%quantities) > 0) call reader%refuse(group, 'quantities', &
+         'is given without parameters: name them, or leave it out')
+      if (reader%given(group, 'deviation')) call reader%refuse(group, 'deviation', &
+         'is given without parameters: name them, or leave it out')
+   end subroutine read_sensitivity
+
+   !> Numbers of words, each of which may be given once.
+   subroutine find_words(reader, name, given, words, numbers)
+      type(reader_type), intent(inout) :: reader
+      !> Of the key.
+      character(*), intent(in) :: name
+      type(string_type), intent(in) :: given(:)
+      character(*), intent(in) :: words(:)
+      integer, allocatable, intent(out) :: numbers(:)
+      type(string_type) :: known(size(words))
+      integer :: i, k
+
+      ! For the nearest word of a misspelling.
+      do k = 1, size(words)
+         known(k)%text = trim(words(k))
+      end do
+      allocate (numbers(0))
+      do i = 1, size(given)
+         k = findloc(words, lower_case(given(i)%text), dim=1)
+         if (k == 0) then
+            call reader%refuse(group, name, '= '//quoted_text(given(i)%text)//': must be one '// &
+                               'of '//list_of(words)//did_you_mean(given(i)%text, known))
+         else if (any(numbers == k)) then
+            call reader%refuse(group, name, 'names '//quoted_text(given(i)%text)//' twice')
+         else
+            numbers = [numbers, k]
+         end if
+      end do
+   end subroutine find_words
+
+   !> The words, separated by commas.
+   pure function list_of(words) result(text)
+      character(*), intent(in) :: words(:)
+      character(:), allocatable :: text
+      integer :: k
+
+      text = "'"//trim(words(1))//"'"
+      do k = 2, size(words)
+         text = text//", '"//trim(words(k))//"'"
+      end do
+   end function list_of
+
+   !> All quantities that the case has, where none is named.
+   subroutine finish_sensitivity(reader, case)
+      type(reader_type), intent(inout) :: reader
+      type(case_type), intent(inout) :: case
+
+      associate (options => case%sensitivity)
+         if (.not. options%is_wanted()) return
+         ! An accuracy would choose other harmonics from point to point, and with them another
+         ! function.
+         if (.not. reader%given('harmonics', 'n_harmonics')) then
+            call reader%refuse('harmonics', 'n_harmonics', 'is missing: derivatives '// &
+                               '(&sensitivity) are those of a balance of given harmonics')
+         end if
+         if (size(options%quantities) > 0) return
+         options%quantities = [first_harmonic, largest]
+         if (case%contact%n_pairs == 0) return
+         options%quantities = [first_harmonic, largest, dissipation]
+         if (case%wear%coefficient > 0.0_wp) options%quantities = [options%quantities, wear_volume]
+      end associate
+   end subroutine finish_sensitivity
+
+   !> Refuse what has no derivative, or none that the program knows.
+   subroutine check_sensitivity(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: asks = 'sensitivity%parameters'
+      !> What derivatives go with instead of what was found.
+      character(:), allocatable :: with
+      integer :: k
+
+      if (.not. case%sensitivity%is_wanted()) return
+      ! Carried positions depend on all points before.
+      if (all(case%analysis /= [analysis_frf, analysis_point])) then
+         with = "analysis = 'frf' or 'point'"
+      else if (case%harmonics%method /= method_hbm) then
+         with = "harmonics%method = 'hbm'"
+      else if (case%contact%memory == memory_carried) then
+         with = "contact%memory = 'assembly'"
+      else if (case%solver%kind /= solver_newton) then
+         with = "solver%kind = 'newton'"
+      else if (case%harmonics%adaptive) then
+         with = 'harmonics%adaptive = .false.'
+      else if (case%harmonics%accuracy > 0.0_wp) then
+         with = 'a given n_harmonics, not with harmonics%accuracy'
+      end if
+      if (allocated(with)) then
+         call fatal_error(error, asks//' goes with '//with//': leave one of the two out', &
+                          status_input)
+         return
+      end if
+      do k = 1, size(case%sensitivity%parameters)
+         call check_parameter(case, case%sensitivity%parameters(k), asks, error)
+         if (.not. allocated(error)) call check_onset(case, case%sensitivity%parameters(k), error)
+         if (allocated(error)) return
+      end do
+      call check_quantities(case, error)
+   end subroutine check_sensitivity
+
+   !> Friction begins at mu = 0 and at a load of 0: derivatives there are one-sided.
+   subroutine check_onset(case, parameter, error)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: parameter
+      type(error_type), allocatable, intent(out) :: error
+      logical :: slides(case%contact%n_pairs), closes(case%contact%n_pairs)
+      logical :: begins(case%contact%n_pairs)
+
+      if (all(parameter /= [friction_coefficient, normal_load])) return
+      associate (c => case%contact)
+         ! Pairs without friction of their own do not count.
+         slides = any(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)
+         closes = c%side_1(3, :) /= 0 .or. c%side_2(3, :) /= 0
+         if (parameter == friction_coefficient) then
+            begins = slides .and. .not. c%mu > 0.0_wp
+         else
+            begins = slides .and. .not. closes .and. .not. c%normal_load > 0.0_wp
+         end if
+      end associate
+      if (any(begins)) call fatal_error(error, "sensitivity%parameters = '"// &
+         trim(parameter_words(parameter))//"': it is 0 at a pair, where friction begins and "// &
+         'the derivative is one-sided; leave it out, or give a small value', status_input)
+   end subroutine check_onset
+
+   !> Work of friction needs pairs, wear its coefficient.
+   subroutine check_quantities(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 1, size(case%sensitivity%quantities)
+         associate (quantity => case%sensitivity%quantities(k))
+            if (is_of_pairs(quantity) .and. case%contact%n_pairs == 0) then
+               call fatal_error(error, "sensitivity%quantities = '"// &
+                                trim(quantity_words(quantity))//"' needs contact pairs, and "// &
+                                'there are none: leave it out', status_input)
+            else if (quantity == wear_volume .and. .not. case%wear%coefficient > 0.0_wp) then
+               call fatal_error(error, "sensitivity%quantities = 'wear_volume' needs "// &
+                                'wear%coefficient: give it, or leave the quantity out', &
+                                status_input)
+            end if
+         end associate
+         if (allocated(error)) return
+      end do
+   end subroutine check_quantities
+
+end module fw_read_sensitivity
