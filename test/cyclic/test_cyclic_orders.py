@@ -112,7 +112,7 @@ def test_matrices_of_nodal_diameters(tmp_path, scale):
     scaled = case | {"load": case["load"] | {"harmonic_scale": scale}}
     sector = run_at(tmp_path / "sector", scaled, OMEGAS)
     run(tmp_path, {"model": {"source": "hdf5", "file": "model.h5"},
-                   "load": {"harmonic_scale": scale},
+                   "load": {"harmonic_scale": scale}, "contact": {"law": "dlft"},
                    "cyclic": {"engine_order": case["engine_order"]},
                    "harmonics": {"n_harmonics": case["n_harmonics"], "sampling": "events"},
                    "sweep": {"frequencies": OMEGAS}, "solver": {"tolerance": TIGHT}})

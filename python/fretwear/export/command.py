@@ -30,6 +30,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=int, metavar="N",
                         help="write N instants of a period as OUTPUT_000.vtu, ..., and OUTPUT.pvd "
                              "that plays them")
+    parser.add_argument("--sectors", metavar="N",
+                        help="how many sectors of a cyclic structure, or `all` (default: 1)")
+    parser.add_argument("--axis", metavar="AXIS", default="z",
+                        help="axis about which the next sector is turned: x, y, z, or -x, -y, -z "
+                             "for the other way; write --axis=-z (default: z)")
 
 
 def main(options: argparse.Namespace) -> int:
@@ -43,13 +48,22 @@ def main(options: argparse.Namespace) -> int:
     else:
         written = [(output.with_name(f"{output.stem}_{k:03d}{output.suffix}"),
                     360.0 * k / options.frames) for k in range(options.frames)]
-    fields = Fields(result, point)
+    fields = Fields(result, point, sectors=_sectors(options.sectors), axis=options.axis)
     for path, phase in written:
         _write(fields.at(phase), path)
     if options.frames is not None:
         _write_collection(output.with_suffix(".pvd"), [path for path, _ in written])
     print(fields.summary())
     return 0
+
+
+def _sectors(text: str | None) -> int:
+    """How many sectors; 0 are all."""
+    if text is None or text == "all":
+        return 1 if text is None else 0
+    if not text.isdigit() or int(text) < 1:
+        raise InputError(f"--sectors {text}: must be a number of at least 1, or all")
+    return int(text)
 
 
 def _write(mesh: meshio.Mesh, path: Path) -> None:

@@ -14,6 +14,7 @@ from ..result import Result
 from ..rows import choose_point, pair_fields, synthesis
 from .mesh import read_mesh
 from .recovery import recover_displacement
+from .wave import delayed, turned
 
 if TYPE_CHECKING:
     import meshio
@@ -27,7 +28,7 @@ _INSTANTS = 256
 
 
 def export_mesh(result: Result | str | Path, point: int | None = None,
-                phase: float | None = None) -> meshio.Mesh:
+                phase: float | None = None, *, sectors: int = 1, axis: str = "z") -> meshio.Mesh:
     """Mesh of the model with the fields of one point of a result.
 
     Parameters
@@ -38,6 +39,11 @@ def export_mesh(result: Result | str | Path, point: int | None = None,
         Solution point or wear step from 0; the largest amplitude, or the last wear step without.
     phase : float, optional
         Instant of `displacement` [degrees]; where the first observed quantity is largest without.
+    sectors : int
+        Sectors of a cyclic structure; 0 are all of them.
+    axis : str
+        About which the next sector is turned, by the right hand: "x", "y" or "z"; "-x" the other
+        way.
 
     Returns
     -------
@@ -45,7 +51,8 @@ def export_mesh(result: Result | str | Path, point: int | None = None,
         Hexahedra and the facets of the pairs. Point data: `displacement` (at the instant),
         `displacement_static`, `displacement_cosine`, `displacement_sine` (first harmonic) and
         `vibration`, the largest distance from the static position. Cell data: `body`, `pair`
-        (from 1; 0 on hexahedra), and `pair_fields`, NaN on hexahedra.
+        (from 1; 0 on hexahedra), and `pair_fields`, NaN on hexahedra; of several sectors
+        `sector`.
 
     Raises
     ------
@@ -54,14 +61,16 @@ def export_mesh(result: Result | str | Path, point: int | None = None,
     """
     if not isinstance(result, Result):
         result = Result(result)
-    return Fields(result, choose_point(result, None) if point is None else point).at(phase)
+    point = choose_point(result, None) if point is None else point
+    return Fields(result, point, sectors=sectors, axis=axis).at(phase)
 
 
 class Fields:
     """What one point of a result shows on the mesh of its model."""
 
-    def __init__(self, result: Result, point: int) -> None:
+    def __init__(self, result: Result, point: int, *, sectors: int = 1, axis: str = "z") -> None:
         self.result, self.point = result, point
+        self.turns = _turns(result, sectors, axis)
         self.mesh: RecoveryMesh = read_mesh(result.model_file)
         self.pairs = pair_fields(result, point)
         self.coefficients: Floats | None = None
@@ -70,7 +79,11 @@ class Fields:
             if not np.isfinite(recovered).all():
                 raise InputError(f"{result.name}: point {point + 1} holds no solution")
             shape = (len(recovered), *self.mesh.points.shape)
-            self.coefficients = (recovered @ self.mesh.basis.T).reshape(shape)
+            alone = recovered @ self.mesh.basis.T
+            # Sector after sector: later by its phase, and turned to its place.
+            self.coefficients = np.concatenate([
+                delayed(alone, phase).reshape(shape) @ turn.T for phase, turn in self.turns],
+                axis=1)
 
     def _largest_instant(self) -> float:
         """Where in the period the first observed quantity is largest [rad]."""
@@ -97,28 +110,52 @@ class Fields:
             import meshio
         except ImportError:
             raise InputError("fretwear export needs meshio: pip install meshio") from None
-        mesh = self.mesh
-        nowhere = np.full(len(mesh.cells), np.nan)
+        mesh, n = self.mesh, len(self.turns)
+        shift = len(mesh.points) * np.arange(n)
+        nowhere = np.full(n * len(mesh.cells), np.nan)
         # Facets belong to the body of a cell that has their corners.
         owner = np.zeros(int(mesh.cells.max()) + 1, dtype=np.int32)
         owner[mesh.cells] = mesh.body[:, None]
         cell_data: dict[str, list[Any]] = {
-            "body": [mesh.body.astype(np.int32), owner[mesh.facets[:, 0]]],
-            "pair": [np.zeros(len(mesh.cells), dtype=np.int32), mesh.pair.astype(np.int32) + 1]}
+            "body": [np.tile(mesh.body.astype(np.int32), n),
+                     np.tile(owner[mesh.facets[:, 0]], n)],
+            "pair": [np.zeros(n * len(mesh.cells), dtype=np.int32),
+                     np.tile(mesh.pair.astype(np.int32) + 1, n)]}
+        if n > 1:
+            cell_data["sector"] = [np.repeat(np.arange(n, dtype=np.int32), len(part))
+                                   for part in (mesh.cells, mesh.facets)]
         for name, (values, _) in self.pairs.items():
-            cell_data[name] = [nowhere, values[mesh.pair]]
-        return meshio.Mesh(np.asarray(mesh.points, dtype=float),
-                           [("hexahedron", mesh.cells), ("quad", mesh.facets)],
+            cell_data[name] = [nowhere, np.tile(values[mesh.pair], n)]
+        points = np.asarray(mesh.points, dtype=float)
+        return meshio.Mesh(np.concatenate([points @ turn.T for _, turn in self.turns]),
+                           [("hexahedron", np.concatenate([mesh.cells + k for k in shift])),
+                            ("quad", np.concatenate([mesh.facets + k for k in shift]))],
                            point_data=self._point_data(phase), cell_data=cell_data)
 
     def summary(self) -> str:
         """Fields with their units and largest values, one line each."""
         length = self.result.units("amplitude")
-        lines = [f"{self.result.name}: point {self.point + 1}, {len(self.mesh.points)} points, "
-                 f"{len(self.mesh.cells)} hexahedra, {len(self.mesh.facets)} facets in contact"]
+        n = len(self.turns)
+        lines = [f"{self.result.name}: point {self.point + 1}, {n * len(self.mesh.points)} points, "
+                 f"{n * len(self.mesh.cells)} hexahedra, {n * len(self.mesh.facets)} facets in "
+                 "contact" + (f", {n} sectors" if n > 1 else "")]
         shown = {name: (np.linalg.norm(values, axis=1) if values.ndim == 2 else values, length)
                  for name, values in self._point_data(None).items()}
         for name, (values, units) in {**shown, **self.pairs}.items():
             lines.append(f"  {name:20s} {np.nanmin(values):12.5g} to {np.nanmax(values):12.5g} "
                          f"{units}")
         return "\n".join(lines)
+
+
+def _turns(result: Result, sectors: int, axis: str) -> list[tuple[float, Floats]]:
+    """Delay [rad] and rotation (3, 3) of every sector that is shown."""
+    if sectors == 1:
+        return [(0.0, np.eye(3))]
+    if "engine_order" not in result.attributes:
+        raise InputError(f"{result.name}: has no sectors: give the case &cyclic n_sectors and "
+                         "engine_order")
+    n = int(result.attributes["n_sectors"])
+    if not 0 <= sectors <= n:
+        raise InputError(f"{sectors} sectors: there are {n}")
+    phase = 2.0 * np.pi * (int(result.attributes["engine_order"]) % n) / n
+    return [(j * phase, turned(axis, 2.0 * np.pi * j / n)) for j in range(sectors or n)]

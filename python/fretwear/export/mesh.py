@@ -29,28 +29,47 @@ def read_mesh(path: Path) -> RecoveryMesh:
     """
     try:
         with h5py.File(path, "r") as file:
+            if "stiffness" not in file:
+                raise InputError(f"{path}: holds matrices of nodal diameters, whose coordinates "
+                                 "are no displacements of one mesh")
             n_dof = len(file["stiffness"])
             if "mesh" in file:
                 return mesh_of_group(file["mesh"], path, n_dof)
-            if "parameters" not in file.attrs:
+            is_disk = "disk_parameters" in file.attrs
+            if "parameters" not in file.attrs and not is_disk:
                 raise InputError(f"{path}: holds no group /mesh, so there is nothing to show a "
                                  "displacement on (docs/user-guide.md says what it holds)")
             observe = file["observe/matrix"][()]
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {error}") from None
-    return _regenerated(path, observe)
+    return _regenerated(path, observe, is_disk)
 
 
-def _regenerated(path: Path, observe: Floats) -> RecoveryMesh:
+def _regenerated(path: Path, observe: Floats, is_disk: bool) -> RecoveryMesh:
     try:
-        from ..sector import build_full, read_parameters
-        from ..sector.recovery import recovery_mesh
+        made = _disk_mesh(path) if is_disk else _sector_mesh(path)
     except ImportError as error:
         raise InputError(f"{path}: holds no group /mesh, and generating it again needs "
                          f"scikit-fem ({error})") from None
-    mesh, tip = recovery_mesh(build_full(read_parameters(path)))
+    mesh, tip = made
     # Of the order of what another order of summation changes; another generator is far off.
     if tip.shape != observe.shape or np.abs(tip - observe).max() > 1e-6 * np.abs(observe).max():
         raise InputError(f"{path}: this version of the generator does not give its coordinates; "
                          "write the model again, with --mesh")
     return mesh
+
+
+def _sector_mesh(path: Path) -> tuple[RecoveryMesh, Floats]:
+    from ..sector import build_full, read_parameters
+    from ..sector.recovery import recovery_mesh
+
+    mesh, rows = recovery_mesh(build_full(read_parameters(path)))
+    return mesh, rows
+
+
+def _disk_mesh(path: Path) -> tuple[RecoveryMesh, Floats]:
+    from ..disk import build_full, read_parameters
+    from ..disk.recovery import recovery_mesh
+
+    mesh, rows = recovery_mesh(build_full(read_parameters(path)))
+    return mesh, rows

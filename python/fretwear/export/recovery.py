@@ -9,7 +9,7 @@ as they stand in the file; otherwise the model file is not the one that was run.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from .._native import Session, namelist_values
 from ..errors import AbsentError, InputError
 from ..result import Result
+from .wave import Wave, delayed, read_wave
 
 __all__ = ["Structure", "read_structure", "recover_displacement", "relative_displacement"]
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 #: Largest difference between recovered and stored observed quantities, over the largest of them,
 #: and in multiples of the tolerance of the solver; the greater one holds.
@@ -46,6 +48,10 @@ class Structure:
         Initial gap [length].
     observe : (n_observed, n)
         Rows of the quantities that the result observes.
+    sides : tuple of (3 n_pairs, n)
+        Both sides of the pairs: contact is their difference within one sector.
+    wave : Wave or None
+        Of a cyclic structure: then the structure is one sector.
     waves : tuple
         Further loads: harmonic, power of its frequency, cosine and sine part (n,) of each.
     """
@@ -59,6 +65,8 @@ class Structure:
     contact: Floats
     gap: Floats
     observe: Floats
+    sides: tuple[Floats, Floats]
+    wave: Wave | None = None
     waves: tuple[tuple[int, int, Floats, Floats], ...] = ()
 
 
@@ -83,7 +91,8 @@ def read_structure(result: Result) -> Structure:
         return Structure(
             mass, stiffness, damping, static, session.part("load/cosine"),
             session.part("load/sine"), first - second, session.part("contact/gap"),
-            session.part("observe/matrix").reshape(-1, n), _waves(session, n))
+            session.part("observe/matrix").reshape(-1, n), (first, second),
+            read_wave(result, len(first) // 3), _waves(session, n))
 
 
 def _waves(session: Session, n: int) -> tuple[tuple[int, int, Floats, Floats], ...]:
@@ -120,29 +129,35 @@ def recover_displacement(result: Result, structure: Structure | None = None,
     load = np.zeros((n_coefficients, n))
     load[0] = s.static
     load[1], load[2] = s.cosine, s.sine
-    right = np.broadcast_to(load, (result.n_points, n_coefficients, n)).copy()
+    load = np.broadcast_to(load, (result.n_points, n_coefficients, n)).copy()
     for harmonic, power, cosine, sine in s.waves:
         grows = ((harmonic * result.omega) ** power)[:, None]
-        right[:, 2 * harmonic - 1] += grows * cosine
-        right[:, 2 * harmonic] += grows * sine
+        load[:, 2 * harmonic - 1] += grows * cosine
+        load[:, 2 * harmonic] += grows * sine
+    force = np.zeros((result.n_points, n_coefficients, 0))
     if len(s.contact):
         if "contact/force" not in result:
             raise AbsentError(f"{result.name}: holds no contact forces; run with output%contact = "
                               ".true.")
         force = result.force.reshape(result.n_points, n_coefficients, -1)
-        right -= force @ s.contact
-    displacement = np.full_like(right, np.nan)
-    known = np.isfinite(right).all(axis=(1, 2)) & np.isfinite(result.coefficients).all(axis=(1, 2))
+    displacement = np.full((result.n_points, n_coefficients, n), np.nan)
+    known = np.isfinite(force).all(axis=(1, 2)) & np.isfinite(result.coefficients).all(axis=(1, 2))
     if points is not None:
         known &= np.isin(np.arange(result.n_points), points)
     position = _known_positions(result, namelist_values(result.namelist), s.gap)
+    still, tie, _ = _of_harmonic(s, 0)
     for point in np.flatnonzero(known):
-        displacement[point, 0] = _static_part(s, right[point, 0], result.coefficients[point, 0],
-                                              position[point])
-        for h in range(1, (n_coefficients - 1) // 2 + 1):
+        right = tie.T.real @ load[point, 0] - force[point, 0] @ still.contact
+        displacement[point, 0] = tie.real @ _static_part(
+            still, right, result.coefficients[point, 0], position[point])
+    for h in range(1, (n_coefficients - 1) // 2 + 1):
+        _, tie, rows = _of_harmonic(s, h)
+        outer = (load[:, 2 * h - 1] - 1j * load[:, 2 * h]) @ tie.conj()
+        for point in np.flatnonzero(known):
             w = h * result.omega[point]
             z = s.stiffness - w**2 * s.mass + 1j * w * s.damping
-            u = la.solve(z, right[point, 2 * h - 1] - 1j * right[point, 2 * h])
+            inner = (force[point, 2 * h - 1] - 1j * force[point, 2 * h]) @ rows.conj()
+            u = tie @ la.solve(tie.conj().T @ z @ tie, outer[point] - inner)
             displacement[point, 2 * h - 1], displacement[point, 2 * h] = u.real, -u.imag
     _check(result, s, displacement, known & result.converged)
     return displacement
@@ -157,8 +172,31 @@ def relative_displacement(result: Result, points: Sequence[int] | None = None) -
         In the local frame (t1, t2, n) [length].
     """
     structure = read_structure(result)
-    relative = recover_displacement(result, structure, points) @ structure.contact.T
+    moved = recover_displacement(result, structure, points)
+    first, second = structure.sides
+    relative = moved @ first.T
+    if structure.wave is None:
+        relative -= moved @ second.T
+    else:
+        for sector in np.unique(structure.wave.sector_2):
+            rows = np.repeat(structure.wave.sector_2 == sector, 3)
+            there = delayed(moved, sector * structure.wave.phase)
+            relative[:, :, rows] -= there @ second[rows].T
     return relative.reshape(*relative.shape[:2], -1, 3)
+
+
+def _of_harmonic(s: Structure, harmonic: int) -> tuple[Structure, Complexes, Complexes]:
+    """What a harmonic moves: the structure of its free dofs (of the static part), the tie to all
+    dofs, and the rows of the relative displacements on the free ones."""
+    if s.wave is None:
+        return s, np.eye(len(s.stiffness), dtype=complex), s.contact.astype(complex)
+    tie = s.wave.tie(harmonic, len(s.stiffness))
+    rows = s.wave.rows(harmonic, *s.sides) @ tie
+    if harmonic > 0:
+        return s, tie, rows
+    still = tie.real
+    return replace(s, stiffness=still.T @ s.stiffness @ still, observe=s.observe @ still,
+                   contact=rows.real), tie, rows
 
 
 def _known_positions(result: Result, values: dict[str, list[str]], gap: Floats) -> Floats:
