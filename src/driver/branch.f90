@@ -200,6 +200,7 @@ contains
       if (.not. self%has_begun .or. self%has_no_start) return
       call self%level%solver%method%newton%linear%add_work(self%branch%curve%corrector%linear)
       call self%branch%bifurcations%doubt(self%branch%track)
+      call self%branch%bifurcations%merge_turns()
       call self%branch%closing_words(case, observer%run_out, words)
       call observer%on_message(words)
    end subroutine finish

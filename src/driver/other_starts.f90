@@ -19,7 +19,8 @@ module fw_other_starts
 
    public :: start_elsewhere
 
-   !> Iterations of all balances together, beyond which no other one is begun.
+   !> Iterations of all other balances together, beyond which no other one is begun: what the point
+   !> had spent before does not count, for it says nothing of these ways.
    integer, parameter :: most_work = 1200
    !> Times the stiffness of elastic pairs, and times the eps of rigid ones: softer ones lead on to
    !> stiffer ones; for eps there is no such order.
@@ -35,10 +36,11 @@ contains
       type(point_request), intent(in) :: request
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
-      integer :: work, harmonics
+      integer :: work, harmonics, spent
       logical :: done
 
-      work = point%iterations
+      work = 0
+      spent = point%iterations
       call by_fewer_harmonics(case, level, request, point, work, done, harmonics, error)
       if (allocated(error)) return
       if (done) then
@@ -48,7 +50,7 @@ contains
          if (allocated(error)) return
          if (done) point%note = 'started from another stiffness of its pairs'
       end if
-      point%iterations = work
+      point%iterations = spent + work
       if (done) point%served_by = served_by_other_balance
    end subroutine start_elsewhere
 

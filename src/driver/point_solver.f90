@@ -52,6 +52,9 @@ module fw_point_solver
    !> which at least as many count. (Where a sector loses its hold, points take 470 at most, and
    !> none of those with a solution took more than 25.)
    integer, parameter :: most_work = 20, least_counted = 60
+   !> The same of raising the load, over what was spent before: it advances step by step, and where
+   !> it gets there no other way did.
+   integer, parameter :: raising_work = 50
    !> First and smallest step of the load on the way to a first solution.
    real(wp), parameter :: first_load_step = 0.25_wp, smallest_load_step = 1.0_wp/512.0_wp
 
@@ -297,6 +300,8 @@ contains
 
       share = 0.0_wp
       step = first_load_step
+      self%work_limit = max(self%work_limit, iterations + raising_work* &
+                            max(self%method%newton%options%max_iterations, least_counted))
       ! The position at rest, from which the load is raised.
       system%load_share = 0.0_wp
       call system%set_frequency(omega, error)

@@ -258,8 +258,8 @@ contains
 
       call remarks%add('branch condensed', 'the structure without condensation did not '// &
          'converge where the branch begins: it was followed by the unknowns of its joint, '// &
-         'and a resonance that these do not show may be stepped over; loosen solver%tolerance, or '// &
-         'compare with a natural sweep')
+         'and a resonance that these do not show may be stepped over; loosen '// &
+         'solver%tolerance, or compare with a natural sweep')
    end subroutine remark_condensed
 
    !> Of verdicts on stability that nothing stands behind.

@@ -47,7 +47,17 @@ module fw_bifurcation
    contains
       procedure :: add
       procedure :: doubt
+      procedure :: merge_turns
    end type bifurcation_list
+
+   !> Two turns are one place where frequencies and amplitudes agree to this, relative.
+   real(wp), parameter :: same_omega = 1.0e-9_wp, same_amplitude = 1.0e-6_wp
+   !> Way back of the frequency between two turns, relative, that harmonics and instants of a
+   !> balance may make of a curve that does not turn.
+   real(wp), parameter :: ripple = 1.0e-5_wp
+   !> A multiplier that passes 1 this near to a fold, whose own is off 1 by so much, is that of the
+   !> fold.
+   real(wp), parameter :: beside = 3.0e-4_wp, beside_amplitude = 0.03_wp, off_one = 1.0e-3_wp
 
 contains
 
@@ -68,6 +78,81 @@ contains
       self%n = self%n + 1
       self%item(self%n) = bifurcation
    end subroutine add
+
+   !> Turns that are one place become one, or none where the branch goes on as before; what
+   !> truncation may have made of a curve is left open: two turns with next to no way back between
+   !> them, and a multiplier that passes 1 beside a fold instead of at it.
+   subroutine merge_turns(self)
+      class(bifurcation_list), intent(inout) :: self
+      type(bifurcation_type), allocatable :: kept(:)
+      integer :: k, last, n
+
+      if (self%n < 2) return
+      allocate (kept(self%n))
+      n = 0
+      do k = 1, self%n
+         last = 0
+         if (self%item(k)%found_by == way_turn) last = last_turn(kept(:n))
+         if (last > 0) then
+            if (is_same(kept(last), self%item(k))) then
+               ! Back and forth at one place: the turn before is undone.
+               kept(last:n - 1) = kept(last + 1:n)
+               n = n - 1
+               cycle
+            end if
+            if (abs(kept(last)%omega - self%item(k)%omega) <= ripple*self%item(k)%omega) then
+               call leave_open(kept(last), self%item(k)%omega)
+               call leave_open(self%item(k), kept(last)%omega)
+            end if
+         end if
+         n = n + 1
+         kept(n) = self%item(k)
+      end do
+      do k = 1, n
+         if (kept(k)%kind == kind_branch) then
+            if (any(is_beside(kept(:n), kept(k)))) kept(k)%kind = kind_undecided
+         end if
+      end do
+      self%n = n
+      call move_alloc(kept, self%item)
+   end subroutine merge_turns
+
+   pure integer function last_turn(items) result(last)
+      type(bifurcation_type), intent(in) :: items(:)
+
+      do last = size(items), 1, -1
+         if (items(last)%found_by == way_turn) return
+      end do
+      last = 0
+   end function last_turn
+
+   pure logical function is_same(a, b)
+      type(bifurcation_type), intent(in) :: a, b
+
+      is_same = abs(a%omega - b%omega) <= same_omega*b%omega .and. &
+                maxval(abs(a%amplitude - b%amplitude)) <= same_amplitude*maxval(b%amplitude)
+   end function is_same
+
+   !> The other turn is as far as the place may be off.
+   pure subroutine leave_open(item, other)
+      type(bifurcation_type), intent(inout) :: item
+      real(wp), intent(in) :: other
+
+      item%kind = kind_undecided
+      item%error = abs(item%omega - other)
+   end subroutine leave_open
+
+   !> Whether a turn, whose multiplier should be 1 and is not, lies beside a place.
+   elemental logical function is_beside(fold, place)
+      type(bifurcation_type), intent(in) :: fold, place
+
+      is_beside = fold%found_by == way_turn .and. &
+                  abs(fold%omega - place%omega) <= beside*place%omega .and. &
+                  abs(fold%multiplier - 1.0_wp) > off_one .and. abs(fold%multiplier) > 0.0_wp
+      if (.not. is_beside) return
+      is_beside = maxval(abs(fold%amplitude - place%amplitude)) <= &
+                  beside_amplitude*maxval(place%amplitude)
+   end function is_beside
 
    !> Leave open what errors of the multipliers may have made.
    pure subroutine doubt(self, track)
