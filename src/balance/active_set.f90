@@ -21,6 +21,7 @@ module fw_active_set
 
 contains
 
+   !> Room for the lists; which coordinates are in them is decided with every derivative.
    pure subroutine reserve(self, n_coordinates)
       class(active_set), intent(inout) :: self
       integer, intent(in) :: n_coordinates

@@ -17,6 +17,7 @@ module fw_balance_scratch
 
 contains
 
+   !> All that residuals and products need, once: neither of them allocates anything.
    pure subroutine reserve(self, n_coordinates, n_harmonics, n_coefficients)
       class(balance_scratch), intent(inout) :: self
       integer, intent(in) :: n_coordinates, n_harmonics, n_coefficients

@@ -205,6 +205,7 @@ contains
       self%balance%shift = self%p/h
    end subroutine set_shift
 
+   !> The balance as it is, without a step of pseudo-time: its solution is a steady state.
    subroutine clear_shift(self)
       class(flow_system), intent(inout) :: self
 
@@ -214,6 +215,8 @@ contains
 
    ! The system of the balance, shifted or not.
 
+   !> R(x) + P (x - x_old)/step: an implicit step is the root of it, and the balance itself is
+   !> met where x no longer moves.
    subroutine residual(self, x, r)
       class(flow_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
@@ -229,6 +232,7 @@ contains
       r = r + self%inverse_step*self%shifted
    end subroutine residual
 
+   !> Also behind calls from elsewhere: all rows stay in the linear problem here.
    subroutine linearize(self, n_linear)
       class(flow_system), intent(inout) :: self
       integer, intent(out) :: n_linear
@@ -237,6 +241,7 @@ contains
       call self%balance%linearize(n_linear)
    end subroutine linearize
 
+   !> Handed on, as are the next: the shift stands in the balance itself.
    subroutine reduce(self, r, rhs)
       class(flow_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:)

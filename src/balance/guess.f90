@@ -263,6 +263,7 @@ contains
       end associate
    end subroutine mean_tension
 
+   !> Complex amplitudes as the unknowns of the balance; a shape for what comes as a vector.
    subroutine to_real_vector(system, q, x)
       type(balance_state), intent(in) :: system
       complex(wp), intent(in) :: q(:, :)

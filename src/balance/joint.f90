@@ -89,6 +89,7 @@ contains
       call check_independent(contact, self, error)
    end subroutine new_joint
 
+   !> The sector that side 2 of an element lies in, counted from its own; 0 where none is given.
    pure integer function sector_of(sector_2, element) result(sector)
       integer, allocatable, intent(in) :: sector_2(:)
       integer, intent(in) :: element

@@ -135,6 +135,8 @@ contains
       end do
    end function nearest_to
 
+   !> How far a multiplier is from where it would have to cross the unit circle: at 1, at -1, or
+   !> anywhere as one of a complex pair.
    pure real(wp) function distance_to(multiplier, crossing)
       complex(wp), intent(in) :: multiplier
       integer, intent(in) :: crossing
@@ -185,6 +187,8 @@ contains
       is_certain = has_decided(self, k, -1) .and. has_decided(self, k + 1, 1)
    end function is_certain
 
+   !> Whether, from an entry on and in one direction, a verdict is sure before the signature
+   !> changes: what lies between two changes is believed where one of its points is sure.
    pure logical function has_decided(self, from, step)
       class(multiplier_track), intent(in) :: self
       integer, intent(in) :: from, step

@@ -73,6 +73,7 @@ contains
       end do
    end function multiplier_errors
 
+   !> The nearest multiplier that has no partner yet, and how far it is.
    pure subroutine find_nearest(value, others, free, place, distance)
       complex(wp), intent(in) :: value, others(:)
       logical, intent(in) :: free(:)

@@ -296,6 +296,7 @@ contains
       curve%pole_width = max(curve%pole_width, least*curve%pole)
    end subroutine find_poles
 
+   !> What was made for the view of the whole structure; the level goes with its strategy.
    subroutine release(self)
       type(branch_type), intent(inout) :: self
 
@@ -376,6 +377,7 @@ contains
       self%before = found
    end subroutine note_peak
 
+   !> A point between the two that enclose a maximum, for who narrows it down.
    subroutine solve_peak(self, share, point, error)
       class(peak_segment), intent(inout) :: self
       real(wp), intent(in) :: share
@@ -444,6 +446,8 @@ contains
       self%iterations = self%iterations + point%iterations
    end subroutine at
 
+   !> Solve across the chord between two points of the branch, at a share of it: where it turns,
+   !> a frequency in between would not tell which part is meant.
    subroutine solve_between(self, case, first, second, share, with_stability, point, error)
       type(branch_type), intent(inout) :: self
       type(case_type), intent(in) :: case

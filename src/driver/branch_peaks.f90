@@ -185,6 +185,7 @@ contains
 
    end subroutine climb
 
+   !> A maximum as it stands in a point that was solved there.
    pure function peak_of(point, i) result(peak)
       type(point_type), intent(in) :: point
       integer, intent(in) :: i

@@ -246,6 +246,7 @@ contains
 
    end function described
 
+   !> How far a point is from the crossing: what an interpolation brings to zero.
    pure real(wp) function distance_of(point, crossing)
       type(point_type), intent(in) :: point
       integer, intent(in) :: crossing
@@ -299,6 +300,7 @@ contains
       is_symmetric = even <= no_part**2*all_of_it
    end function is_symmetric
 
+   !> Whether a point tells anything of its stability.
    pure logical function is_known(point)
       type(point_type), intent(in) :: point
 

@@ -124,6 +124,7 @@ contains
       if (known) rate = finer%rate
    end subroutine solve
 
+   !> A level with more than twice the harmonics, made when it is first asked for.
    subroutine build(self, case, march, error)
       class(finer_wear), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -153,6 +154,7 @@ contains
       notes = [real(self%n_states, wp), real(self%n_found, wp), real(self%pair, wp), self%cycles]
    end function notes
 
+   !> What a resumed run knew already, in the order in which `notes` gives it.
    pure subroutine take_notes(self, notes)
       class(finer_wear), intent(inout) :: self
       real(wp), intent(in) :: notes(n_notes)

@@ -52,6 +52,7 @@ contains
                    phase_step(below, above, i) < -turn
    end function turns_back
 
+   !> Whether a mode lies between two rows, and would show in neither.
    pure logical function hides_mode(mode, below, above)
       type(joint_mode_type), intent(in) :: mode
       type(sample_type), intent(in) :: below, above

@@ -338,6 +338,7 @@ contains
       call to_real(self%problem%fourier, m, q, self%x)
    end subroutine complete
 
+   !> Observed coefficients of the present answer, its tail among them.
    subroutine observe(self, coefficients)
       class(known_tail), intent(inout) :: self
       real(wp), allocatable, intent(out) :: coefficients(:, :)

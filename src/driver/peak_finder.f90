@@ -517,6 +517,7 @@ contains
       end associate
    end function describe
 
+   !> Samples stand behind pointers.
    subroutine clear(self)
       class(peak_finder), intent(inout) :: self
 

@@ -78,6 +78,8 @@ contains
       call new_balance_state(problem, system, stand)
    end subroutine build_system
 
+   !> What all workers share. The first state is made along the way: the stiffness of rigid laws
+   !> is chosen by the structure at the first frequency.
    subroutine build_problem(case, problem, stand, error, keep_all, of_level, forces, held)
       type(case_type), intent(in) :: case
       type(balance_problem), intent(out) :: problem

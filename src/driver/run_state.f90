@@ -35,6 +35,7 @@ contains
       if (point%converged) self%n_converged = self%n_converged + 1
    end subroutine note
 
+   !> Whether every point so far converged; true before the first.
    pure logical function all_converged(self)
       class(run_state), intent(in) :: self
 

@@ -139,6 +139,7 @@ contains
       if (allocated(self%memory%x)) deallocate (self%memory%x)
    end subroutine forget
 
+   !> Samples stand behind pointers, so that inserting one moves no solutions.
    subroutine clear(self)
       class(sample_list), intent(inout) :: self
       integer :: i

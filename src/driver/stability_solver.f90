@@ -98,6 +98,7 @@ contains
                                marched=marched)
    end subroutine refine
 
+   !> The balance with twice the harmonics and no filter: what a filter does is an error, too.
    subroutine build(self, case, system, error)
       class(stability_solver), intent(inout), target :: self
       type(case_type), intent(in) :: case

@@ -64,6 +64,7 @@ contains
       end select
    end subroutine reserve
 
+   !> The same law with its paths followed from event to event: no number of instants decides.
    subroutine evaluate(self, fourier, work)
       class(friction_by_events), intent(in) :: self
       type(fourier_type), intent(in) :: fourier

@@ -203,6 +203,7 @@ contains
       end do
    end subroutine first_of_others
 
+   !> Place of a name in a list of constants, 0 where it has none of that name.
    pure integer function place_of(list, name) result(place)
       type(constant_type), allocatable, intent(in) :: list(:)
       character(*), intent(in) :: name

@@ -29,6 +29,7 @@ module fw_polynomial_law
 
 contains
 
+   !> Springs of one power each, filtered together.
    pure type(polynomial_law) function new_polynomial(coefficient, power, highest_harmonic) &
       result(self)
       !> (n_springs) each.

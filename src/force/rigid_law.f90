@@ -137,6 +137,7 @@ contains
       end do
    end subroutine measure_paths
 
+   !> State over the whole period: open at all times, stuck at all times, or anything else.
    elemental integer function state_of(open, closed, moved) result(state)
       logical, intent(in) :: open, closed, moved
 
@@ -145,6 +146,8 @@ contains
       if (closed .and. .not. moved) state = pair_stuck
    end function state_of
 
+   !> Forces of the pairs whose mass and damping matter: each direction is an oscillator between
+   !> its events.
    subroutine evaluate_massive(self, fourier, work, room)
       class(rigid_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier

@@ -160,6 +160,7 @@ contains
       text = text//')'
    end function count_text
 
+   !> The word with an s where there is not just one.
    pure function plural(word, n) result(text)
       character(*), intent(in) :: word
       integer, intent(in) :: n

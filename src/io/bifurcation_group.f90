@@ -93,6 +93,7 @@ contains
       call write_attribute(file, name, 'names', names, error)
    end subroutine write_words
 
+   !> Units and meanings, as every dataset of the file has them.
    subroutine label_all(file, unit_system, error)
       type(hdf5_file), intent(in) :: file
       character(:), allocatable, intent(in) :: unit_system

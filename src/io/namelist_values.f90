@@ -144,6 +144,7 @@ contains
       end if
    end subroutine parse_value
 
+   !> By doubling: lists of a hundred thousand pairs are read in linear time.
    pure subroutine grow(values)
       type(value_type), allocatable, intent(inout) :: values(:)
       type(value_type), allocatable :: larger(:)

@@ -77,6 +77,7 @@ contains
       end if
    end subroutine set
 
+   !> Whether a key was given.
    pure logical function has(self, group, key)
       class(record_list), intent(in) :: self
       character(*), intent(in) :: group, key

@@ -55,6 +55,7 @@ module fw_restart_rows
 
 contains
 
+   !> Datasets of `create`, alone with the library: HDF5 is not called from two threads at once.
    subroutine create_datasets(self, file, contact, n_unknowns, error)
       class(restart_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -69,6 +70,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine create_datasets
 
+   !> What a march needs to go on from a row bit for bit, beside what the row itself holds.
    subroutine create(self, file, contact, n_unknowns, error)
       class(restart_row_set), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
@@ -161,6 +163,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine copy
 
+   !> Handles stay open over the run: a row is appended without looking up its dataset.
    subroutine close_datasets(self)
       class(restart_row_set), intent(inout) :: self
       integer :: i
@@ -172,6 +175,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine close_datasets
 
+   !> Words of their own length from words of one length.
    pure function strings_of(words) result(strings)
       character(*), intent(in) :: words(:)
       type(string_type) :: strings(size(words))

@@ -31,6 +31,7 @@ contains
       call try_file(trial, case%restart, error)
    end subroutine try_restart
 
+   !> In a process of its own: a damaged file that makes the library crash ends only that.
    subroutine read_in_trial(self, path)
       class(restart_trial), intent(in) :: self
       character(*), intent(in) :: path

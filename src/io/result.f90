@@ -217,6 +217,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine add_remarks
 
+   !> One more entry in every dataset, flushed where that takes a small part of the time since then.
    subroutine append_point(self, point, error)
       class(result_writer), intent(inout) :: self
       type(point_type), intent(in) :: point
@@ -242,6 +243,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine flush
 
+   !> For who reads the growing file, and for what a crash leaves; it is timed, see append_point.
    subroutine flush_file(self, error)
       class(result_writer), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -272,6 +274,7 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine close
 
+   !> How it ended is written last: a file without it was cut short.
    subroutine close_file(self, status, elapsed, error, skipped, sampling)
       class(result_writer), intent(inout) :: self
       character(*), intent(in) :: status
@@ -322,6 +325,7 @@ contains
       if (.not. self%in_memory) call delete_part(self%file%path)
    end subroutine discard_file
 
+   !> What holds for all points: formats, versions, the case as it was read.
    subroutine write_header(file, case, error)
       type(hdf5_file), intent(in) :: file
       type(case_type), intent(in) :: case
@@ -380,6 +384,7 @@ contains
       end if
    end subroutine write_pairs
 
+   !> Nothing where there is no text.
    subroutine write_optional(file, name, text, error)
       type(hdf5_file), intent(in) :: file
       character(*), intent(in) :: name

@@ -11,6 +11,7 @@ module fw_complex_form
 
 contains
 
+   !> U_n = uc - i us of real coefficients: u(tau) is the real part of U_n exp(i n tau).
    pure subroutine amplitudes_of(harmonic, column, n_rows, coefficients, n_stored, amplitudes)
       !> Harmonics and their columns (n_retained).
       integer, intent(in) :: harmonic(:), column(:)
@@ -33,6 +34,7 @@ contains
       end do
    end subroutine amplitudes_of
 
+   !> And back: uc = re U_n, us = -im U_n.
    pure subroutine coefficients_of(harmonic, column, n_rows, n_stored, amplitudes, coefficients)
       !> Harmonics and their columns (n_retained).
       integer, intent(in) :: harmonic(:), column(:)

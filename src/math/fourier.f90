@@ -99,6 +99,7 @@ contains
       if (self%has_constant()) self%analysis(1, :) = 1.0_wp/real(self%n_time, wp)
    end subroutine fill_operators
 
+   !> Whether harmonic 0 is retained; it is the first then.
    pure logical function has_constant(self)
       class(fourier_type), intent(in) :: self
 

@@ -17,12 +17,14 @@ module fw_panel_product
 
 contains
 
+   !> Panels of a matrix with so many rows; the last is filled up with zeros.
    pure integer function panel_count(n_rows)
       integer, intent(in) :: n_rows
 
       panel_count = (n_rows + panel_height - 1)/panel_height
    end function panel_count
 
+   !> Groups of so many right-hand sides, filled up likewise.
    pure integer function group_count(n_columns)
       integer, intent(in) :: n_columns
 
@@ -50,6 +52,7 @@ contains
       !$omp end parallel do
    end subroutine multiply_panels
 
+   !> One panel with all right-hand sides, tile by tile.
    pure subroutine multiply_panel(n_rows, n_inner, n_columns, panel, right, first, n_stored, &
                                   product)
       integer, intent(in) :: n_rows, n_inner, n_columns, first, n_stored

@@ -162,6 +162,7 @@ contains
       row = 0
    end function first_dependent
 
+   !> Euclid's; 0 and n have n.
    pure integer function common_divisor(a, b) result(divisor)
       integer, intent(in) :: a, b
       integer :: other, rest

@@ -34,6 +34,7 @@ module fw_formed_stiffness
 
 contains
 
+   !> Matrices of all harmonics and scratch for their products; copies of rows in use come later.
    pure subroutine reserve(self, m, n_harmonics)
       class(formed_stiffness), intent(inout) :: self
       integer, intent(in) :: m, n_harmonics
@@ -67,6 +68,7 @@ contains
       !$omp end parallel do
    end subroutine form
 
+   !> One harmonic, in a thread of its own: D, the load without internal modes, and Z_r.
    subroutine form_harmonic(basis, n, theta, s, matrix, load, n_failed)
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n

@@ -140,6 +140,7 @@ contains
       end if
    end subroutine make_room
 
+   !> [K_qq M_qq C_qq K_qi M_qi C_qi] of the rows in use: one product takes them all.
    pure subroutine fill_rows(basis, n_active, n_used, used, n_inner, panels)
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n_active, n_used, n_inner
@@ -173,6 +174,7 @@ contains
       end do
    end subroutine fill_rows
 
+   !> [K_iq M_iq C_iq] of the columns in use.
    pure subroutine fill_modes(basis, n_active, used, panels)
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n_active
@@ -221,6 +223,7 @@ contains
                            self%active%rows, self%active%modes, v, n_stored, product)
    end subroutine multiply_active
 
+   !> Both products of the module header, with the panels that serve: all, or those in use.
    subroutine multiply_packed(self, basis, factors, n_used, n_active, rows, modes, v, n_stored, &
                               product)
       class(real_products), intent(inout) :: self

@@ -128,12 +128,14 @@ contains
       end do
    end subroutine transform_changes
 
+   !> Whether the eigenproblem was solved before.
    pure logical function is_known(self)
       class(held_basis), intent(in) :: self
 
       is_known = allocated(self%t_q)
    end function is_known
 
+   !> The part that is as dear as the cube of the dofs, and depends on nothing but the structure.
    subroutine find_basis(model, relative, basis, error)
       type(model_type), intent(in) :: model
       type(relative_type), intent(in) :: relative

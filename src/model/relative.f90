@@ -72,6 +72,7 @@ contains
       call finish(self, m, echelon)
    end subroutine new_relative
 
+   !> A signed dof with a sign: negative numbers are dofs that count the other way.
    pure subroutine add_side(row, side, sign)
       real(wp), intent(inout) :: row(:)
       integer, intent(in) :: side
@@ -143,6 +144,7 @@ contains
       end do
    end subroutine express
 
+   !> Echelon form as dofs that follow (pivots) and dofs that are free, u_p = c q - r u_f.
    subroutine finish(self, m, echelon)
       type(relative_type), intent(inout) :: self
       integer, intent(in) :: m

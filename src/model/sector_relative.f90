@@ -81,6 +81,7 @@ contains
       end do
    end subroutine append
 
+   !> The same of complex rows: turned dofs of other sectors are one dof of this one.
    subroutine finish(self, m, echelon)
       type(sector_relative), intent(inout) :: self
       integer, intent(in) :: m

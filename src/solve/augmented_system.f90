@@ -200,6 +200,8 @@ contains
       dr(n + 1:) = 0.0_wp
    end subroutine parameter_derivative
 
+   !> R and g at (q, z). A z that the inner system cannot be brought to has a residual that every
+   !> line search turns back from.
    subroutine residual(self, x, r)
       class(augmented_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
@@ -231,6 +233,7 @@ contains
       n_linear = self%n_linear_inner + self%n_linear_extra
    end subroutine linearize
 
+   !> Right-hand sides of what stays: what leaves the problem is settled first, inside and among z.
    subroutine reduce(self, r, rhs)
       class(augmented_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:)
@@ -246,6 +249,7 @@ contains
       call self%reduce_rows(self%adjusted, r(n + 1:), rhs(k + 1:))
    end subroutine reduce
 
+   !> Steps of all unknowns from those of the linear problem, in the same order.
    subroutine expand(self, r, solution, step)
       class(augmented_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:), solution(:)
@@ -272,6 +276,8 @@ contains
       dz = solution
    end subroutine expand_extra
 
+   !> [R_q v + R_z dz; g_q v + g_z dz]. The rows g come first: they read what the inner product
+   !> has just left.
    subroutine apply(self, vector, product)
       class(augmented_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: vector(:)
@@ -285,6 +291,7 @@ contains
       call self%add_columns(vector(k + 1:), product(:k))
    end subroutine apply
 
+   !> M, its solutions M^-1 R_z, one for each further unknown, and the complement.
    subroutine build_preconditioner(self)
       class(augmented_system), intent(inout) :: self
       logical :: singular
@@ -308,6 +315,7 @@ contains
       self%is_bordered = .not. singular
    end subroutine build_preconditioner
 
+   !> Their number changes with the states of the pairs.
    subroutine reserve_columns(self)
       class(augmented_system), intent(inout) :: self
 
@@ -326,6 +334,7 @@ contains
       if (preconditioner_fits) preconditioner_fits = self%inner%preconditioner_fits()
    end function preconditioner_fits
 
+   !> The bordered solution by blocks: q alone, then z with the complement, then q for that z.
    subroutine precondition(self, vector)
       class(augmented_system), intent(inout) :: self
       real(wp), intent(inout), contiguous :: vector(:)

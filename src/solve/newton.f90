@@ -137,6 +137,7 @@ contains
       norm = norm2(self%r)/system%reference
    end subroutine search
 
+   !> Vectors of the unknowns; solutions of one system reuse them.
    subroutine reserve(self, n)
       type(newton_solver), intent(inout) :: self
       integer, intent(in) :: n

@@ -218,6 +218,7 @@ contains
       jacobian = jacobian/state%system%reference
    end subroutine evaluate_jacobian
 
+   !> Dense matrices and vectors of the unknowns, used again by the next solution.
    subroutine reserve(self, n)
       type(powell_solver), intent(inout) :: self
       integer, intent(in) :: n

@@ -134,6 +134,7 @@ contains
       error = relative_norm(self, self%k3, x)
    end subroutine try_step
 
+   !> Every stage has the same matrix: its factors, or its preconditioner, serve them all.
    subroutine solve_stage(self, system, b, done)
       type(rosenbrock_scheme), intent(inout) :: self
       class(pseudo_system), intent(inout) :: system

@@ -44,6 +44,7 @@ contains
       call self%clear()
    end function new_period_record
 
+   !> Ready for another period, with the same room.
    pure subroutine clear(self)
       class(period_record), intent(inout) :: self
 

@@ -121,6 +121,7 @@ contains
       end do
    end subroutine new_smooth_integration
 
+   !> Once for the run: M^-1 K, M^-1 C and M^-1 F, so that a step needs products alone.
    subroutine divide_by_mass(structure, omega, acceleration)
       type(time_structure), intent(in) :: structure
       real(wp), intent(in) :: omega
@@ -158,6 +159,7 @@ contains
       acceleration%springs = acceleration%springs/omega**2
    end subroutine divide_by_mass
 
+   !> In place, column by column of a matrix.
    subroutine solve_columns(lu, columns)
       type(lu_type), intent(in) :: lu
       !> Right-hand sides, then solutions, in columns.

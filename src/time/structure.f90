@@ -120,6 +120,7 @@ contains
       end do
    end subroutine take_pairs
 
+   !> Rows of springs behind those of the pairs: their elongations.
    subroutine take_springs(springs, self)
       type(spring_type), intent(in) :: springs
       type(time_structure), intent(inout) :: self
@@ -139,6 +140,7 @@ contains
       self%power = springs%power
    end subroutine take_springs
 
+   !> A signed dof; 0 is the ground, and does not move.
    pure subroutine add_side(self, side, sign)
       type(time_structure), intent(inout) :: self
       integer, intent(in) :: side

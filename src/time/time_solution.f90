@@ -104,6 +104,7 @@ contains
       end do
    end function row_memory
 
+   !> Harmonics of the recorded period, as those of a balance are reported.
    subroutine fill_point(record, n_harmonics, point)
       type(period_record), intent(in) :: record
       integer, intent(in) :: n_harmonics

@@ -93,6 +93,7 @@ contains
       if (options%max_depth_step > 0.0_wp) self%max_depth_step = options%max_depth_step
    end function new_wear_stepper
 
+   !> Where steps follow an error 2 (explicit) or 3, else Euler.
    pure integer function automatic_order(options) result(order)
       type(wear_options), intent(in) :: options
 

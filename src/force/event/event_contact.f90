@@ -183,6 +183,7 @@ contains
       end do
    end subroutine fill_batch
 
+   !> d/dtau of one row of coefficients, whatever its shape is outside.
    pure subroutine differentiate(fourier, p, derivative)
       type(fourier_type), intent(in) :: fourier
       real(wp), intent(in) :: p(*)

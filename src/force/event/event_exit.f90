@@ -146,6 +146,7 @@ contains
       end do
    end subroutine refine
 
+   !> Excess below which the cone counts as touched.
    pure real(wp) function noise_of(motion)
       !> The excess is a square: its round-off goes with the square of the size of P.
       type(motion_type), intent(in) :: motion
@@ -162,6 +163,7 @@ contains
       excess = (at%p(1) - z(1))**2 + (at%p(2) - z(2))**2 - at%radius**2
    end function excess
 
+   !> d/dtau of the excess |P - z|^2 - R^2: its sign tells whether a stick is being left.
    pure real(wp) function excess_slope(at, z) result(slope)
       type(instant_type), intent(in) :: at
       real(wp), intent(in) :: z(2)

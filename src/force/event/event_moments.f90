@@ -34,6 +34,7 @@ module fw_event_moments
 
 contains
 
+   !> Moments up to twice the degree: products of two waves have no more.
    pure subroutine reserve(self, degree)
       class(moments_type), intent(inout) :: self
       integer, intent(in) :: degree
@@ -43,6 +44,7 @@ contains
       allocate (self%cosine(-2*degree:2*degree), self%sine(-2*degree:2*degree), source=0.0_wp)
    end subroutine reserve
 
+   !> Back to nothing gathered, with the same room.
    pure subroutine clear(self)
       class(moments_type), intent(inout) :: self
 

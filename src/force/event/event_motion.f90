@@ -69,6 +69,7 @@ module fw_event_motion
 
 contains
 
+   !> Room for the inputs of one pair on the cells, used again by the next.
    pure subroutine reserve(self, cells)
       class(motion_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells

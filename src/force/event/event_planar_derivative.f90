@@ -60,6 +60,7 @@ module fw_event_planar_derivative
 
 contains
 
+   !> Room for cells of one size; gradients start from zero with each period.
    pure type(planar_derivative_type) function new_derivative(cells, measures) result(self)
       type(cells_type), intent(in) :: cells
       logical, intent(in) :: measures
@@ -215,6 +216,7 @@ contains
       self%last_weight = weight
    end subroutine add_row
 
+   !> gradient += row projector^T over the rows gathered so far.
    subroutine flush_rows(self)
       class(planar_derivative_type), intent(inout) :: self
       integer :: n, n_out

@@ -51,6 +51,7 @@ module fw_event_planar_force
 
 contains
 
+   !> Room for cells of one size, used again by every pair.
    pure subroutine reserve(self, cells)
       class(planar_force_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells

@@ -205,6 +205,7 @@ contains
                    width**3*bounds%third <= bounds%noise
    end function negligible
 
+   !> The root of a cell whose ends have values of opposite sign.
    pure subroutine append(degree, p, left, right, noise, n_roots, roots)
       integer, intent(in) :: degree
       real(wp), intent(in) :: p(0:degree, 2)

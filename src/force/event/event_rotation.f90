@@ -167,6 +167,7 @@ contains
       by_a_2 = 0.25_wp*step%h*by(1:2) + commutator*step%h**2*by(3)*[a_1(2), -a_1(1)]
    end subroutine rotation_derivative
 
+   !> a x b of the plane: positive where b lies to the left of a.
    pure real(wp) function cross(a, b)
       real(wp), intent(in) :: a(2), b(2)
 

@@ -57,6 +57,7 @@ module fw_oscillator_search
 
 contains
 
+   !> Room for a wave and its values on the grid that isolates its roots.
    pure subroutine reserve(self, degree, n_grid)
       class(wave_type), intent(inout) :: self
       integer, intent(in) :: degree, n_grid
@@ -73,6 +74,7 @@ contains
       self%bounds = new_bounds(self%n_grid, self%degree, self%p, self%value, sum(abs(self%p)))
    end subroutine measure
 
+   !> Value and slope of the wave alone, without a free motion.
    pure subroutine at(self, angle, value, slope)
       class(wave_type), intent(in) :: self
       real(wp), intent(in) :: angle
@@ -147,6 +149,8 @@ contains
       call add_motion(motion, knot)
    end subroutine take_node
 
+   !> What the free motion adds at a knot: the grid knows the wave alone, for the oscillation
+   !> starts anew with every event.
    pure subroutine add_motion(motion, knot)
       type(motion_type), intent(in) :: motion
       type(free_knot), intent(inout) :: knot

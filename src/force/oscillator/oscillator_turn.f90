@@ -342,6 +342,7 @@ contains
       step(2) = (m(2, 1)*defect(1) + (1.0_wp - m(1, 1))*defect(2))/determinant
    end subroutine newton_step
 
+   !> a x of two by two, without the call of the library: it stands in the innermost loop.
    pure function matmul_2(a, x) result(product)
       real(wp), intent(in) :: a(2, 2), x(2)
       real(wp) :: product(2)
