@@ -192,7 +192,7 @@ def test_all_sectors_move_as_one_disk(disk: Result) -> None:
         written = export_mesh(disk, 0, phase, sectors=0)
         radius = np.hypot(*written.points[:, :2].T)
         inside = np.flatnonzero(radius < 121.0)
-        places, number, count = np.unique(np.round(written.points[inside], 4), axis=0,
+        _, number, count = np.unique(np.round(written.points[inside], 4), axis=0,
                                           return_inverse=True, return_counts=True)
         assert (count == 2).sum() == 36 * 4 * 3  # four radii, three places along the axis
         moved = written.point_data["displacement"][inside]

@@ -15,12 +15,13 @@ from .finding import Finding
 from .labels import Dofs, read_label_table
 from .matrices import FORMATS, read_matrices
 from .matrix_file import MatrixFile
+from .sectors import FRAMES, Interfaces, in_sector_frames, read_interfaces
 from .tables import Pairs, contact_rows, read_loads, read_pairs
 
-__all__ = ["FORMATS", "Dofs", "Finding", "FullModel", "MatrixFile", "Pairs", "Source",
-           "add_arguments", "check_model", "contact_rows", "drop", "gather", "main",
-           "model_datasets", "read_label_table", "read_loads", "read_matrices", "read_pairs",
-           "save"]
+__all__ = ["FORMATS", "Dofs", "Finding", "FullModel", "Interfaces", "MatrixFile", "Pairs",
+           "Source", "add_arguments", "check_model", "contact_rows", "drop", "gather", "main",
+           "model_datasets", "read_interfaces", "read_label_table", "read_loads", "read_matrices",
+           "read_pairs", "save"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,6 +52,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="observed degree of freedom: number or node:component; repeatable")
     parser.add_argument("--reduce", type=int, metavar="N_MODES",
                         help="reduce to relative displacements and so many bonded modes")
+    parser.add_argument("--sectors", type=int, metavar="N",
+                        help="the model is one of N equal sectors around an axis; needs --left "
+                             "and --right")
+    for side in ("left", "right"):
+        parser.add_argument(f"--{side}", type=Path, metavar="TABLE",
+                            help=f"nodes of the {side} interface: columns node, x, y, z; the left "
+                                 "ones, turned by a sector, lie on the right ones")
+    parser.add_argument("--axis", default="z", metavar="AXIS",
+                        help="of the disk, by the right hand from left to right: x, y, z, or -x, "
+                             "-y, -z; write --axis=-z (default: z)")
+    parser.add_argument("--frames", choices=FRAMES, default=FRAMES[0],
+                        help="of the components of interface nodes; Cartesian ones are turned "
+                             "(default: cylindrical)")
     parser.add_argument("--title", default="", help="title of the model")
     parser.add_argument("--unit-system", default="", metavar="TEXT",
                         help="such as mm-tonne-s-N or m-kg-s-N; with one of these two, sizes are "
@@ -105,8 +119,25 @@ def _read(options: argparse.Namespace) -> FullModel:
         observe[name] = model.dofs.signed(dof, f"--observe {text}")
         if observe[name] == 0:
             raise InputError(f"--observe {text}: the ground does not move")
-    return replace(
+    model = replace(
         model, observe=observe, title=options.title, unit_system=options.unit_system,
         pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs,
                                                                rows),
         loads={} if options.loads is None else read_loads(options.loads, model.dofs))
+    return _sector(model, options)
+
+
+def _sector(model: FullModel, options: argparse.Namespace) -> FullModel:
+    """The model with the interfaces of a sector, where it is one."""
+    given = [name for name in ("sectors", "left", "right") if getattr(options, name) is not None]
+    if not given:
+        if model.pairs is not None and model.pairs.sector_2 is not None:
+            raise InputError(f"{options.pairs}: column sector_2 needs --sectors")
+        return model
+    if len(given) < 3:
+        raise InputError(f"--{given[0]} needs --sectors, --left and --right")
+    interfaces = read_interfaces(options.sectors, options.left, options.right, model.dofs,
+                                 options.axis)
+    if options.frames == "cartesian":
+        model = in_sector_frames(model, interfaces)
+    return replace(model, interfaces=interfaces)

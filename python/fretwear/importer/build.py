@@ -18,6 +18,7 @@ from .finding import Finding
 from .labels import Dofs
 from .matrices import read_matrices
 from .matrix_file import HELD, MatrixFile, mirrored, one_triangle
+from .sectors import Interfaces
 from .tables import LOADS, Pairs, contact_rows
 
 __all__ = ["ROLES", "FullModel", "Source", "drop", "gather", "model_datasets", "read_rows",
@@ -72,6 +73,8 @@ class FullModel:
         Attributes of the model file.
     notes : list of str
         What was done on the way.
+    interfaces : Interfaces or None
+        Of one sector of a cyclic structure.
     """
 
     matrices: dict[str, sp.csr_array]
@@ -82,6 +85,7 @@ class FullModel:
     title: str = ""
     unit_system: str = ""
     notes: list[str] = field(default_factory=list)
+    interfaces: Interfaces | None = None
 
 
 def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
@@ -222,6 +226,10 @@ def model_datasets(model: FullModel, n_modes: int | None) -> dict[str, NDArray[A
     """
     symmetric = {role: (matrix + matrix.T) * 0.5 for role, matrix in model.matrices.items()}
     observed = _observed(model)
+    cyclic = model.interfaces is not None
+    if cyclic and model.pairs is not None and model.pairs.rows is not None:
+        raise InputError("pairs of sectors need degrees of freedom of their own on both sides: "
+                         "columns side_1_t1 ... side_2_n and sector_2")
     if n_modes is None:
         if model.pairs is not None and model.pairs.rows is not None:
             raise InputError("pairs given by nodes and normals, or by rows, are no degrees of "
@@ -231,8 +239,10 @@ def model_datasets(model: FullModel, n_modes: int | None) -> dict[str, NDArray[A
         data.update({f"load/{name}": load for name, load in model.loads.items()})
         if model.pairs is not None:
             data["contact/side_1"], data["contact/side_2"] = model.pairs.side_1, model.pairs.side_2
+        if model.interfaces is not None:
+            data |= {"cyclic/left": model.interfaces.left, "cyclic/right": model.interfaces.right}
     else:
-        data = _reduced(model, symmetric, n_modes)
+        data = (_reduced_sector if cyclic else _reduced)(model, symmetric, n_modes)
         basis = data.pop("basis")
         observed = np.asarray(observed @ basis)
     if model.pairs is not None:
@@ -266,6 +276,40 @@ def _reduced(model: FullModel, matrices: dict[str, sp.csr_array],
     return data
 
 
+def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array],
+                    n_modes: int) -> dict[str, NDArray[Any]]:
+    """Interfaces and both sides of the pairs as they are, and modes with all of them held."""
+    assert model.interfaces is not None
+    sides = np.zeros((2, 0, 3), dtype=np.int32) if model.pairs is None else np.stack(
+        (model.pairs.side_1, model.pairs.side_2))
+    ends = np.concatenate((model.interfaces.left, model.interfaces.right))
+    chosen = np.unique(np.concatenate((ends, np.abs(sides[sides != 0])))) - 1
+    kept = np.concatenate((ends - 1, np.setdiff1d(chosen, ends - 1)))
+    rows = sp.csr_array((np.ones(len(kept)), (np.arange(len(kept)), kept)),
+                        (len(kept), model.dofs.n))
+    place = np.zeros(model.dofs.n + 1, dtype=np.int32)
+    place[kept + 1] = np.arange(1, len(kept) + 1)
+    loads = np.column_stack([model.loads[name] for name in model.loads] or
+                            [np.zeros(model.dofs.n)])
+    system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
+                    damping=matrices.get("damping"),
+                    attachments=np.column_stack((loads, _observed(model).toarray().T)))
+    data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
+    if system.damping is not None:
+        data["damping"] = system.damping
+    if "stiffness_rotation" in matrices:
+        data["stiffness_rotation"] = system.reduction.matrix(matrices["stiffness_rotation"])
+    data.update({f"load/{name}": system.loads[:, k] for k, name in enumerate(model.loads)})
+    n = len(model.interfaces.left)
+    data["cyclic/left"] = np.arange(1, n + 1, dtype=np.int32)
+    data["cyclic/right"] = np.arange(n + 1, 2 * n + 1, dtype=np.int32)
+    if model.pairs is not None:
+        for name, side in zip(("contact/side_1", "contact/side_2"), sides):
+            data[name] = np.sign(side) * place[np.abs(side)]
+    data["basis"] = system.reduction.basis
+    return data
+
+
 def _observed(model: FullModel) -> sp.csr_array:
     """Rows of the observed degrees of freedom (n_observed, n)."""
     signed = np.array(list(model.observe.values()), dtype=int)
@@ -276,7 +320,8 @@ def _observed(model: FullModel) -> sp.csr_array:
 
 def _pair_values(pairs: Pairs) -> dict[str, NDArray[Any]]:
     values = {"mu": pairs.mu, "gap": pairs.gap, "area": pairs.area, "position": pairs.position,
-              "patch": None if pairs.patch is None else strings(pairs.patch)}
+              "patch": None if pairs.patch is None else strings(pairs.patch),
+              "sector_2": pairs.sector_2}
     return {f"contact/{name}": value for name, value in values.items() if value is not None}
 
 
@@ -284,7 +329,9 @@ def save(model: FullModel, path: str | Path, n_modes: int | None = None) -> list
     """Write the model file of a checked model; returns what is to be known about it."""
     data = model_datasets(model, n_modes)
     write_model_file(path, data, title=model.title or Path(path).stem,
-                     unit_system=model.unit_system)
+                     unit_system=model.unit_system,
+                     groups=None if model.interfaces is None else {
+                         "cyclic": {"n_sectors": model.interfaces.n_sectors}})
     n = len(data["mass"])
     found = [Finding("note", str(path), f"{n} degrees of freedom, "
                      f"{0 if model.pairs is None else len(model.pairs)} pairs, loads "

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .build import FullModel
 from .finding import Finding
+from .sectors import check_interfaces, tied_spectrum
 from .spectrum import Spectrum, lowest_modes, negative_directions
 from .tables import DIRECTIONS, Pairs, contact_rows
 
@@ -248,7 +249,16 @@ def _spectrum(model: FullModel) -> Findings:
         yield Finding("error", "mass and stiffness", "a motion has neither mass nor stiffness (a "
                       "mechanism of massless degrees of freedom); hold it or give it mass")
         return
-    yield from _rigid(model, spectrum)
+    if model.interfaces is not None:
+        tied = tied_spectrum(model, model.interfaces)
+        if tied is None:
+            yield Finding("error", "interfaces", "tied in nodal diameter 0 a motion has neither "
+                          "mass nor stiffness")
+            return
+        yield from check_interfaces(model.interfaces, spectrum, tied)
+        spectrum = tied
+    else:
+        yield from _rigid(model, spectrum)
     yield from _units(model, spectrum)
 
 

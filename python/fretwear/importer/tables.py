@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, OutputError
 from .labels import Dofs
 
-__all__ = ["LOADS", "Pairs", "contact_rows", "read_loads", "read_pairs"]
+__all__ = ["LOADS", "Pairs", "contact_rows", "read_loads", "read_pairs", "read_table"]
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +47,8 @@ class Pairs:
         Names.
     where : list of str
         Line of the table, for messages.
+    sector_2 : (n_pairs,) int or None
+        Sector of side 2, where the table has it.
     """
 
     side_1: NDArray[np.int32]
@@ -58,6 +60,7 @@ class Pairs:
     position: Floats | None
     patch: list[str] | None
     where: list[str]
+    sector_2: NDArray[np.int32] | None = None
 
     def __len__(self) -> int:
         return len(self.where)
@@ -109,8 +112,8 @@ def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None) -
         Table with a heading. Either columns side_1_t1 ... side_2_n with signed degrees of
         freedom (numbers, node:component, empty or 0 for none), or node_1, node_2 (0 for the
         ground) with the normal nx, ny, nz from side 2 to side 1 and, if wanted, the first
-        tangent t1x, t1y, t1z. Then any of mu, gap, area, x, y, z, patch. Lines that start with
-        # are comments.
+        tangent t1x, t1y, t1z. Then any of mu, gap, area, x, y, z, patch, and of
+        sectors sector_2. Lines that start with # are comments.
     dofs : Dofs
         Degrees of freedom of the matrices.
     rows : (3 n_pairs, n) sparse array, optional
@@ -122,8 +125,8 @@ def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None) -
     InputError
         A column is not known or missing, or a value is wrong; the message names the line.
     """
-    table = _read_table(Path(path), [*_SIDES, *_NODES, *_NORMAL, *_TANGENT, *_POSITION, *_VALUES,
-                                     "patch"])
+    table = read_table(Path(path), [*_SIDES, *_NODES, *_NORMAL, *_TANGENT, *_POSITION, *_VALUES,
+                                    "patch", "sector_2"])
     if rows is not None:
         side_1 = _numbers_of_rows(table, dofs, rows)
         side_2 = np.zeros_like(side_1)
@@ -137,7 +140,14 @@ def read_pairs(path: str | Path, dofs: Dofs, rows: sp.csr_array | None = None) -
                          "node_1, node_2, nx, ny, nz")
     mu, gap, area = (table.numbers(name) for name in _VALUES)
     patch = [line["patch"] for line in table.lines] if "patch" in table.columns else None
-    return Pairs(side_1, side_2, rows, mu, gap, area, table.vectors(_POSITION), patch, table.where)
+    across = table.numbers("sector_2")
+    if across is not None and (across != np.round(across)).any():
+        raise InputError(f"{path}: column sector_2 holds whole numbers: 0, 1, -1, ...")
+    if across is not None and across.any() and rows is not None:
+        raise InputError(f"{path}: column sector_2 goes with columns side_1_t1 ... side_2_n: both "
+                         "sides of such a pair have degrees of freedom of their own")
+    return Pairs(side_1, side_2, rows, mu, gap, area, table.vectors(_POSITION), patch, table.where,
+                 None if across is None else across.astype(np.int32))
 
 
 def contact_rows(pairs: Pairs, n: int) -> tuple[sp.csr_array, NDArray[np.int32]]:
@@ -166,7 +176,7 @@ def contact_rows(pairs: Pairs, n: int) -> tuple[sp.csr_array, NDArray[np.int32]]
 
 def read_loads(path: str | Path, dofs: Dofs) -> dict[str, Floats]:
     """Loads (n) by name from a table with the columns dof and some of `LOADS`; lines add up."""
-    table = _read_table(Path(path), ["dof", *LOADS])
+    table = read_table(Path(path), ["dof", *LOADS])
     names = [name for name in LOADS if name in table.columns]
     if "dof" not in table.columns or not names:
         raise InputError(f"{path}: expected the column dof and at least one of "
@@ -184,7 +194,8 @@ def read_loads(path: str | Path, dofs: Dofs) -> dict[str, Floats]:
     return loads
 
 
-def _read_table(path: Path, known: Sequence[str]) -> _Table:
+def read_table(path: Path, known: Sequence[str]) -> _Table:
+    """Columns of a table with a heading, of known names."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:

@@ -1,0 +1,174 @@
+"""Import of one sector: interfaces paired by turning, checked, tied and reduced."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse as sp
+from project import PROGRAM
+
+from fretwear.cli import main
+from fretwear.disk import DiskParameters, FullDisk, build_full, reduce_disk
+from fretwear.sector.assembly import Assembly
+
+#: Few elements; what is tested is the way of the matrices, not the disk.
+SMALL = DiskParameters(n_sectors=12, blade_angle=8.0, disk_rows=1, blade_rows=1, axial_layers=1,
+                       side_columns=1, radial_patches=1, axial_patches=1, n_modes=20)
+#: Frequencies of the same matrices in another order, of a condition of 1e7.
+SAME = 1e-7
+#: Of the lowest families, with the modes that the reduction leaves out.
+REDUCED = 1e-3
+
+
+@pytest.fixture(scope="module")
+def full() -> FullDisk:
+    return build_full(SMALL)
+
+
+@pytest.fixture(scope="module")
+def folder(full: FullDisk, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Matrices in Cartesian components, as of another program, with labels and node tables."""
+    path = tmp_path_factory.mktemp("sector")
+    scipy.io.mmwrite(path / "mass.mtx", sp.coo_array(full.mass), symmetry="symmetric")
+    scipy.io.mmwrite(path / "stiffness.mtx", sp.coo_array(full.stiffness), symmetry="symmetric")
+    lines = [f"{i + 1} {dof // 3 + 1} {dof % 3 + 1}" for i, dof in enumerate(full.free)]
+    (path / "labels.txt").write_text("\n".join(["eq node component", *lines]))
+    nodes = Assembly(full.sector.mesh, full.parameters.material).nodes
+    n = full.n_interface
+    for side, rows in (("left", full.rows[:n]), ("right", full.rows[n:2 * n])):
+        found = np.unique(full.free[np.unique(rows.tocoo().col)] // 3)
+        # Another order on either side.
+        found = found[::-1] if side == "right" else found
+        table = [f"{k + 1}, {', '.join(f'{x:.12g}' for x in nodes[:, k])}" for k in found]
+        (path / f"{side}.csv").write_text("\n".join(["node, x, y, z", *table]))
+    return path
+
+
+def command(folder: Path, *more: str) -> list[str]:
+    return ["import", str(folder / "mass.mtx"), str(folder / "stiffness.mtx"), "--labels",
+            str(folder / "labels.txt"), "--sectors", "12", "--left", str(folder / "left.csv"),
+            "--right", str(folder / "right.csv"), *more]
+
+
+def frequencies(folder: Path, file: Path) -> np.ndarray:
+    """Of all nodal diameters [Hz], by the program."""
+    (folder / "modes.nml").write_text(f"&case analysis = 'modes' /\n&model source = 'hdf5' file = "
+                                      f"'{file}' /\n&cyclic n_modes = 3 /\n")
+    subprocess.run([PROGRAM, "-q", "-o", folder / "modes_result.h5", folder / "modes.nml"],
+                   check=True)
+    with h5py.File(folder / "modes_result.h5") as found:
+        values: np.ndarray = found["modes/open"][()] / (2.0 * np.pi)
+        return values
+
+
+@pytest.fixture(scope="module")
+def exact(full: FullDisk) -> np.ndarray:
+    """With all modes that there are, nearly."""
+    model = reduce_disk(full)
+    return np.array([model.frequencies(k, n=3) for k in range(7)])
+
+
+def test_import_of_a_sector(folder: Path, exact: np.ndarray, tmp_path: Path,
+                            capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "model.h5"
+    assert main(command(folder, "--frames", "cartesian", "-o", str(target))) == 0
+    said = capsys.readouterr().err
+    assert "frame of the next sector" in said and "of nodal diameter 0" in said
+    with h5py.File(target) as file:
+        assert file["cyclic"].attrs["n_sectors"] == 12
+        assert len(file["cyclic/left"]) == len(file["cyclic/right"]) == 18
+    found = frequencies(tmp_path, target)
+    assert found.shape == (7, 3)
+    # The reduction of the generator keeps 20 modes: from above, by little.
+    assert found == pytest.approx(exact, rel=REDUCED)
+    reduced = tmp_path / "reduced.h5"
+    assert main(command(folder, "--frames", "cartesian", "--reduce", "20", "-o",
+                        str(reduced))) == 0
+    with h5py.File(reduced) as file:
+        assert len(file["mass"]) == 2 * 18 + 20
+    assert frequencies(tmp_path, reduced) == pytest.approx(found, rel=REDUCED)
+
+
+def test_components_in_the_wrong_frames_have_other_frequencies(folder: Path, exact: np.ndarray,
+                                                               tmp_path: Path) -> None:
+    """A held disk has no rigid motions that would tell: the answer does."""
+    target = tmp_path / "model.h5"
+    assert main(command(folder, "-q", "-o", str(target))) == 0
+    assert np.abs(frequencies(tmp_path, target)[:, 0] / exact[:, 0] - 1.0).max() > 0.01
+
+
+def test_rigid_motions_tell_the_frames(full: FullDisk, folder: Path, tmp_path: Path,
+                                       capsys: pytest.CaptureFixture[str]) -> None:
+    """A sector that nothing holds: two motions of the whole disk are left, or the frames are not
+    those of the sectors."""
+    assembly = Assembly(full.sector.mesh, full.parameters.material)
+    mass = sp.kron(assembly.scalar_mass(), sp.identity(3))
+    nodes = assembly.nodes
+    scipy.io.mmwrite(tmp_path / "mass.mtx", sp.coo_array(mass), symmetry="symmetric")
+    scipy.io.mmwrite(tmp_path / "stiffness.mtx", sp.coo_array(assembly.stiffness()),
+                     symmetry="symmetric")
+    labels = [f"{3 * k + c + 1} {k + 1} {c + 1}" for k in range(assembly.n_nodes)
+              for c in range(3)]
+    (tmp_path / "labels.txt").write_text("\n".join(labels))
+    radius, angle = np.hypot(*nodes[:2]), np.arctan2(nodes[1], nodes[0])
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        on = np.flatnonzero((np.abs(angle - sign * np.pi / 12) < 1e-9) & (radius < 120.0 + 1e-6))
+        (tmp_path / f"{side}.csv").write_text("\n".join(["node; x; y; z", *(
+            f"{k + 1}; {nodes[0, k]}; {nodes[1, k]}; {nodes[2, k]}" for k in on)]))
+    capsys.readouterr()
+    assert main(command(tmp_path, "--check", "--frames", "cartesian")) == 0
+    assert "6 rigid-body motions of the sector, 2 of nodal diameter 0" in capsys.readouterr().out
+    assert main(command(tmp_path, "--check")) == 3
+    assert "do not turn with the sector" in capsys.readouterr().err
+
+
+def test_pairs_reach_the_next_sector(full: FullDisk, folder: Path, tmp_path: Path) -> None:
+    """A pair between tips of neighbours, by signed degrees of freedom."""
+    rows = full.rows[2 * full.n_interface:]
+    ends = [full.free[rows[[k]].tocoo().col[0]] // 3 + 1 for k in (0, 3)]
+    tokens = [[f"{node}:{c}" for c in (1, 2, 3)] for node in ends]
+    (tmp_path / "pairs.csv").write_text(
+        "side_1_t1, side_1_t2, side_1_n, side_2_t1, side_2_t2, side_2_n, mu, sector_2\n"
+        + ", ".join([*tokens[0], *tokens[1], "0.3", "1"]) + "\n")
+    for more in ([], ["--reduce", "20"]):
+        target = tmp_path / "model.h5"
+        assert main(command(folder, "--frames", "cartesian", "-q", "--pairs",
+                            str(tmp_path / "pairs.csv"), "-o", str(target), *more)) == 0
+        with h5py.File(target) as file:
+            assert file["contact/sector_2"][()].tolist() == [1]
+            sides = np.concatenate((file["contact/side_1"], file["contact/side_2"]), axis=None)
+            assert sides.min() > 0 and len(set(sides.tolist())) == 6
+            # Sector matrices: displacements of the nodes themselves, also where it is reduced.
+            assert (sides > 36).all() or not more
+
+
+def test_what_is_refused(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    left = (folder / "left.csv").read_text().splitlines()
+
+    def refused(*options: str) -> str:
+        assert main(command(folder, "--check", *options)) == 3
+        return capsys.readouterr().err
+
+    (tmp_path / "short.csv").write_text("\n".join(left[:-1]))
+    assert "equal meshes" in refused("--left", str(tmp_path / "short.csv"))
+    assert "Is the axis right" in refused("--axis=-z")
+    assert "turned by 90 degrees" in refused("--sectors", "4")
+    node, *place = left[1].split(",")
+    moved = [left[0], ",".join([node, f"{float(place[0]) + 0.1}", *place[1:]]), *left[2:]]
+    (tmp_path / "moved.csv").write_text("\n".join(moved))
+    assert f"node {node} " in refused("--left", str(tmp_path / "moved.csv"))
+    (tmp_path / "other.csv").write_text("\n".join([left[0], "999999," + ",".join(place),
+                                                   *left[2:]]))
+    assert "both need the same" in refused("--left", str(tmp_path / "other.csv"))
+    assert "--sectors" in refused_alone(folder, capsys)
+
+
+def refused_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(["import", str(folder / "mass.mtx"), str(folder / "stiffness.mtx"), "--check",
+                 "--left", str(folder / "left.csv")]) == 3
+    return capsys.readouterr().err
