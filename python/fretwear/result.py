@@ -17,6 +17,7 @@ from .cycle import Cycle, read_cycle
 from .errors import AbsentError, InputError, OutputError
 from .peaks import Peak, read_peaks
 from .result_file import Quantity, ResultFile, plain_text
+from .sensitivity import Sensitivities, read_sensitivities
 
 if TYPE_CHECKING:
     import xarray
@@ -321,6 +322,13 @@ class Result(ResultFile):
         Folds of branches, and with `stability` in `&sweep` all else; empty where there are none.
         """
         return read_bifurcations(self)
+
+    # ------------------------------------------------------------------ derivatives
+
+    @property
+    def sensitivities(self) -> Sensitivities:
+        """Derivatives by parameters: `result.sensitivities["largest"]["contact%mu"]`."""
+        return read_sensitivities(self)
 
     # ------------------------------------------------------------------ wear
 

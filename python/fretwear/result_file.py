@@ -39,6 +39,7 @@ _REMEDIES = {
     "bifurcation/": "run a sweep with sweep%stability = .true., or a branch that turns",
     "cyclic/": "give the case sectors (&cyclic n_sectors, engine_order)",
     "modes/": "run with case%analysis = 'modes'",
+    "sensitivity/": "run with sensitivity%parameters",
     "peak/": "run a sweep (case%analysis = 'frf') with this version of fretwear",
     "observed/": "name what to observe in output%observe",
 }

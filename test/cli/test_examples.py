@@ -21,6 +21,10 @@ NUMBERS = {
     "jenkins/jenkins.nml": [("amplitude", 1.0, 0, 9.468233129, 1e-6),
                             ("contact/dissipation", 1.0, 0, 17.936466258, 5e-6),
                             ("amplitude", None, 0, 9.784333, 1e-6)],
+    # Met by differences of runs to 1e-7 (test/oracles/test_sensitivities.py).
+    "sensitivity/sensitivity.nml": [
+        ("sensitivity/first_harmonic/contact_mu", 1.0, 0, -15.05893873, 1e-6),
+        ("sensitivity/deviation/largest", 1.0, 0, 2.358389, 1e-6)],
     "gap/gap.nml": [("amplitude", 1.15, 0, 1.332770444, 5e-6)],
     "separation/separation.nml": [("amplitude", 0.9, 0, 2.240312606, 5e-6),
                                   ("contact/dissipation", 0.9, 0, 2.830244154, 2e-5)],

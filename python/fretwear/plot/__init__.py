@@ -20,6 +20,7 @@ from .response import (
     plot_response,
     read_response,
 )
+from .sensitivity import plot_sensitivity
 from .table import plot_table
 from .together import plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
@@ -27,6 +28,6 @@ from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
            "half_power_damping", "main", "plot_campbell", "plot_convergence", "plot_cycle",
            "plot_damping", "plot_flanks", "plot_harmonics", "plot_hysteresis",
-           "plot_nodal_diameters", "plot_response", "plot_responses", "plot_safe", "plot_table",
-           "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps", "read_damping",
-           "read_response"]
+           "plot_nodal_diameters", "plot_response", "plot_responses", "plot_safe",
+           "plot_sensitivity", "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",
+           "read_damping", "read_response"]

@@ -13,6 +13,7 @@ from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
 from .response import plot_response
+from .sensitivity import plot_sensitivity
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "fitting"]
@@ -102,6 +103,10 @@ KINDS: dict[str, Kind] = {
     "safe": Kind("Engine orders at a speed",
                  lambda r: _has_diameters(r) and rotation_speed(r) > 0.0,
                  lambda r, c: plot_safe(r, c.speed)),
+    "sensitivity": Kind(
+        "What the parameters do", lambda r: _has("sensitivity/value/first_harmonic")(r) or _has(
+            "sensitivity/value/dissipation")(r),
+        lambda r, c: plot_sensitivity(r, c.point, c.observe)),
     "convergence": Kind("Convergence", lambda r: "iterations" in r and r.n_points > 0,
                         lambda r, c: plot_convergence(r)),
 }

@@ -1,0 +1,78 @@
+"""Derivatives of a result in Python, and their picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fretwear as fw
+from fretwear.cli import main
+from fretwear.plot import fitting, plot_sensitivity
+
+
+@pytest.fixture(scope="module")
+def slipping() -> fw.Result:
+    """Two masses that rub, one of them on the ground."""
+    contact = fw.ContactPairs([[1, 0, 0], [2, 0, 0]], mu=[0.4, 0.3], normal_load=[1.0, 0.8],
+                              tangential_stiffness=[1.5, 1.2])
+    model = fw.Model([[1.0, 0.0], [0.0, 2.0]], [[0.03, -0.01], [-0.01, 0.05]],
+                     [[3.0, -2.0], [-2.0, 5.0]], cosine=[0.0, 0.9], contact=contact)
+    return fw.frf(model, 1.1, 1.5, 9, contact={"law": "penalty"}, harmonics={"n_harmonics": 5},
+                  sensitivity={"parameters": ["contact%mu", "load%harmonic_scale"],
+                               "deviation": [0.05, 0.0]})
+
+
+def test_derivatives_by_name(slipping: fw.Result) -> None:
+    found = slipping.sensitivities
+    assert set(found) == {"first_harmonic", "largest", "dissipation"} and len(found) == 3
+    assert found["largest"]["contact%mu"].shape == (9, 2, 2)
+    assert found["dissipation"]["contact%mu"].shape == (9, 2)
+    assert found["largest"]["load%harmonic_scale"].shape == (9, 2)
+    np.testing.assert_array_equal(found.value["contact%mu"][3], [0.4, 0.3])
+    np.testing.assert_allclose(found.value["largest"], slipping.amplitude, rtol=1e-12)
+    np.testing.assert_allclose(found.value["dissipation"], slipping.dissipation.sum(axis=1),
+                               rtol=1e-9, atol=1e-14)
+
+
+def test_deviation_is_that_of_the_derivatives(slipping: fw.Result) -> None:
+    found = slipping.sensitivities
+    expected = 0.05 * np.abs(found["largest"]["contact%mu"] @ [0.4, 0.3])
+    np.testing.assert_allclose(found.deviation["largest"], expected, rtol=1e-12)
+
+
+def test_relative(slipping: fw.Result) -> None:
+    found = slipping.sensitivities
+    k = slipping.peak()
+    by_mu = found.relative("largest", "contact%mu", k, 1)
+    np.testing.assert_allclose(by_mu, found["largest"]["contact%mu"][k, 1] * [0.4, 0.3]
+                               / slipping.amplitude[k, 1], rtol=1e-12)
+    # Friction is of degree 1 in loads and limits together: so is the response.
+    by_load = found.relative("largest", "load%harmonic_scale", k, 1)
+    assert by_mu.sum() + by_load.sum() == pytest.approx(1.0, abs=1e-6)
+    with pytest.raises(fw.InputError):
+        found.relative("largest", "contact%gap", k)
+
+
+def test_absent(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    linear = fw.frf(fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0]), 0.5, 1.5, 3)
+    with pytest.raises(fw.AbsentError, match="sensitivity%parameters"):
+        _ = linear.sensitivities
+    assert "sensitivity" not in fitting(linear)
+
+
+def test_picture(slipping: fw.Result, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    figure = plot_sensitivity(slipping, observe="u2")
+    panels = figure.axes
+    assert len(panels) == 3
+    assert [label.get_text() for label in panels[0].get_yticklabels()] == [
+        "contact%mu", "load%harmonic_scale"]
+    # Bars are the relative derivatives, pairs one below the other.
+    found = slipping.sensitivities
+    widths = [bar.get_width() for bar in panels[2].patches]
+    expected = np.concatenate([found.relative("largest", name, slipping.peak("u2"), 1)
+                               for name in found["largest"]])
+    np.testing.assert_allclose(widths, expected, rtol=1e-12)
+    slipping.save(tmp_path / "slipping.h5")
+    assert main(["plot", str(tmp_path / "slipping.h5"), "--kind", "sensitivity", "-o",
+                 str(tmp_path / "bars.png")]) == 0
+    assert (tmp_path / "bars.png").stat().st_size > 5000
