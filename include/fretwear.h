@@ -87,7 +87,8 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
 
 /* Give a part of it by the name of its dataset in a model file; `n` says how many values there
    are and is checked. Everything is copied.
-   n_dof * n_dof: "mass", "stiffness" (both required), "damping", "stiffness_rotation"; symmetric
+   n_dof * n_dof: "mass", "stiffness" (both required), "damping", "stiffness_rotation"; symmetric;
+                  "coriolis", skew, row after row
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
                   "contact/tangential_stiffness", "contact/normal_stiffness"

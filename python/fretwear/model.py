@@ -164,6 +164,9 @@ class Model:
         Loads [force].
     stiffness_rotation : (n_dof, n_dof), optional
         Stiffness per square of the rotation speed [force/length/(rad/s)^2].
+    coriolis : (n_dof, n_dof), optional
+        Of cyclic structures: Coriolis matrix for each rad/s of the rotation speed, skew
+        [force/length/(rad/s)^2].
     static_rotation : (n_dof,), optional
         Static load per square of the rotation speed [force/(rad/s)^2].
     harmonic : mapping, optional
@@ -191,6 +194,7 @@ class Model:
                  static_rotation: ArrayLike | None = None, sectors: Sectors | None = None,
                  observe: Mapping[str, Observation] | None = None,
                  harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
+                 coriolis: ArrayLike | None = None,
                  title: str = "", unit_system: str = "") -> None:
         n = self.n_dof = _order(M, C, K)
         if n == 0:
@@ -199,7 +203,7 @@ class Model:
         self._matrices = {"stiffness": array("K", K, square), "mass": array("M", M, square)}
         for name, argument, value in (
                 ("damping", "C", C), ("stiffness_rotation", "stiffness_rotation",
-                                      stiffness_rotation)):
+                                      stiffness_rotation), ("coriolis", "coriolis", coriolis)):
             if value is not None:
                 self._matrices[name] = array(argument, value, square)
         self._loads = {
@@ -250,6 +254,12 @@ class Model:
     def stiffness_rotation(self) -> Floats | None:
         """Stiffness per square of the rotation speed (n_dof, n_dof), read-only; None for none."""
         found = self._matrices.get("stiffness_rotation")
+        return None if found is None else _read_only(found)
+
+    @property
+    def coriolis(self) -> Floats | None:
+        """Coriolis matrix per rotation speed (n_dof, n_dof), read-only; None for none."""
+        found = self._matrices.get("coriolis")
         return None if found is None else _read_only(found)
 
     @property
@@ -321,6 +331,9 @@ class Model:
             kind = _text(file.attrs.get("format", ""))
             if kind != FORMAT:
                 raise InputError(f"{path}: format is '{kind}', expected '{FORMAT}'")
+            if "aero" in file:
+                raise InputError(f"{path}: holds forces of the air, which a Model does not: name "
+                                 "the file in the case (model%file)")
             if "nodal_diameter" in file:
                 raise InputError(f"{path}: holds matrices of nodal diameters, which a Model does "
                                  "not: name the file in the case (model%file)")
@@ -328,7 +341,8 @@ class Model:
                 if name not in file:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
-                "mass", "stiffness", "damping", "stiffness_rotation", *_CONTACT, *_LOADS,
+                "mass", "stiffness", "damping", "stiffness_rotation", "coriolis",
+                *_CONTACT, *_LOADS,
                 *(f"contact/{name}" for name in _IN_NAMELIST)) if name in file}
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
             try:
@@ -337,6 +351,7 @@ class Model:
                     contact=_contact_of(found), observe=_observed_of(file), **loads,
                     sectors=_sectors_of(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
+                    coriolis=found.get("coriolis"),
                     title=_text(file.attrs.get("title", "")),
                     unit_system=_text(file.attrs.get("unit_system", "")))
             except InputError as error:

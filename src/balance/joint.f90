@@ -158,6 +158,8 @@ contains
             if (.not. moving(i)) cycle
             moving(1:) = moving(1:) .or. abs(model%mass(:, i)) > 0.0_wp .or. &
                          abs(model%stiffness(:, i)) > 0.0_wp .or. abs(model%damping(:, i)) > 0.0_wp
+            if (allocated(model%cyclic%coriolis)) moving(1:) = moving(1:) .or. &
+               abs(model%cyclic%coriolis(:, i)) > 0.0_wp
          end do
          do i = 1, contact%n_pairs
             do c = 1, 3
@@ -167,6 +169,11 @@ contains
          do i = 1, springs%n_springs
             call couple(springs%side_1(i), springs%side_2(i))
          end do
+         if (allocated(model%cyclic%air)) then
+            associate (touched => any(abs(model%cyclic%air%modes) > 0.0_wp, dim=1))
+               if (any(touched .and. moving(1:))) moving(1:) = moving(1:) .or. touched
+            end associate
+         end if
          if (allocated(model%cyclic%left)) then
             do i = 1, size(model%cyclic%left)
                call couple(model%cyclic%left(i), model%cyclic%right(i))

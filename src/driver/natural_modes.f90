@@ -21,6 +21,9 @@ module fw_natural_modes
    use fw_sector_relative, only: new_sector_relative
    use fw_sector_relative, only: sector_relative
    use fw_text, only: to_text
+   use fw_whirl_modes, only: find_whirl
+   use fw_whirl_modes, only: wave_matrices
+   use fw_whirl_modes, only: wave_of
    implicit none (type, external)
    private
 
@@ -30,6 +33,9 @@ module fw_natural_modes
    type :: natural_modes
       integer, allocatable :: nodal_diameter(:)
       real(wp), allocatable :: open(:, :), closed(:, :)
+      !> Fractions of critical damping of the same, only where waves in both directions differ; below
+      !> 0 where the motion grows.
+      real(wp), allocatable :: open_damping(:, :), closed_damping(:, :)
    end type natural_modes
 
    !> Shifts of a stiffness that does not hold the structure, in parts of K over M.
@@ -48,26 +54,88 @@ contains
       integer, intent(in) :: n_modes
       type(natural_modes), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
-      !> Nodal diameters, 0 to N/2 (default: all).
+      !> Nodal diameters, 0 to N/2, or with a sign where waves in both directions differ (default:
+      !> all).
       integer, intent(in), optional :: wanted(:)
       integer, allocatable :: list(:)
       integer :: j, k
 
       associate (cyclic => case%model%cyclic)
          list = [(k, k=0, cyclic%n_sectors/2)]
+         if (cyclic%splits_waves()) list = [(k, k=-(cyclic%n_sectors - 1)/2, cyclic%n_sectors/2)]
          if (present(wanted)) list = wanted
-         modes%nodal_diameter = pack(list, [(cyclic%holds(list(j)), j=1, size(list))])
+         modes%nodal_diameter = pack(list, [(cyclic%holds(abs(list(j))), j=1, size(list))])
       end associate
       allocate (modes%open(n_modes, size(modes%nodal_diameter)), &
                 modes%closed(n_modes, size(modes%nodal_diameter)))
       modes%open = ieee_value(1.0_wp, ieee_quiet_nan)
       modes%closed = modes%open
+      if (case%model%cyclic%splits_waves()) then
+         modes%open_damping = modes%open
+         modes%closed_damping = modes%open
+         do j = 1, size(modes%nodal_diameter)
+            call find_waves(case, j, modes, error)
+            if (allocated(error)) return
+         end do
+         return
+      end if
       do j = 1, size(modes%nodal_diameter)
          call find_in_diameter(case, modes%nodal_diameter(j), modes%open(:, j), &
                                modes%closed(:, j), error)
          if (allocated(error)) return
       end do
    end subroutine find_natural_modes
+
+   !> Of a signed nodal diameter, damping included.
+   subroutine find_waves(case, place, modes, error)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: place
+      type(natural_modes), intent(inout) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices) :: nodal
+      type(sector_relative) :: relative
+      type(wave_matrices) :: wave
+      complex(wp), allocatable :: stiffness(:, :), held(:, :), basis(:, :)
+      integer :: k
+
+      k = modes%nodal_diameter(place)
+      call sector_at(case%model, abs(k), nodal, error)
+      if (allocated(error)) return
+      stiffness = nodal%stiffness
+      call add_springs(case, abs(k), stiffness)
+      call wave_of(nodal, stiffness, k < 0, wave)
+      call list_waves(wave, modes%open(:, place), modes%open_damping(:, place))
+      modes%closed(:, place) = modes%open(:, place)
+      modes%closed_damping(:, place) = modes%open_damping(:, place)
+      if (case%contact%n_pairs == 0) return
+      call close_pairs(case, abs(k), stiffness, held)
+      call wave_of(nodal, stiffness, k < 0, wave)
+      if (size(held, 1) > 0) then
+         call new_sector_relative(held, relative)
+         call held_basis(relative, size(nodal%mass, 1), basis)
+         if (k < 0) basis = conjg(basis)
+         wave%mass = congruence(basis, wave%mass, basis)
+         wave%damping = congruence(basis, wave%damping, basis)
+         wave%stiffness = congruence(basis, wave%stiffness, basis)
+      end if
+      call list_waves(wave, modes%closed(:, place), modes%closed_damping(:, place))
+   end subroutine find_waves
+
+   !> The lowest frequencies and their damping, NaN where there are fewer.
+   subroutine list_waves(wave, frequency, damping)
+      type(wave_matrices), intent(in) :: wave
+      real(wp), intent(out) :: frequency(:), damping(:)
+      complex(wp), allocatable :: root(:)
+      integer :: n
+
+      frequency = ieee_value(1.0_wp, ieee_quiet_nan)
+      damping = frequency
+      if (size(wave%mass) == 0) return
+      call find_whirl(wave, root)
+      n = min(size(root), size(frequency))
+      frequency(:n) = aimag(root(:n))
+      damping(:n) = -real(root(:n), wp)/abs(root(:n))
+   end subroutine list_waves
 
    subroutine find_in_diameter(case, k, open, closed, error)
       type(case_type), intent(in) :: case

@@ -39,7 +39,8 @@ contains
       call find_natural_modes(case, min(case%model%cyclic%n_modes, most_of(case)), modes, error)
       if (allocated(error)) return
       call writer%add_modes(modes%nodal_diameter, modes%open, modes%closed, &
-                            case%model%unit_system, error)
+                            case%model%unit_system, error, modes%open_damping, &
+                            modes%closed_damping)
       if (allocated(error)) return
       allocate (table(0))
       call append(table, 'natural frequencies ['//trim(unit_words(case%sweep%unit))// &
@@ -103,7 +104,7 @@ contains
       end do
    end subroutine list_in_range
 
-   !> Nodal diameters, 0 to N/2, of the harmonics, each once.
+   !> Nodal diameters of the harmonics, each once, without sign where waves both ways are alike.
    pure function diameters_of(case) result(list)
       type(case_type), intent(in) :: case
       integer, allocatable :: list(:)
@@ -111,9 +112,9 @@ contains
 
       allocate (list(0))
       do h = 1, case%harmonics%n_harmonics
-         k = abs(case%model%cyclic%nodal_diameter(h))
+         k = case%model%cyclic%nodal_diameter(h)
+         if (.not. case%model%cyclic%splits_waves()) k = abs(k)
          if (.not. any(list == k)) list = [list, k]
-         if (size(list) > case%model%cyclic%n_sectors/2) exit
       end do
    end function diameters_of
 

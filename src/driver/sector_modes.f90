@@ -12,6 +12,10 @@ module fw_sector_modes
    use fw_sector, only: add_sector_spring
    use fw_sector, only: sector_at
    use fw_sector, only: sector_rows
+   use fw_whirl_modes, only: find_whirl
+   use fw_whirl_modes, only: most_whirling
+   use fw_whirl_modes, only: wave_matrices
+   use fw_whirl_modes, only: wave_of
    implicit none (type, external)
    private
 
@@ -49,6 +53,10 @@ contains
       call sector_at(case%model, k, nodal, error)
       if (allocated(error)) return
       call hold_joint(case, k, first_component, nodal%stiffness)
+      if (nodal%has_whirl()) then
+         call find_waves(case, nodal, harmonic, range, modes)
+         return
+      end if
       do trial = 1, size(shift_trials)
          shift = shift_trials(trial)*norm2(abs(nodal%stiffness))/ &
                  max(norm2(abs(nodal%mass)), tiny(1.0_wp))
@@ -93,6 +101,46 @@ contains
                 (nodal%load(:, 2*w + 2) - i*nodal%load(:, 2*w + 3))
       end do
    end function load_in
+
+   !> Where waves in both directions differ: those the way of the harmonic.
+   subroutine find_waves(case, nodal, harmonic, range, modes)
+      type(case_type), intent(in) :: case
+      type(nodal_matrices), intent(in) :: nodal
+      integer, intent(in) :: harmonic
+      real(wp), intent(in) :: range(2)
+      type(mode_type), allocatable, intent(inout) :: modes(:)
+      type(wave_matrices) :: wave
+      complex(wp), allocatable :: root(:), right(:, :), left(:, :), load(:), observe(:, :)
+      complex(wp) :: slope
+      integer, allocatable :: chosen(:)
+      logical :: conjugated
+      integer :: i, j
+
+      if (size(nodal%mass, 1) > most_whirling) return
+      conjugated = case%model%cyclic%nodal_diameter(harmonic) < 0
+      call wave_of(nodal, nodal%stiffness, conjugated, wave)
+      call find_whirl(wave, root, right, left)
+      load = load_in(nodal, harmonic, conjugated, 0.5_wp*sum(range))
+      observe = nodal%observe
+      if (conjugated) then
+         load = conjg(load)
+         observe = conjg(observe)
+      end if
+      chosen = pack([(i, i=1, size(root))], aimag(root) >= range(1) .and. aimag(root) <= range(2))
+      deallocate (modes)
+      allocate (modes(size(chosen)))
+      do j = 1, size(chosen)
+         i = chosen(j)
+         ! Near a root Z(lambda) is (lambda - root) y^H Z' x.
+         slope = dot_product(left(:, i), 2.0_wp*root(i)*matmul(wave%mass, right(:, i)) + &
+                             matmul(wave%damping, right(:, i)))
+         modes(j)%omega = aimag(root(i))
+         modes(j)%width = -2.0_wp*real(root(i), wp)
+         modes(j)%amplitude = abs(matmul(observe, right(:, i)))*abs(dot_product(left(:, i), load))/ &
+                              max(abs(slope)*0.5_wp*max(abs(modes(j)%width), &
+                                                        least_width*modes(j)%omega), tiny(1.0_wp))
+      end do
+   end subroutine find_waves
 
    !> Linear springs, and what the contact holds.
    subroutine hold_joint(case, k, first_component, stiffness)

@@ -2,6 +2,7 @@
 !> diameter. Files that have `phase = 'advance'` tie u_right = exp(2 pi i k/N) u_left, the other way
 !> round: what they hold is conjugated as it is read.
 module fw_cyclic_file
+   use fw_cyclic_data, only: influence_type
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -17,7 +18,7 @@ module fw_cyclic_file
    implicit none (type, external)
    private
 
-   public :: cyclic_parts, nodal_parts, read_cyclic_file
+   public :: cyclic_parts, nodal_parts, read_complex, read_cyclic_file
 
    !> Of one nodal diameter; a component is not allocated where the file has none.
    type :: nodal_parts
@@ -25,6 +26,8 @@ module fw_cyclic_file
       complex(wp), allocatable :: stiffness_rotation(:, :)
       complex(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
       complex(wp), allocatable :: observe(:, :)
+      !> Per rotation speed.
+      complex(wp), allocatable :: coriolis(:, :)
    end type nodal_parts
 
    type :: cyclic_parts
@@ -37,6 +40,8 @@ module fw_cyclic_file
       integer :: n_physical = 0
       !> Nodal diameter k at place k + 1.
       type(nodal_parts), allocatable :: nodal(:)
+      !> Forces of the air.
+      type(influence_type), allocatable :: air
    end type cyclic_parts
 
    character(*), parameter :: group = '/cyclic'
@@ -112,6 +117,11 @@ contains
          if (allocated(error)) return
       end if
       turns = phase == 'advance'
+      if (turns .and. file%exists('/aero/nodal_diameter')) then
+         call fatal_error(error, file%path//': /aero/nodal_diameter does not go with phase '// &
+                          '"advance" of /cyclic: give /aero/sector', status_input)
+         return
+      end if
       if (phase /= 'delay' .and. .not. turns) then
          call fatal_error(error, file%path//': attribute phase of /cyclic is "'//phase// &
                           '", expected "delay" or "advance"', status_input)
@@ -179,6 +189,7 @@ contains
       if (.not. allocated(error)) call read_square('damping', .false., nodal%damping)
       if (.not. allocated(error)) call read_square('stiffness_rotation', .false., &
                                                    nodal%stiffness_rotation)
+      if (.not. allocated(error)) call read_square('coriolis', .false., nodal%coriolis)
       if (.not. allocated(error)) call read_load('load/static', nodal%load_static)
       if (.not. allocated(error)) call read_load('load/cosine', nodal%load_cosine)
       if (.not. allocated(error)) call read_load('load/sine', nodal%load_sine)

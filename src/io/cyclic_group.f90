@@ -37,7 +37,8 @@ contains
    end subroutine write_cyclic
 
    !> Natural frequencies of the nodal diameters, NaN where there are fewer.
-   subroutine write_modes(file, nodal_diameter, open, closed, unit_system, error)
+   subroutine write_modes(file, nodal_diameter, open, closed, unit_system, error, open_damping, &
+                          closed_damping)
       type(hdf5_file), intent(in) :: file
       integer, intent(in), contiguous :: nodal_diameter(:)
       !> Without contact, and with every pair closed (n_modes, n_diameters) [rad/s].
@@ -45,6 +46,8 @@ contains
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
+      !> Fractions of critical damping; not allocated where frequencies are undamped ones.
+      real(wp), allocatable, intent(in) :: open_damping(:, :), closed_damping(:, :)
 
       call write_dataset(file, '/modes/nodal_diameter', nodal_diameter, error)
       if (.not. allocated(error)) call write_dataset(file, '/modes/open', open, error)
@@ -53,6 +56,14 @@ contains
                                                      error)
       if (.not. allocated(error)) call label_dataset(file, '/modes/open', unit_system, error)
       if (.not. allocated(error)) call label_dataset(file, '/modes/closed', unit_system, error)
+      if (.not. allocated(open_damping) .or. allocated(error)) return
+      call write_dataset(file, '/modes/open_damping', open_damping, error)
+      if (.not. allocated(error)) call write_dataset(file, '/modes/closed_damping', &
+                                                     closed_damping, error)
+      if (.not. allocated(error)) call label_dataset(file, '/modes/open_damping', unit_system, &
+                                                     error)
+      if (.not. allocated(error)) call label_dataset(file, '/modes/closed_damping', unit_system, &
+                                                     error)
    end subroutine write_modes
 
 end module fw_cyclic_group

@@ -7,7 +7,7 @@ module fw_matrix_checks
    implicit none (type, external)
    private
 
-   public :: check_matrix, check_vector
+   public :: check_matrix, check_skew, check_vector
 
    !> Entries of a symmetric matrix may differ by this share of the largest one: room for a
    !> matrix written with ten digits or more.
@@ -53,6 +53,35 @@ contains
          end do
       end do
    end subroutine check_matrix
+
+   !> A finite matrix with A^T = -A; made exactly so.
+   subroutine check_skew(matrix, order, message)
+      real(wp), intent(inout) :: matrix(:, :)
+      integer, intent(in) :: order
+      character(:), allocatable, intent(out) :: message
+      integer :: i, j
+      real(wp) :: largest
+
+      if (any(shape(matrix) /= order)) then
+         message = 'has the shape '//to_text(size(matrix, 1))//' x '//to_text(size(matrix, 2))// &
+                   ': must be '//to_text(order)//' x '//to_text(order)
+         return
+      end if
+      call find_not_finite(matrix, message)
+      if (allocated(message)) return
+      largest = maxval(abs(matrix))
+      do j = 1, order
+         do i = 1, j
+            if (abs(matrix(i, j) + matrix(j, i)) > symmetry_tolerance*largest) then
+               message = 'is not skew: entry '//entry_text(matrix, i, j)//', but entry '// &
+                         entry_text(matrix, j, i)//': one must be the negative of the other'
+               return
+            end if
+            matrix(i, j) = 0.5_wp*(matrix(i, j) - matrix(j, i))
+            matrix(j, i) = -matrix(i, j)
+         end do
+      end do
+   end subroutine check_skew
 
    !> A finite vector of the right size.
    subroutine check_vector(vector, order, message)

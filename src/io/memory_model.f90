@@ -25,7 +25,8 @@ module fw_memory_model
 
    !> Parts of one real kind each: of n_dof**2 values, of n_dof, of n_pairs.
    character(*), parameter :: matrix_names(*) = &
-      [character(28) :: 'mass', 'stiffness', 'damping', 'stiffness_rotation']
+      [character(28) :: 'mass', 'stiffness', 'damping', 'stiffness_rotation', &
+       'coriolis']
    character(*), parameter :: load_names(*) = &
       [character(28) :: 'load/static', 'load/cosine', 'load/sine', 'load/static_rotation']
    character(*), parameter :: wave_names(*) = &
@@ -114,6 +115,9 @@ contains
             call take_matrix(name, values, rows, parts%damping, error)
          case ('stiffness_rotation')
             call take_matrix(name, values, rows, parts%stiffness_rotation, error)
+         case ('coriolis')
+            ! Row after row, as in a file: the others are symmetric.
+            parts%coriolis = transpose(reshape(values, [rows, rows]))
          case ('load/static')
             parts%load_static = values
          case ('load/cosine')

@@ -4,6 +4,7 @@
 !> HDF5 counts the slowest dimension first, and matrices are transposed back, so that element
 !> (i, j) is the one h5py calls [i-1, j-1].
 module fw_model_file
+   use fw_air_file, only: read_air_file
    use fw_cyclic_file, only: cyclic_parts
    use fw_cyclic_file, only: read_cyclic_file
    use fw_error, only: error_type
@@ -64,6 +65,8 @@ module fw_model_file
       !> Harmonics that loads act in (m), and their cosine and sine parts (n_dof, m) [force].
       integer, allocatable :: load_harmonic(:)
       real(wp), allocatable :: harmonic_cosine(:, :), harmonic_sine(:, :)
+      !> Coriolis matrix per rotation speed, skew (n_dof, n_dof) [force/length/(rad/s)^2].
+      real(wp), allocatable :: coriolis(:, :)
    contains
       procedure :: order
    end type file_model_type
@@ -95,6 +98,9 @@ contains
       call read_header(file, model, error)
       if (.not. allocated(error)) call read_cyclic_file(file, model%cyclic, error)
       if (.not. allocated(error)) call read_structure(file, model, error)
+      if (.not. allocated(error)) call read_air_file(file, model%order(), &
+                                                     max(1, model%cyclic%n_sectors), &
+                                                     model%cyclic%air, error)
       if (.not. allocated(error)) call read_contact(file, model, error)
       if (.not. allocated(error)) call read_loads(file, model, error)
       if (.not. allocated(error)) call read_observed(file, model, error)
@@ -149,6 +155,7 @@ contains
       call read_matrix(file, '/damping', n, model%damping, error)
       if (allocated(error)) return
       call read_matrix(file, '/stiffness_rotation', n, model%stiffness_rotation, error)
+      if (.not. allocated(error)) call read_matrix(file, '/coriolis', n, model%coriolis, error)
    end subroutine read_structure
 
    !> Pairs; a file without group /contact has none.

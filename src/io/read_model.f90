@@ -7,7 +7,7 @@ module fw_read_model
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_load_terms, only: load_terms
-   use fw_matrix_checks, only: check_matrix, check_vector
+   use fw_matrix_checks, only: check_matrix, check_skew, check_vector
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type, read_model_hdf5
@@ -195,6 +195,7 @@ contains
       real(wp) :: static(raw%order())
 
       if (allocated(raw%unit_system)) model%unit_system = raw%unit_system
+      call take_whirl(reader, options, raw, model)
       call gather_waves(reader, raw, terms, model%cyclic, size(static), model%waves, &
                         model%load_wave, static)
       model%harmonic_scale = options%harmonic_scale
@@ -250,11 +251,37 @@ contains
       if (allocated(raw%load_static_rotation)) then
          model%load_static = model%load_static + speed**2*raw%load_static_rotation
       end if
-      if (allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)) return
+      if (allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation) .or. &
+          allocated(raw%coriolis)) return
       call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
-                         'stiffness_rotation and no load static_rotation: remove it, or use a '// &
-                         'model file that holds them')
+                         'stiffness_rotation, no coriolis and no load static_rotation: remove '// &
+                         'it, or use a model file that holds them')
    end subroutine add_rotation
+
+   !> Coriolis forces at speed and forces of the air, which cyclic structures have.
+   subroutine take_whirl(reader, options, raw, model)
+      type(reader_type), intent(inout) :: reader
+      type(model_options), intent(in) :: options
+      type(file_model_type), intent(inout) :: raw
+      type(model_type), intent(inout) :: model
+      character(:), allocatable :: message
+
+      if (.not. model%cyclic%is_cyclic .and. &
+          (allocated(raw%coriolis) .or. allocated(raw%cyclic%air))) then
+         call reader%refuse_model('a coriolis or aero part, which goes with sectors: give '// &
+                                  '&cyclic, with n_sectors = 1 and engine_order = 0 for a '// &
+                                  'structure that is no sector')
+         return
+      end if
+      if (allocated(raw%cyclic%air)) model%cyclic%air = raw%cyclic%air
+      if (.not. allocated(raw%coriolis)) return
+      call check_skew(raw%coriolis, raw%order(), message)
+      if (allocated(message)) then
+         call reader%refuse_model('a coriolis matrix that '//message)
+      else if (options%rotation_speed > 0.0_wp) then
+         model%cyclic%coriolis = options%rotation_speed*raw%coriolis
+      end if
+   end subroutine take_whirl
 
    !> Finite, symmetric, of the same size.
    subroutine check_parts(reader, raw, is_inline)

@@ -79,22 +79,28 @@ contains
       call check_one('stiffness', parts%stiffness)
       call check_one('damping', parts%damping)
       call check_one('stiffness_rotation', parts%stiffness_rotation)
+      call check_one('coriolis', parts%coriolis, is_skew=.true.)
 
    contains
 
-      subroutine check_one(name, matrix)
+      subroutine check_one(name, matrix, is_skew)
          character(*), intent(in) :: name
          complex(wp), allocatable, intent(in) :: matrix(:, :)
-         real(wp) :: largest
+         logical, intent(in), optional :: is_skew
+         real(wp) :: largest, way
+         character(14) :: kind_of
 
          if (.not. allocated(matrix)) return
+         way = merge(-1.0_wp, 1.0_wp, present(is_skew))
+         kind_of = merge('skew-Hermitian', 'Hermitian     ', present(is_skew))
          largest = maxval(abs(matrix))
          if (.not. largest <= huge(1.0_wp)) then
             call reader%refuse_model('a '//name//' of nodal diameter '//to_text(k)//' with an '// &
                                      'entry that is not finite')
-         else if (any(abs(matrix - conjg(transpose(matrix))) > tolerance*largest)) then
+         else if (any(abs(matrix - way*conjg(transpose(matrix))) > tolerance*largest)) then
             call reader%refuse_model('a '//name//' of nodal diameter '//to_text(k)//' that is '// &
-                                     'not Hermitian: entries must be conjugates of each other')
+                                     'not '//trim(kind_of)//': entries must be conjugates of '// &
+                                     'each other, negative ones where it is skew')
          else if ((k == 0 .or. 2*k == n_sectors) .and. &
                   any(abs(aimag(matrix)) > tolerance*largest)) then
             call reader%refuse_model('a '//name//' of nodal diameter '//to_text(k)//' that is '// &
@@ -119,12 +125,17 @@ contains
          if (allocated(parts%stiffness_rotation)) then
             nodal%stiffness = nodal%stiffness + options%rotation_speed**2* &
                               hermitian(parts%stiffness_rotation)
-         else if (.not. allocated(raw%load_static_rotation)) then
+         else if (.not. (allocated(raw%load_static_rotation) .or. allocated(parts%coriolis))) then
             call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
                                'stiffness_rotation: remove it')
          end if
       end if
       if (allocated(parts%damping)) nodal%damping = hermitian(parts%damping)
+      ! i G is Hermitian.
+      if (allocated(parts%coriolis) .and. options%rotation_speed > 0.0_wp) then
+         nodal%coriolis = options%rotation_speed*0.5_wp* &
+                          (parts%coriolis - conjg(transpose(parts%coriolis)))
+      end if
       if (options%rayleigh_mass + options%rayleigh_stiffness > 0.0_wp) then
          if (.not. allocated(nodal%damping)) nodal%damping = 0.0_wp*nodal%mass
          nodal%damping = nodal%damping + options%rayleigh_mass*nodal%mass + &

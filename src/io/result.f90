@@ -176,7 +176,8 @@ contains
    end subroutine add_bifurcations
 
    !> Natural frequencies of the nodal diameters.
-   subroutine add_modes(self, nodal_diameter, open, closed, unit_system, error)
+   subroutine add_modes(self, nodal_diameter, open, closed, unit_system, error, open_damping, &
+                        closed_damping)
       class(result_writer), intent(inout) :: self
       integer, intent(in), contiguous :: nodal_diameter(:)
       !> (n_modes, n_diameters) [rad/s].
@@ -184,10 +185,13 @@ contains
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
+      !> Fractions of critical damping, only where waves in both directions differ.
+      real(wp), allocatable, intent(in) :: open_damping(:, :), closed_damping(:, :)
 
       if (self%file%id < 0) return
       !$omp critical (fretwear_io)
-      call write_modes(self%file, nodal_diameter, open, closed, unit_system, error)
+      call write_modes(self%file, nodal_diameter, open, closed, unit_system, error, open_damping, &
+                       closed_damping)
       !$omp end critical (fretwear_io)
    end subroutine add_modes
 

@@ -57,6 +57,10 @@ module fw_result_labels
                  'natural frequencies without contact'), &
       label_type('/modes/closed', 'rad/s', 'diameter mode', &
                  'natural frequencies with every pair closed'), &
+      label_type('/modes/open_damping', '1', 'diameter mode', &
+                 'damping of them, over the critical one'), &
+      label_type('/modes/closed_damping', '1', 'diameter mode', &
+                 'damping of them, over the critical one'), &
       label_type('/wear/depth_halved', '<length>', 'pair', &
                  'final wear depth with steps of half the size')]
 

@@ -11,6 +11,7 @@ module fw_lapack
 
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgetrf, claswp, ctrsv, zhegvd, zpotrf, zpotrs
+   public :: zggev
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -180,6 +181,19 @@ module fw_lapack
          integer, intent(inout) :: iwork(*)
          integer, intent(out) :: info
       end subroutine zhegvd
+
+      !> Eigenvalues alpha/beta of a general pencil, and on request both eigenvectors.
+      subroutine zggev(jobvl, jobvr, n, a, lda, b, ldb, alpha, beta, vl, ldvl, vr, ldvr, work, &
+                       lwork, rwork, info)
+         import :: wp
+         character, intent(in) :: jobvl, jobvr
+         integer, intent(in) :: n, lda, ldb, ldvl, ldvr, lwork
+         complex(wp), intent(inout) :: a(lda, *), b(ldb, *), vl(ldvl, *), vr(ldvr, *)
+         complex(wp), intent(out) :: alpha(*), beta(*)
+         complex(wp), intent(inout) :: work(*)
+         real(wp), intent(inout) :: rwork(*)
+         integer, intent(out) :: info
+      end subroutine zggev
 
       !> As dpotrf for a Hermitian matrix.
       subroutine zpotrf(uplo, n, a, lda, info)

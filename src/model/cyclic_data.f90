@@ -10,7 +10,7 @@ module fw_cyclic_data
    implicit none (type, external)
    private
 
-   public :: cyclic_type, nodal_matrices
+   public :: cyclic_type, nodal_matrices, influence_type
 
    !> The sector tied to its neighbours, as it moves in one nodal diameter.
    type :: nodal_matrices
@@ -23,7 +23,28 @@ module fw_cyclic_data
       complex(wp), allocatable :: observe(:, :)
       !> What the columns of the loads are.
       type(load_waves) :: waves
+      !> Coriolis matrix times the rotation speed, skew-Hermitian (n, n), where there is one.
+      complex(wp), allocatable :: coriolis(:, :)
+      !> Stiffness of the air, for the wave of this nodal diameter and for the one the other way, in
+      !> the coordinates of each (n, n, 2), where there is one: neither Hermitian nor conjugates.
+      complex(wp), allocatable :: aero(:, :, :)
+   contains
+      procedure :: has_whirl
    end type nodal_matrices
+
+   !> Forces of the air by the motion of the sectors, linear in it: on sector 0 by that of sector m,
+   !>
+   !>   f_0 = W^T sum_m Q_m W u_m = W^T (sum_m Q_m z**m) W u_0,
+   !>
+   !> given by the sectors m, or by the sums themselves for signed nodal diameters. Not in harmonic 0.
+   type :: influence_type
+      !> Sectors, or nodal diameters (f).
+      integer, allocatable :: number(:)
+      logical :: by_diameter = .false.
+      !> Q [force/length] (a, a, f), and the rows W (a, n_dof).
+      complex(wp), allocatable :: matrix(:, :, :)
+      real(wp), allocatable :: modes(:, :)
+   end type influence_type
 
    type :: cyclic_type
       logical :: is_cyclic = .false.
@@ -40,11 +61,17 @@ module fw_cyclic_data
       !> In place of the matrices of a sector: those of nodal diameter k at place k + 1. What is
       !> not given is not allocated there.
       type(nodal_matrices), allocatable :: nodal(:)
+      !> Of a sector: Coriolis matrix times the rotation speed, skew (n_dof, n_dof).
+      real(wp), allocatable :: coriolis(:, :)
+      !> Forces of the air; not allocated where there are none.
+      type(influence_type), allocatable :: air
    contains
       procedure :: nodal_diameter
       procedure :: factor
       procedure :: has_nodal
       procedure :: holds
+      procedure :: air_stiffness
+      procedure :: splits_waves
    end type cyclic_type
 
 contains
@@ -104,5 +131,43 @@ contains
       if (k >= size(self%nodal)) return
       holds = allocated(self%nodal(k + 1)%mass)
    end function holds
+
+   !> Whether waves in both directions differ, and blocks are not Hermitian.
+   pure logical function has_whirl(self)
+      class(nodal_matrices), intent(in) :: self
+
+      has_whirl = allocated(self%coriolis) .or. allocated(self%aero)
+   end function has_whirl
+
+   !> The same of the whole model.
+   pure logical function splits_waves(self)
+      class(cyclic_type), intent(in) :: self
+      integer :: k
+
+      splits_waves = allocated(self%coriolis) .or. allocated(self%air)
+      if (splits_waves .or. .not. allocated(self%nodal)) return
+      splits_waves = any([(allocated(self%nodal(k)%coriolis), k=1, size(self%nodal))])
+   end function splits_waves
+
+   !> - sum_m Q_m z**m of a signed nodal diameter (a, a); allocated only where it is known.
+   pure subroutine air_stiffness(self, k, stiffness)
+      class(cyclic_type), intent(in) :: self
+      integer, intent(in) :: k
+      complex(wp), allocatable, intent(out) :: stiffness(:, :)
+      integer :: j
+
+      associate (air => self%air)
+         if (.not. air%by_diameter) then
+            allocate (stiffness(size(air%matrix, 1), size(air%matrix, 2)), source=(0.0_wp, 0.0_wp))
+            do j = 1, size(air%number)
+               stiffness = stiffness - air%matrix(:, :, j)*self%factor(k, air%number(j))
+            end do
+            return
+         end if
+         do j = 1, size(air%number)
+            if (modulo(air%number(j) - k, self%n_sectors) == 0) stiffness = -air%matrix(:, :, j)
+         end do
+      end associate
+   end subroutine air_stiffness
 
 end module fw_cyclic_data

@@ -115,6 +115,8 @@ contains
       integer, allocatable :: used(:), slot(:)
       integer :: h, j, n_kept
 
+      call require_air(model, self, error)
+      if (allocated(error)) return
       call list_diameters(model, self, used)
       allocate (self%basis(size(used)), nodal(size(used)))
       do j = 1, size(used)
@@ -127,7 +129,8 @@ contains
             call check_free_modes(self%basis(j), nodal(j), error)
          end if
          if (allocated(error)) return
-         call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range)
+         call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range, &
+                                            nodal(j)%has_whirl())
       end do
       self%n_coordinates = self%n_relative + sum([(size(self%basis(j)%kept), j=1, size(used))])
       allocate (self%kept(0))
@@ -175,6 +178,28 @@ contains
                        to_text(k)//', of which the model holds no matrices: must have '// &
                        '/nodal_diameter/'//to_text(k)//', or fewer harmonics', status_input)
    end subroutine require_diameter
+
+   !> Refuse a harmonic of whose nodal diameter the model does not say the forces of the air.
+   subroutine require_air(model, self, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_structure), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      complex(wp), allocatable :: stiffness(:, :)
+      integer :: h, k
+
+      if (.not. allocated(model%cyclic%air)) return
+      do h = 1, size(self%harmonic)
+         if (self%harmonic(h) == 0) cycle
+         k = model%cyclic%nodal_diameter(self%harmonic(h))
+         call model%cyclic%air_stiffness(k, stiffness)
+         if (allocated(stiffness)) cycle
+         call fatal_error(error, 'harmonic '//to_text(self%harmonic(h))//' has nodal diameter '// &
+                          to_text(k)//', of which the model holds no forces of the air: must '// &
+                          'have /aero/nodal_diameter/'//to_text(k)//', or fewer harmonics', &
+                          status_input)
+         return
+      end do
+   end subroutine require_air
 
    !> A free internal mode has no static position: refuse a static load on it.
    subroutine check_free_modes(basis, nodal, error)

@@ -31,6 +31,7 @@ contains
 
       if (model%cyclic%has_nodal()) then
          nodal = model%cyclic%nodal(k + 1)
+         if (allocated(model%cyclic%air)) call add_air(model, k, nodal)
          return
       end if
       call tie_sector(model, k, place, turn, n)
@@ -38,10 +39,43 @@ contains
       nodal%stiffness = tied(model%stiffness, place, turn, n)
       if (any(abs(model%damping) > 0.0_wp)) nodal%damping = tied(model%damping, place, turn, n)
       call tie_vectors(model, place, turn, n, nodal)
+      if (allocated(model%cyclic%coriolis)) nodal%coriolis = tied(model%cyclic%coriolis, place, &
+                                                                  turn, n)
+      if (allocated(model%cyclic%air)) call add_air(model, k, nodal)
       if (model%cyclic%modal_damping > 0.0_wp) then
          call damp_modes(model%cyclic%modal_damping, nodal, error)
       end if
    end subroutine sector_at
+
+   !> The stiffness of the air for the waves in both directions; their matrices are not alike, but
+   !> T of -k is the conjugate of T of k. Zero where the model does not say it.
+   pure subroutine add_air(model, k, nodal)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      type(nodal_matrices), intent(inout) :: nodal
+      complex(wp), allocatable :: q(:, :), w(:, :)
+      complex(wp) :: turn(model%n_dof)
+      integer :: place(model%n_dof), i, n, way
+
+      if (model%cyclic%has_nodal()) then
+         ! Displacements stand in front of the coordinates.
+         turn = (1.0_wp, 0.0_wp)
+         place = [(i, i=1, model%n_dof)]
+      else
+         call tie_sector(model, k, place, turn, n)
+      end if
+      n = size(nodal%mass, 1)
+      allocate (nodal%aero(n, n, 2), source=(0.0_wp, 0.0_wp))
+      allocate (w(size(model%cyclic%air%modes, 1), n), source=(0.0_wp, 0.0_wp))
+      do i = 1, model%n_dof
+         w(:, place(i)) = w(:, place(i)) + turn(i)*model%cyclic%air%modes(:, i)
+      end do
+      do way = 1, 2
+         call model%cyclic%air_stiffness(merge(k, -k, way == 1), q)
+         if (allocated(q)) nodal%aero(:, :, way) = matmul(conjg(transpose(w)), matmul(q, w))
+         w = conjg(w)
+      end do
+   end subroutine add_air
 
    !> Where the dofs of a sector stand in the tied one, and the factor of each: T.
    pure subroutine tie_sector(model, k, place, turn, n)

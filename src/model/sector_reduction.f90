@@ -40,6 +40,10 @@ module fw_sector_reduction
       !> Loads in columns (n_coordinates, n_columns), (n_internal, n_columns), and what these are.
       complex(wp), allocatable :: load_q(:, :), load_i(:, :)
       type(load_waves) :: waves
+      !> What is not Hermitian as the other blocks are, of coordinates and internal modes together:
+      !> Coriolis, which i s goes with (m + n_internal, m + n_internal), and the air, for the wave
+      !> of this nodal diameter and for the one the other way (.., 2), in the coordinates of each.
+      complex(wp), allocatable :: coriolis(:, :), aero(:, :, :)
       !> Observed quantities (n_observed, n_coordinates), (n_observed, n_internal).
       complex(wp), allocatable :: observe_q(:, :), observe_i(:, :)
       !> Coordinates that this nodal diameter does not have (n_coordinates).
@@ -53,6 +57,7 @@ module fw_sector_reduction
       procedure :: keep_resonances
       procedure :: transform
       procedure :: pushes_free_mode
+      procedure :: has_whirl
    end type sector_reduction
 
    !> As of fw_reduction, with the same reasons.
@@ -149,11 +154,13 @@ contains
 
    !> Internal modes without damping that a harmonic may hit become coordinates, scaled to a largest
    !> displacement of 1, see fw_reduction.
-   subroutine keep_resonances(self, harmonic, omega_range)
+   subroutine keep_resonances(self, harmonic, omega_range, whirls)
       class(sector_reduction), intent(inout) :: self
       !> The harmonics of this nodal diameter.
       integer, intent(in) :: harmonic(:)
       real(wp), intent(in) :: omega_range(2)
+      !> Whether blocks couple the internal modes that are not Hermitian.
+      logical, intent(in) :: whirls
       real(wp), parameter :: margin = 1.0e-2_wp
       complex(wp), allocatable :: wider(:, :)
       integer, allocatable :: others(:)
@@ -166,8 +173,9 @@ contains
          if (self%k_i(j) <= 0.0_wp .or. self%m_i(j) <= 0.0_wp) cycle
          frequency = sqrt(self%k_i(j)/self%m_i(j))
          if (self%c_i(j) > 2.0_wp*undamped_ratio*sqrt(self%k_i(j)*self%m_i(j))) cycle
-         keep(j) = any(frequency >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
-                       frequency <= (1.0_wp + margin)*harmonic*omega_range(2))
+         ! Nobody knows where Coriolis forces move them, or what the air leaves of damping.
+         keep(j) = whirls .or. any(frequency >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
+                                   frequency <= (1.0_wp + margin)*harmonic*omega_range(2))
       end do
       if (.not. any(keep)) return
       self%kept = pack([(j, j=1, size(keep))], keep)
@@ -227,8 +235,34 @@ contains
       self%load_i = matmul(conjg(transpose(self%t_i)), nodal%load)
       self%observe_q = product_of(nodal%observe, self%t_q)
       self%observe_i = product_of(nodal%observe, self%t_i)
+      if (nodal%has_whirl()) call take_whirl(nodal, self)
       deallocate (self%t_q, self%t_i)
    end subroutine transform
+
+   !> Coriolis matrix and stiffness of the air in the whole basis.
+   subroutine take_whirl(nodal, self)
+      type(nodal_matrices), intent(in) :: nodal
+      type(sector_reduction), intent(inout) :: self
+      complex(wp), allocatable :: t(:, :)
+      integer :: m
+
+      m = self%n_coordinates
+      allocate (t(size(self%t_q, 1), m + self%n_internal))
+      t(:, :m) = self%t_q
+      t(:, m + 1:) = self%t_i
+      if (allocated(nodal%coriolis)) self%coriolis = congruence(t, nodal%coriolis, t)
+      if (.not. allocated(nodal%aero)) return
+      allocate (self%aero(size(t, 2), size(t, 2), 2))
+      self%aero(:, :, 1) = congruence(t, nodal%aero(:, :, 1), t)
+      t = conjg(t)
+      self%aero(:, :, 2) = congruence(t, nodal%aero(:, :, 2), t)
+   end subroutine take_whirl
+
+   pure logical function has_whirl(self)
+      class(sector_reduction), intent(in) :: self
+
+      has_whirl = allocated(self%coriolis) .or. allocated(self%aero)
+   end function has_whirl
 
    subroutine fill_blocks(matrix, block, self)
       complex(wp), intent(in) :: matrix(:, :)

@@ -52,12 +52,17 @@ contains
       n = basis%n_internal
       call factor_internal(basis, point, internal, failed)
       call combine_rows(basis, point, 1, m, .false., matrix)
+      if (basis%has_whirl()) call add_whirl(basis, point, 0, 0, matrix)
       load = load_of(basis, basis%load_q, point)
       if (n == 0) return
       allocate (z_iq(n, m), z_qi(n, m), solved(n, m + 1))
       call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
       ! The transpose of Z_qi.
       call combine_rows(basis, point, m + 1, m + n, .true., z_qi)
+      if (basis%has_whirl()) then
+         call add_whirl(basis, point, m, 0, z_iq)
+         call add_whirl(basis, point, m, 0, z_qi, adjoint=.true.)
+      end if
       solved(:, :m) = z_iq
       solved(:, m + 1) = load_of(basis, basis%load_i, point)
       call solve_internal(internal, m + 1, solved)
@@ -82,6 +87,7 @@ contains
       n = basis%n_internal
       allocate (block(m, m))
       call combine_rows(basis, slopes, 1, m, .false., block)
+      call add_whirl(basis, slopes, 0, 0, block)
       derivative = matmul(block, q)
       if (basis%waves%acts()) derivative = derivative - slope_of(basis, basis%load_q, point, slopes)
       if (n == 0) return
@@ -91,12 +97,15 @@ contains
       allocate (block(n, m))
       x(:, 1) = modes_of(basis, point, internal, q)
       call combine_rows(basis, slopes, m + 1, m + n, .true., block)
+      call add_whirl(basis, slopes, m, 0, block, adjoint=.true.)
       derivative = derivative + matmul(x(:, 1), block)
       call combine_rows(basis, slopes, m + 1, m + n, .false., block)
+      call add_whirl(basis, slopes, m, 0, block)
       x(:, 1) = matmul(block, q) + internal_slope(basis, slopes, x(:, 1))
       if (basis%waves%acts()) x(:, 1) = x(:, 1) - slope_of(basis, basis%load_i, point, slopes)
       call solve_internal(internal, 1, x)
       call combine_rows(basis, point, m + 1, m + n, .true., block)
+      call add_whirl(basis, point, m, 0, block, adjoint=.true.)
       derivative = derivative - matmul(x(:, 1), block)
    end subroutine derive_sector
 
@@ -128,6 +137,7 @@ contains
       associate (m => basis%n_coordinates, n => basis%n_internal)
          allocate (z_iq(n, m), rhs(n, 1))
          call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
+         call add_whirl(basis, point, m, 0, z_iq)
          rhs(:, 1) = load_of(basis, basis%load_i, point) - matmul(z_iq, q)
          call solve_internal(internal, 1, rhs)
          x = rhs(:, 1)
@@ -161,6 +171,36 @@ contains
       end associate
    end subroutine combine_rows
 
+   !> Add i s G, and in harmonics above 0 the stiffness of the air, of a part of the rows and
+   !> columns of coordinates and internal modes; of a derivative (k = 0) the air has none.
+   pure subroutine add_whirl(basis, point, rows, columns, z, adjoint)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point
+      !> Rows and columns in front of the part.
+      integer, intent(in) :: rows, columns
+      complex(wp), intent(inout) :: z(:, :)
+      !> Transposed: the part of the columns in question, as rows.
+      logical, intent(in), optional :: adjoint
+      complex(wp) :: added
+      integer :: a, b, i, j
+      logical :: is_turned
+
+      if (.not. basis%has_whirl()) return
+      is_turned = present(adjoint)
+      do j = 1, size(z, 2)
+         do i = 1, size(z, 1)
+            a = merge(columns + j, rows + i, is_turned)
+            b = merge(rows + i, columns + j, is_turned)
+            added = (0.0_wp, 0.0_wp)
+            if (allocated(basis%coriolis)) added = cmplx(0.0_wp, point%s, wp)* &
+               merge(conjg(basis%coriolis(a, b)), basis%coriolis(a, b), point%conjugated)
+            if (allocated(basis%aero) .and. point%harmonic > 0) added = added + &
+               point%k*basis%aero(a, b, merge(2, 1, point%conjugated))
+            z(i, j) = z(i, j) + added
+         end do
+      end do
+   end subroutine add_whirl
+
    subroutine factor_internal(basis, point, self, failed)
       type(sector_reduction), intent(in) :: basis
       type(harmonic_point), intent(in) :: point
@@ -169,12 +209,20 @@ contains
       integer :: j
 
       failed = .false.
-      self%coupled = allocated(basis%c_ii)
+      self%coupled = allocated(basis%c_ii) .or. (basis%has_whirl() .and. basis%n_internal > 0)
       self%inverse = cmplx(basis%k_i - real(point%theta, wp)*basis%m_i, &
                            -aimag(point%theta)*basis%m_i, wp)
       if (self%coupled) then
          call self%lu%reserve(basis%n_internal)
-         self%lu%matrix = cmplx(0.0_wp, point%s, wp)*turned(basis%c_ii, point)
+         if (allocated(basis%c_ii)) then
+            self%lu%matrix = cmplx(0.0_wp, point%s, wp)*turned(basis%c_ii, point)
+         else
+            self%lu%matrix = (0.0_wp, 0.0_wp)
+            do j = 1, basis%n_internal
+               self%lu%matrix(j, j) = cmplx(0.0_wp, point%s*basis%c_i(j), wp)
+            end do
+         end if
+         call add_whirl(basis, point, basis%n_coordinates, basis%n_coordinates, self%lu%matrix)
          do j = 1, basis%n_internal
             self%lu%matrix(j, j) = self%lu%matrix(j, j) + self%inverse(j)
             if (abs(self%inverse(j)) <= 0.0_wp .and. point%s <= 0.0_wp) then
@@ -221,6 +269,7 @@ contains
       type(harmonic_point), intent(in) :: slopes
       complex(wp), intent(in) :: vector(:)
       complex(wp) :: product(size(vector))
+      integer :: m
 
       product = -slopes%theta*basis%m_i*vector
       if (allocated(basis%c_ii)) then
@@ -228,6 +277,10 @@ contains
       else
          product = product + cmplx(0.0_wp, slopes%s, wp)*basis%c_i*vector
       end if
+      if (.not. allocated(basis%coriolis)) return
+      m = basis%n_coordinates
+      product = product + cmplx(0.0_wp, slopes%s, wp)* &
+                matmul(turned(basis%coriolis(m + 1:, m + 1:), slopes), vector)
    end function internal_slope
 
    !> Complex load of a harmonic: G_c - i G_s, of a conjugated basis from the conjugates of both.
