@@ -12,8 +12,8 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["CaseGroup", "Contact", "Cyclic", "Groups", "Harmonics", "Load", "Output", "PseudoTime",
-           "Sensitivity", "Solver", "Spring", "Structure", "Sweep", "Time", "Wear"]
+__all__ = ["CaseGroup", "Contact", "Cyclic", "Groups", "Harmonics", "Load", "Mode", "Output",
+           "PseudoTime", "Sensitivity", "Solver", "Spring", "Structure", "Sweep", "Time", "Wear"]
 
 
 class CaseGroup(TypedDict, total=False):
@@ -21,9 +21,9 @@ class CaseGroup(TypedDict, total=False):
 
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
-    #: a sweep, one frequency, wear at one frequency, integration in time, or natural frequencies
-    #: (default: 'frf')
-    analysis: Literal["frf", "point", "wear", "time", "modes"]
+    #: a sweep, one frequency, wear at one frequency, integration in time, natural frequencies, or a
+    #: nonlinear mode (default: 'frf')
+    analysis: Literal["frf", "point", "wear", "time", "modes", "mode"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
@@ -327,6 +327,34 @@ class Time(TypedDict, total=False):
     steps_per_period: int
 
 
+class Mode(TypedDict, total=False):
+    """Group &mode: a nonlinear mode over its amplitude."""
+
+    #: of the elastic modes of the structure with its closed pairs stuck (default: 1)
+    number: int
+    #: the mode whose frequency with stuck pairs is nearest, in place of number; 0: by number
+    #: (default: 0)
+    near: float
+    #: of near; results are in rad/s (default: 'rad/s')
+    unit: Literal["rad/s", "Hz"]
+    #: [L] lowest amplitude; only: analysis = 'mode' (required)
+    start: float
+    #: [L] highest amplitude; only: analysis = 'mode' (required)
+    end: float
+    #: what the amplitude is: of the first harmonic of the first observed quantity, or modal,
+    #: sqrt(U^H M U) of it (default: 'observed')
+    control: Literal["observed", "modal"]
+    #: points, even in the logarithm; of a branch: sets its longest step (default: 40)
+    n_points: int
+    #: points at given amplitudes, or a branch through folds (default: 'arclength')
+    continuation: Literal["natural", "arclength"]
+    #: points of a branch at most; only: continuation = 'arclength' (default: 1000)
+    max_points: int
+    #: factors of the vibratory load for which the response near the resonance is put together
+    #: (default: none)
+    synthesis: ArrayLike
+
+
 class Output(TypedDict, total=False):
     """Group &output: result file, observed quantities."""
 
@@ -360,4 +388,5 @@ class Groups(TypedDict, total=False):
     pseudo_time: PseudoTime
     wear: Wear
     time: Time
+    mode: Mode
     output: Output

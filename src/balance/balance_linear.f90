@@ -211,15 +211,23 @@ contains
    !> dR/d omega = Z' q - F', with what the forces add to it.
    module procedure parameter_derivative
 
-      call self%problem%structure%derivative(self%structure_state, by_frequency, x, dr)
-      call derivative_with_forces(self, self%problem%structure%n_coordinates, &
-                                  self%problem%fourier%n_coefficients, x, dr)
+      call self%derivative_by(by_frequency, x, dr)
    end procedure parameter_derivative
 
+   module procedure derivative_by
+
+      call self%problem%structure%derivative(self%structure_state, parameter, x, dr)
+      call derivative_with_forces(self, parameter == by_frequency, &
+                                  self%problem%structure%n_coordinates, &
+                                  self%problem%fourier%n_coefficients, x, dr)
+   end procedure derivative_by
+
    !> dr from the slopes of all coordinates: the inputs of a law change by the
-   !> balance that it takes, and by the unit of time of its rates.
-   subroutine derivative_with_forces(self, m, nc, q, dr)
+   !> balance that it takes, and, with the frequency, by the unit of time of its rates.
+   subroutine derivative_with_forces(self, in_time, m, nc, q, dr)
       type(balance_state), intent(inout) :: self
+      !> Whether it is the frequency that changes.
+      logical, intent(in) :: in_time
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc)
       real(wp), intent(inout) :: dr(m, nc)
@@ -228,14 +236,14 @@ contains
       do k = 1, self%problem%forces%n_laws
          associate (p => self%problem%forces%entry(k)%law%prediction)
             ! Inputs of any other law depend on q alone, and q is held.
-            if (.not. (p%takes_balance .or. p%by_time)) cycle
-            call inputs_by_frequency(self, self%problem%forces%entry(k), m, nc, q, dr, &
-                                     self%work(k)%input)
+            if (.not. (p%takes_balance .or. (p%by_time .and. in_time))) cycle
+            call inputs_by_point(self, self%problem%forces%entry(k), in_time, m, nc, q, dr, &
+                                 self%work(k)%input)
          end associate
          call multiply_derivative(self%work(k))
          call add_outputs(self, self%problem%forces%entry(k), self%work(k), &
                           self%problem%incidence%identity, m, dr)
-         if (self%problem%forces%entry(k)%law%prediction%has_inertia) then
+         if (self%problem%forces%entry(k)%law%prediction%has_inertia .and. in_time) then
             call add_law_by_frequency(self, self%problem%forces%entry(k), self%work(k), m, nc, dr)
          end if
       end do
@@ -266,10 +274,11 @@ contains
       call entry%law%evaluate(self%problem%fourier, work)
    end subroutine add_law_by_frequency
 
-   !> Derivatives of the inputs by the frequency.
-   subroutine inputs_by_frequency(self, entry, m, nc, q, dr, input)
+   !> Derivatives of the inputs by the frequency or the self-excitation.
+   subroutine inputs_by_point(self, entry, in_time, m, nc, q, dr, input)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
+      logical, intent(in) :: in_time
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: q(m, nc), dr(m, nc)
       real(wp), intent(inout) :: input(:, :)
@@ -282,13 +291,13 @@ contains
                if (row(c, i) == 0) cycle
                associate (y => input((c - 1)*nc + 1:c*nc, i))
                   ! y = k omega B dq/dtau, so that dy/d omega = k B dq/dtau.
-                  if (p%by_time .and. p%order(c) > 0) then
+                  if (p%by_time .and. p%order(c) > 0 .and. in_time) then
                      call self%problem%incidence%gather_row(row(c, i), &
                                                             self%problem%incidence%identity, m, &
                                                     p%stiffness(i, c), q, y)
                      call take_rate(self, .false., 1.0_wp, y)
                   end if
-                  if (p%has_inertia) then
+                  if (p%has_inertia .and. in_time) then
                      call add_inertia_by_frequency(self, p, row(c, i), i, c, m, q, y)
                   end if
                   ! The balance in y is minus what the residual is without this law, and its slope
@@ -299,7 +308,7 @@ contains
             end do
          end do
       end associate
-   end subroutine inputs_by_frequency
+   end subroutine inputs_by_point
 
    !> Add dE_n/d omega times the displacement of a row.
    subroutine add_inertia_by_frequency(self, prediction, row, element, component, m, q, y)

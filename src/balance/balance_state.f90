@@ -55,8 +55,10 @@ module fw_balance_state
    contains
       procedure :: set_parameter => set_frequency
       procedure :: set_frequency
+      procedure :: set_point
       procedure :: frequency
       procedure :: parameter_derivative
+      procedure :: derivative_by
       procedure :: rate_unit
       procedure :: pair_states
       procedure :: pair_shares
@@ -96,6 +98,15 @@ module fw_balance_state
          real(wp), intent(in), contiguous :: x(:)
          real(wp), intent(out), contiguous :: dr(:)
       end subroutine parameter_derivative
+
+      !> dR/dp, p being by_frequency or by_self_excitation (fw_structure_operator), at the last
+      !> evaluated and linearized point x.
+      module subroutine derivative_by(self, parameter, x, dr)
+         class(balance_state), intent(inout) :: self
+         integer, intent(in) :: parameter
+         real(wp), intent(in), contiguous :: x(:)
+         real(wp), intent(out), contiguous :: dr(:)
+      end subroutine derivative_by
 
       module subroutine apply(self, vector, product)
          class(balance_state), intent(inout) :: self
@@ -173,7 +184,17 @@ contains
       real(wp), intent(in) :: parameter
       type(error_type), allocatable, intent(out) :: error
 
-      call self%problem%structure%at(self%structure_state, parameter, 0.0_wp, error)
+      call self%set_point(parameter, 0.0_wp, error)
+   end subroutine set_frequency
+
+   !> The same with a self-excitation in proportion to mass, as of a mode.
+   subroutine set_point(self, omega, self_excitation, error)
+      class(balance_state), intent(inout) :: self
+      !> [rad/s]
+      real(wp), intent(in) :: omega, self_excitation
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%problem%structure%at(self%structure_state, omega, self_excitation, error)
       if (allocated(error)) return
       call to_real(self%problem%fourier, self%problem%structure%n_coordinates, &
                    self%structure_state%load, &
@@ -185,7 +206,7 @@ contains
       else
          self%load = self%load_share*self%load
       end if
-   end subroutine set_frequency
+   end subroutine set_point
 
    !> Present angular frequency [rad/s].
    pure real(wp) function frequency(self)

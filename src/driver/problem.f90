@@ -7,6 +7,7 @@ module fw_problem
    use fw_balance_state, only: new_balance_state
    use fw_case, only: case_type
    use fw_case, only: analysis_frf
+   use fw_case, only: analysis_mode
    use fw_case, only: analysis_point
    use fw_case, only: analysis_wear
    use fw_cyclic_structure, only: cyclic_structure
@@ -104,6 +105,8 @@ contains
       skip_idle = case%solver%skips .and. .not. case%sweep%stability
       call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
+      ! No load moves a mode, and none has to.
+      if (case%analysis == analysis_mode) joint%idle = .false.
       if (present(forces)) then
          laws = forces
       else
@@ -289,6 +292,11 @@ contains
       if (harmonics%sampling /= sampling_auto .or. case%contact%n_pairs == 0) return
       if (harmonics%accuracy > 0.0_wp) then
          locates_events = .not. is_planar(joint) .or. case%contact%n_pairs <= few_pairs
+         return
+      end if
+      if (case%analysis == analysis_mode) then
+         ! Instants put corners into curves whose derivatives are followed.
+         locates_events = harmonics%n_time == 0
          return
       end if
       locates_events = harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &

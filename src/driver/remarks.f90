@@ -1,6 +1,7 @@
 !> What is allowed and seldom meant: it is said, in the summary and in the result, and never ends a
 !> run.
 module fw_remarks
+   use fw_case, only: analysis_mode
    use fw_case, only: case_type
    use fw_force_law, only: law_facts
    use fw_joint_modes, only: held_stiffness
@@ -84,7 +85,9 @@ contains
             "the model gives contact%"//trim(name)//", which contact%law = '"// &
             trim(law_words(case%contact%law))//"' does not take")
       end if
-      if (.not. is_shaken(case)) call remarks%add('no load', 'no vibratory load acts: the '// &
+      ! A mode has none.
+      if (.not. (is_shaken(case) .or. case%analysis == analysis_mode)) &
+         call remarks%add('no load', 'no vibratory load acts: the '// &
          'response is that at rest; set load%cosine or load%sine (with a model file, '// &
          'load%harmonic_scale)')
       call remark_harmonics(case, remarks)

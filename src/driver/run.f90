@@ -4,6 +4,7 @@ module fw_run
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_combinations, only: check_combinations
+   use fw_case, only: analysis_mode
    use fw_case, only: analysis_modes
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
@@ -18,6 +19,8 @@ module fw_run
    use fw_restart_file, only: read_restart
    use fw_restart_file, only: restart_type
    use fw_result, only: result_writer
+   use fw_run_mode, only: check_mode_case
+   use fw_run_mode, only: run_mode
    use fw_run_modes, only: run_modes
    use fw_run_state, only: run_state
    use fw_summary, only: summary_type
@@ -47,7 +50,11 @@ contains
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
       call threads%enter(case%threads)
-      if (case%analysis /= analysis_modes) call build_system(case, problem, system, error)
+      if (case%analysis == analysis_mode) then
+         call check_mode_case(case, error)
+      else if (case%analysis /= analysis_modes) then
+         call build_system(case, problem, system, error)
+      end if
       call threads%leave()
    end subroutine check_case
 
@@ -95,6 +102,8 @@ contains
       if (case%analysis /= analysis_modes) call remark_input(case, summary%remarks)
       if (case%analysis == analysis_modes) then
          call run_modes(case, writer, table, error)
+      else if (case%analysis == analysis_mode) then
+         call run_mode(case, observer, writer, summary, state, error)
       else if (case%analysis == analysis_wear) then
          call run_wear(case, restart, observer, writer, summary, state, error)
       else

@@ -10,6 +10,7 @@ module fw_summary
    use fw_harmonics_options, only: sampling_uniform
    use fw_balance_state, only: balance_state
    use fw_linear_step, only: linear_step_type
+   use fw_mode_group, only: mode_table
    use fw_peak, only: found_bound
    use fw_peak, only: found_jump
    use fw_peak, only: found_unresolved
@@ -33,6 +34,8 @@ module fw_summary
    integer, parameter :: max_shown = 6
    !> Bifurcations that it shows.
    integer, parameter :: most_places = 12
+   !> Damping ratios below are none.
+   real(wp), parameter :: no_damping = 1.0e-9_wp
 
    type :: summary_type
       !> Of all points, those on the way included.
@@ -60,6 +63,8 @@ module fw_summary
       integer, allocatable :: sampling
       !> Converged points whose forces ask for more instants than they had, and the most of these.
       integer :: n_coarse = 0, instants_wanted = 0
+      !> Lines about a nonlinear mode, in place of the peaks.
+      type(string_type), allocatable :: mode(:)
    contains
       procedure :: add
       procedure :: add_transient
@@ -74,6 +79,7 @@ module fw_summary
       procedure :: describe_harmonics
       procedure :: describe_accuracy
       procedure :: describe_wear
+      procedure :: describe_mode
       procedure :: note_restart
       procedure :: note_profile_change
       procedure :: lines
@@ -355,6 +361,58 @@ contains
                     ' repeated')
    end subroutine describe_wear
 
+   !> What a nonlinear mode is, and where it slips and keeps itself alive.
+   subroutine describe_mode(self, table, name, by_observed, highest)
+      class(summary_type), intent(inout) :: self
+      type(mode_table), intent(in) :: table
+      !> Of the first observed quantity.
+      character(*), intent(in) :: name
+      !> Whether amplitudes are those of it, else modal.
+      logical, intent(in) :: by_observed
+      !> Highest amplitude that was asked for.
+      real(wp), intent(in) :: highest
+      character(:), allocatable :: cycles, what
+      real(wp) :: damping(table%n)
+      integer :: k
+
+      allocate (self%mode(0))
+      if (table%n == 0) return
+      what = 'a'
+      if (by_observed) what = name
+      associate (row => table%row)
+         call add_line(self%mode, 'mode '//to_text(table%number), trim(short(table%stuck_omega))// &
+                       ' rad/s stuck, '//trim(short(row(table%n)%omega))//' at the end')
+         if (table%onset_amplitude > 0.0_wp) then
+            call add_line(self%mode, 'slips from', what//' = '//trim(short(table%onset_amplitude)))
+         end if
+         damping = [(0.5_wp*row(k)%self_excitation/row(k)%omega, k=1, table%n)]
+         k = maxloc(damping, dim=1)
+         call add_line(self%mode, 'damping', trim(short(damping(k)))//' at most, at '//what// &
+                       ' = '//trim(short(row(k)%amplitude)))
+      end associate
+      if (allocated(table%cycle_amplitude)) then
+         cycles = to_text(size(table%cycle_amplitude))//':'
+         do k = 1, size(table%cycle_amplitude)
+            cycles = cycles//' '//what//' = '//trim(short(table%cycle_amplitude(k)))// &
+                     trim(merge(' (stable)  ', ' (unstable)', table%cycle_stable(k) == 1))
+            if (k < size(table%cycle_amplitude)) cycles = cycles//','
+         end do
+         call add_line(self%mode, 'limit cycles', cycles)
+      else if (all(damping < -no_damping)) then
+         call add_line(self%mode, 'limit cycles', 'none up to '//what//' = '//trim(short(highest)) &
+                       //': the mode gains energy at every amplitude')
+      end if
+   end subroutine describe_mode
+
+   !> A number for the table.
+   pure function short(value) result(text)
+      real(wp), intent(in) :: value
+      character(9) :: text
+
+      write (text, '(es9.2)') value
+      text = adjustl(text)
+   end function short
+
    !> The run that was continued.
    subroutine note_restart(self, n_steps, path)
       class(summary_type), intent(inout) :: self
@@ -391,7 +449,13 @@ contains
       call add_line(table, 'converged', to_text(state%n_converged)//' of '// &
                     to_text(state%n_points)//' points')
       call add_line(table, 'iterations', to_text(self%iterations))
-      do i = 1, merge(min(size(self%name), max_shown), 0, state%n_converged > 0)
+      if (allocated(self%mode)) then
+         do i = 1, size(self%mode)
+            call append(table, self%mode(i)%text)
+         end do
+      end if
+      do i = 1, merge(min(size(self%name), max_shown), 0, state%n_converged > 0 .and. &
+                      .not. allocated(self%mode))
          write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', &
             self%peak_omega(i), &
             ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'
@@ -402,7 +466,7 @@ contains
             call add_line(table, 'peak '//self%name(i)%text, trim(adjustl(text)))
          end if
       end do
-      if (size(self%name) > max_shown) then
+      if (size(self%name) > max_shown .and. .not. allocated(self%mode)) then
          call add_line(table, '...', to_text(size(self%name) - max_shown)// &
                        ' more in the result file')
       end if

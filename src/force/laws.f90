@@ -13,7 +13,7 @@ module fw_laws
    private
 
    public :: law_words, law_help, law_number, law_with_tail, new_law, facts_of, is_rigid
-   public :: law_under_accuracy, usual_law
+   public :: law_under_accuracy, usual_law, is_viscous
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
@@ -56,6 +56,15 @@ contains
       call new_law(number, law)
       is_rigid = law%prediction%takes_balance
    end function is_rigid
+
+   !> Whether pairs of the law of a number hold nothing at rest: their friction is one of rates.
+   logical function is_viscous(number)
+      integer, intent(in) :: number
+      class(pair_law), allocatable :: law
+
+      call new_law(number, law)
+      is_viscous = law%prediction%order(1) > 0 .and. .not. law%prediction%takes_balance
+   end function is_viscous
 
    !> The law that has the solutions of the law of a number and knows its forces in every harmonic;
    !> the number itself where there is none.

@@ -6,6 +6,7 @@ module fw_case
    use fw_key_range, only: at_least
    use fw_key_range, only: from_to
    use fw_kinds, only: wp
+   use fw_mode_options, only: mode_options
    use fw_model, only: model_type
    use fw_contact_data, only: contact_type, spring_type
    use fw_harmonics_options, only: harmonics_options
@@ -19,12 +20,12 @@ module fw_case
 
    public :: case_type, output_options
    public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
-             analysis_modes
+             analysis_modes, analysis_mode
 
    character(*), parameter :: analysis_words(*) = &
-      [character(5) :: 'frf', 'point', 'wear', 'time', 'modes']
+      [character(5) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode']
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
-                         analysis_time = 4, analysis_modes = 5
+                         analysis_time = 4, analysis_modes = 5, analysis_mode = 6
 
    !> What is written (group &output).
    type :: output_options
@@ -67,6 +68,7 @@ module fw_case
       !> the namelist.
       character(:), allocatable :: restart
       type(sensitivity_options) :: sensitivity
+      type(mode_options) :: mode
    contains
       procedure :: bind_keys => bind_case_keys
    end type case_type
@@ -82,8 +84,8 @@ contains
       call keys%bind(key('title', 'stands in the result file', &
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
-                              'integration in time, or natural frequencies'), self%analysis, &
-                          analysis_words)
+                              'integration in time, natural frequencies, or a nonlinear '// &
+                              'mode'), self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)
       call keys%bind(key('max_seconds', 'time after which the run ends with the points that '// &

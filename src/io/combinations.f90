@@ -3,8 +3,8 @@
 !> Ranges of single keys are checked where the keys are declared, and what needs the model where it
 !> is built. The first combination that fails is told: others may follow from it.
 module fw_combinations
-   use fw_case, only: case_type, analysis_frf, analysis_modes, analysis_point, analysis_time, &
-                      analysis_wear
+   use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_modes, analysis_point, &
+                      analysis_time, analysis_wear
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
@@ -14,6 +14,7 @@ module fw_combinations
    use fw_harmonics_options, only: sampling_events
    use fw_harmonics_options, only: sampling_uniform
    use fw_laws, only: facts_of
+   use fw_laws, only: is_viscous
    use fw_laws, only: law_words
    use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: continuation_natural
@@ -21,6 +22,7 @@ module fw_combinations
    use fw_solver_options, only: scheme_bdf
    use fw_solver_options, only: scheme_implicit_euler
    use fw_solver_options, only: scheme_runge_kutta
+   use fw_solver_options, only: solver_newton
    use fw_solver_options, only: solver_pseudo_time
    use fw_text, only: to_text
    use fw_wear_options, only: wear_explicit
@@ -40,7 +42,8 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
-      call check_jacobian(case, error)
+      call check_mode(case, error)
+      if (.not. allocated(error)) call check_jacobian(case, error)
       if (.not. allocated(error)) call check_memory(case, error)
       if (.not. allocated(error)) call check_refine(case, error)
       if (.not. allocated(error)) call check_adaptive(case, error)
@@ -65,6 +68,58 @@ contains
                           'at least '//to_text(highest), status_input)
       end associate
    end subroutine check_loads
+
+   !> What nonlinear modes are not made for.
+   subroutine check_mode(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: with = " does not go with case%analysis = 'mode': "
+
+      if (case%analysis /= analysis_mode) return
+      if (case%model%cyclic%is_cyclic) then
+         call fatal_error(error, 'a cyclic structure (&cyclic)'//with//'model all sectors', &
+                          status_input)
+      else if (case%harmonics%method /= method_hbm) then
+         call fatal_error(error, 'harmonics%method'//with//"use 'hbm'", status_input)
+      else if (case%harmonics%adaptive) then
+         call fatal_error(error, 'harmonics%adaptive = .true.'//with//'give n_harmonics', &
+                          status_input)
+      else if (case%harmonics%accuracy > 0.0_wp) then
+         call fatal_error(error, 'harmonics%accuracy'//with//'give n_harmonics', status_input)
+      else if (case%solver%kind /= solver_newton) then
+         call fatal_error(error, 'solver%kind'//with//"use 'newton'", status_input)
+      else if (case%solver%jacobian /= jacobian_analytic) then
+         call fatal_error(error, "solver%jacobian = 'difference'"//with//"use 'analytic'", &
+                          status_input)
+      else if (case%contact%memory == memory_carried .and. case%contact%n_pairs > 0) then
+         call fatal_error(error, "contact%memory = 'carried'"//with//"use 'assembly'", &
+                          status_input)
+      else if (case%output%histories) then
+         call fatal_error(error, 'output%histories'//with//'leave it out', status_input)
+      else if (allocated(case%mode%synthesis) .and. .not. is_loaded(case)) then
+         call fatal_error(error, 'mode%synthesis needs a vibratory load: set load%cosine or '// &
+                          'load%sine', status_input)
+      else if (case%output%tail > 0) then
+         call fatal_error(error, 'output%tail'//with//'take more n_harmonics', status_input)
+      end if
+      if (allocated(error) .or. case%contact%n_pairs == 0) return
+      if (is_viscous(case%contact%law)) then
+         call fatal_error(error, "contact%law = '"//trim(law_words(case%contact%law))//"'"//with// &
+                          'its pairs do not stick, so that no mode starts from stuck pairs; '// &
+                          "use 'penalty' or 'dlft'", status_input)
+      end if
+   end subroutine check_mode
+
+   !> Whether anything drives harmonic 1.
+   pure logical function is_loaded(case)
+      type(case_type), intent(in) :: case
+
+      is_loaded = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
+                  any(abs(case%model%load_sine) > 0.0_wp)
+      if (allocated(case%model%waves%harmonic)) then
+         is_loaded = is_loaded .or. any(case%model%waves%harmonic == 1)
+      end if
+   end function is_loaded
 
    !> What waves around a cyclic structure cannot do.
    subroutine check_cyclic(case, error)

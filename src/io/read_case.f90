@@ -1,7 +1,8 @@
 !> From a namelist file to a validated case.
 module fw_read_case
    use fw_combinations, only: check_combinations
-   use fw_case, only: case_type, analysis_frf, analysis_modes, analysis_point, analysis_wear
+   use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_modes, analysis_point, &
+                      analysis_wear
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
@@ -13,7 +14,7 @@ module fw_read_case
    use fw_read_contact, only: read_contact, read_springs
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_model, only: read_model, read_loads, finish_model
-   use fw_read_options, only: read_harmonics, read_sweep
+   use fw_read_options, only: read_harmonics, read_mode, read_sweep
    use fw_read_output, only: read_output, read_observed
    use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
    use fw_read_worn, only: read_worn
@@ -45,6 +46,9 @@ module fw_read_case
       !> Try model files in a process of their own first: for programs of one thread.
       logical :: tries_files = .false.
    end type case_input
+
+   !> Harmonics of a nonlinear mode where nothing is said of them: frequencies to some 1e-5.
+   integer, parameter :: usual_of_mode = 7
 
 contains
 
@@ -131,6 +135,11 @@ contains
       if (reader%given('harmonics', 'n_harmonics')) return
       if (reader%given('harmonics', 'accuracy')) return
       if (case%sensitivity%is_wanted()) return
+      if (case%analysis == analysis_mode) then
+         case%harmonics%n_harmonics = usual_of_mode
+         call reader%amend('harmonics', 'n_harmonics', to_text(usual_of_mode))
+         return
+      end if
       if (.not. has_nonlinear(case) .or. .not. goes_with_accuracy(case)) return
       case%harmonics%accuracy = usual_accuracy
       case%harmonics%n_harmonics = most_for_accuracy
@@ -184,6 +193,7 @@ contains
       call case%pseudo_time%bind_keys(reader)
       call case%wear%bind_keys(reader, case%analysis == analysis_wear)
       call case%time%bind_keys(reader)
+      call read_mode(reader, case%analysis, case%mode)
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)
       call read_observed(reader, raw, case%model)

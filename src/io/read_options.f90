@@ -3,10 +3,11 @@
 !> Single values have passed the range of their key already (fw_key_range). Here are the refusals
 !> that need two keys or the analysis, and what follows from other keys where one is left out.
 module fw_read_options
-   use fw_case, only: analysis_frf, analysis_modes, analysis_time
+   use fw_case, only: analysis_frf, analysis_mode, analysis_modes, analysis_time
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
                                    instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
+   use fw_mode_options, only: mode_options
    use fw_reader, only: reader_type
    use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength
    use fw_text, only: to_text
@@ -14,7 +15,10 @@ module fw_read_options
    implicit none (type, external)
    private
 
-   public :: read_harmonics, read_sweep
+   public :: read_harmonics, read_sweep, read_mode
+
+   !> Responses that are put together from a mode.
+   integer, parameter :: most_scales = 100
 
 contains
 
@@ -82,11 +86,15 @@ contains
       integer, intent(in) :: analysis
       type(sweep_options), intent(inout) :: options
 
-      if (analysis /= analysis_modes) then
+      logical :: has_frequency
+
+      has_frequency = analysis /= analysis_modes .and. analysis /= analysis_mode
+      if (has_frequency) then
          call reader%require_group('sweep', &
                                    'the frequency: start (and end and n_points of a sweep)')
       end if
-      call options%bind_keys(reader, analysis == analysis_frf, analysis /= analysis_modes)
+      call options%bind_keys(reader, analysis == analysis_frf, has_frequency)
+      if (analysis == analysis_mode) call refuse_sweep(reader)
       call check_ends(reader, analysis, options)
       if (allocated(options%frequencies)) call take_list(reader, analysis, options)
       ! Everything inside is in rad/s; the effective input keeps the unit of the user.
@@ -96,6 +104,46 @@ contains
          options%end = 2.0_wp*pi*options%end
       end if
    end subroutine read_sweep
+
+   !> The frequencies of a mode are its own.
+   subroutine refuse_sweep(reader)
+      type(reader_type), intent(inout) :: reader
+      character(*), parameter :: keys(*) = [character(12) :: 'frequencies', 'start', 'end', &
+                                            'unit', 'continuation', 'n_points', 'max_points', &
+                                            'stability', 'refine']
+      integer :: i
+
+      do i = 1, size(keys)
+         if (.not. reader%given('sweep', trim(keys(i)))) cycle
+         call reader%refuse('sweep', trim(keys(i)), "does not go with case%analysis = 'mode', "// &
+                            'whose frequencies follow from its amplitudes: leave &sweep out, '// &
+                            'and give &mode start and end')
+      end do
+   end subroutine refuse_sweep
+
+   !> Group &mode; a frequency leaves in rad/s.
+   subroutine read_mode(reader, analysis, options)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: analysis
+      type(mode_options), intent(inout) :: options
+
+      call options%bind_keys(reader, analysis == analysis_mode)
+      if (options%unit == unit_hertz) options%near = 2.0_wp*pi*options%near
+      if (analysis /= analysis_mode) return
+      if (reader%given('mode', 'near') .and. reader%given('mode', 'number')) then
+         call reader%refuse('mode', 'near', 'is given beside number: keep one of the two')
+      end if
+      if (reader%given('mode', 'start') .and. reader%given('mode', 'end') .and. &
+          options%end <= options%start) then
+         call reader%refuse('mode', 'end', '= '//number_text(options%end)//': must be above '// &
+                            'start = '//number_text(options%start)//', the lowest amplitude')
+      end if
+      if (.not. allocated(options%synthesis)) return
+      if (size(options%synthesis) > most_scales) then
+         call reader%refuse('mode', 'synthesis', 'has '//to_text(size(options%synthesis))// &
+                            ' factors: at most '//to_text(most_scales)//' are served')
+      end if
+   end subroutine read_mode
 
    !> A list stands for start, end and n_points.
    subroutine take_list(reader, analysis, options)

@@ -22,6 +22,8 @@ module fw_result
    use fw_hdf5, only: write_dataset
    use fw_hdf5, only: write_text
    use fw_kinds, only: wp
+   use fw_mode_group, only: mode_table
+   use fw_mode_group, only: write_mode
    use fw_peak, only: peak_type
    use fw_peak_group, only: write_peaks
    use fw_point, only: point_type
@@ -65,6 +67,7 @@ module fw_result
       procedure :: add_bifurcations
       procedure :: add_remarks
       procedure :: add_modes
+      procedure :: add_mode
       procedure :: sort_points
       procedure :: flush
       procedure :: close
@@ -194,6 +197,20 @@ contains
                        closed_damping)
       !$omp end critical (fretwear_io)
    end subroutine add_modes
+
+   !> A nonlinear mode, beside its points.
+   subroutine add_mode(self, table, unit_system, error)
+      class(result_writer), intent(inout) :: self
+      type(mode_table), intent(in) :: table
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call write_mode(self%file, table, unit_system, error)
+      !$omp end critical (fretwear_io)
+   end subroutine add_mode
 
    !> Bring the rows into the order of their frequencies.
    subroutine sort_points(self, descending, error)

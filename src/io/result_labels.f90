@@ -61,6 +61,29 @@ module fw_result_labels
                  'damping of them, over the critical one'), &
       label_type('/modes/closed_damping', '1', 'diameter mode', &
                  'damping of them, over the critical one'), &
+      label_type('/mode/damping_ratio', '1', 'point', &
+                 'damping ratio of the mode, xi/(2 omega)'), &
+      label_type('/mode/self_excitation', '1/s', 'point', &
+                 'self-excitation xi in proportion to mass'), &
+      label_type('/mode/modal_amplitude', '', 'point', &
+                 'modal amplitude sqrt(U^H M U) of the first harmonic'), &
+      label_type('/mode/first_harmonic', '<length>', 'point observed', &
+                 'amplitude of the first harmonic'), &
+      label_type('/mode/shape', '', 'point observed part', &
+                 'first harmonic, cosine and sine, over the modal amplitude'), &
+      label_type('/mode/resonant_scale', '1', 'point', &
+                 'factor of the load with which the point is a resonance'), &
+      label_type('/mode/limit_cycle/amplitude', '', 'cycle', &
+                 'amplitude of the limit cycle, as the control has it'), &
+      label_type('/mode/limit_cycle/omega', 'rad/s', 'cycle', &
+                 'angular frequency of the limit cycle'), &
+      label_type('/mode/limit_cycle/stable', '', 'cycle', &
+                 '1 where damping grows with the amplitude'), &
+      label_type('/synthesis/scale', '1', 'scale', 'factor of the vibratory load'), &
+      label_type('/synthesis/omega', 'rad/s', 'scale point side', &
+                 'frequencies of the response put together, NaN: none'), &
+      label_type('/synthesis/first_harmonic', '<length>', 'point', &
+                 'amplitude of the first observed quantity'), &
       label_type('/wear/depth_halved', '<length>', 'pair', &
                  'final wear depth with steps of half the size')]
 

@@ -2,6 +2,7 @@
 !> declares them.
 module fw_result_rows
    use fw_case, only: analysis_frf
+   use fw_case, only: analysis_mode
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -109,6 +110,8 @@ contains
       if (case%analysis == analysis_wear) then
          ! The state before any wear is a row of its own.
          expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
+      else if (case%analysis == analysis_mode) then
+         expected_rows = case%mode%n_points
       else if (case%analysis == analysis_frf) then
          expected_rows = max(1, case%sweep%n_points)
          if (case%sweep%continuation == continuation_arclength) then

@@ -47,6 +47,8 @@ module fw_continuation
       !> First step as a share of the interval.
       real(wp) :: step = 0.01_wp
       integer :: max_points = 1000
+      !> Longest step of p over the interval.
+      real(wp) :: longest = 0.0625_wp
       !> The least size of x that matters.
       real(wp) :: x_scale = 0.0_wp
       !> Resonances of what x does not show, heeded where x does not move at all: where they are in
@@ -97,8 +99,8 @@ module fw_continuation
    real(wp), parameter :: least_share = 2.0e-2_wp
    !> Share of a step at its ends where no corner is looked for.
    real(wp), parameter :: least_place = 0.25_wp
-   !> Longest step: of p over the interval, and of y over its size.
-   real(wp), parameter :: longest_p = 0.0625_wp, longest_y = 0.5_wp
+   !> Longest step of y over its size.
+   real(wp), parameter :: longest_y = 0.5_wp
    !> Step over the distance of a simple pole at which a cubic misses (0.45)^4/16 of it, 0.3 %.
    real(wp), parameter :: beside_pole = 0.45_wp
    !> What is left of the size of x from one point to the next where x itself gets smaller.
@@ -634,7 +636,7 @@ contains
       associate (metric => self%corrector%metric, here => self%here)
          change = abs(here%t_p)/metric%p_scale
          ! In shares of the scales of p and of y.
-         if (change*self%ds > longest_p) self%ds = longest_p/change
+         if (change*self%ds > self%longest) self%ds = self%longest/change
          change = metric%size(here%t_y)
          if (change*self%ds > longest_y) self%ds = longest_y/change
          if (self%near%n == 0 .and. allocated(self%pole)) then

@@ -33,6 +33,7 @@ NUMBERS = {
     "shrouded_disk/wave.nml": [("amplitude", 2.0 * np.pi * 1261.0, 0, 0.01940509147, 1e-7)],
     # Depth after 13 steps whose sizes follow from an estimate of their error.
     "shrouded_disk/wear.nml": [("wear/depth", None, 3, 9.36634942e-4, 1e-5)],
+    "nonlinear_mode/mode.nml": [("mode/damping_ratio", None, Ellipsis, 0.1202550647, 1e-8)],
     "wear/two_pairs.nml": [("wear/depth", None, 0, 0.2, 1e-5),
                            ("wear/depth", None, 1, 0.0, 0.0)],
     "wear/oscillator.nml": [("wear/depth", None, 0, 0.294758, 2e-6),

@@ -1,0 +1,80 @@
+!> Options of a nonlinear mode (group &mode). Defaults live here and nowhere else.
+module fw_mode_options
+   use fw_key, only: key
+   use fw_key, only: key_visitor
+   use fw_key_range, only: above
+   use fw_key_range, only: at_least
+   use fw_kinds, only: wp
+   use fw_solver_options, only: continuation_arclength
+   use fw_solver_options, only: continuation_words
+   use fw_solver_options, only: unit_rad_per_second
+   use fw_solver_options, only: unit_words
+   implicit none (type, external)
+   private
+
+   public :: mode_options
+   public :: control_words, control_observed, control_modal
+
+   !> What an amplitude is: of the first harmonic of the first observed quantity, or
+   !> sqrt(U_1^H M U_1) of the whole structure.
+   character(*), parameter :: control_words(*) = [character(8) :: 'observed', 'modal']
+   integer, parameter :: control_observed = 1, control_modal = 2
+
+   type :: mode_options
+      !> Of the elastic modes of the structure with its closed pairs stuck, from 1.
+      integer :: number = 1
+      !> In place of the number, the mode of the nearest frequency (0: by its number): in the unit
+      !> of `unit` while it is read, in rad/s from then on.
+      real(wp) :: near = 0.0_wp
+      integer :: unit = unit_rad_per_second
+      !> Lowest and highest amplitude, as `control` has it.
+      real(wp) :: start = 0.0_wp
+      real(wp) :: end = 0.0_wp
+      integer :: control = control_observed
+      !> Points, evenly spaced in the logarithm of the amplitude; of a branch the number that sets
+      !> its longest step.
+      integer :: n_points = 40
+      integer :: continuation = continuation_arclength
+      !> A branch may turn round without end.
+      integer :: max_points = 1000
+      !> Factors of the vibratory load for which responses are put together.
+      real(wp), allocatable :: synthesis(:)
+   contains
+      procedure :: bind_keys
+   end type mode_options
+
+contains
+
+   !> The keys of group &mode.
+   subroutine bind_keys(self, keys, is_mode)
+      class(mode_options), intent(inout) :: self
+      class(key_visitor), intent(inout) :: keys
+      !> Whether the analysis is that of a mode.
+      logical, intent(in) :: is_mode
+
+      call keys%open('mode', 'a nonlinear mode over its amplitude')
+      call keys%bind(key('number', 'of the elastic modes of the structure with its closed '// &
+                         'pairs stuck', at_least(1)), self%number)
+      call keys%bind(key('near', 'the mode whose frequency with stuck pairs is nearest, in '// &
+                         'place of number; 0: by number', at_least(0.0_wp), unit='unit'), &
+                     self%near)
+      call keys%bind_word(key('unit', 'of near; results are in rad/s'), self%unit, unit_words)
+      call keys%bind(key('start', 'lowest amplitude', above(0.0_wp), unit='L', &
+                         absent='required', only="analysis = 'mode'"), self%start, needed=is_mode)
+      call keys%bind(key('end', 'highest amplitude', above(0.0_wp), unit='L', &
+                         absent='required', only="analysis = 'mode'"), self%end, needed=is_mode)
+      call keys%bind_word(key('control', 'what the amplitude is: of the first harmonic of the '// &
+                              'first observed quantity, or modal, sqrt(U^H M U) of it'), &
+                          self%control, control_words)
+      call keys%bind(key('n_points', 'points, even in the logarithm; of a branch: sets its '// &
+                         'longest step', at_least(2)), self%n_points)
+      call keys%bind_word(key('continuation', 'points at given amplitudes, or a branch through '// &
+                              'folds'), self%continuation, continuation_words)
+      call keys%bind(key('max_points', 'points of a branch at most', at_least(2), &
+                         only="continuation = 'arclength'"), self%max_points)
+      call keys%bind(key('synthesis', 'factors of the vibratory load for which the response '// &
+                         'near the resonance is put together', above(0.0_wp), shape=':', &
+                         repeats=.false., absent='none'), self%synthesis)
+   end subroutine bind_keys
+
+end module fw_mode_options

@@ -1,0 +1,154 @@
+!> A nonlinear mode from amplitude to amplitude: natural steps in ln A that are halved where they
+!> fail, from the points before.
+module fw_mode_path
+   use fw_error, only: error_type
+   use fw_interrupt, only: stop_run
+   use fw_kinds, only: wp
+   use fw_mode_system, only: mode_system
+   use fw_newton, only: newton_solver
+   use fw_newton, only: solver_report
+   use fw_solver_options, only: linear_lu
+   use fw_solver_options, only: solver_options
+   implicit none (type, external)
+   private
+
+   public :: mode_path
+
+   type :: mode_path
+      type(newton_solver) :: newton
+      type(mode_system), pointer :: system => null()
+      !> The last points: ln A in descending order of age, unknowns (n, kept), and how many.
+      real(wp) :: p(3) = 0.0_wp
+      real(wp), allocatable :: y(:, :)
+      integer :: kept = 0
+      !> Iterations so far, and steps that failed.
+      integer :: iterations = 0, n_failed = 0
+      !> Step that served last, in ln A.
+      real(wp) :: step = 0.25_wp
+   contains
+      procedure :: start
+      procedure :: reach
+      procedure :: solve
+      procedure :: remember
+   end type mode_path
+
+   !> Longest and shortest step in ln A, and how steps grow and shrink.
+   real(wp), parameter :: longest = 0.5_wp, shortest = 1.0e-5_wp, growth = 1.5_wp
+   !> Newton steps from which on a step is too long.
+   integer, parameter :: most_iterations = 25
+   !> Part of their size by which unknowns may move in a step: beyond, the solution is another.
+   real(wp), parameter :: most_moved = 0.5_wp
+
+   !> ln A closer than this are one amplitude.
+   real(wp), parameter :: same = 1.0e-9_wp
+
+contains
+
+   subroutine start(self, system, options)
+      class(mode_path), intent(inout) :: self
+      !> Has to outlive the path.
+      type(mode_system), intent(inout), target :: system
+      type(solver_options), intent(in) :: options
+
+      self%system => system
+      self%newton%options = options
+      self%newton%options%linear = linear_lu
+      self%newton%options%max_iterations = min(options%max_iterations, most_iterations)
+      allocate (self%y(system%n, 3), source=0.0_wp)
+   end subroutine start
+
+   !> Solve at an amplitude from a guess.
+   subroutine solve(self, p, y, report, error)
+      class(mode_path), intent(inout) :: self
+      !> ln A
+      real(wp), intent(in) :: p
+      real(wp), intent(inout), contiguous :: y(:)
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+
+      call stop_run(self%system%interrupt, error)
+      if (.not. allocated(error)) call self%system%set_parameter(p, error)
+      if (allocated(error)) return
+      call self%newton%solve(self%system, y, report)
+      self%iterations = self%iterations + report%iterations
+      if (report%interrupted) call stop_run(self%system%interrupt, error)
+   end subroutine solve
+
+   !> Go on to an amplitude, by as many steps as it takes; report%converged says whether it was
+   !> reached, else y is the last point that was, at `reached`.
+   subroutine reach(self, p, y, report, reached, error)
+      class(mode_path), intent(inout) :: self
+      real(wp), intent(in) :: p
+      real(wp), intent(out), contiguous :: y(:)
+      type(solver_report), intent(out) :: report
+      real(wp), intent(out) :: reached
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: next
+      logical :: done
+
+      y = self%y(:, 1)
+      reached = self%p(1)
+      do
+         next = self%p(1) + sign(min(abs(p - self%p(1)), self%step), p - self%p(1))
+         ! A rest that is nothing beside the step is taken with it.
+         if (abs(p - next) < 0.1_wp*self%step) next = p
+         call predict(self, next, y)
+         call self%solve(next, y, report, error)
+         if (allocated(error)) return
+         done = report%converged
+         if (done) done = norm2(y - self%y(:, 1)) <= most_moved*norm2(self%y(:, 1))
+         if (done) then
+            call self%remember(next, y)
+            reached = next
+            self%step = min(longest, growth*self%step)
+            if (abs(next - p) <= 0.0_wp) return
+         else
+            report%converged = .false.
+            self%n_failed = self%n_failed + 1
+            self%step = 0.5_wp*min(self%step, abs(next - self%p(1)))
+            if (self%step >= shortest) cycle
+            y = self%y(:, 1)
+            reached = self%p(1)
+            self%step = longest*0.5_wp
+            return
+         end if
+      end do
+   end subroutine reach
+
+   !> The polynomial through the last points.
+   subroutine predict(self, p, y)
+      class(mode_path), intent(in) :: self
+      real(wp), intent(in) :: p
+      real(wp), intent(out) :: y(:)
+      real(wp) :: weight
+      integer :: i, j
+
+      y = 0.0_wp
+      do i = 1, self%kept
+         weight = 1.0_wp
+         do j = 1, self%kept
+            if (j /= i) weight = weight*(p - self%p(j))/(self%p(i) - self%p(j))
+         end do
+         y = y + weight*self%y(:, i)
+      end do
+   end subroutine predict
+
+   !> A point for the guesses of the next ones; the same amplitude again replaces it.
+   subroutine remember(self, p, y)
+      class(mode_path), intent(inout) :: self
+      real(wp), intent(in) :: p, y(:)
+
+      if (self%kept > 0) then
+         if (abs(p - self%p(1)) <= same) then
+            self%y(:, 1) = y
+            return
+         end if
+      end if
+      self%p = [p, self%p(1), self%p(2)]
+      self%y(:, 3) = self%y(:, 2)
+      self%y(:, 2) = self%y(:, 1)
+      self%y(:, 1) = y
+      self%kept = min(3, self%kept + 1)
+   end subroutine remember
+
+end module fw_mode_path

@@ -1,0 +1,400 @@
+!> Where a nonlinear mode starts: the structure with nothing condensed, at rest, its mode with
+!> closed pairs stuck, and the amplitude from which on a pair slips or separates.
+module fw_mode_start
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_fourier, only: to_real
+   use fw_guess, only: stuck_guess
+   use fw_kinds, only: wp
+   use fw_memory, only: require_memory
+   use fw_mode_options, only: control_observed
+   use fw_mode_system, only: mode_system
+   use fw_mode_system, only: new_mode_system
+   use fw_newton, only: newton_solver
+   use fw_newton, only: solver_report
+   use fw_problem, only: build_system
+   use fw_solver_options, only: linear_lu
+   use fw_stuck_modes, only: find_stuck_modes
+   use fw_stuck_modes, only: stuck_modes
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: mode_start
+
+   !> Everything that a curve needs; not to be moved once it is built.
+   type :: mode_start
+      !> The case, as the structure of a mode is built from it.
+      type(case_type) :: case
+      type(balance_problem) :: problem
+      type(balance_state) :: balance
+      type(mode_system) :: system
+      !> Number among the elastic modes with stuck pairs.
+      integer :: number = 0
+      !> Frequency and self-excitation there [rad/s].
+      real(wp) :: omega = 0.0_wp, self_excitation = 0.0_wp
+      !> Amplitude from which on the stuck motion slips or separates, in the unit of the control;
+      !> NaN where it does not up to the highest amplitude.
+      real(wp) :: onset = 0.0_wp
+      !> With stuck pairs there is no mode: this is the one with sliding pairs, which the curve
+      !> tends to at high amplitudes.
+      logical :: slides = .false.
+      !> The stuck motion as unknowns of the mode.
+      real(wp), allocatable :: y(:)
+      !> Vibratory load of the case, cosine and sine (n_coordinates, 2) [force].
+      real(wp), allocatable :: load(:, :)
+   contains
+      procedure :: build
+      procedure :: departs
+   end type mode_start
+
+   !> Two frequencies nearer than this part of them are one: the plane of the motion is free.
+   real(wp), parameter :: same_frequency = 1.0e-6_wp
+   !> Part of its size below which a mode has a node.
+   real(wp), parameter :: node = 1.0e-8_wp
+   !> Change of the shares of the period that is no round-off of the march.
+   real(wp), parameter :: share_change = 1.0e-9_wp
+   !> Amplitude over the lowest one at which the motion is that near rest.
+   real(wp), parameter :: near_rest = 1.0e-6_wp
+   !> Residual of the position at rest: the first guess of the curve, not its result.
+   real(wp), parameter :: rest_tolerance = 1.0e-6_wp
+
+contains
+
+   !> Build the problem, find the mode and its onset; refuse what has no such mode.
+   subroutine build(self, case, error)
+      class(mode_start), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(stuck_modes) :: modes
+      real(wp), allocatable :: x(:), row(:)
+
+      self%case = case
+      ! Everything stays in the linear problem, which has two borders.
+      self%case%solver%skips = .false.
+      self%case%sweep%start = rough_frequency(case)
+      call check_size(case, error)
+      if (.not. allocated(error)) call at_rest(self, x, modes, error)
+      if (.not. allocated(error)) call choose(self, modes, error)
+      if (allocated(error)) return
+      if (any_rigid(self%problem)) then
+         ! Their numbers of the method are those of the structure near the frequency of the mode.
+         self%case%sweep%start = modes%omega(self%number)
+         call at_rest(self, x, modes, error)
+         if (allocated(error)) return
+      end if
+      call observed_row(self%balance, row)
+      call take_mode(self, modes, x, row, error)
+      if (.not. allocated(error)) call find_onset(self)
+   end subroutine build
+
+   !> A frequency of the structure's order [rad/s].
+   pure real(wp) function rough_frequency(case) result(omega)
+      type(case_type), intent(in) :: case
+
+      omega = 1.0_wp
+      if (norm2(case%model%mass) > 0.0_wp .and. norm2(case%model%stiffness) > 0.0_wp) then
+         omega = sqrt(norm2(case%model%stiffness)/norm2(case%model%mass))
+      end if
+   end function rough_frequency
+
+   !> The matrix of a step is dense, of all dofs and coefficients.
+   subroutine check_size(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: n
+
+      n = real(case%model%n_dof, wp)*(2*case%harmonics%n_harmonics + 1)
+      call require_memory(2.0_wp*n**2, "analysis = 'mode' with "//to_text(case%model%n_dof)// &
+                          ' dofs and harmonics%n_harmonics = '// &
+                          to_text(case%harmonics%n_harmonics), &
+                          'reduce the model (fretwear reduce), or take fewer harmonics', error)
+   end subroutine check_size
+
+   pure logical function any_rigid(problem)
+      type(balance_problem), intent(in) :: problem
+      integer :: k
+
+      any_rigid = .false.
+      do k = 1, problem%forces%n_laws
+         any_rigid = any_rigid .or. problem%forces%entry(k)%law%prediction%takes_balance
+      end do
+   end function any_rigid
+
+   !> The problem, and its modes about the position at rest x.
+   subroutine at_rest(self, x, modes, error)
+      class(mode_start), intent(inout), target :: self
+      real(wp), allocatable, intent(out) :: x(:)
+      type(stuck_modes), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      type(newton_solver) :: newton
+      type(solver_report) :: report
+      real(wp), allocatable :: r(:), guess(:)
+      logical :: done
+
+      call build_system(self%case, self%problem, self%balance, error, keep_all=.true.)
+      if (allocated(error)) return
+      if (self%balance%n == 0) then
+         call fatal_error(error, "case%analysis = 'mode' needs contact pairs or springs: of a "// &
+                          "linear structure take 'modes'", status_input)
+         return
+      end if
+      call take_load(self)
+      self%balance%load_share = 0.0_wp
+      call self%balance%set_point(self%case%sweep%start, 0.0_wp, error)
+      if (allocated(error)) return
+      allocate (x(self%balance%n), r(self%balance%n))
+      call stuck_guess(self%balance, x)
+      guess = x
+      newton%options = self%case%solver
+      newton%options%linear = linear_lu
+      newton%options%tolerance = max(rest_tolerance, self%case%solver%tolerance)
+      call newton%solve(self%balance, x, report)
+      if (.not. report%converged) x = guess
+      call self%balance%residual(x, r)
+      call find_stuck_modes(self%balance, modes, done)
+      if (done) done = size(modes%omega) > 0
+      self%slides = .not. done .and. self%problem%n_pairs > 0
+      if (self%slides) call find_stuck_modes(self%balance, modes, done, slides=.true.)
+      if (done) return
+      call fatal_error(error, "case%analysis = 'mode': with its closed pairs stuck nothing of "// &
+                       'the structure can vibrate, or a part has neither stiffness nor mass', &
+                       status_input)
+   end subroutine at_rest
+
+   !> The load that a response of the same case has, as coefficients of harmonic 1.
+   subroutine take_load(self)
+      class(mode_start), intent(inout) :: self
+      integer :: h
+
+      if (allocated(self%load)) deallocate (self%load)
+      allocate (self%load(self%problem%structure%n_coordinates, 2))
+      associate (structure => self%balance%structure_state)
+         h = findloc(self%problem%fourier%harmonic, 1, dim=1)
+         ! F = Fc - i Fs.
+         self%load(:, 1) = real(structure%load(:, h), wp)
+         self%load(:, 2) = -aimag(structure%load(:, h))
+      end associate
+   end subroutine take_load
+
+   !> By number or by frequency; double modes are refused.
+   subroutine choose(self, modes, error)
+      class(mode_start), intent(inout) :: self
+      type(stuck_modes), intent(in) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      integer :: j, n
+
+      associate (mode => self%case%mode)
+         n = size(modes%omega)
+         if (n == 0) then
+            call fatal_error(error, "case%analysis = 'mode': with its closed pairs stuck the "// &
+                             'structure has no elastic mode (rigid motions do not count): '// &
+                             'check the stiffness', status_input)
+            return
+         end if
+         self%number = mode%number
+         if (mode%near > 0.0_wp) self%number = minloc(abs(modes%omega - mode%near), dim=1)
+         if (self%number > n) then
+            call fatal_error(error, '&mode number = '//to_text(self%number)//': the structure '// &
+                             'with its closed pairs stuck has '//to_text(n)//' elastic modes', &
+                             status_input)
+            return
+         end if
+         do j = max(1, self%number - 1), min(n, self%number + 1)
+            if (j == self%number) cycle
+            if (abs(modes%omega(j) - modes%omega(self%number)) > &
+                same_frequency*modes%omega(j)) cycle
+            call fatal_error(error, '&mode number = '//to_text(self%number)//': modes '// &
+                             to_text(min(j, self%number))//' and '//to_text(max(j, self%number))// &
+                             ' with stuck pairs have one frequency ('// &
+                             to_text(modes%omega(j))//' rad/s), so that the plane of the '// &
+                             'motion is free: detune the structure', status_input)
+            return
+         end do
+      end associate
+   end subroutine choose
+
+   !> The row of the first observed quantity in the coordinates: nothing is condensed, so that it
+   !> is the same in all harmonics; one coordinate in each of them at a time.
+   subroutine observed_row(balance, row)
+      type(balance_state), intent(inout) :: balance
+      real(wp), allocatable, intent(out) :: row(:)
+      complex(wp), allocatable :: q(:, :), observed(:, :)
+      integer :: first, h, m, n
+
+      m = balance%problem%structure%n_coordinates
+      n = balance%problem%fourier%n_retained
+      allocate (row(m), q(m, n), observed(balance%problem%structure%n_observed, n))
+      do first = 1, m, n
+         q = (0.0_wp, 0.0_wp)
+         do h = 1, min(n, m - first + 1)
+            q(first + h - 1, h) = (1.0_wp, 0.0_wp)
+         end do
+         call balance%problem%structure%recover(balance%structure_state, q, observed)
+         do h = 1, min(n, m - first + 1)
+            row(first + h - 1) = real(observed(1, h), wp)
+         end do
+      end do
+   end subroutine observed_row
+
+   !> The mode with its damping, and the system of its curve at the lowest amplitude.
+   subroutine take_mode(self, modes, x, row, error)
+      class(mode_start), intent(inout), target :: self
+      type(stuck_modes), intent(in) :: modes
+      real(wp), intent(in) :: x(:), row(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), dimension(size(row)) :: cosine, sine, about
+      logical :: done
+
+      ! Without phase of its own where the first observed quantity does not move.
+      about = row
+      associate (phi => modes%shape(:, self%number))
+         if (abs(dot_product(row, phi)) <= node*norm2(row)*norm2(phi)) then
+            if (self%case%mode%control == control_observed) then
+               call fatal_error(error, 'output%observe: the first observed quantity is at a '// &
+                                'node of mode '//to_text(self%number)//': name another, or '// &
+                                "take &mode control = 'modal'", status_input)
+               return
+            end if
+            about = phi
+         end if
+      end associate
+      call modes%refine(self%number, about, self%omega, self%self_excitation, cosine, sine, done)
+      if (.not. done) then
+         call fatal_error(error, '&mode number = '//to_text(self%number)//': the mode with its '// &
+                          'damping was not found (overdamped, or next to another): check the '// &
+                          'damping', status_input)
+         return
+      end if
+      call new_mode_system(self%balance, self%case%mode%control, self%omega, &
+                           self%case%mode%end*maxval(abs(cosine)), row, self%system)
+      call scale_mode(self, x, cosine, sine)
+   end subroutine take_mode
+
+   !> A mode of amplitude one, and the sizes to which residuals are compared.
+   subroutine scale_mode(self, x, cosine, sine)
+      class(mode_start), intent(inout) :: self
+      real(wp), intent(in) :: x(:), cosine(:), sine(:)
+      type(error_type), allocatable :: ignored
+      real(wp), allocatable :: q(:)
+      complex(wp), allocatable :: shape(:, :)
+      real(wp) :: modal
+      integer :: h, m
+
+      m = size(cosine)
+      associate (fourier => self%problem%fourier, system => self%system)
+         system%amplitude = 1.0_wp
+         allocate (shape(m, fourier%n_retained), source=(0.0_wp, 0.0_wp))
+         h = findloc(fourier%harmonic, 1, dim=1)
+         shape(:, h) = cmplx(cosine, -sine, wp)
+         allocate (q(size(x)), self%y(system%n))
+         call to_real(fourier, m, shape, q)
+         if (fourier%has_constant()) q(:m) = x(:m)
+         call system%from_balance(q, self%omega, self%self_excitation, self%y)
+         if (system%control /= control_observed) then
+            modal = system%modal_amplitude(self%y)
+            if (fourier%has_constant()) then
+               self%y(m + 1:size(x)) = self%y(m + 1:size(x))/modal
+            else
+               self%y(:size(x)) = self%y(:size(x))/modal
+            end if
+            cosine_and_sine: associate (c => cosine/modal, s => sine/modal)
+               call set_inertia(c, s)
+            end associate cosine_and_sine
+         else
+            call set_inertia(cosine, sine)
+         end if
+         call system%remember(self%y)
+         system%static_load = static_size(self%balance)
+         call system%set_parameter(log(self%case%mode%start), ignored)
+      end associate
+
+   contains
+
+      subroutine set_inertia(c, s)
+         real(wp), intent(in) :: c(:), s(:)
+
+         self%system%inertia = self%omega**2*hypot(norm2(matmul(self%system%mass, c)), &
+                                                   norm2(matmul(self%system%mass, s)))
+      end subroutine set_inertia
+
+   end subroutine scale_mode
+
+   !> Static loads, and what interferences would press with [force].
+   real(wp) function static_size(balance) result(force)
+      type(balance_state), intent(in) :: balance
+
+      force = 0.0_wp
+      if (.not. balance%problem%fourier%has_constant()) return
+      force = norm2(balance%load(:, 1))
+      associate (p => balance%problem%forces%entry(balance%problem%forces%pairs)%law%prediction)
+         if (size(balance%depth) > 0) force = force + norm2(p%stiffness(:, 3)*min(p%gap, 0.0_wp))
+      end associate
+   end function static_size
+
+   !> Bisection between rest and the highest amplitude: what the stuck motion does to a pair only
+   !> grows with its amplitude.
+   subroutine find_onset(self)
+      class(mode_start), intent(inout) :: self
+      real(wp), allocatable :: rest(:, :)
+      real(wp) :: low, high, middle
+      logical :: slips
+      integer :: k
+      integer, parameter :: most_halvings = 200
+
+      self%onset = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (self%problem%n_pairs == 0) return
+      allocate (rest(3, self%problem%n_pairs))
+      if (self%slides) then
+         self%onset = 0.0_wp
+         return
+      end if
+      low = near_rest*self%case%mode%start
+      high = self%case%mode%end
+      call shares_of(self, low, rest)
+      if (.not. self%departs(high, rest)) return
+      do k = 1, most_halvings
+         middle = sqrt(low*high)
+         if (middle <= low .or. middle >= high) exit
+         slips = self%departs(middle, rest)
+         if (slips) then
+            high = middle
+         else
+            low = middle
+         end if
+      end do
+      self%onset = low
+   end subroutine find_onset
+
+   !> Whether the stuck motion of an amplitude has other shares of stick, slip and separation than
+   !> at rest.
+   logical function departs(self, amplitude, rest)
+      class(mode_start), intent(inout) :: self
+      real(wp), intent(in) :: amplitude
+      !> (3, n_pairs)
+      real(wp), intent(in) :: rest(:, :)
+      real(wp) :: share(3, size(rest, 2))
+
+      call shares_of(self, amplitude, share)
+      departs = any(abs(share - rest) > share_change)
+   end function departs
+
+   subroutine shares_of(self, amplitude, share)
+      class(mode_start), intent(inout) :: self
+      real(wp), intent(in) :: amplitude
+      real(wp), intent(out) :: share(:, :)
+      type(error_type), allocatable :: ignored
+      real(wp) :: r(self%system%n)
+
+      call self%system%set_parameter(log(amplitude), ignored)
+      call self%system%residual(self%y, r)
+      call self%balance%pair_shares(share)
+   end subroutine shares_of
+
+end module fw_mode_start

@@ -1,0 +1,544 @@
+!> Analysis 'mode': a nonlinear mode over its amplitude, its limit cycles, and responses near its
+!> resonance that are put together from it.
+module fw_run_mode
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_case, only: case_type
+   use fw_continuation, only: arclength_type
+   use fw_continuation, only: branch_point
+   use fw_error, only: error_type
+   use fw_error, only: status_stopped
+   use fw_kinds, only: wp
+   use fw_mode_group, only: mode_row
+   use fw_mode_group, only: mode_table
+   use fw_mode_options, only: control_observed
+   use fw_mode_path, only: mode_path
+   use fw_mode_start, only: mode_start
+   use fw_newton, only: solver_report
+   use fw_observer, only: observer_type
+   use fw_point, only: point_type
+   use fw_point, only: served_by_arclength
+   use fw_point, only: served_by_newton
+   use fw_recovery, only: recover_point
+   use fw_result, only: result_writer
+   use fw_run_state, only: run_state
+   use fw_sinks, only: observer_sink
+   use fw_sinks, only: sink_list
+   use fw_sinks, only: summary_sink
+   use fw_sinks, only: writer_sink
+   use fw_solver_options, only: continuation_arclength
+   use fw_solver_options, only: continuation_natural
+   use fw_solver_options, only: linear_lu
+   use fw_summary, only: summary_type
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: run_mode, check_mode_case
+
+   !> A curve at work.
+   type :: mode_curve
+      type(mode_start) :: start
+      type(mode_path) :: path
+      type(arclength_type) :: branch
+      type(mode_table) :: table
+      type(sink_list) :: sinks
+      type(observer_sink) :: to_observer
+      integer(int64) :: clock = 0
+      !> Ends of intervals of ln A in which the self-excitation vanishes, with their unknowns
+      !> (n, 2) one after the other.
+      real(wp), allocatable :: bracket(:, :), bracket_y(:, :)
+      !> ln A of the last row, and of the last with damping, with its unknowns.
+      real(wp) :: end_p = 0.0_wp, last_p = 0.0_wp
+      real(wp), allocatable :: last_y(:)
+   end type mode_curve
+
+   !> Below this part of the stuck frequency nothing holds the motion any more.
+   real(wp), parameter :: lost_frequency = 1.0e-3_wp
+   !> The self-excitation of a limit cycle, over its frequency, and halvings to get there.
+   real(wp), parameter :: no_excitation = 1.0e-13_wp
+   integer, parameter :: most_trials = 60
+   !> Self-excitation over the frequency that is none.
+   real(wp), parameter :: no_damping = 1.0e-9_wp
+
+contains
+
+   !> What would refuse the case before anything is computed.
+   subroutine check_mode_case(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(mode_start), allocatable, target :: start
+
+      allocate (start)
+      call start%build(case, error)
+   end subroutine check_mode_case
+
+   !> Follow the mode from its lowest to its highest amplitude.
+   subroutine run_mode(case, observer, writer, summary, state, error)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(result_writer), intent(inout), target :: writer
+      type(summary_type), intent(inout), target :: summary
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(mode_curve), allocatable, target :: curve
+      type(writer_sink), target :: to_file
+      type(summary_sink), target :: to_summary
+      real(wp), allocatable :: y(:)
+
+      allocate (curve)
+      call curve%start%build(case, error)
+      if (allocated(error)) return
+      call describe_start(curve%start, curve%table)
+      to_file%writer => writer
+      to_summary%summary => summary
+      curve%to_observer%observer => observer
+      if (case%mode%continuation == continuation_natural) then
+         curve%to_observer%n_points = case%mode%n_points
+      end if
+      call curve%sinks%add(to_file)
+      call curve%sinks%add(to_summary)
+      call curve%sinks%add(curve%to_observer)
+      call observer%on_start(case%title, curve%to_observer%n_points)
+      curve%start%system%interrupt => observer
+      curve%start%balance%interrupt => observer
+      allocate (y(curve%start%system%n))
+      allocate (curve%bracket(2, 0), curve%bracket_y(size(y), 0))
+      call curve%path%start(curve%start%system, case%solver)
+      call follow(case, curve, observer, state, y, error)
+      if (.not. allocated(error)) call find_cycles(curve, error)
+      if (allocated(error)) then
+         if (error%status == status_stopped) then
+            deallocate (error)
+            state%was_stopped = .true.
+            state%is_incomplete = .true.
+         end if
+      end if
+      call observer%on_end()
+      if (allocated(error)) return
+      call synthesize(case, curve%table)
+      call writer%add_mode(curve%table, case%model%unit_system, error)
+      call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
+                                 state%all_converged())
+      call summary%describe_mode(curve%table, case%model%observe_name(1)%text, &
+                                 case%mode%control == control_observed, case%mode%end)
+   end subroutine run_mode
+
+   subroutine describe_start(start, table)
+      type(mode_start), intent(in) :: start
+      type(mode_table), intent(inout) :: table
+
+      table%number = start%number
+      table%stuck_omega = start%omega
+      table%stuck_damping_ratio = 0.5_wp*start%self_excitation/start%omega
+      table%onset_amplitude = start%onset
+   end subroutine describe_start
+
+   !> Up to the lowest amplitude from where the stuck mode is exact, then along the curve.
+   subroutine follow(case, curve, observer, state, y, error)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(inout), target :: curve
+      class(observer_type), intent(inout), target :: observer
+      type(run_state), intent(inout) :: state
+      real(wp), intent(inout), contiguous :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: reached
+
+      call system_clock(curve%clock)
+      call begin(case, curve, y, report, error)
+      if (allocated(error)) return
+      if (report%converged) then
+         call curve%path%reach(log(case%mode%start), y, report, reached, error)
+         if (allocated(error)) return
+      end if
+      if (.not. report%converged) then
+         call add_row(case, curve, y, report, served_by_newton, state, error)
+         state%is_incomplete = .true.
+         call observer%on_message('the first point did not converge: no curve to follow')
+      else if (case%mode%continuation == continuation_arclength) then
+         call along_branch(case, curve, observer, state, y, report, error)
+      else
+         call along_amplitudes(case, curve, observer, state, y, report, error)
+      end if
+   end subroutine follow
+
+   !> The first solution: just below the onset, where that lies below the lowest amplitude.
+   subroutine begin(case, curve, y, report, error)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(inout), target :: curve
+      real(wp), intent(inout), contiguous :: y(:)
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: below = 0.99_wp, smaller = 0.1_wp
+      integer, parameter :: most_smaller = 8
+      real(wp) :: amplitude
+      integer :: k
+
+      amplitude = case%mode%start
+      if (curve%start%onset < amplitude) amplitude = below*curve%start%onset
+      ! The sliding mode is the limit of high amplitudes.
+      if (curve%start%slides) amplitude = case%mode%end
+      do k = 1, most_smaller
+         y = curve%start%y
+         call curve%path%solve(log(amplitude), y, report, error)
+         if (allocated(error) .or. report%converged) exit
+         ! Springs without an onset: nearer to the linear mode.
+         amplitude = merge(1.0_wp/smaller, smaller, curve%start%slides)*amplitude
+      end do
+      if (allocated(error) .or. .not. report%converged) return
+      call curve%path%remember(log(amplitude), y)
+   end subroutine begin
+
+   !> Points at given amplitudes.
+   subroutine along_amplitudes(case, curve, observer, state, y, first, error)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(inout), target :: curve
+      class(observer_type), intent(inout), target :: observer
+      type(run_state), intent(inout) :: state
+      real(wp), intent(inout), contiguous :: y(:)
+      type(solver_report), intent(in) :: first
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: reached
+      integer :: before, k
+
+      report = first
+      do k = 1, case%mode%n_points
+         before = curve%path%iterations
+         call curve%path%reach(amplitude_of(case, k), y, report, reached, error)
+         if (allocated(error)) return
+         if (.not. report%converged .or. is_lost(curve, y)) then
+            call end_early(case, curve, observer, state, exp(reached), &
+                           'no solution was found beyond')
+            return
+         end if
+         report%iterations = curve%path%iterations - before
+         call settle_phase(curve, y, report, error)
+         if (.not. allocated(error)) call add_row(case, curve, y, report, served_by_newton, state, &
+                                                  error)
+         if (allocated(error)) return
+      end do
+   end subroutine along_amplitudes
+
+   !> ln A of point k, evenly spaced, both ends exact.
+   pure real(wp) function amplitude_of(case, k) result(p)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: k
+      real(wp) :: share
+
+      share = real(k - 1, wp)/real(case%mode%n_points - 1, wp)
+      p = (1.0_wp - share)*log(case%mode%start) + share*log(case%mode%end)
+   end function amplitude_of
+
+   !> Nothing holds the motion where its frequency vanishes.
+   pure logical function is_lost(curve, y)
+      type(mode_curve), intent(in) :: curve
+      real(wp), intent(in) :: y(:)
+
+      is_lost = y(size(y) - 1) < lost_frequency
+      associate (unused => curve)
+      end associate
+   end function is_lost
+
+   subroutine end_early(case, curve, observer, state, amplitude, reason)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(in) :: curve
+      class(observer_type), intent(inout) :: observer
+      type(run_state), intent(inout) :: state
+      real(wp), intent(in) :: amplitude
+      character(*), intent(in) :: reason
+      character(:), allocatable :: why
+
+      state%is_incomplete = .true.
+      why = 'nothing may hold the structure once all pairs slip'
+      if (case%mode%continuation == continuation_natural) why = why//", or the curve folds, "// &
+         "which mode%continuation = 'arclength' follows"
+      call observer%on_message('the mode ended: '//reason//' the amplitude '//to_text(amplitude)// &
+                               ' of '//to_text(case%mode%end)//'; '//why)
+      associate (unused => curve)
+      end associate
+   end subroutine end_early
+
+   !> Turn the motion so that the first observed quantity has a positive cosine and no sine, and
+   !> solve there: paths that start at rest may depend on where the period starts.
+   subroutine settle_phase(curve, y, report, error)
+      type(mode_curve), intent(inout), target :: curve
+      real(wp), intent(inout), contiguous :: y(:)
+      type(solver_report), intent(inout) :: report
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: again
+
+      associate (system => curve%start%system)
+         if (system%control == control_observed) return
+         call turn(curve%start, y)
+         call system%remember(y)
+         call curve%path%solve(log(system%amplitude), y, again, error)
+         if (allocated(error)) return
+         report%iterations = report%iterations + again%iterations
+         report%residual = again%residual
+         report%converged = again%converged
+         if (again%converged) call curve%path%remember(log(system%amplitude), y)
+      end associate
+   end subroutine settle_phase
+
+   !> U_n exp(-i n alpha), alpha the phase of the first observed quantity in harmonic 1.
+   subroutine turn(start, y)
+      type(mode_start), intent(in) :: start
+      real(wp), intent(inout), target, contiguous :: y(:)
+      real(wp), pointer :: q(:, :)
+      complex(wp) :: first, factor
+      real(wp), allocatable :: cosine(:)
+      integer :: h, k, m
+
+      m = start%problem%structure%n_coordinates
+      associate (fourier => start%problem%fourier)
+         q(1:m, 1:fourier%n_coefficients) => y(:start%balance%n)
+         k = fourier%column(findloc(fourier%harmonic, 1, dim=1))
+         first = cmplx(dot_product(start%system%observed, q(:, k)), &
+                       -dot_product(start%system%observed, q(:, k + 1)), wp)
+         if (.not. abs(first) > 0.0_wp) return
+         first = first/abs(first)
+         do h = 1, fourier%n_retained
+            if (fourier%harmonic(h) == 0) cycle
+            factor = conjg(first)**fourier%harmonic(h)
+            k = fourier%column(h)
+            cosine = q(:, k)
+            ! (c - i s) factor.
+            q(:, k) = real(factor, wp)*cosine + aimag(factor)*q(:, k + 1)
+            q(:, k + 1) = real(factor, wp)*q(:, k + 1) - aimag(factor)*cosine
+         end do
+      end associate
+   end subroutine turn
+
+   !> Points of the branch in the order in which it has them.
+   subroutine along_branch(case, curve, observer, state, y, first, error)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(inout), target :: curve
+      class(observer_type), intent(inout), target :: observer
+      type(run_state), intent(inout) :: state
+      real(wp), intent(inout), contiguous :: y(:)
+      type(solver_report), intent(in) :: first
+      type(error_type), allocatable, intent(out) :: error
+      type(branch_point) :: found
+      type(solver_report) :: report
+      logical :: more
+
+      report = first
+      call settle_phase(curve, y, report, error)
+      if (allocated(error)) return
+      associate (branch => curve%branch)
+         branch%options = case%solver
+         branch%options%linear = linear_lu
+         branch%start = log(case%mode%start)
+         branch%finish = log(case%mode%end)
+         branch%max_points = case%mode%max_points
+         branch%step = 1.0_wp/real(case%mode%n_points - 1, wp)
+         ! Nothing of the curve is known beforehand: tongues of internal resonances are narrow.
+         branch%longest = min(branch%longest, branch%step)
+         call branch%begin(curve%start%system, y, error)
+         if (.not. allocated(error)) call add_row(case, curve, y, report, served_by_arclength, &
+                                                  state, error)
+         do while (.not. allocated(error))
+            call branch%next(curve%start%system, found, more, error)
+            if (allocated(error) .or. .not. more) exit
+            if (is_lost(curve, found%x)) then
+               call end_early(case, curve, observer, state, exp(found%p), 'its frequency '// &
+                              'vanishes at')
+               return
+            end if
+            call add_turned_row(case, curve, found, state, error)
+         end do
+         call curve%path%newton%linear%add_work(branch%corrector%linear)
+         if (allocated(error)) return
+         if (branch%complete) return
+         call end_early(case, curve, observer, state, exp(curve%end_p), branch%ending//', at')
+      end associate
+   end subroutine along_branch
+
+   !> A point of the branch with the phase that results have: the branch itself keeps the one that
+   !> it began with.
+   subroutine add_turned_row(case, curve, found, state, error)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(inout), target :: curve
+      type(branch_point), intent(in) :: found
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp), allocatable :: y(:), cosine(:), sine(:)
+
+      associate (system => curve%start%system)
+         y = found%x
+         report = found%report
+         cosine = system%before_cosine
+         sine = system%before_sine
+         call system%set_parameter(found%p, error)
+         if (.not. allocated(error)) call settle_phase(curve, y, report, error)
+         if (.not. allocated(error)) call add_row(case, curve, y, report, served_by_arclength, &
+                                                  state, error)
+         system%before_cosine = cosine
+         system%before_sine = sine
+      end associate
+   end subroutine add_turned_row
+
+   !> A point of the result from the unknowns at the present amplitude.
+   subroutine add_row(case, curve, unknowns, report, served_by, state, error)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(inout), target :: curve
+      real(wp), intent(in) :: unknowns(:)
+      type(solver_report), intent(in) :: report
+      integer, intent(in) :: served_by
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: point
+      type(mode_row) :: row
+      real(wp), allocatable :: y(:), q(:), r(:)
+      integer(int64) :: now, rate
+
+      y = unknowns
+      call turn(curve%start, y)
+      associate (system => curve%start%system, balance => curve%start%balance)
+         allocate (q(balance%n), r(system%n))
+         call system%residual(y, r)
+         call system%to_balance(y, q, row%omega, row%self_excitation)
+         point%omega = row%omega
+         point%converged = report%converged
+         point%residual = report%residual
+         point%iterations = report%iterations
+         if (report%converged) point%served_by = served_by
+         call recover_point(balance, q, case%harmonics%n_harmonics, case%output%contact, point)
+         point%n_harmonics = case%harmonics%n_harmonics
+         point%n_time = balance%problem%fourier%n_time
+         row%amplitude = system%amplitude
+         row%converged = report%converged
+         row%modal_amplitude = system%modal_amplitude(y)*system%amplitude
+         row%first = point%coefficients(2:3, :)
+         row%force = modal_force(curve%start, y)*system%amplitude/row%modal_amplitude
+      end associate
+      call system_clock(now, rate)
+      point%seconds = real(now - curve%clock, wp)/real(rate, wp)
+      curve%clock = now
+      call curve%sinks%take(point, error)
+      if (allocated(error)) return
+      call state%note(point)
+      curve%end_p = log(row%amplitude)
+      call note_zero(curve, row, unknowns)
+      call curve%table%add(row)
+   end subroutine add_row
+
+   !> |U_1^H F| for the vibratory load of the case, over the amplitude.
+   real(wp) function modal_force(start, y) result(force)
+      type(mode_start), intent(in) :: start
+      real(wp), intent(in) :: y(:)
+      integer :: c, m
+
+      m = start%problem%structure%n_coordinates
+      associate (fourier => start%problem%fourier)
+         c = (fourier%column(findloc(fourier%harmonic, 1, dim=1)) - 1)*m
+      end associate
+      ! (c + i s) . (Fc - i Fs).
+      associate (cosine => y(c + 1:c + m), sine => y(c + m + 1:c + 2*m), f => start%load)
+         force = abs(cmplx(dot_product(cosine, f(:, 1)) + dot_product(sine, f(:, 2)), &
+                           dot_product(sine, f(:, 1)) - dot_product(cosine, f(:, 2)), wp))
+      end associate
+   end function modal_force
+
+   !> Keep two rows between which the self-excitation changes its sign.
+   subroutine note_zero(curve, row, y)
+      type(mode_curve), intent(inout) :: curve
+      type(mode_row), intent(in) :: row
+      real(wp), intent(in) :: y(:)
+      integer :: n
+
+      n = size(y)
+      ! Round-off of an undamped mode has no sign.
+      if (abs(row%self_excitation) <= no_damping*row%omega) return
+      if (allocated(curve%last_y)) then
+         if (curve%last_y(n)*y(n) < 0.0_wp .and. row%converged) then
+            curve%bracket = reshape([curve%bracket, curve%last_p, log(row%amplitude)], &
+                                    [2, size(curve%bracket, 2) + 1])
+            curve%bracket_y = reshape([curve%bracket_y, curve%last_y, y], &
+                                      [n, size(curve%bracket_y, 2) + 2])
+         end if
+      end if
+      curve%last_p = log(row%amplitude)
+      curve%last_y = y
+   end subroutine note_zero
+
+   !> Where the self-excitation vanishes the motion keeps itself alive: false position with
+   !> halvings of the weight (Illinois), each value of the self-excitation a solution.
+   subroutine find_cycles(curve, error)
+      type(mode_curve), intent(inout), target :: curve
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 1, size(curve%bracket, 2)
+         call find_cycle(curve, curve%bracket(:, k), curve%bracket_y(:, 2*k - 1:2*k), error)
+         if (allocated(error)) return
+      end do
+   end subroutine find_cycles
+
+   subroutine find_cycle(curve, ends, ends_y, error)
+      type(mode_curve), intent(inout), target :: curve
+      real(wp), intent(in) :: ends(2), ends_y(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: p(2), y(size(ends_y, 1), 2), trial(size(ends_y, 1)), weight(2), share, middle
+      integer :: k, n, side
+
+      n = size(trial)
+      p = ends
+      y = ends_y
+      weight = ends_y(n, :)
+      do k = 1, most_trials
+         share = weight(1)/(weight(1) - weight(2))
+         middle = p(1) + share*(p(2) - p(1))
+         trial = y(:, 1) + share*(y(:, 2) - y(:, 1))
+         call curve%path%solve(middle, trial, report, error)
+         ! A bracket across a jump of the curve has no limit cycle in it.
+         if (allocated(error) .or. .not. report%converged) return
+         if (abs(trial(n)) <= no_excitation*trial(n - 1) .or. &
+             abs(p(2) - p(1)) <= epsilon(1.0_wp)*max(1.0_wp, abs(middle))) exit
+         ! The new point takes the end of its sign; the other counts half where it stays again.
+         side = merge(1, 2, trial(n)*y(n, 1) > 0.0_wp)
+         if (k > 1 .and. weight(side)*y(n, side) > 0.0_wp .and. &
+             abs(weight(side) - y(n, side)) <= 0.0_wp) weight(3 - side) = 0.5_wp*weight(3 - side)
+         p(side) = middle
+         y(:, side) = trial
+         weight(side) = trial(n)
+      end do
+      ! Stable where damping grows with the amplitude.
+      call curve%table%add_cycle(exp(middle), curve%start%system%frequency_unit*trial(n - 1), &
+                                 (ends_y(n, 2) - ends_y(n, 1))*(ends(2) - ends(1)) > 0.0_wp)
+   end subroutine find_cycle
+
+   !> Responses of one mode: P^2 = a^2 ((omega^2 - W^2)^2 + (2 zeta omega W)^2), which for each
+   !> amplitude a has two frequencies W, or none.
+   subroutine synthesize(case, table)
+      type(case_type), intent(in) :: case
+      type(mode_table), intent(inout) :: table
+      real(wp) :: centre, half, force, zeta
+      integer :: j, k
+
+      if (.not. allocated(case%mode%synthesis) .or. table%n == 0) return
+      table%scale = case%mode%synthesis
+      allocate (table%response_omega(2, table%n, size(table%scale)), &
+                source=ieee_value(1.0_wp, ieee_quiet_nan))
+      do j = 1, size(table%scale)
+         do k = 1, table%n
+            associate (row => table%row(k))
+               zeta = 0.5_wp*row%self_excitation/row%omega
+               force = table%scale(j)*row%force/row%modal_amplitude
+               half = force**2 - 4.0_wp*zeta**2*row%omega**4*(1.0_wp - zeta**2)
+               if (half < 0.0_wp) cycle
+               half = sqrt(half)
+               centre = row%omega**2*(1.0_wp - 2.0_wp*zeta**2)
+               if (centre - half > 0.0_wp) table%response_omega(1, k, j) = sqrt(centre - half)
+               if (centre + half > 0.0_wp) table%response_omega(2, k, j) = sqrt(centre + half)
+            end associate
+         end do
+      end do
+   end subroutine synthesize
+
+end module fw_run_mode
