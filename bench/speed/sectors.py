@@ -1,0 +1,245 @@
+"""Cost of a point of a cyclic structure: of one sector of a disk of 36, against a plain structure
+with the same dofs, and against annuli of the same sectors as one structure.
+
+    python -m bench.speed.sectors [--program build/release/fw_run] [--most 9] [--disk disk.h5]
+
+Engine order 4 of 36 sectors moves as order 1 of 9, 2 of 18. Times are of the processor, of a sweep
+less that of its first point alone, so that reading and the condensation do not count; the smallest
+of several runs. Writes the table between its marks in docs/robustness.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from fretwear._namelist import write_namelist
+from fretwear.model_file import write_model_file
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "robustness.md"
+BEGIN, END = "<!-- sector cost: begin -->", "<!-- sector cost: end -->"
+N_SECTORS, ENGINE_ORDER = 36, 4
+#: Above the resonance of the closed shrouds [Hz], where no maximum is looked for: of the wave, and
+#: of the plain structure, which moves as all sectors alike do.
+START, PLAIN_START, SPAN, N_POINTS = 1292.0, 660.0, 20.0, 201
+#: Instants: a whole number for each sector, so that those of an annulus are as good as alike.
+N_TIME = 144
+REPEATS = 3
+#: Condensation of an annulus is not measured, but has to be done.
+POINTS_OF_ANNULUS = 5
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of a structure: dofs, unknowns, processor time of a point [ms], Newton steps of a point,
+    largest memory [MB]."""
+
+    name: str
+    dofs: int
+    unknowns: int
+    milliseconds: float
+    steps: float
+    memory: float
+
+
+def read_disk(path: Path) -> dict[str, Any]:
+    """Every dataset of a model file of a sector."""
+    found: dict[str, Any] = {}
+    with h5py.File(path) as file:
+        for name in ("mass", "stiffness", "damping", "cyclic/left", "cyclic/right",
+                     "contact/side_1", "contact/side_2", "contact/sector_2", "load/cosine"):
+            if name in file:
+                found[name] = file[name][()]
+    found.setdefault("damping", 0.0 * found["mass"])
+    return found
+
+
+class Ring:
+    """Sectors of a disk as one structure; one sector alone is tied to itself."""
+
+    def __init__(self, disk: dict[str, Any], n: int) -> None:
+        self.disk, self.n = disk, n
+        right = {abs(r) - 1: (left - 1, int(np.sign(r)))
+                 for left, r in zip(disk["cyclic/left"], disk["cyclic/right"])}
+        size = len(disk["mass"])
+        inner = [i for i in range(size) if i not in right]
+        self.width, self.size = len(inner), size
+        #: Place in a sector, sign, and whether it is that of the next sector, of each dof.
+        self.place = np.zeros(size, int)
+        self.place[inner] = np.arange(len(inner))
+        self.sign, self.next = np.ones(size), np.zeros(size, int)
+        for i, (source, sign) in right.items():
+            self.place[i], self.sign[i], self.next[i] = self.place[source], sign, 1
+
+    def dofs(self, sector: int) -> np.ndarray:
+        return ((sector + self.next) % self.n) * self.width + self.place
+
+    def matrix(self, name: str) -> np.ndarray:
+        whole = np.zeros((self.n * self.width,) * 2)
+        part = self.sign[:, None] * self.disk[name] * self.sign
+        for sector in range(self.n):
+            at = self.dofs(sector)
+            np.add.at(whole, (at[:, None], at[None, :]), part)
+        return whole
+
+    def signed(self, sector: int, dof: int) -> int:
+        if dof == 0:
+            return 0
+        i = abs(dof) - 1
+        return int(np.sign(dof) * self.sign[i]) * (int(self.dofs(sector % self.n)[i]) + 1)
+
+    def datasets(self, order: int) -> dict[str, np.ndarray]:
+        found = {name: self.matrix(name) for name in ("mass", "stiffness", "damping")}
+        load = np.zeros(len(found["mass"]), complex)
+        for sector in range(self.n):
+            force = self.sign * self.disk["load/cosine"]
+            np.add.at(load, self.dofs(sector),
+                      force * np.exp(-2j * np.pi * sector * order / self.n))
+        found |= {"load/cosine": load.real, "load/sine": -load.imag}
+        for side in ("side_1", "side_2"):
+            shift = self.disk["contact/sector_2"] if side == "side_2" else 0
+            shift = np.broadcast_to(shift, len(self.disk["contact/side_1"]))
+            found[f"contact/{side}"] = np.array(
+                [[self.signed(j + s, int(d)) for d in pair] for j in range(self.n)
+                 for pair, s in zip(self.disk[f"contact/{side}"], shift)])
+        return found
+
+
+def groups(model: Path, n_harmonics: int, observed: int) -> dict[str, dict[str, Any]]:
+    """The case but for its sweep: the damping of the disk, shrouds pressed on."""
+    omega = 2.0 * np.pi * 1288.3
+    return {
+        "model": {"source": "hdf5", "file": str(model), "rayleigh_mass": 0.0005 * omega,
+                  "rayleigh_stiffness": 0.0005 / omega},
+        "contact": {"law": "penalty", "mu": 0.3, "gap": -0.04, "tangential_stiffness": 5e4,
+                    "normal_stiffness": 5e4},
+        "load": {"harmonic_scale": 10.0},
+        "harmonics": {"n_harmonics": n_harmonics, "n_time": N_TIME, "sampling": "uniform"},
+        "output": {"observe": [observed], "contact": False}}
+
+
+def run(program: Path, folder: Path, case: dict[str, dict[str, Any]],
+        points: int, start: float) -> tuple[float, float]:
+    """Processor time of a sweep [s] and its largest memory [MB]."""
+    sweep = {"frequencies": np.linspace(start, start + SPAN, N_POINTS)[:points].tolist(),
+             "unit": "Hz"}
+    (folder / "case.nml").write_text(write_namelist(case | {"sweep": sweep}))
+    process = subprocess.Popen([program, "-q", "case.nml"], cwd=folder, env={
+        **os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+    memory, done = 0.0, 0
+    while not done:
+        memory = max(memory, memory_of(process.pid))
+        time.sleep(0.002)
+        done, status, used = os.wait4(process.pid, os.WNOHANG)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"fw_run ended with status {process.returncode}")
+    return used.ru_utime + used.ru_stime, memory
+
+
+def memory_of(process: int) -> float:
+    """Largest memory of a process so far [MB]; that of its end also counts what started it."""
+    try:
+        status = Path(f"/proc/{process}/status").read_text()
+    except OSError:
+        return 0.0
+    found = [line.split()[1] for line in status.splitlines() if line.startswith("VmHWM")]
+    return float(found[0]) / 1024.0 if found else 0.0
+
+
+def measure(program: Path, name: str, case: dict[str, dict[str, Any]], dofs: int, pairs: int,
+            points: int, repeats: int, start: float = START) -> tuple[Cost, np.ndarray]:
+    """The cost of a point, and the response."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        times = []
+        for _ in range(repeats):
+            one, _ = run(program, folder, case, 1, start)
+            all_of_them, memory = run(program, folder, case, points, start)
+            times.append((all_of_them - one) / (points - 1))
+        with h5py.File(folder / "case.h5") as file:
+            steps = float(np.mean(file["iterations"][1:points]))
+            response = file["coefficients"][:points, :, 0]
+            assert file["converged"][:points].all()
+    unknowns = 3 * pairs * (2 * case["harmonics"]["n_harmonics"] + 1)
+    return Cost(name, dofs, unknowns, 1e3 * min(times), steps, memory), response
+
+
+def measure_all(program: Path, disk: Path, n_harmonics: int, most: int) -> list[Cost]:
+    """Plain sector, cyclic sector, and rings up to `most` sectors."""
+    parts = read_disk(disk)
+    pairs = len(parts["contact/side_1"])
+    loaded = int(np.abs(parts["load/cosine"]).argmax()) + 1
+    costs = []
+    with tempfile.TemporaryDirectory() as place:
+        model = Path(place) / "model.h5"
+
+        def ring_of(n: int) -> tuple[dict[str, dict[str, Any]], Ring]:
+            ring = Ring(parts, n)
+            order = ENGINE_ORDER * n // N_SECTORS if n > 1 else 0
+            write_model_file(model, ring.datasets(order), title="", unit_system="", groups={})
+            return groups(model, n_harmonics, abs(ring.signed(0, loaded))), ring
+
+        case, ring = ring_of(1)
+        costs.append(measure(program, "plain structure", case, ring.width, pairs, N_POINTS,
+                             REPEATS, PLAIN_START)[0])
+        case = groups(disk.resolve(), n_harmonics, loaded) | {
+            "cyclic": {"n_sectors": N_SECTORS, "engine_order": ENGINE_ORDER}}
+        cost, _ = measure(program, f"sector of {N_SECTORS}", case, ring.width, pairs, N_POINTS,
+                             REPEATS)
+        costs.append(cost)
+        for n in (9, 18, 36):
+            if n > most:
+                continue
+            case, ring = ring_of(n)
+            cost, _ = measure(program, f"annulus of {n}", case, n * ring.width, n * pairs,
+                                  POINTS_OF_ANNULUS, 1)
+            costs.append(cost)
+    return costs
+
+
+def table(costs: dict[int, list[Cost]]) -> str:
+    lines = ["| harmonics | structure | dofs | unknowns | Newton steps | ms a point "
+             "| to the plain one | memory [MB] |", "|---|---|---|---|---|---|---|---|"]
+    for n_harmonics, rows in costs.items():
+        for row in rows:
+            lines.append(f"| {n_harmonics} | {row.name} | {row.dofs} | {row.unknowns} | "
+                         f"{row.steps:.1f} | {row.milliseconds:.2f} | "
+                         f"{row.milliseconds / rows[0].milliseconds:.2f} | {row.memory:.0f} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--program", type=Path, default=ROOT / "build" / "release" / "fw_run")
+    parser.add_argument("--disk", type=Path,
+                        default=ROOT / "example" / "shrouded_disk" / "disk.h5")
+    parser.add_argument("--most", type=int, default=9, help="sectors of an annulus")
+    parser.add_argument("--harmonics", type=int, nargs="+", default=[3, 7, 15])
+    parser.add_argument("--page", type=Path, default=PAGE)
+    arguments = parser.parse_args()
+    costs = {}
+    for position, n_harmonics in enumerate(arguments.harmonics):
+        # Annuli once: with more harmonics they take minutes.
+        most = arguments.most if position == 0 else 1
+        costs[n_harmonics] = measure_all(arguments.program.resolve(), arguments.disk, n_harmonics,
+                                         most)
+        print(table({n_harmonics: costs[n_harmonics]}), flush=True)
+    text = arguments.page.read_text()
+    before, rest = text.split(BEGIN)
+    after = rest.split(END)[1]
+    arguments.page.write_text(f"{before}{BEGIN}\n\n{table(costs)}\n\n{END}{after}")
+
+
+if __name__ == "__main__":
+    main()
