@@ -29,5 +29,5 @@ __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "
            "half_power_damping", "main", "plot_campbell", "plot_convergence", "plot_cycle",
            "plot_damping", "plot_flanks", "plot_harmonics", "plot_hysteresis",
            "plot_nodal_diameters", "plot_response", "plot_responses", "plot_safe",
-           "plot_sensitivity", "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",
-           "read_damping", "read_response"]
+           "plot_sensitivity", "plot_table", "plot_wave", "plot_wear_bars",
+           "plot_wear_evolution", "plot_wear_maps", "read_damping", "read_response"]
