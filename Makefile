@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint keys docs clean
-.PHONY: fuzz wheel ways
+.PHONY: fuzz wheel ways sensitivities
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -147,6 +147,9 @@ rest: build ## where pairs of the velocity law come to rest, also of a program B
 slow: build ## slow stick-slip, also of a program BEFORE, written to docs/robustness.md
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/rigid/slow_family.py \
 	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
+
+sensitivities: build ## derivatives of 200 random cases against differences, in docs/robustness.md
+	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/sensitivity_family.py -o docs/robustness.md
 
 scars: build ## steady states of wear against a march of cycles, also of a program BEFORE
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/fretting/steady_states.py \
