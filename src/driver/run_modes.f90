@@ -1,5 +1,6 @@
 !> Runs analysis 'modes', and lists the natural frequencies that a sweep covers.
 module fw_run_modes
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use fw_case, only: analysis_modes
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -133,7 +134,9 @@ contains
       text = ''
       n = 0
       do i = 1, size(frequency)
-         if (.not. (frequency(i) >= first .and. frequency(i) <= last)) cycle
+         ! Where there are fewer: a comparison of what is no number would be an invalid operation.
+         if (ieee_is_nan(frequency(i))) cycle
+         if (frequency(i) < first .or. frequency(i) > last) cycle
          n = n + 1
          if (n > most_shown) cycle
          write (number, '(es13.5)') factor*frequency(i)
