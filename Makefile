@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint keys docs clean
-.PHONY: fuzz wheel ways sensitivities
+.PHONY: fuzz wheel ways sensitivities stops
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -167,6 +167,9 @@ sectors: build ## 300 random sectors against whole annuli, written to docs/robus
 	@if [ $(BUILD)/fw_run -nt build/sectors.jsonl ]; then rm -f build/sectors.jsonl; fi
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/cyclic/family.py --count 300 \
 	   --state build/sectors.jsonl -o docs/robustness.md
+
+stops: build ## how long a stop takes at 16, 48 and 384 pairs, written to docs/robustness.md
+	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/stops.py -o docs/robustness.md
 
 faults: build ## kills, signals, full disks, two runs at a time, written to docs/robustness.md
 	$(OVERVIEW) PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/fault_report.py \
