@@ -5,7 +5,7 @@ with the same dofs, and against annuli of the same sectors as one structure.
 
 Engine order 4 of 36 sectors moves as order 1 of 9, 2 of 18. Times are of the processor, of a sweep
 less that of its first point alone, so that reading and the condensation do not count; the smallest
-of several runs. Writes the table between its marks in docs/robustness.md.
+of several runs. Writes the table between its marks in docs/benchmarks/sectors.md.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fretwear._namelist import write_namelist
 from fretwear.model_file import write_model_file
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "robustness.md"
+PAGE = ROOT / "docs" / "benchmarks" / "sectors.md"
 BEGIN, END = "<!-- sector cost: begin -->", "<!-- sector cost: end -->"
 N_SECTORS, ENGINE_ORDER = 36, 4
 #: Above the resonance of the closed shrouds [Hz], where no maximum is looked for: of the wave, and

@@ -26,7 +26,8 @@ module fw_point
 
    !> Derivatives of one quantity by one parameter, or the deviation of the quantity.
    type :: point_sensitivity
-      !> As in quantity_words and parameter_words; parameter 0: standard deviation.
+      !> As in quantity_words and parameter_words; parameter 0: standard deviation; -1 for one of
+      !> both: the value of the other one.
       integer :: quantity = 0
       integer :: parameter = 0
       !> The pair or spring runs faster than what is observed.

@@ -4,7 +4,10 @@ module fw_sensitivity_options
    implicit none (type, external)
    private
 
-   public :: sensitivity_options
+   public :: sensitivity_options, of_itself
+
+   !> In the place of a parameter or a quantity: the value of the other one.
+   integer, parameter :: of_itself = -1
 
    type :: sensitivity_options
       !> Numbers in parameter_words; not allocated, or empty, where nothing is asked for.
@@ -29,17 +32,17 @@ contains
    end function is_wanted
 
    !> Whether a quantity is differentiated by a parameter; parameter 0: whether its deviation is
-   !> asked for.
+   !> asked for; `of_itself` for one of the two: whether the other one is used.
    pure logical function has(self, quantity, parameter)
       class(sensitivity_options), intent(in) :: self
       integer, intent(in) :: quantity, parameter
 
       has = self%is_wanted() .and. allocated(self%quantities)
       if (.not. has) return
-      has = any(self%quantities == quantity)
+      has = any(self%quantities == quantity) .or. quantity == of_itself
       if (parameter > 0) then
          has = has .and. any(self%parameters == parameter)
-      else
+      else if (parameter /= of_itself) then
          has = has .and. allocated(self%deviation)
       end if
    end function has

@@ -57,7 +57,7 @@ contains
       names = trim(list(1)%name)
       do i = 2, size(list)
          ! Too many to name each.
-         if (list(i)%sensitivity(1) > 0) cycle
+         if (any(list(i)%sensitivity /= 0)) cycle
          names = names//', '//trim(list(i)%name)
       end do
       names = names//', sensitivity/QUANTITY/PARAMETER'

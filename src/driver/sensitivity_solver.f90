@@ -24,6 +24,7 @@ module fw_sensitivity_solver
    use fw_point, only: point_type
    use fw_remarks, only: remark_list
    use fw_sensitivity, only: sensitivity_finder
+   use fw_sensitivity_options, only: of_itself
    use fw_text, only: to_text
    implicit none (type, external)
    private
@@ -160,14 +161,23 @@ contains
                end do
                point%sensitivity = [point%sensitivity, block]
             end do
+            block%parameter = of_itself
+            block%values = pack(finder%rows%value, finder%rows%quantity == options%quantities(q))
+            point%sensitivity = [point%sensitivity, block]
             if (.not. allocated(options%deviation)) cycle
-            block%quantity = options%quantities(q)
             block%parameter = 0
             block%values = [real(wp) ::]
             do k = 1, size(finder%rows)
                if (finder%rows(k)%quantity /= options%quantities(q)) cycle
                block%values = [block%values, deviation_of(case, finder, k)]
             end do
+            point%sensitivity = [point%sensitivity, block]
+         end do
+         block%quantity = of_itself
+         do p = 1, size(options%parameters)
+            block%parameter = options%parameters(p)
+            block%values = pack(finder%parameters%value, &
+                                finder%parameters%number == options%parameters(p))
             point%sensitivity = [point%sensitivity, block]
          end do
       end associate

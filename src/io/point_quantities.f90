@@ -24,6 +24,7 @@ module fw_point_quantities
    use fw_point, only: served_words
    use fw_response_rows, only: is_of_pairs
    use fw_response_rows, only: quantity_words
+   use fw_sensitivity_options, only: of_itself
    use fw_solver_options, only: continuation_arclength
    use fw_text, only: string_type
    use fw_text_list, only: words_of
@@ -53,7 +54,8 @@ module fw_point_quantities
       !> Its numbers in a point, and whether the result of a case has it at all.
       procedure(get_values), pointer, nopass :: get => null()
       procedure(is_wanted), pointer, nopass :: exists => null()
-      !> Of derivatives: the quantity, and the parameter (0: deviation), which no name tells.
+      !> Of derivatives: the quantity, and the parameter (0: deviation; `of_itself`: the value of
+      !> the other one), which no name tells.
       integer :: sensitivity(2) = 0
    contains
       procedure :: row_shape
@@ -158,6 +160,15 @@ contains
                      'point'//trim(of), 'standard deviation of '//trim(quantity_words(q)), &
                      nothing, always)
             list(size(list))%sensitivity = [q, 0]
+            call add('sensitivity/value/'//trim(quantity_words(q)), r, '', 'point'//trim(of), &
+                     trim(quantity_words(q)), nothing, always)
+            list(size(list))%sensitivity = [q, of_itself]
+         end do
+         do p = 1, n_parameter_words
+            call parameter_dataset(p, name)
+            call add('sensitivity/value/'//trim(name), r, '', 'point'//trim(elements_of(p)), &
+                     trim(parameter_words(p)), nothing, always)
+            list(size(list))%sensitivity = [of_itself, p]
          end do
       end subroutine add_sensitivities
 
@@ -245,7 +256,7 @@ contains
       real(wp), allocatable :: carried(:)
       integer :: n
 
-      if (self%sensitivity(1) > 0) then
+      if (any(self%sensitivity /= 0)) then
          call find_sensitivity(point, self%sensitivity, carried)
       else
          call self%get(point, carried)
@@ -263,7 +274,7 @@ contains
       class(quantity_type), intent(in) :: self
       type(case_type), intent(in) :: case
 
-      if (self%sensitivity(1) > 0) then
+      if (any(self%sensitivity /= 0)) then
          is_there = case%sensitivity%has(self%sensitivity(1), self%sensitivity(2))
       else
          is_there = self%exists(case)

@@ -11,8 +11,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verify"))
 from verify import PARTS
 
 #: Of the scripts that write a section, and of the parts of `make verify`.
+#: A script may write one section of a whole family and another one of a part of it.
+CALL = re.compile(r'write_section\("([^"]+)"(?: if [^"]* else "([^"]+)")?')
 NAMES = [*sorted({name for path in (ROOT / "test").rglob("*.py")
-                  for name in re.findall(r'write_section\("([^"]+)"', path.read_text())}), *PARTS]
+                  for call in CALL.findall(path.read_text()) for name in call if name}), *PARTS]
 
 
 @pytest.mark.parametrize("name", NAMES)
