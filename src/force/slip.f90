@@ -29,7 +29,7 @@ contains
       real(wp), intent(in) :: x_end(n_pairs, 2)
       real(wp), intent(inout) :: work(n_pairs)
       integer :: i, k
-      real(wp) :: p, before, path, x(2)
+      real(wp) :: p, before, path, x(2), here(3)
 
       do i = 1, n_pairs
          work(i) = 0.0_wp
@@ -37,7 +37,9 @@ contains
          ! The pressure of the last instant: the period closes on itself.
          before = max(-y(i, 3, n_time), 0.0_wp)
          do k = 1, n_time
-            call advance(mu(i), y(i, :, k), x, p, path)
+            ! Three numbers that lie apart: without this the call would allocate room for them.
+            here = y(i, :, k)
+            call advance(mu(i), here, x, p, path)
             if (remembers) then
                work(i) = work(i) + 0.5_wp*(p + before)*path
             else
