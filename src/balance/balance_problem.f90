@@ -65,15 +65,18 @@ contains
    end subroutine new_balance_problem
 
    !> Give laws that take the balance their stiffness, from the structure.
-   subroutine scale_forces(self, stand)
+   subroutine scale_forces(self, stand, highest)
       class(balance_problem), intent(inout) :: self
       !> The structure at a frequency.
       class(structure_state), intent(in) :: stand
+      !> The highest frequency that is asked for [rad/s]: wherever a sweep begins, its points have
+      !> the same balance.
+      real(wp), intent(in) :: highest
       integer :: k
 
       do k = 1, self%forces%n_laws
          associate (law => self%forces%entry(k)%law)
-            if (law%prediction%takes_balance) call set_stiffness(self, stand, law%prediction)
+            if (law%prediction%takes_balance) call set_stiffness(self, stand, highest, law%prediction)
          end associate
       end do
    end subroutine scale_forces
@@ -82,9 +85,10 @@ contains
    !> has none: any value above zero serves), one for both tangential directions (the
    !> friction law is isotropic) and one for the normal. Directions that nothing moves do not
    !> count, whether they are left out or not.
-   subroutine set_stiffness(self, stand, prediction)
+   subroutine set_stiffness(self, stand, highest, prediction)
       type(balance_problem), intent(in) :: self
       class(structure_state), intent(in) :: stand
+      real(wp), intent(in) :: highest
       type(prediction_type), intent(inout) :: prediction
       real(wp) :: stiffness(3)
       logical :: counts(2)
@@ -103,14 +107,14 @@ contains
          where (stiffness <= 0.0_wp .and. self%joint%row(:, i) > 0) stiffness = maxval(stiffness)
          prediction%stiffness(i, :) = prediction%scale*stiffness
       end do
-      if (prediction%has_inertia) call set_inertia(self, stand, prediction)
+      if (prediction%has_inertia) call set_inertia(self, highest, prediction)
    end subroutine set_stiffness
 
    !> What the structure is to motions above the harmonics of the balance, in place of its static
    !> stiffness; its mass and damping where they matter to a pair with one tangential direction.
-   subroutine set_inertia(self, stand, prediction)
+   subroutine set_inertia(self, highest, prediction)
       type(balance_problem), intent(in) :: self
-      class(structure_state), intent(in) :: stand
+      real(wp), intent(in) :: highest
       type(prediction_type), intent(inout) :: prediction
       real(wp) :: m(3), c(3), k(3)
       logical :: counts(3)
@@ -124,7 +128,7 @@ contains
          k = 0.0_wp
          do j = 1, 3
             if (.not. counts(j)) cycle
-            call self%structure%split(self%coordinate_of(j, i), (n + 1)*stand%omega, m(j), &
+            call self%structure%split(self%coordinate_of(j, i), (n + 1)*highest, m(j), &
                                       c(j), k(j))
             if (k(j) > 0.0_wp) prediction%stiffness(i, j) = prediction%scale*k(j)
          end do
@@ -139,7 +143,7 @@ contains
          if (j == 0) cycle
          if (all(self%joint%row(1:2, i) > 0)) cycle
          if (.not. k(j) > 0.0_wp) cycle
-         call take_inertia(4*n*stand%omega, m(j), c(j), k(j))
+         call take_inertia(4*n*highest, m(j), c(j), k(j))
          prediction%inertia(i, j) = prediction%scale*m(j)
          prediction%damping(i, j) = prediction%scale*c(j)
       end do

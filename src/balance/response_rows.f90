@@ -48,13 +48,15 @@ contains
    end function is_of_pairs
 
    !> The rows of quantities at the motion x of a state, which has been evaluated there.
-   subroutine new_rows(state, x, quantities, mu, wear_coefficient, rows)
+   subroutine new_rows(state, x, quantities, mu, wear_coefficient, by_energy, rows)
       type(balance_state), intent(inout) :: state
       real(wp), intent(in), contiguous :: x(:)
       !> Quantities that are wanted, in this order.
       integer, intent(in) :: quantities(:)
       !> Friction coefficients (n_pairs), and k_w [area/force].
       real(wp), intent(in) :: mu(:), wear_coefficient
+      !> Whether wear follows the energy, whatever mu is.
+      logical, intent(in) :: by_energy
       type(response_row), allocatable, intent(out) :: rows(:)
       complex(wp), allocatable :: observed(:, :)
       real(wp), allocatable :: coefficients(:, :)
@@ -81,7 +83,7 @@ contains
             case (largest)
                call set_largest(state, coefficients(:, i), rows(n_rows))
             case default
-               call set_work(state, x, mu, wear_coefficient, rows(n_rows))
+               call set_work(state, x, mu, wear_coefficient, by_energy, rows(n_rows))
             end select
          end do
       end do
@@ -128,10 +130,11 @@ contains
    end subroutine set_largest
 
    !> Work of friction over a cycle, weighted where it wears.
-   subroutine set_work(state, x, mu, wear_coefficient, row)
+   subroutine set_work(state, x, mu, wear_coefficient, by_energy, row)
       type(balance_state), intent(in) :: state
       real(wp), intent(in), contiguous :: x(:)
       real(wp), intent(in) :: mu(:), wear_coefficient
+      logical, intent(in) :: by_energy
       type(response_row), intent(inout) :: row
       real(wp) :: weight(size(mu)), work(size(mu))
       real(wp), allocatable :: u(:, :, :)
@@ -146,7 +149,7 @@ contains
          weight = 1.0_wp
          if (row%quantity == wear_volume) then
             weight = 0.0_wp
-            where (mu > 0.0_wp) weight = wear_coefficient/mu
+            where (mu > 0.0_wp) weight = wear_coefficient/merge(1.0_wp, mu, by_energy)
          end if
          call incidence%gather(state%problem%forces%entry(pairs)%rows, &
                                state%problem%structure%n_coordinates, f%n_coefficients, x, u)
@@ -171,6 +174,7 @@ contains
       row%value = sum(weight*work)
       if (row%quantity /= wear_volume) return
       allocate (row%by_friction(size(mu)), source=0.0_wp)
+      if (by_energy) return
       where (mu > 0.0_wp) row%by_friction = -weight*work/mu
    end subroutine set_work
 

@@ -45,6 +45,8 @@ module fw_sensitivity
       !> Friction coefficients (n_pairs), and k_w [area/force].
       real(wp), allocatable :: mu(:)
       real(wp) :: wear_coefficient = 0.0_wp
+      !> Whether the volume is that coefficient times the energy, not times the energy over mu.
+      logical :: wears_by_energy = .false.
       integer :: way = by_counts
       !> Unknowns above which GMRES solves.
       integer :: lu_up_to = lu_up_to
@@ -81,7 +83,8 @@ contains
       call stand(self, problem, system, x, error)
       if (allocated(error)) return
       associate (state => self%state)
-         call new_rows(state, x, self%quantities, self%mu, self%wear_coefficient, self%rows)
+         call new_rows(state, x, self%quantities, self%mu, self%wear_coefficient, &
+                       self%wears_by_energy, self%rows)
          self%linear%kind = merge(linear_lu, linear_krylov, state%n <= self%lu_up_to)
          self%linear%keeps = .false.
          call self%linear%prepare(state, done)

@@ -131,7 +131,7 @@ contains
       call new_balance_problem(joint, structure, fourier, laws, case%contact%depth, problem)
       problem%reduced = case%solver%skips
       problem%solves_values = harmonics%method == method_hdhb
-      if (.not. present(forces)) call problem%scale_forces(stand)
+      if (.not. present(forces)) call problem%scale_forces(stand, range(2))
    end subroutine build_problem
 
    !> The structure of a case, condensed.

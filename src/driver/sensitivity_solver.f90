@@ -26,6 +26,7 @@ module fw_sensitivity_solver
    use fw_sensitivity, only: sensitivity_finder
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: to_text
+   use fw_wear_options, only: wear_energy
    implicit none (type, external)
    private
 
@@ -64,6 +65,8 @@ contains
       call self%finder%find(system%problem, system, x, done, error)
       if (allocated(error)) return
       self%n_points = self%n_points + 1
+      ! A located fold is singular but for round-off.
+      done = done .and. .not. point%fold
       if (.not. done) then
          ! At a fold quantities have no derivative: NaN, and a remark.
          self%n_singular = self%n_singular + 1
@@ -96,6 +99,7 @@ contains
          allocate (finder%mu(case%contact%n_pairs), source=0.0_wp)
          if (case%contact%n_pairs > 0) finder%mu = case%contact%mu
          finder%wear_coefficient = max(case%wear%coefficient, 0.0_wp)
+         finder%wears_by_energy = case%wear%law == wear_energy
       end associate
       self%is_started = .true.
    end subroutine start

@@ -109,8 +109,10 @@ contains
       type(file_model_type), intent(in) :: raw
       type(load_terms), intent(in) :: terms
       type(cyclic_type), intent(in) :: cyclic
-      logical :: has_first
+      logical :: has_first, has_others
 
+      has_others = .false.
+      if (allocated(raw%load_harmonic)) has_others = any(raw%load_harmonic > 0)
       ! In a file or in the namelist.
       has_first = .false.
       if (allocated(raw%load_cosine)) has_first = any(abs(raw%load_cosine) > 0.0_wp)
@@ -120,6 +122,10 @@ contains
             call reader%refuse('load', 'term_order', 'has orders that are multiples of '// &
                                to_text(g)//', beside cosine or sine of order 1: must have 1 as '// &
                                'their greatest common divisor, or give all loads as terms')
+         else if (has_others .and. g /= 1) then
+            call reader%refuse('load', 'term_order', 'has orders that are multiples of '// &
+                               to_text(g)//', beside loads of harmonics in the model: must '// &
+                               'have 1 as their greatest common divisor, or use term_harmonic')
          else if (cyclic%is_cyclic .and. modulo(cyclic%engine_order - g, n) /= 0 .and. &
                   modulo(cyclic%engine_order + g, n) /= 0) then
             call reader%refuse('cyclic', 'engine_order', '= '//to_text(cyclic%engine_order)// &

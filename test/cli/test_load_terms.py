@@ -159,6 +159,10 @@ def test_model_file_and_memory(tmp_path):
     bare = {key: groups[key] for key in ("case", "harmonics", "sweep", "solver", "spring")}
     run(tmp_path, bare | {"model": {"source": "hdf5", "file": "model.h5"}}, name="file")
     close(read(tmp_path / "file.h5")["coefficients"], expected, SAME)
+    # Orders would make the harmonics of the file others than it says.
+    orders = bare | {"model": {"source": "hdf5", "file": "model.h5"}, "load": {
+        "n_terms": 1, "term_dof": 1, "term_order": 2, "term_amplitude": 1.0}}
+    assert "multiples of 2" in run(tmp_path, orders, name="orders", status=3).stderr
     again = Model.from_hdf5(tmp_path / "model.h5")
     assert again.harmonic.keys() == waves.keys()
     case = Case(again, **{key: value for key, value in bare.items() if key != "case"})

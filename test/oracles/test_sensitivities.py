@@ -234,6 +234,8 @@ def test_branch_with_folds(tmp_path):
     for name, exact in (("spring_coefficient", by_coefficient), ("load_harmonic_scale", by_load)):
         numbers = found["first_harmonic", name].reshape(len(omega))
         np.testing.assert_allclose(numbers[away], exact[away], rtol=1e-6, atol=1e-8)
+        # The amplitude has no derivative at a fold.
+        assert np.isnan(numbers[fold]).all() and np.isfinite(numbers[~fold]).all()
 
 
 def cyclic(**sensitivity):
@@ -307,6 +309,18 @@ REFUSED = [
     ({"sensitivity": {"parameters": ["contact%mu"]}, "solver": {"kind": "powell"}}, "newton"),
     ({"sensitivity": {"parameters": ["contact%mu"]}, "case": {"analysis": "time"}}, "analysis"),
 ]
+
+
+def test_wear_by_energy(tmp_path):
+    """Under the law of energy the volume is in proportion to the dissipation, whatever mu is."""
+    run(tmp_path, merged(chain(2), {
+        "wear": {"coefficient": 0.3, "law": "energy"},
+        "sensitivity": {"parameters": ["contact%mu"],
+                        "quantities": ["wear_volume", "dissipation"]}}))
+    found = datasets(tmp_path / "case.h5")
+    volume, energy = (found[name, "contact_mu"] for name in ("wear_volume", "dissipation"))
+    assert np.abs(energy).max() > 1e-3
+    np.testing.assert_allclose(volume, 0.3 * energy, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("changes", "words"), REFUSED)

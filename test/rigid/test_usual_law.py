@@ -42,6 +42,24 @@ def same(folder, case, law):
     return np.array_equal(result["coefficients"], named["coefficients"])
 
 
+def test_a_sweep_gives_the_same_rows_in_both_directions(tmp_path):
+    """Which modes follow the motion and which are springs is asked of the highest frequency, not of
+    the first."""
+    case = {"model": {"n_dof": 2, "mass": np.eye(2), "stiffness": [[2.0, -1.0], [-1.0, 2.0]],
+                      "damping": 0.05 * np.eye(2)},
+            "contact": {"n_pairs": 1, "side_1": [1, 0, 0], "mu": 0.5, "normal_load": 0.4},
+            "load": {"cosine": [0.6, 0.3]}, "harmonics": {"n_harmonics": 3},
+            "solver": {"tolerance": 1e-10}}
+    rows = {}
+    for name, ends in (("up", (0.3, 2.4)), ("down", (2.4, 0.3))):
+        (tmp_path / name).mkdir()
+        rows[name], _ = solve(tmp_path / name, case | {"sweep": dict(zip(
+            ("start", "end", "n_points"), (*ends, 22)))})
+        assert rows[name]["converged"].all()
+    difference = np.abs(rows["up"]["amplitude"] - rows["down"]["amplitude"][::-1])
+    assert difference.max() < 1e-7
+
+
 @pytest.mark.parametrize("structure", [TWO, BOTH])
 def test_events_take_the_law_of_high_order(tmp_path, structure):
     """Constant normal load, one direction: `rigid`, bit for bit, and not `dlft`."""
