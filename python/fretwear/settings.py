@@ -80,8 +80,7 @@ class Cyclic(TypedDict, total=False):
     engine_order: int
     #: natural frequencies of each nodal diameter; only: analysis = 'modes' (default: 10)
     n_modes: int
-    #: dofs of an interface; 0: only contact joins the sectors (default: of the file, else 0, else
-    #: 0)
+    #: dofs of an interface; 0: only contact joins the sectors (default: of the file, else 0)
     n_interface: int
     #: dofs of the left interface (default: of the file)
     left: ArrayLike
@@ -96,7 +95,7 @@ class Contact(TypedDict, total=False):
     #: required with side_1; 0 switches the contact of a file off (default: of the file, else 0)
     n_pairs: int
     #: rigid, rigid at velocity level, elastic, rigid of high order (friction on dofs with mass), or
-    #: smooth in the velocity (default: 'rigid' where it goes, else 'dlft', else 'dlft')
+    #: smooth in the velocity (default: 'rigid' where it goes, else 'dlft')
     law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised"]
     #: dofs of t1, t2, n on one side; 0: none, negative: with its sign turned (default: of the file,
     #: else required)
@@ -105,7 +104,7 @@ class Contact(TypedDict, total=False):
     #: the file, else 0)
     side_2: ArrayLike
     #: sector of side 2, counted from that of side 1: 1 is the next, -1 the one before; only:
-    #: &cyclic (default: of the file, else 0, else 0)
+    #: &cyclic (default: of the file, else 0)
     sector_2: ArrayLike
     #: friction coefficient (default: of the file, else required with tangential dofs)
     mu: ArrayLike
@@ -182,7 +181,7 @@ class Load(TypedDict, total=False):
     term_power: ArrayLike
     #: multiplies the static load, that of rotation included (default: 1)
     static_scale: float
-    #: multiplies cosine and sine (default: 1)
+    #: multiplies all vibratory loads (default: 1)
     harmonic_scale: float
 
 
@@ -193,7 +192,7 @@ class Harmonics(TypedDict, total=False):
     #: instants (default: 'hbm')
     method: Literal["hbm", "tcm", "tcm_least_squares", "hdhb"]
     #: H, the highest harmonic; with accuracy the most that may be used (default: 53 with accuracy,
-    #: else 1)
+    #: 7 with 'mode', else 1)
     n_harmonics: int
     #: instants of a period, at least 2H+1; 0: chosen (default: 0)
     n_time: int

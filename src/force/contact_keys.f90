@@ -47,7 +47,7 @@ contains
       type(contact_type), intent(inout) :: contact
 
       ! Without a word fw_usual_law takes one.
-      call keys%bind_word(key('law', law_help, absent="'rigid' where it goes, else 'dlft'"), &
+      call keys%bind_word(key('law', law_help, absent="'rigid' where it goes"), &
                           contact%law, law_words)
    end subroutine bind_law
 
@@ -66,7 +66,7 @@ contains
                          'from side 2 to side 1', dof_numbers(), shape='3 x n_pairs', &
                          absent=of_file), contact%side_2, default=0)
       call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1: 1 is the '// &
-                         'next, -1 the one before', shape='n_pairs', absent='of the file, else 0', &
+                         'next, -1 the one before', shape='n_pairs', absent=of_file, &
                          only='&cyclic'), contact%sector_2, default=0)
    end subroutine bind_sides
 

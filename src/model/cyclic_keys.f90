@@ -45,7 +45,7 @@ contains
       logical, intent(in) :: needed
 
       call keys%bind(key('n_interface', 'dofs of an interface; 0: only contact joins the sectors', &
-                         from_to(0, most_dofs), absent='of the file, else 0'), n_interface)
+                         from_to(0, most_dofs), absent='of the file'), n_interface)
       call keys%set_size('n_interface', n_interface)
       call keys%bind(key('left', 'dofs of the left interface', dof_numbers(), shape='n_interface', &
                          repeats=.false., absent='of the file'), cyclic%left, &

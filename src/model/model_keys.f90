@@ -135,7 +135,7 @@ contains
 
       call keys%bind(key('static_scale', 'multiplies the static load, that of rotation '// &
                          'included'), self%static_scale)
-      call keys%bind(key('harmonic_scale', 'multiplies cosine and sine'), self%harmonic_scale)
+      call keys%bind(key('harmonic_scale', 'multiplies all vibratory loads'), self%harmonic_scale)
    end subroutine bind_scales
 
 end module fw_model_keys
