@@ -33,8 +33,8 @@ module fw_natural_modes
    type :: natural_modes
       integer, allocatable :: nodal_diameter(:)
       real(wp), allocatable :: open(:, :), closed(:, :)
-      !> Fractions of critical damping of the same, only where waves in both directions differ; below
-      !> 0 where the motion grows.
+      !> Fractions of critical damping of the same, only where waves in both directions differ;
+      !> below 0 where the motion grows.
       real(wp), allocatable :: open_damping(:, :), closed_damping(:, :)
    end type natural_modes
 

@@ -136,7 +136,8 @@ contains
                              matmul(wave%damping, right(:, i)))
          modes(j)%omega = aimag(root(i))
          modes(j)%width = -2.0_wp*real(root(i), wp)
-         modes(j)%amplitude = abs(matmul(observe, right(:, i)))*abs(dot_product(left(:, i), load))/ &
+         modes(j)%amplitude = abs(matmul(observe, right(:, i)))* &
+                              abs(dot_product(left(:, i), load))/ &
                               max(abs(slope)*0.5_wp*max(abs(modes(j)%width), &
                                                         least_width*modes(j)%omega), tiny(1.0_wp))
       end do

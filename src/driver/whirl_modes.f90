@@ -13,8 +13,8 @@ module fw_whirl_modes
 
    public :: wave_matrices, wave_of, find_whirl
 
-   !> Orders up to which peaks of sweeps are looked for by modes: QZ takes 60 n**3 operations of twice
-   !> the order.
+   !> Orders up to which peaks of sweeps are looked for by modes: QZ takes 60 n**3 operations, n
+   !> being twice the order.
    integer, parameter, public :: most_whirling = 400
    !> Roots beyond this many of the largest stiffness over mass, or without direction, are those of
    !> massless motions.
@@ -27,7 +27,7 @@ module fw_whirl_modes
 
 contains
 
-   !> The matrices of a wave from those of 0 to N/2; `stiffness` as it is held by contact and springs.
+   !> The matrices of a wave from those of 0 to N/2; `stiffness` as contact and springs hold it.
    pure subroutine wave_of(nodal, stiffness, conjugated, wave)
       type(nodal_matrices), intent(in) :: nodal
       complex(wp), intent(in) :: stiffness(:, :)
