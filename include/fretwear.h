@@ -35,7 +35,7 @@ enum fw_status {
    FW_INPUT = 3,         /* something is wrong in the case */
    FW_NOT_CONVERGED = 4, /* what was computed is there, marked */
    FW_IO = 5,            /* a file cannot be read or written */
-   FW_STOPPED = 6        /* by the callback, fw_stop or case%max_seconds; what was computed is there */
+   FW_STOPPED = 6        /* by the callback, fw_stop or case%max_seconds; what is done is there */
 };
 
 typedef struct fw_session *fw_handle;

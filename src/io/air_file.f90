@@ -1,5 +1,5 @@
-!> Forces of the air in a model file: complex matrices of influence by the motion of every sector, or
-!> of every nodal diameter, on the amplitudes of rows of motion.
+!> Forces of the air in a model file: complex matrices of influence by the motion of every sector,
+!> or of every nodal diameter, on the amplitudes of rows of motion.
 module fw_air_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_cyclic_data, only: influence_type
@@ -36,8 +36,8 @@ contains
       found%by_diameter = file%exists(by_diameter)
       if (found%by_diameter .eqv. file%exists(by_sector)) then
          call fatal_error(error, file%path//': /aero holds '// &
-                          trim(merge('both   ', 'neither', found%by_diameter))//' of the groups '// &
-                          'sector and nodal_diameter, expected one', status_input)
+                          trim(merge('both   ', 'neither', found%by_diameter))// &
+                          ' of the groups sector and nodal_diameter, expected one', status_input)
          return
       end if
       group = by_sector

@@ -42,8 +42,8 @@ contains
       call find_words(reader, 'parameters', words, parameter_words, options%parameters)
       call reader%bind_list(key('quantities', 'what is differentiated: first_harmonic, '// &
                                 'largest, dissipation, wear_volume', &
-                                absent='all that the case has', only='parameters'), 'quantities', size(quantity_words), words, &
-                            is_text)
+                                absent='all that the case has', only='parameters'), &
+                            'quantities', size(quantity_words), words, is_text)
       call find_words(reader, 'quantities', words, quantity_words, options%quantities)
       ! One deviation for each parameter, or one for all.
       call reader%set_size('n_parameters', size(options%parameters))

@@ -36,7 +36,8 @@ module fw_cyclic_data
    !>
    !>   f_0 = W^T sum_m Q_m W u_m = W^T (sum_m Q_m z**m) W u_0,
    !>
-   !> given by the sectors m, or by the sums themselves for signed nodal diameters. Not in harmonic 0.
+   !> given by the sectors m, or by the sums themselves for signed nodal diameters. Not in harmonic
+   !> 0.
    type :: influence_type
       !> Sectors, or nodal diameters (f).
       integer, allocatable :: number(:)
