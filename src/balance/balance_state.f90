@@ -14,7 +14,6 @@ module fw_balance_state
    use fw_active_set, only: active_set
    use fw_balance_problem, only: balance_problem
    use fw_balance_scratch, only: balance_scratch
-   use fw_complex_form, only: amplitudes_of
    use fw_force_law, only: force_workspace
    use fw_force_law, only: prediction_type
    use fw_force_list, only: force_entry

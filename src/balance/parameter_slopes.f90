@@ -23,7 +23,6 @@ module fw_parameter_slopes
    use fw_fourier, only: new_fourier
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
-   use fw_pair_law, only: pair_law
    use fw_parameters, only: friction_coefficient
    use fw_parameters, only: gap
    use fw_parameters, only: harmonic_scale

@@ -21,7 +21,6 @@ module fw_point_quantities
    use fw_parameters, only: parameter_words
    use fw_patches, only: count_patches
    use fw_point, only: point_type
-   use fw_point, only: served_words
    use fw_response_rows, only: is_of_pairs
    use fw_response_rows, only: quantity_words
    use fw_sensitivity_options, only: of_itself

@@ -12,7 +12,6 @@
 module fw_branch_step
    use fw_branch_point, only: branch_point
    use fw_branch_point, only: metric_type
-   use fw_branch_point, only: reverse
    use fw_kinds, only: wp
    implicit none (type, external)
    private

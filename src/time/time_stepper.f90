@@ -19,8 +19,6 @@ module fw_time_stepper
    use fw_kinds, only: pi
    use fw_contact_step, only: contact_problem
    use fw_contact_step, only: new_contact_problem
-   use fw_contact_step, only: state_open
-   use fw_contact_step, only: state_slip
    use fw_error, only: error_type
    use fw_period_record, only: new_period_record
    use fw_period_record, only: period_record
@@ -28,7 +26,6 @@ module fw_time_stepper
    use fw_step_operator, only: new_step_operator
    use fw_step_operator, only: step_operator
    use fw_time_structure, only: time_structure
-   use fw_lapack, only: dgemv
    implicit none (type, external)
    private
 
