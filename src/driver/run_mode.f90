@@ -209,8 +209,8 @@ contains
          before = curve%path%iterations
          call curve%path%reach(amplitude_of(case, k), y, report, reached, error)
          if (allocated(error)) return
-         if (.not. report%converged .or. is_lost(curve, y)) then
-            call end_early(case, curve, observer, state, exp(reached), &
+         if (.not. report%converged .or. is_lost(y)) then
+            call end_early(case, observer, state, exp(reached), &
                            'no solution was found beyond')
             return
          end if
@@ -233,18 +233,15 @@ contains
    end function amplitude_of
 
    !> Nothing holds the motion where its frequency vanishes.
-   pure logical function is_lost(curve, y)
-      type(mode_curve), intent(in) :: curve
+   pure logical function is_lost(y)
       real(wp), intent(in) :: y(:)
 
       is_lost = y(size(y) - 1) < lost_frequency
-      associate (unused => curve)
-      end associate
    end function is_lost
 
-   subroutine end_early(case, curve, observer, state, amplitude, reason)
+   !> Say where the curve ended short of its highest amplitude, and why it may have.
+   subroutine end_early(case, observer, state, amplitude, reason)
       type(case_type), intent(in) :: case
-      type(mode_curve), intent(in) :: curve
       class(observer_type), intent(inout) :: observer
       type(run_state), intent(inout) :: state
       real(wp), intent(in) :: amplitude
@@ -257,8 +254,6 @@ contains
          "which mode%continuation = 'arclength' follows"
       call observer%on_message('the mode ended: '//reason//' the amplitude '//to_text(amplitude)// &
                                ' of '//to_text(case%mode%end)//'; '//why)
-      associate (unused => curve)
-      end associate
    end subroutine end_early
 
    !> Turn the motion so that the first observed quantity has a positive cosine and no sine, and
@@ -343,8 +338,8 @@ contains
          do while (.not. allocated(error))
             call branch%next(curve%start%system, found, more, error)
             if (allocated(error) .or. .not. more) exit
-            if (is_lost(curve, found%x)) then
-               call end_early(case, curve, observer, state, exp(found%p), 'its frequency '// &
+            if (is_lost(found%x)) then
+               call end_early(case, observer, state, exp(found%p), 'its frequency '// &
                               'vanishes at')
                return
             end if
@@ -353,7 +348,7 @@ contains
          call curve%path%newton%linear%add_work(branch%corrector%linear)
          if (allocated(error)) return
          if (branch%complete) return
-         call end_early(case, curve, observer, state, exp(curve%end_p), branch%ending//', at')
+         call end_early(case, observer, state, exp(curve%end_p), branch%ending//', at')
       end associate
    end subroutine along_branch
 
