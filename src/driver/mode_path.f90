@@ -17,12 +17,12 @@ module fw_mode_path
    type :: mode_path
       type(newton_solver) :: newton
       type(mode_system), pointer :: system => null()
-      !> The last points: ln A in descending order of age, unknowns (n, kept), and how many.
+      !> The last points, the newest first: ln A, unknowns (n, 3), and how many there are.
       real(wp) :: p(3) = 0.0_wp
       real(wp), allocatable :: y(:, :)
       integer :: kept = 0
-      !> Iterations so far, and steps that failed.
-      integer :: iterations = 0, n_failed = 0
+      !> Iterations so far.
+      integer :: iterations = 0
       !> Step that served last, in ln A.
       real(wp) :: step = 0.25_wp
    contains
@@ -104,7 +104,6 @@ contains
             if (abs(next - p) <= 0.0_wp) return
          else
             report%converged = .false.
-            self%n_failed = self%n_failed + 1
             self%step = 0.5_wp*min(self%step, abs(next - self%p(1)))
             if (self%step >= shortest) cycle
             y = self%y(:, 1)

@@ -114,7 +114,8 @@ contains
       call require_memory(2.0_wp*n**2, "analysis = 'mode' with "//to_text(case%model%n_dof)// &
                           ' dofs and harmonics%n_harmonics = '// &
                           to_text(case%harmonics%n_harmonics), &
-                          'reduce the model (fretwear reduce), or take fewer harmonics', error)
+                          'reduce the model (fretwear import --reduce), or take fewer '// &
+                          'harmonics', error)
    end subroutine check_size
 
    pure logical function any_rigid(problem)
