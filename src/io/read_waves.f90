@@ -14,6 +14,11 @@ module fw_read_waves
 
    public :: read_terms, gather_waves
 
+   !> What each term has.
+   character(*), parameter :: term_keys(*) = &
+      [character(14) :: 'term_dof', 'term_harmonic', 'term_order', 'term_amplitude', &
+       'term_phase', 'term_power']
+
 contains
 
    !> The keys term_...
@@ -23,8 +28,13 @@ contains
       logical :: by_order
       integer :: i
 
-      if (reader%given('load', 'term_amplitude') .and. .not. reader%given('load', 'n_terms')) then
-         call reader%refuse('load', 'n_terms', 'is missing: must be the number of terms')
+      ! Without their number the terms would be left out.
+      if (.not. reader%given('load', 'n_terms')) then
+         do i = 1, size(term_keys)
+            if (.not. reader%given('load', trim(term_keys(i)))) cycle
+            call reader%refuse('load', 'n_terms', 'is missing: must be the number of terms')
+            exit
+         end do
       end if
       by_order = reader%given('load', 'term_order')
       call terms%bind_keys(reader, by_order)

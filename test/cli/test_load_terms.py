@@ -179,6 +179,7 @@ def test_model_file_and_memory(tmp_path):
     ({"term_harmonic": [1, 2, -5, 0]}, ["term_harmonic", "-5"]),
     ({"term_amplitude": None}, ["term_amplitude", "missing"]),
     ({"n_terms": None}, ["n_terms", "missing"]),
+    ({"n_terms": None, "term_amplitude": None}, ["n_terms", "missing"]),
 ])
 def test_refusals(tmp_path, changes, words):
     done = run(tmp_path, merged(GROUPS, {"load": changes}), status=3)
