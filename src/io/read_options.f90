@@ -114,7 +114,11 @@ contains
       integer :: i
 
       do i = 1, size(keys)
-         if (.not. reader%given('sweep', trim(keys(i)))) cycle
+         if (.not. reader%given('sweep', trim(keys(i)))) then
+            ! The effective input shall run again.
+            call reader%amend('sweep', trim(keys(i)), '')
+            cycle
+         end if
          call reader%refuse('sweep', trim(keys(i)), "does not go with case%analysis = 'mode', "// &
                             'whose frequencies follow from its amplitudes: leave &sweep out, '// &
                             'and give &mode start and end')
@@ -132,6 +136,12 @@ contains
       if (analysis /= analysis_mode) return
       if (reader%given('mode', 'near') .and. reader%given('mode', 'number')) then
          call reader%refuse('mode', 'near', 'is given beside number: keep one of the two')
+      end if
+      ! Nor shall both stand in the effective input.
+      if (reader%given('mode', 'near')) then
+         call reader%amend('mode', 'number', '')
+      else
+         call reader%amend('mode', 'near', '')
       end if
       if (reader%given('mode', 'start') .and. reader%given('mode', 'end') .and. &
           options%end <= options%start) then

@@ -1,8 +1,11 @@
 """What misleads a nonlinear mode: poles of a condensation, the free phase, the kink at the onset,
 folds of internal resonances, the end of the curve, double modes; and what is refused."""
+import subprocess
+
+import h5py
 import numpy as np
 import pytest
-from cases import merged, read, run
+from cases import PROGRAM, merged, read, run
 from mode_cases import REFERENCES, follow, mode_groups
 
 #: An oscillator with friction, mode 1; a second mass whose frequency is about three times as high.
@@ -142,6 +145,18 @@ def test_refusals(tmp_path, changes, words):
     assert words in done.stderr
     assert not (tmp_path / "case.h5").exists()
     run(tmp_path, mode_groups(CHAIN, 0.1, 1.0, 3, changes=changes), "--check", status=3)
+
+
+@pytest.mark.parametrize("named_by", [{"number": 1}, {"near": 1.3}])
+def test_effective_input_runs_again(tmp_path, named_by):
+    """The input that a result holds has no keys that the analysis refuses."""
+    expected = follow(tmp_path, CHAIN, 0.1, 1.0, 3, **named_by)
+    with h5py.File(tmp_path / "case.h5") as file:
+        text = file.attrs["namelist"]
+    (tmp_path / "again.nml").write_text(text)
+    subprocess.run([PROGRAM, "-q", "-o", "again.h5", "again.nml"], cwd=tmp_path, check=True)
+    found = read(tmp_path / "again.h5")
+    assert np.array_equal(found["omega"], expected["omega"])
 
 
 def test_node_of_the_mode(tmp_path):
