@@ -70,7 +70,8 @@ lint: build/deps.stamp ## linters of the Fortran and the Python code, type check
 	@$(PYTHON) tools/comment_share.py
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench tools docs \
-	   test/builds test/fretting test/rest test/robustness test/stress test/verify
+	   test/builds test/cyclic test/fretting test/legacy test/modes test/rest test/rigid \
+	   test/robustness test/stress test/verify
 
 keys: build ## tables of keys in the user guide, settings of the Python package
 	@$(PYTHON) tools/write_keys.py $(BUILD)/fw_run
