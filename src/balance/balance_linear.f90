@@ -8,6 +8,7 @@
 !> coordinates are solved at once. The others are `active`; behind them in `used` stand the
 !> coordinates whose rows of A the active pairs need still (normal forces of slipping pairs).
 submodule(fw_balance_state) fw_balance_linear
+   use fw_complex_form, only: amplitudes_of
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_open
    use fw_force_law, only: pair_stuck
