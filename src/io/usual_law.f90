@@ -3,6 +3,7 @@
 !> at the instants.
 module fw_usual_law
    use fw_case, only: analysis_frf
+   use fw_case, only: analysis_mode
    use fw_case, only: analysis_point
    use fw_case, only: analysis_time
    use fw_case, only: analysis_wear
@@ -42,7 +43,8 @@ contains
       type(case_type), intent(in) :: case
 
       associate (h => case%harmonics, c => case%contact)
-         goes = any(case%analysis == [analysis_frf, analysis_point, analysis_wear]) .and. &
+         goes = any(case%analysis == [analysis_frf, analysis_mode, analysis_point, &
+                                      analysis_wear]) .and. &
                 h%method == method_hbm .and. h%sampling /= sampling_uniform .and. &
                 h%n_time == 0 .and. .not. h%adaptive .and. .not. case%output%histories .and. &
                 .not. any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)) .and. &

@@ -1,6 +1,7 @@
 """Nonlinear modes against exact orbits, closed forms, and harmonic balances solved elsewhere."""
 import numpy as np
 import pytest
+from cases import merged
 from mode_cases import REFERENCES, at_amplitude, follow
 
 #: Balances with as many harmonics: their references are solved to 1e-10.
@@ -50,6 +51,12 @@ def test_rigid_friction_on_mass(tmp_path):
     assert worst[0] < 5e-3
     assert worst[1] < worst[0] / 6
     assert worst[2] < worst[1] / 6
+
+
+def test_a_law_that_is_not_named_is_of_high_order(tmp_path):
+    groups = REFERENCES["coulomb"]["groups"]
+    unnamed = merged(groups, {"contact": {"law": None}})
+    assert at_amplitude(tmp_path, unnamed, 1.0, 7) == at_amplitude(tmp_path, groups, 1.0, 7)
 
 
 @pytest.mark.parametrize("control", ["modal", "observed"])
