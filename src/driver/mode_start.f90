@@ -56,6 +56,8 @@ module fw_mode_start
 
    !> Two frequencies nearer than this part of them are one: the plane of the motion is free.
    real(wp), parameter :: same_frequency = 1.0e-6_wp
+   !> Unknowns of a dense factorization that takes seconds and below 1 GB; both grow fast.
+   integer, parameter :: most_unknowns = 6000
    !> Part of its size below which a mode has a node.
    real(wp), parameter :: node = 1.0e-8_wp
    !> Change of the shares of the period that is no round-off of the march.
@@ -144,6 +146,13 @@ contains
       if (self%balance%n == 0) then
          call fatal_error(error, "case%analysis = 'mode' needs contact pairs or springs: of a "// &
                           "linear structure take 'modes'", status_input)
+         return
+      end if
+      if (self%balance%n > most_unknowns) then
+         call fatal_error(error, "case%analysis = 'mode' factors a dense matrix of all "// &
+                          'unknowns: '//to_text(self%balance%n)//' here, '// &
+                          to_text(most_unknowns)//' at most; reduce the model (fretwear '// &
+                          'reduce), or take fewer harmonics', status_input)
          return
       end if
       call take_load(self)

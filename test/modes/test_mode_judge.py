@@ -134,10 +134,9 @@ def test_controls_agree(tmp_path):
 
 
 @pytest.mark.parametrize("changes", [
-    {"solver": {"skips": False}}, {"solver": {"linear": "krylov"}},
     {"case": {"threads": 2}}, {"harmonics": {"parity": "all"}}])
 def test_ways_agree(tmp_path, changes):
-    """What a case may leave out, and threads, do not change a mode."""
+    """Even harmonics that symmetry leaves out, and threads, do not change a mode."""
     first = follow(tmp_path, REFERENCES["chain"]["groups"], 0.2, 3.0, 5, n_points=5)
     other = follow(tmp_path, REFERENCES["chain"]["groups"], 0.2, 3.0, 5, n_points=5,
                    changes=changes)

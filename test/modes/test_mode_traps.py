@@ -5,8 +5,10 @@ import subprocess
 import h5py
 import numpy as np
 import pytest
-from cases import PROGRAM, merged, read, run
+from cases import merged, read, run, write_namelist
+from limits import limit
 from mode_cases import REFERENCES, follow, mode_groups
+from project import PATIENT, PROGRAM
 
 #: An oscillator with friction, mode 1; a second mass whose frequency is about three times as high.
 CHAIN = REFERENCES["chain"]["groups"]
@@ -104,6 +106,14 @@ def test_internal_resonance_folds(tmp_path):
     assert (third / amplitude).max() > 1.0
 
 
+def start(folder, *arguments):
+    """What a successful run says."""
+    done = subprocess.run([PROGRAM, *arguments], cwd=folder, text=True, capture_output=True,
+                          timeout=limit(120.0), check=False, env=PATIENT)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_double_modes_are_refused(tmp_path):
     groups = {
         "model": {"n_dof": 2, "mass": [1, 0, 0, 1], "stiffness": [1, 0, 0, 1],
@@ -130,6 +140,14 @@ REFUSALS = [
     ({"harmonics": {"accuracy": 1e-3}}, "give n_harmonics"),
     ({"solver": {"kind": "powell"}}, "use 'newton'"),
     ({"solver": {"jacobian": "difference"}}, "use 'analytic'"),
+    ({"solver": {"linear": "krylov"}}, "use 'lu'"),
+    ({"solver": {"skips": True}}, "leaves nothing out"),
+    ({"sensitivity": {"parameters": "contact%mu"}}, "goes with analysis = 'frf' or 'point'"),
+    ({"sweep": {"end": 1.0}}, "leave &sweep out"),
+    ({"sweep": {"n_points": 5}}, "leave &sweep out"),
+    ({"sweep": {"frequencies": [1.0, 2.0]}}, "leave &sweep out"),
+    ({"sweep": {"stability": True}}, "leave &sweep out"),
+    ({"sweep": {"continuation": "arclength"}}, "leave &sweep out"),
     ({"contact": {"memory": "carried"}}, "use 'assembly'"),
     ({"contact": {"law": "regularised", "tangential_stiffness": None, "slip_speed": 0.01}},
      "regularised"),
@@ -159,16 +177,45 @@ def test_effective_input_runs_again(tmp_path, named_by):
     assert np.array_equal(found["omega"], expected["omega"])
 
 
-def test_node_of_the_mode(tmp_path):
-    """Two equal masses: the second one's motion against the first; their mean is at a node."""
-    groups = {
-        "model": {"n_dof": 2, "mass": [1, 0, 0, 1], "stiffness": [2, -1, -1, 2],
-                  "damping": [0.02, -0.01, -0.01, 0.02]},
-        "spring": {"n_springs": 1, "side_1": 1, "side_2": 2, "coefficient": 0.5, "power": 3},
-        "output": {"observe": "1 + 2"}}
-    groups["output"]["observe"] = 1
+def test_too_many_unknowns(tmp_path):
+    """One matrix of all dofs and coefficients is factored: what would take hours is refused."""
+    changes = {"harmonics": {"parity": "all"}}
+    done = run(tmp_path, mode_groups(CHAIN, 0.1, 1.0, 1500, changes=changes), status=3)
+    assert "6002 here, 6000 at most" in done.stderr
+    assert "fretwear reduce" in done.stderr
+
+
+#: Two equal masses in a row: in mode 1 they move alike, in mode 2 against each other.
+TWINS = {
+    "model": {"n_dof": 2, "mass": [1, 0, 0, 1], "stiffness": [2, -1, -1, 2],
+              "damping": [0.02, -0.01, -0.01, 0.02]},
+    "spring": {"n_springs": 1, "side_1": 1, "side_2": 2, "coefficient": 0.5, "power": 3}}
+#: A third mass between them, which rests in the mode in which the others swing apart.
+TRIPLETS = {
+    "model": {"n_dof": 3, "mass": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+              "stiffness": [2, -1, 0, -1, 2, -1, 0, -1, 2],
+              "damping": [0.02, -0.01, 0, -0.01, 0.02, -0.01, 0, -0.01, 0.02]},
+    "spring": {"n_springs": 1, "side_1": 1, "side_2": 3, "coefficient": 0.5, "power": 3}}
+
+
+def test_second_mode_of_twins(tmp_path):
+    groups = merged(TWINS, {"output": {"observe": 1}})
     options = {"number": 2, "control": "observed"}
     assert follow(tmp_path, groups, 0.1, 1.0, 3, **options)["converged"].all()
+
+
+def test_first_observed_at_a_node(tmp_path):
+    """Its amplitude cannot be that of the curve: refused by name, unless the control is modal."""
+    groups = merged(TRIPLETS, {"output": {"observe": [2, 1]}})
+    observed = mode_groups(groups, 0.1, 1.0, 3, number=2, control="observed")
+    done = run(tmp_path, observed, status=3)
+    assert "at a node of mode 2" in done.stderr
+    assert "'modal'" in done.stderr
+    found = follow(tmp_path, groups, 0.1, 1.0, 3, number=2)
+    assert found["converged"].all()
+    assert np.abs(found["mode/first_harmonic"][:, 0]).max() < 1e-6
+    other = merged(groups, {"output": {"observe": [1, 2]}})
+    assert follow(tmp_path, other, 0.1, 1.0, 3, number=2, control="observed")["converged"].all()
 
 
 def test_near_is_a_frequency(tmp_path):
@@ -180,10 +227,26 @@ def test_near_is_a_frequency(tmp_path):
     assert hertz["omega"] == pytest.approx(second["omega"], rel=1e-14)
 
 
-def test_limit_cycle_repels_and_attracts(tmp_path):
+def test_words_of_limit_cycles(tmp_path):
+    """The summary names each cycle with its stability, and says where there is none."""
+    groups, numbers = REFERENCES["limit_cycle"]["groups"], []
+    write_namelist(tmp_path / "case.nml", mode_groups(groups, 0.1, 10.0, 7, n_points=41))
+    said = start(tmp_path, "case.nml").splitlines()
+    line = next(line for line in said if line.startswith("limit cycles"))
+    found = read(tmp_path / "case.h5")
+    for k, amplitude in enumerate(found["mode/limit_cycle/amplitude"]):
+        word = "stable" if found["mode/limit_cycle/stable"][k] else "unstable"
+        numbers.append(f"a = {amplitude:.2E} ({word})")
+    assert len(numbers) == 2
+    assert line.split(None, 2)[2] == "2: " + ", ".join(numbers)
+
+
+def test_no_limit_cycle(tmp_path):
     """No cycle where damping stays negative: the summary says so."""
     groups = merged(JENKINS, {"model": {"damping": -2.0}})
-    run(tmp_path, mode_groups(groups, 0.1, 1.0, 3))
+    write_namelist(tmp_path / "case.nml", mode_groups(groups, 0.1, 1.0, 3))
+    said = start(tmp_path, "case.nml")
+    assert "none up to a = 1.00E+00: the mode gains energy at every amplitude" in said
     assert "mode/limit_cycle/amplitude" not in read(tmp_path / "case.h5")
 
 
