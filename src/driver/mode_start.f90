@@ -45,6 +45,8 @@ module fw_mode_start
       !> With stuck pairs there is no mode: this is the one with sliding pairs, which the curve
       !> tends to at high amplitudes.
       logical :: slides = .false.
+      !> Frequencies of the linear modes with stuck and with sliding pairs [rad/s].
+      real(wp), allocatable :: stuck_omega(:), sliding_omega(:)
       !> The stuck motion as unknowns of the mode.
       real(wp), allocatable :: y(:)
       !> Vibratory load of the case, cosine and sine (n_coordinates, 2) [force].
@@ -91,6 +93,7 @@ contains
          call at_rest(self, x, modes, error)
          if (allocated(error)) return
       end if
+      call note_frequencies(self, modes)
       call observed_row(self%balance, row)
       call take_mode(self, modes, x, row, error)
       if (.not. allocated(error)) call find_onset(self)
@@ -177,6 +180,24 @@ contains
                        'the structure can vibrate, or a part has neither stiffness nor mass', &
                        status_input)
    end subroutine at_rest
+
+   !> Frequencies that harmonics of the curve may meet.
+   subroutine note_frequencies(self, modes)
+      class(mode_start), intent(inout) :: self
+      type(stuck_modes), intent(in) :: modes
+      type(stuck_modes) :: sliding
+      logical :: done
+
+      allocate (self%stuck_omega(0), self%sliding_omega(0))
+      if (self%slides) then
+         self%sliding_omega = modes%omega
+         return
+      end if
+      self%stuck_omega = modes%omega
+      if (self%problem%n_pairs == 0) return
+      call find_stuck_modes(self%balance, sliding, done, slides=.true.)
+      if (done) self%sliding_omega = sliding%omega
+   end subroutine note_frequencies
 
    !> The load that a response of the same case has, as coefficients of harmonic 1.
    subroutine take_load(self)

@@ -14,6 +14,7 @@ module fw_run_mode
    use fw_mode_group, only: mode_table
    use fw_mode_options, only: control_observed
    use fw_mode_path, only: mode_path
+   use fw_mode_remarks, only: remark_internal
    use fw_mode_start, only: mode_start
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
@@ -117,6 +118,7 @@ contains
       end if
       call observer%on_end()
       if (allocated(error)) return
+      call remark_internal(curve%start, curve%table, summary%remarks)
       call synthesize(case, curve%table)
       call writer%add_mode(curve%table, case%model%unit_system, error)
       call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &

@@ -101,6 +101,11 @@ def test_internal_resonance_folds(tmp_path):
     # It comes back to the lowest amplitude; a point on a bound may not converge.
     assert branch["converged"][:-1].all()
     assert (np.diff(amplitude) < 0).any()
+    # Which is said, whichever way the curve is followed.
+    steps = follow(tmp_path, DUFFING, 0.05, 2.0, 5, n_points=30, control="observed",
+                   status=(0, 4))
+    for found in (branch, steps):
+        assert "3 omega meets mode 2 (3.3" in remark_of(found, "internal resonance")
     # On the way the second mass takes over.
     third = np.hypot(branch["coefficients"][:, 5, 1], branch["coefficients"][:, 6, 1])
     assert (third / amplitude).max() > 1.0
@@ -112,6 +117,38 @@ def start(folder, *arguments):
                           timeout=limit(120.0), check=False, env=PATIENT)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def remark_of(found, name):
+    """Text of a remark of a result; empty where it has none of this name."""
+    names = found.get("remarks/name", [])
+    texts = [text.decode() for at, text in zip(names, found.get("remarks/text", []), strict=True)
+             if at.decode() == name]
+    return texts[0] if texts else ""
+
+
+def test_no_internal_resonance(tmp_path):
+    """Nothing is said where no harmonic meets a mode, and of harmonics that the balance lacks."""
+    for groups, n_harmonics in ((JENKINS, 7), (CHAIN, 7), (DUFFING, 1)):
+        found = follow(tmp_path, groups, 0.1, 1.0, n_harmonics, status=(0, 4))
+        assert remark_of(found, "internal resonance") == ""
+
+
+def test_internal_resonance_of_sliding_pairs(tmp_path):
+    """Three times the frequency falls through that of mode 2 without friction."""
+    free = np.sqrt(np.linalg.eigvalsh([[1.1, -0.3], [-0.3, 11.0]]))
+    groups = merged(DUFFING, {
+        "model": {"damping": [0.02, 0, 0, 0.02]},
+        "spring": {"n_springs": None, "side_1": None, "side_2": None, "coefficient": None,
+                   "power": None},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 0], "side_2": [0, 0, 0],
+                    "mu": 1.0, "normal_load": 0.5, "tangential_stiffness": 1.0}})
+    found = follow(tmp_path, groups, 0.1, 20.0, 5, n_points=40, status=(0, 4))
+    low, high = 3 * found["omega"].min(), 3 * found["omega"].max()
+    assert low < free[1] < high
+    said = remark_of(found, "internal resonance")
+    assert f"3 omega meets mode 2 with stuck pairs ({free[1]:.1E}"[:-4] in said
+    assert "near the amplitude" in said
 
 
 def test_double_modes_are_refused(tmp_path):

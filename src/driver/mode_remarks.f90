@@ -1,0 +1,100 @@
+!> Remarks on a nonlinear mode: harmonics that meet another mode on the way.
+module fw_mode_remarks
+   use fw_kinds, only: wp
+   use fw_mode_group, only: mode_table
+   use fw_mode_start, only: mode_start
+   use fw_remarks, only: remark_list
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: remark_internal
+
+   !> Frequencies this near, as a part of them, meet: the tongues of weak couplings are narrow, and
+   !> their damping is of this order.
+   real(wp), parameter :: near = 1.0e-3_wp
+   !> Meetings that are named.
+   integer, parameter :: most_named = 3
+
+contains
+
+   !> Where a harmonic of the curve passes the frequency of a linear mode energy goes from one to
+   !> the other: the curve has a narrow tongue there, which steps may miss. The other mode moves
+   !> with the amplitude too: its frequencies with stuck and with sliding pairs stand for it.
+   subroutine remark_internal(start, table, remarks)
+      type(mode_start), intent(in) :: start
+      type(mode_table), intent(in) :: table
+      type(remark_list), intent(inout) :: remarks
+      character(:), allocatable :: text
+      integer :: n_found
+
+      if (table%n == 0) return
+      text = ''
+      n_found = 0
+      call note_meetings(start, table, start%stuck_omega, 'stuck', start%sliding_omega(:0), text, &
+                         n_found)
+      call note_meetings(start, table, start%sliding_omega, 'sliding', start%stuck_omega, text, &
+                         n_found)
+      if (n_found == 0) return
+      if (n_found > most_named) text = text//' and '//to_text(n_found - most_named)//' more'
+      call remarks%add('internal resonance', text//': a narrow tongue of the curve may be '// &
+                       "stepped over there; to follow it take &mode continuation = "// &
+                       "'arclength' and more n_points")
+   end subroutine remark_internal
+
+   !> Meetings of all harmonics with the modes of one kind.
+   subroutine note_meetings(start, table, omega, kind, known, text, n_found)
+      type(mode_start), intent(in) :: start
+      type(mode_table), intent(in) :: table
+      !> Frequencies of the modes, and those that were asked for already [rad/s].
+      real(wp), intent(in) :: omega(:), known(:)
+      !> How their pairs are.
+      character(*), intent(in) :: kind
+      character(:), allocatable, intent(inout) :: text
+      integer, intent(inout) :: n_found
+      integer :: h, j, k, n
+
+      do h = 1, start%problem%fourier%n_retained
+         n = start%problem%fourier%harmonic(h)
+         if (n < 2) cycle
+         do j = 1, size(omega)
+            if (any(abs(known - omega(j)) <= near*omega(j))) cycle
+            k = meeting(table, real(n, wp), omega(j))
+            if (k == 0) cycle
+            n_found = n_found + 1
+            if (n_found > most_named) cycle
+            if (n_found > 1) text = text//', '
+            text = text//to_text(n)//' omega meets mode '//to_text(j)
+            if (start%problem%n_pairs > 0) text = text//' with '//kind//' pairs'
+            text = text//' ('//trim(short(omega(j)))//' rad/s) near the amplitude '// &
+                   trim(short(table%row(k)%amplitude))
+         end do
+      end do
+   end subroutine note_meetings
+
+   !> The first row behind which, or at which, n omega is that of a mode; 0 where it never is.
+   pure integer function meeting(table, n, omega) result(row)
+      type(mode_table), intent(in) :: table
+      real(wp), intent(in) :: n, omega
+      real(wp) :: apart, before
+
+      before = 0.0_wp
+      do row = 1, table%n
+         if (.not. table%row(row)%converged) cycle
+         apart = n*table%row(row)%omega - omega
+         if (abs(apart) <= near*omega .or. before*apart < 0.0_wp) return
+         before = apart
+      end do
+      row = 0
+   end function meeting
+
+   !> A number for a text.
+   pure function short(value) result(text)
+      real(wp), intent(in) :: value
+      character(9) :: text
+
+      write (text, '(es9.2)') value
+      text = adjustl(text)
+   end function short
+
+end module fw_mode_remarks
