@@ -93,6 +93,9 @@ def _again(result: Result, point: int) -> Point:
     if values.get("case%analysis") == ["time"]:
         raise AbsentError(_excuse(result, point, "integration in time has no harmonic balance to "
                                   "solve"))
+    if values.get("case%analysis") == ["mode"]:
+        raise AbsentError(f"{result.name}: a nonlinear mode keeps no histories, and as a response "
+                          "to a load it would be another motion")
     tolerance = float(values.get("solver%tolerance", ["1e-8"])[0])
     settings = _settings(result, point)
     if "contact%law" in values:

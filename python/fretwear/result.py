@@ -15,6 +15,7 @@ from .bifurcation import Bifurcation, read_bifurcations
 from .case import Case
 from .cycle import Cycle, read_cycle
 from .errors import AbsentError, InputError, OutputError
+from .nonlinear_mode import NonlinearMode, read_mode
 from .peaks import Peak, read_peaks
 from .result_file import Quantity, ResultFile, plain_text
 from .sensitivity import Sensitivities, read_sensitivities
@@ -329,6 +330,13 @@ class Result(ResultFile):
     def sensitivities(self) -> Sensitivities:
         """Derivatives by parameters: `result.sensitivities["largest"]["contact%mu"]`."""
         return read_sensitivities(self)
+
+    # ------------------------------------------------------------------ modes
+
+    @property
+    def mode(self) -> NonlinearMode:
+        """The curve of a nonlinear mode: amplitude, frequency, damping, limit cycles."""
+        return read_mode(self)
 
     # ------------------------------------------------------------------ wear
 

@@ -38,6 +38,8 @@ _REMEDIES = {
     "served_by": "run with case%analysis = 'frf' or 'point'",
     "bifurcation/": "run a sweep with sweep%stability = .true., or a branch that turns",
     "cyclic/": "give the case sectors (&cyclic n_sectors, engine_order)",
+    "mode/": "run with case%analysis = 'mode'",
+    "synthesis/": "run case%analysis = 'mode' with mode%synthesis",
     "modes/": "run with case%analysis = 'modes'",
     "sensitivity/": "run with sensitivity%parameters",
     "peak/": "run a sweep (case%analysis = 'frf') with this version of fretwear",

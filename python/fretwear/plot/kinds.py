@@ -12,6 +12,7 @@ from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
+from .mode import plot_mode
 from .response import plot_response
 from .sensitivity import plot_sensitivity
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
@@ -60,10 +61,17 @@ def _has(*names: str) -> Callable[[Result], bool]:
     return lambda result: all(name in result for name in names)
 
 
+def _is_mode(result: Result) -> bool:
+    return "mode/damping_ratio" in result
+
+
 def _has_cycle(result: Result) -> bool:
     """Whether there are pairs that have a period to show."""
     if "contact/force" not in result or not (
             result.converged.any() or "history/force" in result):
+        return False
+    # The contact of a nonlinear mode cannot be asked for again.
+    if _is_mode(result):
         return False
     # A wear analysis has one row of both for each of its steps.
     return "wear/depth" not in result or len(result.depth) == result.n_points
@@ -77,7 +85,8 @@ def _has_diameters(result: Result) -> bool:
 KINDS: dict[str, Kind] = {
     "response": Kind(
         "Frequency response",
-        lambda r: "omega" in r and r.n_points > 1 and "wear/depth" not in r,
+        lambda r: ("omega" in r and r.n_points > 1 and "wear/depth" not in r
+                   and not _is_mode(r)),
         lambda r, c: plot_response(r, c.observe, linear=c.linear, modal_mass=c.modal_mass)),
     "cycle": Kind(
         "One cycle", lambda r: "coefficients" in r and r.n_points > 0 and (
@@ -103,6 +112,7 @@ KINDS: dict[str, Kind] = {
     "safe": Kind("Engine orders at a speed",
                  lambda r: _has_diameters(r) and rotation_speed(r) > 0.0,
                  lambda r, c: plot_safe(r, c.speed)),
+    "mode": Kind("Nonlinear mode", _is_mode, lambda r, c: plot_mode(r)),
     "sensitivity": Kind(
         "What the parameters do", lambda r: _has("sensitivity/value/first_harmonic")(r) or _has(
             "sensitivity/value/dissipation")(r),

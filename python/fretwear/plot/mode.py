@@ -1,0 +1,64 @@
+"""A nonlinear mode: frequency and damping against amplitude."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..errors import InputError
+from .style import CURVE, FAILED, Source, as_result, label, new_figure, tidy, units_of
+
+__all__ = ["plot_mode"]
+
+#: Colours of limit cycles, unstable and stable, and of the onset.
+_CYCLE = (FAILED, "#009e73")
+_ONSET = "0.4"
+
+
+def plot_mode(source: Source) -> Figure:
+    """Frequency and damping ratio against the amplitude, which has a logarithmic axis.
+
+    The dotted line is the onset of slip or separation; circles are limit cycles, full where they
+    are stable.
+
+    Parameters
+    ----------
+    source : Result or path
+        Result of `analysis = 'mode'`.
+    """
+    result = as_result(source)
+    mode = result.mode
+    amplitude = np.where(mode.converged, mode.amplitude, np.nan)
+    if not np.isfinite(amplitude).any():
+        raise InputError(f"{result.name}: no point of the mode has converged")
+    figure = new_figure(8.0, 6.0)
+    panels = figure.subplots(2, 1, sharex=True)
+    for axes, values in zip(panels, (mode.omega, mode.damping_ratio)):
+        axes.plot(amplitude, values, color=CURVE, linewidth=1.6)
+        if mode.onset > 0.0:
+            axes.axvline(mode.onset, color=_ONSET, linestyle=":", linewidth=1.2,
+                         label=f"onset, {mode.onset:.3g}")
+        tidy(axes)
+    if (mode.damping_ratio < 0.0).any():
+        panels[1].axhline(0.0, color="black", linewidth=0.8)
+    for cycle in mode.limit_cycles:
+        colour = _CYCLE[cycle.stable]
+        name = f"{'stable' if cycle.stable else 'unstable'} limit cycle, {cycle.amplitude:.3g}"
+        for axes, height in zip(panels, (cycle.omega, 0.0)):
+            axes.plot([cycle.amplitude], [height], "o", color=colour, markersize=7,
+                      markerfacecolor=colour if cycle.stable else "white", label=name)
+    panels[0].set_xscale("log")
+    panels[0].set_ylabel("frequency [rad/s]")
+    panels[0].ticklabel_format(axis="y", useOffset=False)
+    panels[1].set_ylabel("damping ratio")
+    if mode.control == "modal":
+        text, units = "modal amplitude", units_of(result, "mode/modal_amplitude")
+    else:
+        text = f"first harmonic of {result.observed[0]}"
+        units = units_of(result, "mode/first_harmonic")
+    panels[1].set_xlabel(label(text, units))
+    if mode.onset > 0.0 or mode.limit_cycles:
+        panels[1].legend(frameon=False, fontsize=8)
+    figure.suptitle(f"Nonlinear mode {mode.number}, {mode.stuck_omega:.6g} rad/s with stuck pairs",
+                    fontsize=11)
+    return figure

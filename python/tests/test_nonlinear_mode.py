@@ -1,0 +1,93 @@
+"""Nonlinear modes of a result in Python, and their picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fretwear as fw
+from fretwear.cli import main
+from fretwear.plot import fitting, plot_mode
+
+#: Limit cycles of the exact motion (test/modes/mode_references.json): amplitude, frequency.
+UNSTABLE_ABOVE = [(0.7164337865536, 1.3226517322658298, True),
+                  (2.3530734382268554, 1.0740437114068488, False)]
+#: What 7 harmonics leave out.
+SEVEN_HARMONICS = 2e-4
+
+
+def follow(damping: float, **mode: Any) -> fw.Result:
+    """An oscillator with an elastic friction element that slips from 0.5 on."""
+    contact = fw.ContactPairs([[1, 0, 0]], mu=1.0, normal_load=0.5, tangential_stiffness=1.0)
+    case = fw.Case(fw.Model([[1.0]], [[damping]], [[1.0]], contact=contact),
+                   case={"analysis": "mode"}, contact={"law": "penalty"},
+                   harmonics={"n_harmonics": 7},
+                   mode={"start": 0.1, "end": 10.0, "n_points": 41, "continuation": "natural"}
+                   | mode)
+    return fw.run(case)
+
+
+@pytest.fixture(scope="module")
+def fluttering() -> fw.Result:
+    return follow(-0.2)
+
+
+def test_curve(fluttering: fw.Result) -> None:
+    mode = fluttering.mode
+    assert (mode.number, mode.control) == (1, "observed")
+    assert mode.converged.all() and mode.amplitude.shape == (41,)
+    np.testing.assert_allclose(mode.amplitude, np.geomspace(0.1, 10.0, 41), rtol=1e-9)
+    stuck = mode.amplitude < 0.5
+    np.testing.assert_allclose(mode.omega[stuck], np.sqrt(2.0), rtol=1e-9)
+    assert mode.stuck_omega == pytest.approx(np.sqrt(2.0), rel=1e-12)
+    assert mode.stuck_damping_ratio == pytest.approx(-0.2 / (2 * np.sqrt(2.0)), rel=1e-12)
+    assert mode.onset == pytest.approx(0.5, rel=1e-12)
+    np.testing.assert_allclose(mode.frequency, mode.omega / (2 * np.pi))
+
+
+def test_limit_cycles(fluttering: fw.Result) -> None:
+    cycles = fluttering.mode.limit_cycles
+    assert len(cycles) == 2
+    for cycle, (amplitude, omega, stable) in zip(cycles, UNSTABLE_ABOVE):
+        assert cycle.amplitude == pytest.approx(amplitude, rel=SEVEN_HARMONICS)
+        assert cycle.omega == pytest.approx(omega, rel=SEVEN_HARMONICS)
+        assert cycle.stable is stable
+
+
+def test_modal_amplitudes() -> None:
+    """Without slip there is no onset, and without a change of sign no limit cycle."""
+    mode = follow(0.02, control="modal", end=0.4, n_points=3).mode
+    np.testing.assert_allclose(mode.amplitude, np.geomspace(0.1, 0.4, 3), rtol=1e-9)
+    assert mode.control == "modal"
+    assert np.isnan(mode.onset) and mode.limit_cycles == ()
+
+
+def test_absent() -> None:
+    linear = fw.frf(fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0]), 0.5, 1.5, 3)
+    with pytest.raises(fw.AbsentError, match="case%analysis = 'mode'"):
+        _ = linear.mode
+    assert "mode" not in fitting(linear)
+
+
+def test_no_period_of_the_contact(fluttering: fw.Result) -> None:
+    """Solved again as a response it would be another motion: refused, and no picture of it."""
+    with pytest.raises(fw.AbsentError, match="nonlinear mode keeps no histories"):
+        fluttering.cycle(20)
+    assert set(fitting(fluttering)) == {"mode", "harmonics", "convergence"}
+
+
+def test_picture(fluttering: fw.Result, tmp_path: Path) -> None:
+    upper, lower = plot_mode(fluttering).axes
+    assert upper.get_xscale() == "log"
+    np.testing.assert_array_equal(upper.lines[0].get_ydata(), fluttering.mode.omega)
+    np.testing.assert_array_equal(lower.lines[0].get_ydata(), fluttering.mode.damping_ratio)
+    assert upper.lines[1].get_xdata()[0] == pytest.approx(0.5)
+    assert [text.get_text() for text in lower.get_legend().get_texts()] == [
+        "onset, 0.5", "stable limit cycle, 0.716", "unstable limit cycle, 2.35"]
+    fluttering.save(tmp_path / "mode.h5")
+    assert main(["plot", str(tmp_path / "mode.h5"), "--kind", "mode", "-o",
+                 str(tmp_path / "mode.png")]) == 0
+    assert (tmp_path / "mode.png").stat().st_size > 5000
