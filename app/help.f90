@@ -43,6 +43,8 @@ contains
          '  &load         static and harmonic loads', &
          '  &harmonics    method, number of harmonics, instants per period', &
          '  &sweep        frequencies', &
+         '  &mode         nonlinear mode: which one, and its amplitudes', &
+         '  &sensitivity  derivatives by parameters of the case', &
          '  &solver       nonlinear solver, tolerance', &
          '  &pseudo_time  pseudo-time integration', &
          '  &wear         fretting wear', &

@@ -36,7 +36,8 @@ COMMANDS = """## Measure
 | `make bench-scaling` | scaling |
 | `make bench-limit` | limit, skips |
 | `make bench-peers` | peers |
-| `make bench-full` | all |
+| `python -m bench.speed.sectors` | sectors |
+| `make bench-full` | all others |
 | `make compare OTHER=fw_run TIMES=9` | two builds side by side, on the screen |"""
 
 

@@ -76,7 +76,8 @@ contains
 
       do k = 1, self%forces%n_laws
          associate (law => self%forces%entry(k)%law)
-            if (law%prediction%takes_balance) call set_stiffness(self, stand, highest, law%prediction)
+            if (.not. law%prediction%takes_balance) cycle
+            call set_stiffness(self, stand, highest, law%prediction)
          end associate
       end do
    end subroutine scale_forces

@@ -86,10 +86,10 @@ contains
             trim(law_words(case%contact%law))//"' does not take")
       end if
       ! A mode has none.
-      if (.not. (is_shaken(case) .or. case%analysis == analysis_mode)) &
-         call remarks%add('no load', 'no vibratory load acts: the '// &
-         'response is that at rest; set load%cosine or load%sine (with a model file, '// &
-         'load%harmonic_scale)')
+      if (.not. (is_shaken(case) .or. case%analysis == analysis_mode)) then
+         call remarks%add('no load', 'no vibratory load acts: the response is that at rest; '// &
+                          'set load%cosine or load%sine (with a model file, load%harmonic_scale)')
+      end if
       call remark_harmonics(case, remarks)
       call remark_law(case, remarks)
       call remark_tail(case, remarks)

@@ -271,10 +271,12 @@ contains
                              "between instants (1 % off is usual); take harmonics%sampling = "// &
                              "'events'")
          end if
-         if (law%prediction%takes_balance .and. any(is_of_matrices(case%sensitivity%parameters))) &
+         if (law%prediction%takes_balance .and. &
+             any(is_of_matrices(case%sensitivity%parameters))) then
             call remarks%add('derivatives at held eps', 'the eps of a rigid law follows the '// &
                              'matrices; derivatives by them hold it, as solutions of many '// &
-                             'harmonics do not depend on it')
+                             'harmonics do not depend on it; with few they may be far off')
+         end if
       end associate
       if (self%n_onset > 0) call remarks%add('one-sided derivatives', 'at '// &
          to_text(self%n_onset)//' of '//to_text(self%n_points)//' points a pair is at the '// &
