@@ -90,7 +90,8 @@ def stopped(way, namelist, wait):
 def measure(pairs, tries, folder):
     """Rows of the table of a size."""
     random.seed(pairs)
-    namelist = folder / f"sector_{pairs}.nml"
+    # Its result is beside it under its name, and must not be the model.
+    namelist = folder / f"stops_{pairs}.nml"
     groups = [f"&model source = 'hdf5' file = '{model(pairs, folder)}' rotation_speed = 628.3 "
               "modal_damping = 1e-3 /", "&load harmonic_scale = 0.5 /",
               "&case analysis = 'frf' /", "&harmonics n_harmonics = 7 n_time = 128 /",
