@@ -26,12 +26,7 @@ contains
       integer :: i, j
       real(wp) :: largest
 
-      if (any(shape(matrix) /= order)) then
-         message = 'has the shape '//to_text(size(matrix, 1))//' x '//to_text(size(matrix, 2))// &
-                   ': must be '//to_text(order)//' x '//to_text(order)
-         return
-      end if
-      call find_not_finite(matrix, message)
+      call check_entries(matrix, order, message)
       if (allocated(message)) return
       largest = maxval(abs(matrix))
       do j = 1, order
@@ -54,6 +49,20 @@ contains
       end do
    end subroutine check_matrix
 
+   !> A matrix of an order, all of whose entries are finite.
+   subroutine check_entries(matrix, order, message)
+      real(wp), intent(in) :: matrix(:, :)
+      integer, intent(in) :: order
+      character(:), allocatable, intent(out) :: message
+
+      if (any(shape(matrix) /= order)) then
+         message = 'has the shape '//to_text(size(matrix, 1))//' x '//to_text(size(matrix, 2))// &
+                   ': must be '//to_text(order)//' x '//to_text(order)
+         return
+      end if
+      call find_not_finite(matrix, message)
+   end subroutine check_entries
+
    !> A finite matrix with A^T = -A; made exactly so.
    subroutine check_skew(matrix, order, message)
       real(wp), intent(inout) :: matrix(:, :)
@@ -62,12 +71,7 @@ contains
       integer :: i, j
       real(wp) :: largest
 
-      if (any(shape(matrix) /= order)) then
-         message = 'has the shape '//to_text(size(matrix, 1))//' x '//to_text(size(matrix, 2))// &
-                   ': must be '//to_text(order)//' x '//to_text(order)
-         return
-      end if
-      call find_not_finite(matrix, message)
+      call check_entries(matrix, order, message)
       if (allocated(message)) return
       largest = maxval(abs(matrix))
       do j = 1, order
