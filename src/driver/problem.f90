@@ -47,7 +47,7 @@ module fw_problem
    implicit none (type, external)
    private
 
-   public :: build_system
+   public :: build_system, renew_forces
 
    !> Instants at least where the events decide and instants only isolate them.
    integer, parameter :: fewest_for_events = 8, fewest_for_planar = 32
@@ -133,6 +133,31 @@ contains
       problem%solves_values = harmonics%method == method_hdhb
       if (.not. present(forces)) call problem%scale_forces(stand, range(2))
    end subroutine build_problem
+
+   !> The laws anew from pairs and springs whose constants have changed since the problem was built.
+   !> States take new workspaces then.
+   subroutine renew_forces(case, problem)
+      type(case_type), intent(in) :: case
+      type(balance_problem), intent(inout) :: problem
+      type(force_list) :: laws
+      integer :: k
+
+      call new_forces(case%contact, case%springs, problem%joint%row, problem%joint%spring_row, &
+                      locates_events(case, case%harmonics, problem%joint), &
+                      case%harmonics%filter_harmonics, laws)
+      do k = 1, laws%n_laws
+         associate (new => laws%entry(k)%law%prediction, &
+                    old => problem%forces%entry(k)%law%prediction)
+            ! The structure gave it, and has not changed.
+            if (new%takes_balance) new%stiffness = old%stiffness
+            if (new%takes_balance .and. new%has_inertia) then
+               new%inertia = old%inertia
+               new%damping = old%damping
+            end if
+         end associate
+      end do
+      problem%forces = laws
+   end subroutine renew_forces
 
    !> The structure of a case, condensed.
    subroutine new_structure(case, joint, forces, fourier, range, structure, error, keep_all, &

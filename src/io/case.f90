@@ -7,6 +7,7 @@ module fw_case
    use fw_key_range, only: from_to
    use fw_kinds, only: wp
    use fw_mode_options, only: mode_options
+   use fw_model_forming, only: model_origin
    use fw_model, only: model_type
    use fw_contact_data, only: contact_type, spring_type
    use fw_harmonics_options, only: harmonics_options
@@ -69,6 +70,10 @@ module fw_case
       character(:), allocatable :: restart
       type(sensitivity_options) :: sensitivity
       type(mode_options) :: mode
+      !> The parameter of fw_parameters that changes from point to point (0: none), and what the
+      !> model is formed from, only where that changes its matrices.
+      integer :: varied = 0
+      type(model_origin), allocatable :: origin
    contains
       procedure :: bind_keys => bind_case_keys
    end type case_type

@@ -10,6 +10,7 @@ module fw_read_case
    use fw_load_terms, only: load_terms
    use fw_model_file, only: file_model_type
    use fw_model_keys, only: model_options
+   use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
    use fw_read_cyclic, only: check_sectors, read_cyclic
@@ -241,6 +242,7 @@ contains
       type(model_options) :: options
       type(load_terms) :: terms
       character(:), allocatable :: worn
+      integer, allocatable :: wanted(:)
       integer :: n_dof
 
       call read_model(reader, directory_of(path), options, raw, n_dof, error, memory_model)
@@ -257,7 +259,12 @@ contains
       call read_springs(reader, case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
       call read_loads(reader, options, raw, terms)
-      call finish_model(reader, options, raw, terms, case%model, error, case%sensitivity%parameters)
+      wanted = case%sensitivity%parameters
+      if (case%varied > 0) then
+         if (all(wanted /= case%varied)) wanted = [wanted, case%varied]
+         if (is_of_matrices(case%varied)) allocate (case%origin)
+      end if
+      call finish_model(reader, options, raw, terms, case%model, case%origin, error, wanted)
       if (.not. allocated(case%title)) then
          case%title = stem_of(path)
          if (allocated(raw%title)) case%title = raw%title

@@ -11,11 +11,10 @@ module fw_read_model
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type, read_model_hdf5
-   use fw_model_changes, only: find_changes
+   use fw_model_forming, only: form_structure, model_origin
    use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads
    use fw_model_keys, only: source_words, source_inline, source_hdf5, source_matrix_market, &
                             source_memory
-   use fw_damping, only: add_modal_damping
    use fw_paths, only: resolve_path
    use fw_read_nodal, only: finish_nodal
    use fw_read_waves, only: gather_waves
@@ -183,12 +182,14 @@ contains
    end subroutine read_loads
 
    !> Check the parts and put them together: rotation, damping, scales.
-   subroutine finish_model(reader, options, raw, terms, model, error, wanted)
+   subroutine finish_model(reader, options, raw, terms, model, origin, error, wanted)
       type(reader_type), intent(inout) :: reader
       type(model_options), intent(in) :: options
       type(file_model_type), intent(inout) :: raw
       type(load_terms), intent(in) :: terms
       type(model_type), intent(inout) :: model
+      !> Filled where it is allocated, for a structure that is to be formed again.
+      type(model_origin), allocatable, intent(inout) :: origin
       type(error_type), allocatable, intent(out) :: error
       !> Parameters of fw_parameters by which responses are to be differentiated.
       integer, intent(in) :: wanted(:)
@@ -207,56 +208,31 @@ contains
       end if
       call check_parts(reader, raw, options%source == source_inline)
       if (reader%failed()) return
-      model%n_dof = size(raw%stiffness, 1)
-      model%mass = raw%mass
-      model%stiffness = raw%stiffness
-      model%load_static = raw%load_static + static
       model%load_cosine = options%harmonic_scale*raw%load_cosine
       model%load_sine = options%harmonic_scale*raw%load_sine
-      ! Rotation comes before damping, which takes the stiffness at speed, and before the static
-      ! scale, which multiplies the load of the rotation too.
-      call add_rotation(reader, options%rotation_speed, raw, model)
-      model%load_static = options%static_scale*model%load_static
-      if (allocated(raw%damping)) then
-         model%damping = raw%damping
-      else
-         allocate (model%damping(model%n_dof, model%n_dof), source=0.0_wp)
+      call check_rotation(reader, options%rotation_speed, raw)
+      if (allocated(origin)) then
+         origin%options = options
+         origin%raw = raw
+         origin%static = static
+         origin%wanted = wanted
       end if
-      model%damping = model%damping + options%rayleigh_mass*model%mass &
-                      + options%rayleigh_stiffness*model%stiffness
-      ! Last: its modes are those of the rotating structure, contact open.
-      if (model%cyclic%is_cyclic) then
-         ! Modes are those of the tied sectors.
-         model%cyclic%modal_damping = options%modal_damping
-      else if (options%modal_damping > 0.0_wp) then
-         call add_modal_damping(model%mass, model%stiffness, options%modal_damping, model%damping, &
-                                error)
-      end if
-      model%rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)
-      if (model%cyclic%is_cyclic .or. allocated(error)) return
-      call find_changes(options, raw, wanted, model, error)
+      call form_structure(options, raw, static, wanted, model, error)
    end subroutine finish_model
 
-   !> Centrifugal stiffness and load grow with the square of the speed.
-   subroutine add_rotation(reader, speed, raw, model)
+   !> A speed that nothing depends on.
+   subroutine check_rotation(reader, speed, raw)
       type(reader_type), intent(inout) :: reader
       real(wp), intent(in) :: speed
       type(file_model_type), intent(in) :: raw
-      type(model_type), intent(inout) :: model
 
       if (speed <= 0.0_wp) return
-      if (allocated(raw%stiffness_rotation)) then
-         model%stiffness = model%stiffness + speed**2*raw%stiffness_rotation
-      end if
-      if (allocated(raw%load_static_rotation)) then
-         model%load_static = model%load_static + speed**2*raw%load_static_rotation
-      end if
       if (allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation) .or. &
           allocated(raw%coriolis)) return
       call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
                          'stiffness_rotation, no coriolis and no load static_rotation: remove '// &
                          'it, or use a model file that holds them')
-   end subroutine add_rotation
+   end subroutine check_rotation
 
    !> Coriolis forces at speed and forces of the air, which cyclic structures have.
    subroutine take_whirl(reader, options, raw, model)

@@ -70,6 +70,7 @@ module fw_cyclic_structure
       procedure :: mass
       procedure :: held_modes
       procedure :: magnitudes
+      procedure :: scale_loads
    end type cyclic_structure
 
    type, extends(structure_state) :: cyclic_state
@@ -579,5 +580,20 @@ contains
          end do
       end associate
    end subroutine magnitudes
+
+   pure subroutine scale_loads(self, static, vibration)
+      class(cyclic_structure), intent(inout) :: self
+      real(wp), intent(in) :: static, vibration
+      integer :: k
+
+      do k = 1, size(self%basis)
+         associate (b => self%basis(k))
+            b%load_q(:, 1) = static*b%load_q(:, 1)
+            b%load_i(:, 1) = static*b%load_i(:, 1)
+            b%load_q(:, 2:) = vibration*b%load_q(:, 2:)
+            b%load_i(:, 2:) = vibration*b%load_i(:, 2:)
+         end associate
+      end do
+   end subroutine scale_loads
 
 end module fw_cyclic_structure

@@ -69,6 +69,7 @@ module fw_plain_structure
       procedure :: mass
       procedure :: held_modes
       procedure :: magnitudes
+      procedure :: scale_loads
       procedure :: whole_size
       procedure :: condense_field
       procedure :: complete_field
@@ -752,5 +753,18 @@ contains
          end do
       end associate
    end subroutine change_field
+
+   pure subroutine scale_loads(self, static, vibration)
+      class(plain_structure), intent(inout) :: self
+      real(wp), intent(in) :: static, vibration
+
+      associate (b => self%basis)
+         b%load_q(:, 1) = static*b%load_q(:, 1)
+         b%load_i(:, 1) = static*b%load_i(:, 1)
+         b%load_q(:, 2:) = vibration*b%load_q(:, 2:)
+         b%load_i(:, 2:) = vibration*b%load_i(:, 2:)
+         if (allocated(b%change_load)) b%change_load = static*b%change_load
+      end associate
+   end subroutine scale_loads
 
 end module fw_plain_structure

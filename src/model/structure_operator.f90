@@ -62,6 +62,7 @@ module fw_structure_operator
       procedure(read_mass), deferred :: mass
       procedure(list_modes), deferred :: held_modes
       procedure(sum_magnitudes), deferred :: magnitudes
+      procedure(multiply_loads), deferred :: scale_loads
       procedure :: whole_size
       procedure :: condense_field
       procedure :: complete_field
@@ -198,6 +199,14 @@ module fw_structure_operator
          real(wp), intent(in) :: amplitude(:)
          real(wp), intent(out) :: sums(:)
       end subroutine sum_magnitudes
+
+      !> Multiply the loads of harmonic 0, and those above. States go to their frequency again
+      !> afterwards, from nowhere.
+      pure subroutine multiply_loads(self, static, vibration)
+         import :: structure_operator, wp
+         class(structure_operator), intent(inout) :: self
+         real(wp), intent(in) :: static, vibration
+      end subroutine multiply_loads
    end interface
 
 contains

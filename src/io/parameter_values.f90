@@ -1,0 +1,151 @@
+!> Values of the parameters of fw_parameters in a case that has been read, and a case with other
+!> values, as if it had been read with them.
+module fw_parameter_values
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_model, only: model_type
+   use fw_model_forming, only: form_structure
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
+                            is_per_pair, is_per_spring, modal_damping, normal_load, &
+                            normal_stiffness, rayleigh_mass, rayleigh_stiffness, rotation_speed, &
+                            static_scale, tangential_stiffness
+   implicit none (type, external)
+   private
+
+   public :: n_values, get_parameter, put_parameter
+
+contains
+
+   !> Values that a parameter has: one, or one for each pair or spring.
+   pure integer function n_values(case, number)
+      type(case_type), intent(in) :: case
+      !> As in parameter_words.
+      integer, intent(in) :: number
+
+      n_values = 1
+      if (is_per_pair(number)) n_values = case%contact%n_pairs
+      if (is_per_spring(number)) n_values = case%springs%n_springs
+   end function n_values
+
+   !> Values in the case (n_values).
+   pure subroutine get_parameter(case, number, values)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: number
+      real(wp), allocatable, intent(out) :: values(:)
+      integer :: k
+
+      associate (c => case%contact)
+         select case (number)
+         case (friction_coefficient); values = c%mu
+         case (normal_load); values = c%normal_load
+         case (gap); values = c%gap
+         case (tangential_stiffness); values = c%tangential_stiffness
+         case (normal_stiffness); values = c%normal_stiffness
+         case (harmonic_scale); values = [case%model%harmonic_scale]
+         case (static_scale); values = [case%model%static_scale]
+         case default
+            if (is_per_spring(number)) then
+               values = case%springs%coefficient
+               return
+            end if
+            values = [0.0_wp]
+            if (.not. allocated(case%model%changes)) return
+            do k = 1, size(case%model%changes)
+               if (case%model%changes(k)%parameter == number) then
+                  values = [case%model%changes(k)%value]
+               end if
+            end do
+         end select
+      end associate
+   end subroutine get_parameter
+
+   !> Give the case other values. A parameter of the matrices needs `origin`, which the case keeps
+   !> where it was read with the parameter among those wanted.
+   subroutine put_parameter(case, number, values, error)
+      type(case_type), intent(inout) :: case
+      integer, intent(in) :: number
+      !> (n_values)
+      real(wp), intent(in) :: values(:)
+      !> Modes of the damping that cannot be found.
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (c => case%contact)
+         select case (number)
+         case (friction_coefficient); c%mu = values
+         case (normal_load); c%normal_load = values
+         case (gap); c%gap = values
+         case (tangential_stiffness); c%tangential_stiffness = values
+         case (normal_stiffness); c%normal_stiffness = values
+         case (harmonic_scale)
+            call scale_vibration(values(1)/case%model%harmonic_scale, case%model)
+            case%model%harmonic_scale = values(1)
+            if (allocated(case%origin)) case%origin%options%harmonic_scale = values(1)
+         case (static_scale)
+            call scale_static(values(1)/case%model%static_scale, case%model)
+            case%model%static_scale = values(1)
+            if (allocated(case%origin)) case%origin%options%static_scale = values(1)
+         case default
+            if (is_per_spring(number)) case%springs%coefficient = values
+            if (is_of_matrices(number)) call put_of_matrices(case, number, values(1), error)
+         end select
+      end associate
+   end subroutine put_parameter
+
+   !> Factor of the loads above harmonic 0.
+   subroutine scale_vibration(factor, model)
+      real(wp), intent(in) :: factor
+      type(model_type), intent(inout) :: model
+      integer :: k
+
+      if (allocated(model%load_cosine)) model%load_cosine = factor*model%load_cosine
+      if (allocated(model%load_sine)) model%load_sine = factor*model%load_sine
+      if (allocated(model%load_wave)) model%load_wave = factor*model%load_wave
+      if (.not. allocated(model%cyclic%nodal)) return
+      do k = 1, size(model%cyclic%nodal)
+         if (.not. allocated(model%cyclic%nodal(k)%load)) cycle
+         associate (load => model%cyclic%nodal(k)%load)
+            load(:, 2:) = factor*load(:, 2:)
+         end associate
+      end do
+   end subroutine scale_vibration
+
+   !> Factor of the loads of harmonic 0.
+   subroutine scale_static(factor, model)
+      real(wp), intent(in) :: factor
+      type(model_type), intent(inout) :: model
+      integer :: k
+
+      if (allocated(model%load_static)) model%load_static = factor*model%load_static
+      if (.not. allocated(model%cyclic%nodal)) return
+      do k = 1, size(model%cyclic%nodal)
+         if (.not. allocated(model%cyclic%nodal(k)%load)) cycle
+         associate (load => model%cyclic%nodal(k)%load)
+            load(:, 1) = factor*load(:, 1)
+         end associate
+      end do
+   end subroutine scale_static
+
+   !> Put the structure together anew.
+   subroutine put_of_matrices(case, number, value, error)
+      type(case_type), intent(inout) :: case
+      integer, intent(in) :: number
+      real(wp), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (options => case%origin%options)
+         select case (number)
+         case (modal_damping); options%modal_damping = value
+         case (rotation_speed); options%rotation_speed = value
+         case (rayleigh_mass); options%rayleigh_mass = value
+         case (rayleigh_stiffness); options%rayleigh_stiffness = value
+         case default ! changes no matrix
+         end select
+      end associate
+      associate (origin => case%origin)
+         call form_structure(origin%options, origin%raw, origin%static, origin%wanted, &
+                             case%model, error)
+      end associate
+   end subroutine put_of_matrices
+
+end module fw_parameter_values
