@@ -36,7 +36,7 @@ build: build/deps.stamp ## optimised program build/release/fw_run
 	   cmake -S . -B $(BUILD) -G Ninja -DFRETWEAR_NATIVE=ON -DFRETWEAR_PYTHON=ON \
 	      "-DPython3_EXECUTABLE=$(CURDIR)/$(PYTHON)" $(CMAKE_OPTIONS); \
 	fi
-	@cmake --build $(BUILD)
+	@cmake --build $(BUILD) --target fw_run fretwear_python fretwear_shared
 
 debug: build/deps.stamp ## build/debug: every check, and floating-point traps
 	@cmake -S . -B build/debug -G Ninja -DCMAKE_BUILD_TYPE=Debug $(CMAKE_OPTIONS)
@@ -63,6 +63,7 @@ $(RUN)/frf.png: $(RUN)/frf.h5 $(RUN)/frf_stuck.h5 $(wildcard python/fretwear/*.p
 
 # The closing line has to be the last one, whatever the build said before.
 test: build ## every test; the last line counts the cases
+	@cmake --build $(BUILD)
 	@$(PYTHON) test/support/run_tests.py --build $(BUILD) --python $(PYTHON)
 
 lint: build/deps.stamp ## linters of the Fortran and the Python code, type checker
@@ -79,8 +80,8 @@ keys: build ## tables of keys in the user guide, settings of the Python package
 docs: build/deps.stamp ## reference of library and Python package, in build/docs
 	@$(PYTHON) tools/build_docs.py build/docs
 
-wheel: build/deps.stamp ## the package in a fresh environment, used as the README says
-	@tools/check_install.sh build/wheel
+wheel: build/deps.stamp ## a wheel that needs no compiler and no library, tried: build/wheel
+	@tools/build_wheel.sh build/wheel $(PYTHON)
 
 ways: build/deps.stamp ## the other ways to build: CMake alone, fpm, pip
 	@tools/check_builds.sh build/ways $(PYTHON)

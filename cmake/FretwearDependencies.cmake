@@ -17,9 +17,15 @@ if(NOT BLA_VENDOR)
 endif()
 find_dependency(LAPACK)
 find_dependency(OpenMP COMPONENTS Fortran)
-find_dependency(FFTW3)
+# What a transform of many harmonics goes through: `fftw`, or `none` for matrix products alone.
+if(NOT FRETWEAR_FFT STREQUAL "none")
+  find_dependency(FFTW3)
+endif()
 find_dependency(MINPACK)
 find_dependency(HDF5 COMPONENTS Fortran)
+# A static library of the Fortran part needs the C part and what that needs behind it.
+set_property(TARGET hdf5::hdf5_fortran APPEND PROPERTY
+  INTERFACE_LINK_LIBRARIES ${HDF5_Fortran_LIBRARIES})
 set(fretwear_sundials fcvode farkode fida fkinsol
   fnvecserial fsunmatrixdense fsunlinsoldense fsunlinsolspgmr)
 find_dependency(SUNDIALSFortran COMPONENTS ${fretwear_sundials})

@@ -3,16 +3,116 @@
 !> A transform of length n_time costs O(n_time log n_time) a row where the matrix product costs
 !> n_time (2H+1); it pays above a number of coefficients that fw_fourier knows (`fft_pays`). The row
 !> is the first index, so that all rows of an instant are neighbours and FFTW vectorises over them.
+!>
+!> Compiled with FRETWEAR_WITHOUT_FFTW the same transforms are sums over a table of one wave:
+!> nothing is planned then (`has_fftw`), and matrix products serve every number of coefficients.
 module fw_fft
+#ifdef FRETWEAR_WITHOUT_FFTW
+   use fw_kinds, only: pi
+#else
    ! allow(C121): all that fftw3.f03 takes from there
    use, intrinsic :: iso_c_binding
+#endif
    use fw_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: fft_type
+   public :: fft_type, has_fftw
 
+#ifdef FRETWEAR_WITHOUT_FFTW
+   !> Whether FFTW stands behind fft_type.
+   logical, parameter :: has_fftw = .false.
+
+   !> A table of one wave over the instants of a period.
+   type :: fft_type
+      !> Number of rows (pairs times components), and of instants in a period.
+      integer :: n_rows = 0
+      integer :: n_time = 0
+      !> Cosine and sine of 2 pi k/n_time at k = 0, 1, ..
+      real(wp), allocatable :: cosine(:), sine(:)
+   contains
+      procedure :: plan
+      procedure :: renew
+      procedure :: synthesise
+      procedure :: analyse
+   end type fft_type
+
+contains
+
+   !> The table of n_time instants, for n_rows rows.
+   subroutine plan(self, n_rows, n_time)
+      class(fft_type), intent(inout) :: self
+      integer, intent(in) :: n_rows, n_time
+      integer :: k
+
+      self%n_rows = n_rows
+      self%n_time = n_time
+      self%cosine = [(cos(2.0_wp*pi*k/n_time), k=0, n_time - 1)]
+      self%sine = [(sin(2.0_wp*pi*k/n_time), k=0, n_time - 1)]
+   end subroutine plan
+
+   !> A copy of a table is a table: nothing is shared.
+   subroutine renew(self)
+      class(fft_type), intent(inout) :: self
+
+      if (self%n_rows > 0) call self%plan(self%n_rows, self%n_time)
+   end subroutine renew
+
+   !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.
+   subroutine synthesise(self, harmonic, column, coefficients, values)
+      class(fft_type), intent(inout) :: self
+      !> Harmonic numbers, increasing, and the column at which the coefficients of each begin (n).
+      integer, intent(in) :: harmonic(:), column(:)
+      !> Coefficients (n_rows, n_coefficients): one column for harmonic 0, cosine and sine for
+      !> others.
+      real(wp), intent(in) :: coefficients(self%n_rows, *)
+      !> Values at tau_k = 2 pi k/n_time (n_rows, n_time).
+      real(wp), intent(inout) :: values(self%n_rows, *)
+      integer :: i, k, at
+
+      do k = 1, self%n_time
+         values(:, k) = 0.0_wp
+         do i = 1, size(harmonic)
+            at = 1 + modulo(harmonic(i)*(k - 1), self%n_time)
+            values(:, k) = values(:, k) + self%cosine(at)*coefficients(:, column(i))
+            if (harmonic(i) > 0) values(:, k) = values(:, k) + &
+               self%sine(at)*coefficients(:, column(i) + 1)
+         end do
+      end do
+   end subroutine synthesise
+
+   !> Coefficients of the retained harmonics from values at the instants.
+   !> Harmonics above n_time/2 alias: the caller keeps n_time > 2H.
+   subroutine analyse(self, harmonic, column, values, coefficients)
+      !> As in synthesise.
+      class(fft_type), intent(inout) :: self
+      integer, intent(in) :: harmonic(:), column(:)
+      real(wp), intent(in) :: values(self%n_rows, *)
+      real(wp), intent(inout) :: coefficients(self%n_rows, *)
+      integer :: i, k, at
+      real(wp) :: weight
+
+      do i = 1, size(harmonic)
+         weight = merge(1.0_wp, 2.0_wp, harmonic(i) == 0)/real(self%n_time, wp)
+         coefficients(:, column(i)) = 0.0_wp
+         if (harmonic(i) > 0) coefficients(:, column(i) + 1) = 0.0_wp
+         do k = 1, self%n_time
+            at = 1 + modulo(harmonic(i)*(k - 1), self%n_time)
+            coefficients(:, column(i)) = coefficients(:, column(i)) + &
+               weight*self%cosine(at)*values(:, k)
+            if (harmonic(i) > 0) then
+               coefficients(:, column(i) + 1) = coefficients(:, column(i) + 1) + &
+                  weight*self%sine(at)*values(:, k)
+            end if
+         end do
+      end do
+   end subroutine analyse
+
+#else
 #include <fftw3.f03>
+
+   !> Whether FFTW stands behind fft_type.
+   logical, parameter :: has_fftw = .true.
 
    !> A pair of plans with their own buffers; belongs to one thread.
    type :: fft_type
@@ -139,5 +239,6 @@ contains
       self%forward = c_null_ptr
       self%backward = c_null_ptr
    end subroutine destroy
+#endif
 
 end module fw_fft

@@ -12,7 +12,7 @@ module fw_fourier
    use fw_complex_form, only: coefficients_of
    use fw_lapack, only: dgemm
    use fw_linalg, only: lu_type
-   use fw_fft, only: fft_type
+   use fw_fft, only: fft_type, has_fftw
    implicit none (type, external)
    private
 
@@ -151,7 +151,7 @@ contains
    pure logical function fft_pays(n_coefficients)
       integer, intent(in) :: n_coefficients
 
-      fft_pays = n_coefficients > 64
+      fft_pays = has_fftw .and. n_coefficients > 64
    end function fft_pays
 
    !> Plans are made for one number of rows; others go through the matrix.

@@ -99,9 +99,11 @@ class Record:
 
 
 def find_program(given: str = "") -> str:
-    """Absolute path of fw_run: as given, of FW_RUN, beside this Python, or on the path."""
+    """Absolute path of fw_run: as given, of FW_RUN, of this package, or on the path."""
+    # In a wheel the program itself lies beside the package; what is beside Python only starts it.
+    inside = str(Path(__file__).parents[2] / "fretwear.scripts" / "fw_run")
     beside = str(Path(sys.executable).parent / "fw_run")
-    for candidate in (given, os.environ.get("FW_RUN", ""), beside, "fw_run"):
+    for candidate in (given, os.environ.get("FW_RUN", ""), inside, beside, "fw_run"):
         found = shutil.which(candidate) if candidate else None
         if found:
             return os.path.abspath(found)
