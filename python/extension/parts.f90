@@ -21,8 +21,9 @@ module fw_python_parts
    character(*), parameter :: names = 'mass, stiffness, damping, load/static, load/cosine, '// &
                               'load/sine, load/wave_harmonic, load/wave_power, load/wave, '// &
                               'contact/side_1, contact/side_2, contact/gap, '// &
-                              'contact/depth, contact/mu, observe/matrix, n_springs, '// &
-                              'solver_tolerance'
+                              'contact/depth, contact/mu, contact/normal_load, '// &
+                              'contact/tangential_stiffness, contact/normal_stiffness, '// &
+                              'spring/coefficient, observe/matrix, n_springs, solver_tolerance'
 
 contains
 
@@ -67,6 +68,14 @@ contains
             if (allocated(contact%depth)) values = contact%depth
          case ('contact/mu')
             if (allocated(contact%mu)) values = contact%mu
+         case ('contact/normal_load')
+            if (allocated(contact%normal_load)) values = contact%normal_load
+         case ('contact/tangential_stiffness')
+            if (allocated(contact%tangential_stiffness)) values = contact%tangential_stiffness
+         case ('contact/normal_stiffness')
+            if (allocated(contact%normal_stiffness)) values = contact%normal_stiffness
+         case ('spring/coefficient')
+            if (allocated(case%springs%coefficient)) values = case%springs%coefficient
          case ('n_springs')
             values = [real(case%springs%n_springs, wp)]
          case ('solver_tolerance')

@@ -11,6 +11,8 @@ fretwear.analyses
     Runs of the library in this process.
 fretwear.steps
     A case frequency by frequency.
+fretwear.design
+    Optimisation and calibration of the parameters of a case.
 fretwear.result, fretwear.bifurcation
     Results, and where their stability changes.
 fretwear.importer
@@ -43,6 +45,7 @@ __version__: str = "0.1.0"
 from .analyses import frf, run, wear
 from .bifurcation import Bifurcation
 from .case import Case
+from .design import optimise
 from .errors import (
     AbsentError,
     ConvergenceError,
@@ -57,8 +60,8 @@ from .steps import Point, Steps
 
 __all__ = ["AbsentError", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "FretwearError", "InputError", "Model", "OutputError", "Point",
-           "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "frf", "run",
-           "wear"]
+           "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "frf",
+           "optimise", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -96,12 +96,23 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         case = case.replace(output={"file": os.path.abspath(file)})
     if max_seconds is not None:
         case = case.replace(case={"max_seconds": max_seconds})
-    in_memory = not case.names_output
-    with case.open() as session:
-        tell = _Line() if progress is True else progress or None
-        status, interrupted = _watched(session, tell, is_stopped, in_memory=in_memory)
+    tell = _Line() if progress is True else progress or None
+    try:
+        return _run(case, tell, is_stopped, check=check, in_memory=not case.names_output)
+    finally:
         if isinstance(tell, _Line):
             tell.end()
+
+
+def run_in_memory(case: Case) -> Result:
+    """Run a case, check included, without touching a file, whatever output it names."""
+    return _run(case, None, None, check=True, in_memory=True)
+
+
+def _run(case: Case, tell: _Tell | None, is_stopped: Callable[[], object] | None, *, check: bool,
+         in_memory: bool) -> Result:
+    with case.open() as session:
+        status, interrupted = _watched(session, tell, is_stopped, in_memory=in_memory)
         report = (session.text("remarks") + session.text("summary")).splitlines()
         message, path, image = session.text("message"), session.text("output"), session.image()
     if status not in (NOT_CONVERGED, STOPPED):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
@@ -115,6 +115,22 @@ class Case:
         case = type(self).__new__(type(self))
         case._text, case._path, case._model = self._text, self._path, self._model
         case._overrides = self._overrides + tuple(_settings(groups))
+        return case
+
+    def overridden(self, texts: Iterable[str]) -> Case:
+        """The same case with keys set as `fw_run --set` sets them.
+
+        Parameters
+        ----------
+        texts : iterable of str
+            Such as "sweep%n_points=20".
+        """
+        case = self.replace()
+        for text in texts:
+            key, equals, value = text.partition("=")
+            if not equals or "%" not in key:
+                raise InputError(f"{text!r}: must be group%key=value")
+            case._overrides += ((key.strip(), value.strip()),)
         return case
 
     @property

@@ -25,6 +25,7 @@ COMMANDS = {
     "report": ("report", "one self-contained HTML page of a result file"),
     "export": ("export", "mesh with deformation, contact state and wear, for ParaView"),
     "import": ("importer", "a model file from the matrices of another program"),
+    "optimise": ("design.optimise_command", "parameters that make a quantity smallest or largest"),
     "study": ("study", "a parameter study on all local cores or a cluster"),
 }
 

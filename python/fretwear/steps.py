@@ -142,7 +142,7 @@ class Steps:
         Point
             Converged or not.
         """
-        self._session.solve(float(omega), np.zeros(3, dtype=np.int64))
+        self.advance(omega)
         values = {}
         for name, shape in self._shapes.items():
             try:
@@ -151,3 +151,16 @@ class Steps:
                 continue
             values[name] = flat.reshape(shape)
         return Point(values)
+
+    def advance(self, omega: float) -> bool:
+        """Solve at a frequency [rad/s] as `solve`, and copy nothing but whether it converged."""
+        self._session.solve(float(omega), np.zeros(3, dtype=np.int64))
+        return bool(self._session.point("converged")[0])
+
+    def numbers(self, name: str) -> Floats:
+        """Numbers of the last point by the name of their dataset in a result file, flattened.
+
+        Also of those whose shape the case alone does not tell, such as
+        "sensitivity/largest/contact_mu".
+        """
+        return self._session.point(name)

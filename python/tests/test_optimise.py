@@ -1,0 +1,231 @@
+"""Optima of parameters by exact gradients, against closed forms and differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fretwear as fw
+from fretwear.cli import main
+from fretwear.design import OBJECTIVES, Evaluation
+from fretwear.design.objectives import new_objective
+from fretwear.design.parameters import Unknowns
+from fretwear.errors import ConvergenceError, InputError
+
+#: Oscillator with an elastic friction element, one harmonic, in closed form: the normal load of
+#: the lowest resonance under a force of 0.3, and its amplitude.
+BEST_LOAD, BEST_AMPLITUDE = 0.40320249672597236, 0.7903043939637545
+#: Derivatives against differences of runs whose residuals are 1e-11.
+DIFFERENCES = 2e-6
+
+
+def jenkins(**groups: Any) -> fw.Case:
+    contact = fw.ContactPairs([[1, 0, 0]], mu=1.0, normal_load=0.5, tangential_stiffness=1.0)
+    model = fw.Model([[1.0]], [[0.05]], [[1.0]], contact=contact, cosine=[0.3])
+    return fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 1},
+                   sweep={"start": 0.8, "end": 1.6, "n_points": 41}).replace(**groups)
+
+
+def rubbing(**groups: Any) -> fw.Case:
+    """Two masses, two pairs with unlike values, a spring."""
+    contact = fw.ContactPairs([[1, 0, 0], [2, 0, 0]], mu=[0.4, 0.3], normal_load=[1.0, 0.8],
+                              tangential_stiffness=[1.5, 1.2])
+    model = fw.Model([[1.0, 0.0], [0.0, 2.0]], [[0.06, -0.02], [-0.02, 0.1]],
+                     [[3.0, -2.0], [-2.0, 5.0]], cosine=[0.0, 0.9], contact=contact,
+                     springs=[fw.Spring(side_1=1, coefficient=0.1, power=3)])
+    return fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 3},
+                   sweep={"start": 0.9, "end": 1.6, "n_points": 36}).replace(**groups)
+
+
+@pytest.mark.parametrize("start", [0.06, 0.5, 2.0])
+def test_best_load_of_a_damper(start: float) -> None:
+    told: list[Evaluation] = []
+    found = fw.optimise(jenkins(), minimise="max_amplitude", over="contact%normal_load",
+                        bounds=(0.05, 5.0), start=start, progress=told.append)
+    assert found.converged and found.word == "optimum"
+    assert found.n_evaluations <= 9 and len(told) == len(found.history) == found.n_evaluations
+    assert found.values[0] == pytest.approx(BEST_LOAD, rel=1e-6)
+    assert found.value == pytest.approx(BEST_AMPLITUDE, rel=1e-10)
+    assert abs(found.gradient[0]) < 1e-6 and not found.failures
+    assert "contact%normal_load" in str(found)
+    # The case at the optimum is a case like any other.
+    assert fw.run(found.case).maximum()[1] == pytest.approx(BEST_AMPLITUDE, rel=1e-3)
+
+
+def test_where_all_sticks_the_load_changes_nothing() -> None:
+    """At the start the slope vanishes without being that of an optimum."""
+    found = fw.optimise(jenkins(), minimise="max_amplitude", over="contact%normal_load",
+                        bounds=(0.05, 5.0), start=5.0)
+    assert found.converged and found.values[0] == pytest.approx(BEST_LOAD, rel=1e-6)
+    flat = fw.optimise(jenkins(), minimise="max_amplitude", over="contact%normal_load",
+                       bounds=(20.0, 50.0))
+    assert not flat.converged and "does not depend on the parameters" in flat.word
+
+
+def test_several_parameters() -> None:
+    """Two that are at no bound: the slopes vanish, and neighbours are higher."""
+    case = rubbing(sweep={"start": 0.9, "end": 2.2, "n_points": 53})
+    over = ["contact%normal_load(1)", "contact%normal_load(2)"]
+    found = fw.optimise(case, minimise="max_amplitude[u2]", over=over,
+                        bounds=[(0.1, 10.0), (0.1, 10.0)])
+    assert found.word == "optimum" and np.abs(found.gradient).max() < 1e-6
+    _, evaluate = evaluator(case, "max_amplitude[u2]", over)
+    for step in ([1.02, 1.0], [0.98, 1.0], [1.0, 1.02], [1.0, 0.98]):
+        assert evaluate(found.values * step).value > found.value
+
+
+def test_optimum_at_a_bound() -> None:
+    found = fw.optimise(jenkins(), minimise="max_amplitude", over="contact%normal_load",
+                        bounds=(0.5, 2.0))
+    assert found.converged and found.values[0] == 0.5
+    assert found.word == "optimum at a bound: contact%normal_load at its lower one"
+
+
+def evaluator(case: fw.Case, what: Any, over: list[str], *, factors: bool = False
+              ) -> tuple[Unknowns, Callable[[Any], Evaluation]]:
+    unknowns = Unknowns(case, over, [(1e-6, 1e6)] * len(over), factors=factors)
+    return unknowns, new_objective(what, unknowns, case)
+
+
+def check_gradient(case: fw.Case, what: Any, over: list[str], *, factors: bool = False) -> None:
+    unknowns, evaluate = evaluator(case, what, over, factors=factors)
+    here = unknowns.present
+    found = evaluate(here)
+    for k in range(len(here)):
+        step = np.zeros(len(here))
+        step[k] = 1e-4 * here[k]
+        far = [evaluate(here + m * step).value for m in (-2, -1, 1, 2)]
+        slope = (8 * (far[2] - far[1]) - (far[3] - far[0])) / (12 * step[k])
+        assert found.gradient[k] == pytest.approx(
+            slope, rel=DIFFERENCES, abs=DIFFERENCES * abs(found.value / here[k])), over[k]
+
+
+@pytest.mark.parametrize("what", ["max_amplitude", "max_first_harmonic", "frequency_at_peak",
+                                  "dissipation_at_peak"])
+def test_gradient_at_the_peak(what: str) -> None:
+    check_gradient(rubbing(), f"{what}[u2]", ["contact%normal_load(1)", "load%harmonic_scale"])
+
+
+def test_gradient_of_factors_and_of_other_groups() -> None:
+    check_gradient(rubbing(structure={"modal_damping": 0.01}), "max_amplitude",
+                   ["contact%mu", "model%modal_damping", "spring%coefficient"], factors=True)
+
+
+def test_gradient_at_a_point() -> None:
+    case = rubbing(case={"analysis": "point"}, sweep={"start": 1.3})
+    for what in ("largest[u2]", "first_harmonic", "dissipation"):
+        check_gradient(case, what, ["contact%mu(2)", "contact%tangential_stiffness(1)"])
+
+
+def test_gradient_of_a_function() -> None:
+    """Two points, the squares of the amplitudes of one, friction energy of the other."""
+
+    def cost(found: Any) -> tuple[float, dict[str, Any]]:
+        u, energy = found.value["first_harmonic"], found.value["dissipation"]
+        by_u, by_energy = np.zeros_like(u), np.zeros_like(energy)
+        by_u[0], by_energy[1] = 2.0 * u[0], -0.5
+        return float((u[0]**2).sum() - 0.5 * energy[1]), {"first_harmonic": by_u,
+                                                          "dissipation": by_energy}
+
+    case = rubbing(sweep={"start": 1.2, "end": 1.3, "n_points": 2}, solver={"tolerance": 1e-12})
+    check_gradient(case, cost, ["contact%normal_load", "load%harmonic_scale"], factors=True)
+
+
+def test_what_is_refused() -> None:
+    def refused(match: str, case: fw.Case | None = None, **changes: Any) -> None:
+        arguments: dict[str, Any] = {"minimise": "max_amplitude", "over": "contact%normal_load",
+                                     "bounds": (0.1, 1.0)}
+        with pytest.raises(InputError, match=match):
+            fw.optimise(case or jenkins(), **(arguments | changes))
+
+    refused("no quantity", minimise="amplitude")
+    refused("give one of the two", maximise="max_amplitude")
+    refused("there are no derivatives by it", over="model%mass")
+    refused("lower and a higher", bounds=(1.0, 0.1))
+    refused("not the same everywhere", case=rubbing())
+    refused("there are 1 of", over="contact%normal_load(2)")
+    refused("has no springs", over="spring%coefficient")
+    refused("is of case%analysis = 'point'", minimise="largest")
+    refused("are of the same number", over=["contact%mu", "contact%mu(1)"],
+            bounds=[(0.1, 1), (0.1, 1)])
+    refused("is 0 in the case", over="contact%gap", factors=True)
+    refused("must be group%key", over="contact%mu[1]")
+    assert set(OBJECTIVES) >= {"max_amplitude", "dissipation_at_peak", "largest"}
+
+
+def test_failed_runs_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs fail above 0.45: the optimum below is found, one above is not called one."""
+    from fretwear.design import optimum
+
+    true_objective = new_objective
+
+    def failing(limit: float) -> Any:
+        def make(*arguments: Any) -> Any:
+            evaluate = true_objective(*arguments)
+
+            def guarded(values: Any) -> Evaluation:
+                if values[0] > limit:
+                    raise ConvergenceError("1 of 41 points did not converge")
+                return evaluate(values)
+
+            return guarded
+        return make
+
+    monkeypatch.setattr(optimum, "new_objective", failing(0.45))
+    arguments: dict[str, Any] = {"minimise": "max_amplitude", "over": "contact%normal_load",
+                                 "bounds": (0.05, 5.0)}
+    found = fw.optimise(jenkins(), start=0.3, **arguments)
+    assert found.converged and found.values[0] == pytest.approx(BEST_LOAD, rel=1e-6)
+    assert found.failures and "did not converge" in found.failures[0]
+    assert found.n_evaluations == len(found.history) + len(found.failures)
+    monkeypatch.setattr(optimum, "new_objective", failing(0.35))
+    short = fw.optimise(jenkins(), start=0.3, **arguments)
+    assert not short.converged and short.word.startswith("no optimum")
+    with pytest.raises(ConvergenceError, match="the first run failed"):
+        fw.optimise(jenkins(), start=0.4, **arguments)
+
+
+def test_peak_at_the_end_of_the_sweep_is_said() -> None:
+    _, evaluate = evaluator(jenkins(sweep={"end": 1.1, "n_points": 16}), "max_amplitude",
+                            ["contact%normal_load"])
+    found = evaluate(np.array([0.5]))
+    assert found.omega == pytest.approx(1.1) and any("end of the sweep" in t for t in found.remarks)
+
+
+def test_a_jump_is_no_peak() -> None:
+    """A hardening spring: the response falls, or is lost, where the upper branch ends."""
+    model = fw.Model([[1.0]], [[0.05]], [[1.0]], cosine=[0.3],
+                     springs=[fw.Spring(side_1=1, coefficient=0.5, power=3)])
+    case = fw.Case(model, harmonics={"n_harmonics": 3},
+                   sweep={"start": 0.5, "end": 3.5, "n_points": 121})
+    with pytest.raises(ConvergenceError, match="the first run failed"):
+        fw.optimise(case, minimise="max_amplitude", over="spring%coefficient", bounds=(0.1, 1.0))
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "case.nml"
+    path.write_text("""&case analysis = 'frf' /
+&model n_dof = 1 mass = 1.0 stiffness = 1.0 damping = 0.05 /
+&contact n_pairs = 1 law = 'penalty' side_1 = 1, 0, 0 mu = 1.0 normal_load = 0.5
+   tangential_stiffness = 1.0 /
+&load cosine = 0.3 /
+&harmonics n_harmonics = 1 /
+&sweep start = 0.8 end = 1.6 n_points = 21 /
+""")
+    best = tmp_path / "best.nml"
+    assert main(["optimise", str(path), "--minimise", "max_amplitude", "--over",
+                 "contact%normal_load", "--bounds", "0.05", "5", "--set", "sweep%n_points=41", "-o",
+                 str(best)]) == 0
+    text = capsys.readouterr().out
+    assert "0.40320249" in text and "0.790304394" in text and "evaluations" in text
+    assert fw.Case.from_file(best).namelist() == best.read_text()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["best.nml", "case.nml"]
+    assert main(["optimise", str(path), "--over", "contact%mu", "--bounds", "1", "2"]) == 3
+    assert main(["optimise", str(path), "--minimise", "max_amplitude"]) == 3
+    assert main(["optimise", str(path), "--minimise", "max_amplitude", "--over",
+                 "contact%normal_load", "--bounds", "20", "50", "-q"]) == 4
+    assert main(["optimise", "--quantities"]) == 0
