@@ -19,7 +19,7 @@ from .steps import Point, Steps
 if TYPE_CHECKING:
     from .result import Result
 
-__all__ = ["Cycle", "read_cycle"]
+__all__ = ["Cycle", "read_cycle", "read_peak_cycle"]
 
 Floats = NDArray[np.float64]
 
@@ -49,11 +49,24 @@ class Cycle:
     displacement, force : (n_time + 1, n_pairs, 3)
         Relative displacement [length] and contact force [force] in (t1, t2, n), as the law gives
         them.
+    pairs : (n_pairs,)
+        Which pairs these are, from 0: all, but at the peak.
+    frequency : float
+        [Hz]
     """
 
     degrees: Floats
     displacement: Floats
     force: Floats
+    pairs: NDArray[np.int64]
+    frequency: float
+
+
+def read_peak_cycle(result: Result) -> Cycle:
+    """One period at the highest peak of the pairs that dissipate most; see `Result.peak_cycle`."""
+    omega = result["peak/cycle/omega"]
+    return _closed(result["peak/cycle/relative_displacement"], result["peak/cycle/force"],
+                   float(omega[0]), result["peak/cycle/pair"])
 
 
 def read_cycle(result: Result, point: int) -> Cycle:
@@ -62,7 +75,7 @@ def read_cycle(result: Result, point: int) -> Cycle:
         displacement = result["history/relative_displacement"][point]
         force = result["history/force"][point]
         if np.isfinite(force).all():
-            return _closed(displacement, force)
+            return _closed(displacement, force, result.omega[point])
     if not result.converged[point]:
         raise AbsentError(f"{result.name}: point {point + 1} has not converged: it has no period "
                           "to show")
@@ -73,13 +86,17 @@ def read_cycle(result: Result, point: int) -> Cycle:
         raise
     except FretwearError as error:
         raise AbsentError(_excuse(result, point, str(error))) from None
-    return _closed(solved["history/relative_displacement"], solved["history/force"])
+    return _closed(solved["history/relative_displacement"], solved["history/force"],
+                   result.omega[point])
 
 
-def _closed(displacement: Floats, force: Floats) -> Cycle:
+def _closed(displacement: Floats, force: Floats, omega: float,
+            pairs: NDArray[np.int64] | None = None) -> Cycle:
     return Cycle(np.linspace(0.0, 360.0, len(force) + 1),
                  np.concatenate((displacement, displacement[:1])),
-                 np.concatenate((force, force[:1])))
+                 np.concatenate((force, force[:1])),
+                 np.arange(force.shape[1]) if pairs is None else pairs,
+                 omega / (2.0 * np.pi))
 
 
 def _excuse(result: Result, point: int, why: str) -> str:

@@ -13,7 +13,7 @@ from ._native import namelist_values
 from ._notebook import result_dataset, result_html
 from .bifurcation import Bifurcation, read_bifurcations
 from .case import Case
-from .cycle import Cycle, read_cycle
+from .cycle import Cycle, read_cycle, read_peak_cycle
 from .errors import AbsentError, InputError, OutputError
 from .nonlinear_mode import NonlinearMode, read_mode
 from .peaks import Peak, read_peaks
@@ -169,6 +169,18 @@ class Result(ResultFile):
         if point not in self._cycles:
             self._cycles[point] = read_cycle(self, point)
         return self._cycles[point]
+
+    @property
+    def peak_cycle(self) -> Cycle:
+        """One period at the peak of the first observed quantity, of the six pairs that dissipate
+        most there; every sweep keeps it.
+
+        Raises
+        ------
+        AbsentError
+            The run was no sweep with contact, or has not come to its end.
+        """
+        return read_peak_cycle(self)
 
     def __repr__(self) -> str:
         points = f"{len(self.omega)} points, " if "omega" in self else ""

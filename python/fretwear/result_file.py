@@ -42,6 +42,7 @@ _REMEDIES = {
     "synthesis/": "run case%analysis = 'mode' with mode%synthesis",
     "modes/": "run with case%analysis = 'modes'",
     "sensitivity/": "run with sensitivity%parameters",
+    "peak/cycle/": "run a sweep with contact with this version of fretwear",
     "peak/": "run a sweep (case%analysis = 'frf') with this version of fretwear",
     "observed/": "name what to observe in output%observe",
 }

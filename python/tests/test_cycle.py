@@ -91,20 +91,68 @@ def test_wear_shows_the_law_of_the_worn_joint(tmp_path: Path) -> None:
     assert (tangential <= 0.5 * -force[..., 2] + ROUNDING * tangential.max()).all()
 
 
+@pytest.mark.parametrize("groups", [
+    {}, {"harmonics": {"n_time": 512}}, {"harmonics": {"method": "tcm"}},
+    {"harmonics": {"adaptive": True}}, {"harmonics": {"accuracy": 1e-2, "n_harmonics": 31}},
+    {"contact": {"memory": "carried", "law": "dlft"}}, {"sweep": {"continuation": "arclength"}},
+    {"case": {"analysis": "time"}, "time": {"steps_per_period": 400}}], ids=str)
+def test_a_sweep_keeps_the_period_of_its_peak(groups: dict[str, object]) -> None:
+    """The loops of the reported maximum are those of the law, and enclose what is dissipated
+    there."""
+    result = sweep(**groups)
+    cycle = result.peak_cycle
+    omega, height = result.maximum()
+    assert 2.0 * np.pi * cycle.frequency == pytest.approx(omega, rel=1e-6)
+    assert np.abs(cycle.displacement[:, 0, 0]).max() == pytest.approx(height, rel=1e-3)
+    assert np.abs(cycle.force[:, 0, 0]).max() == pytest.approx(LIMIT, rel=1e-9)
+    # It slips all the way: 4 mu N times the amplitude.
+    work = np.trapezoid(cycle.force[:, 0, 0], cycle.displacement[:, 0, 0])
+    assert work == pytest.approx(4.0 * LIMIT * height, rel=3e-2)
+    (line,) = plot_hysteresis(result).axes[0].lines
+    assert np.array_equal(line.get_ydata(), cycle.force[:, 0, 0])
+    upper, lower = plot_cycle(result).axes
+    assert np.abs(upper.lines[0].get_ydata()).max() == pytest.approx(height, rel=1e-3)
+    assert np.array_equal(lower.lines[0].get_ydata(), cycle.displacement[:, 0, 0])
+
+
+def test_the_pairs_kept_dissipate_most() -> None:
+    """Of seven rubbing masses, in the order of what they dissipate at the peak."""
+    n = 7
+    model = fw.Model(np.eye(n), 0.05 * np.eye(n), np.diag(np.linspace(1.0, 1.3, n)),
+                     cosine=np.linspace(1.0, 0.4, n), observe={"x": 4},
+                     contact=fw.ContactPairs([[j + 1, 0, 0] for j in range(n)], mu=0.3,
+                                             normal_load=0.5))
+    result = fw.run(fw.Case(model, harmonics={"n_harmonics": 5},
+                            contact={"law": "penalty", "tangential_stiffness": 5.0},
+                            sweep={"start": 0.7, "end": 1.6, "n_points": 10}))
+    cycle = result.peak_cycle
+    work = np.trapezoid(cycle.force[..., 0], cycle.displacement[..., 0], axis=0)
+    assert len(cycle.pairs) == 6 and (np.diff(work) <= 0.0).all()
+    again = fw.run(result.case.replace(sweep={"start": 2.0 * np.pi * cycle.frequency, "end": 2.0,
+                                              "n_points": 2}))
+    assert work == pytest.approx(again.dissipation[0][cycle.pairs], rel=1e-2)
+    assert (again.dissipation[0][cycle.pairs].min()
+            >= np.delete(again.dissipation[0], cycle.pairs).max())
+    titles = [axes.get_title().split(",")[0] for axes in plot_hysteresis(result).axes]
+    assert titles == [f"pair {pair + 1}" for pair in sorted(cycle.pairs)]
+
+
 def test_where_the_law_cannot_be_had_it_is_said(tmp_path: Path) -> None:
     """No series in its place, in pictures and in the report."""
     result = sweep()
-    point = result.peak()
     saved = fw.Result(result.save(tmp_path / "rubbing.h5").path)  # another program reads it
     with pytest.raises(fw.AbsentError, match="its model was in the memory"):
-        saved.cycle(point)
+        saved.cycle(0)
     with pytest.raises(fw.AbsentError, match="its model was in the memory"):
-        plot_hysteresis(saved)
+        plot_hysteresis(saved, 0)
     with pytest.raises(fw.AbsentError, match="its model was in the memory"):
-        plot_cycle(saved)
-    page = re.sub(r"data:image[^\"]*", "", render_report(saved, Choices()))
+        plot_cycle(saved, 0)
+    page = re.sub(r"data:image[^\"]*", "", render_report(saved, Choices(point=0)))
     assert page.count("its model was in the memory") == 2  # loops, cycle
     assert "Frequency response" in page
+    # At the peak they are kept.
+    assert "its model was in the memory" not in re.sub(
+        r"data:image[^\"]*", "", render_report(saved, Choices()))
     with pytest.raises(fw.InputError, match="must be an integer from 0 to 8"):
         result.cycle(9)
 

@@ -1,6 +1,7 @@
 !> What is known of one solution point; results leave the library as a list of these.
 module fw_point
    use fw_kinds, only: wp
+   use fw_pair_cycle, only: pair_cycle
    use fw_stability_verdict, only: verdict_undecided
    implicit none (type, external)
    private
@@ -85,6 +86,8 @@ module fw_point
       !> Contact forces and relative displacements over one period, only when asked for
       !> (3, n_pairs, n_time).
       real(wp), allocatable :: force_history(:, :, :), slip_history(:, :, :)
+      !> The same of the pairs that dissipate most, only when asked for.
+      type(pair_cycle), allocatable :: cycle
       !> Instants of a period that its forces ask for, where they had fewer; else 0.
       integer :: instants_wanted = 0
       !> Derivatives by parameters, only when asked for; NaN where there is none, as at a fold.

@@ -17,6 +17,7 @@ module fw_branch
    use fw_continuation, only: branch_point
    use fw_crossing_search, only: probe_type
    use fw_crossing_search, only: search_crossings
+   use fw_cycle_recovery, only: recover_cycle
    use fw_error, only: error_type
    use fw_formulation, only: formulation_type
    use fw_balance_problem, only: balance_problem
@@ -81,6 +82,9 @@ module fw_branch
       !> The first row, and the last point of the curve.
       type(point_type) :: first_row
       type(branch_point), private :: before
+      !> The solution of the largest amplitude of the first observed quantity.
+      type(branch_point), private :: highest
+      real(wp), private :: height = 0.0_wp
       !> Where it turns and where its stability changes, and the solutions made to find out.
       type(bifurcation_list) :: bifurcations
       integer :: n_solved = 0, iterations = 0
@@ -99,6 +103,7 @@ module fw_branch
       procedure :: note
       procedure :: point_along
       procedure :: closing_words
+      procedure :: at_highest
       final :: release
    end type branch_type
 
@@ -337,9 +342,7 @@ contains
       if (allocated(error)) return
       if (point%fold) then
          ! One just beyond a bound belongs to no point of the sweep.
-         if ((point%omega - case%sweep%start)*(point%omega - case%sweep%end) <= 0.0_wp) then
-            call add_fold(self, found, point)
-         end if
+         if (is_within(case, point%omega)) call add_fold(self, found, point)
          self%has_fold = .true.
          return
       end if
@@ -389,6 +392,14 @@ contains
       self%n_solved = self%n_solved + 1
       self%iterations = self%iterations + point%iterations
    end subroutine solve_peak
+
+   !> Whether a frequency lies in the range of the sweep.
+   pure logical function is_within(case, omega)
+      type(case_type), intent(in) :: case
+      real(wp), intent(in) :: omega
+
+      is_within = (omega - case%sweep%start)*(omega - case%sweep%end) <= 0.0_wp
+   end function is_within
 
    !> A place that would not settle may be one of round-off: it is left open.
    subroutine add_fold(self, found, point)
@@ -523,11 +534,8 @@ contains
       real(wp), allocatable :: coefficients(:)
 
       ! A fold is located by steps of its own: the system may stand at another frequency.
-      call self%system%set_frequency(found%p, error)
+      call stand_at(self, found, coefficients, error)
       if (allocated(error)) return
-      allocate (coefficients(size(found%x)))
-      call self%formulation%to_coefficients(found%x, coefficients)
-      call self%system%residual(coefficients, self%r)
       point%omega = found%p
       point%converged = found%report%converged
       if (point%converged) point%converged = is_lasting(self%system) .and. .not. &
@@ -542,6 +550,7 @@ contains
          call recover_histories(self%system, size(self%system%balance, 1), coefficients, &
                                 case%harmonics%n_harmonics, point)
       end if
+      if (point%converged .and. is_within(case, found%p)) call note_height(self, found, point)
       if (point%converged .and. with_stability) then
          call self%stability%find(case, self%system, coefficients, point, error)
       end if
@@ -550,6 +559,50 @@ contains
       end if
       if (.not. allocated(error)) call self%point_along(case, found, point, error)
    end subroutine describe
+
+   !> Evaluate the system at a point of the curve.
+   subroutine stand_at(self, found, coefficients, error)
+      type(branch_type), intent(inout) :: self
+      type(branch_point), intent(in) :: found
+      real(wp), allocatable, intent(out) :: coefficients(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%system%set_frequency(found%p, error)
+      if (allocated(error)) return
+      allocate (coefficients(size(found%x)))
+      call self%formulation%to_coefficients(found%x, coefficients)
+      call self%system%residual(coefficients, self%r)
+   end subroutine stand_at
+
+   !> Keep the solution of the largest amplitude.
+   pure subroutine note_height(self, found, point)
+      type(branch_type), intent(inout) :: self
+      type(branch_point), intent(in) :: found
+      type(point_type), intent(in) :: point
+
+      if (size(point%amplitude) == 0) return
+      if (point%amplitude(1) <= self%height) return
+      self%height = point%amplitude(1)
+      self%highest = found
+   end subroutine note_height
+
+   !> That solution with one period of the pairs that dissipate most; not converged where there is
+   !> none.
+   subroutine at_highest(self, case, point, error)
+      class(branch_type), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: coefficients(:)
+
+      if (.not. (allocated(self%highest%x) .and. case%output%contact)) return
+      call stand_at(self, self%highest, coefficients, error)
+      if (allocated(error)) return
+      point%omega = self%highest%p
+      point%converged = .true.
+      call recover_point(self%system, coefficients, case%harmonics%n_harmonics, .true., point)
+      call recover_cycle(self%system, size(self%system%balance, 1), coefficients, point)
+   end subroutine at_highest
 
    !> The direction of the branch at a point, by a difference along the tangent: observed
    !> quantities follow from unknowns and frequency, nothing is solved for.

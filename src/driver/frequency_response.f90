@@ -14,6 +14,7 @@ module fw_frequency_response
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
    use fw_peak, only: peak_type
+   use fw_peak_cycle, only: cycle_keeper
    use fw_peak_finder, only: peak_finder
    use fw_remarks, only: is_shaken
    use fw_remarks, only: is_undamped
@@ -22,6 +23,7 @@ module fw_frequency_response
    use fw_remarks, only: remark_range
    use fw_remarks, only: remark_stability
    use fw_result, only: result_writer
+   use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_sinks, only: observer_sink
    use fw_sinks, only: sink_list
@@ -59,6 +61,7 @@ contains
       type(observer_sink), target :: to_observer
       type(peak_finder), target :: finder
       type(sweep_bifurcations), target :: changes
+      type(cycle_keeper), target :: keeper
       type(sink_list) :: sinks
 
       call new_strategy(case, strategy)
@@ -81,6 +84,7 @@ contains
             call finder%start(case, source%omega, source, strategy, observer)
             ! It keeps the rows that a search after them may need.
             call sinks%add(finder)
+            call sinks%add(keeper)
             call remark_range(case, finder%modes, summary%remarks)
             if (case%analysis == analysis_frf .and. case%sweep%stability .and. finder%in_order) then
                call changes%start(source, strategy, observer)
@@ -101,7 +105,7 @@ contains
       if (.not. case%sweep%refine) call describe(case, strategy, observer, state, summary, error)
       ! A run that was stopped is not made longer by a search.
       if (.not. (allocated(error) .or. state%was_stopped)) then
-         call find_peaks(case, source, finder, writer, summary, error)
+         call find_peaks(case, source, finder, strategy, observer, keeper, writer, summary, error)
          if (.not. allocated(error)) call changes%search(case, error)
          if (.not. allocated(error)) call add_rows(case, finder, sinks, writer, state, error)
          call note_stop(observer, state, error)
@@ -191,28 +195,38 @@ contains
    end subroutine note_stop
 
    !> The maxima between the rows go to the result and the summary.
-   subroutine find_peaks(case, source, finder, writer, summary, error)
+   subroutine find_peaks(case, source, finder, strategy, observer, keeper, writer, summary, error)
       type(case_type), intent(in) :: case
-      class(point_source), intent(in) :: source
+      class(point_source), intent(inout) :: source
       type(peak_finder), intent(inout) :: finder
+      class(point_strategy), intent(inout), target :: strategy
+      class(observer_type), intent(inout), target :: observer
+      type(cycle_keeper), intent(inout) :: keeper
       type(result_writer), intent(inout) :: writer
       type(summary_type), intent(inout) :: summary
       type(error_type), allocatable, intent(out) :: error
       type(peak_type), allocatable :: peaks(:)
+      type(point_type) :: highest
 
       select type (source)
       type is (branch_source)
          call source%branch%peaks%list(source%branch%first_row, peaks)
+         call source%branch%at_highest(case, highest, error)
+         if (.not. allocated(error)) call keeper%take(highest, error)
+         if (allocated(error)) return
          call summary%describe_peaks(peaks, source%branch%peaks%n_solved, &
                                      source%branch%peaks%iterations)
       class default
          call finder%search(case, error)
          if (allocated(error)) return
          call finder%peaks(peaks)
+         call keeper%solve_at_peak(case, finder, strategy, observer, peaks, error)
+         if (allocated(error)) return
          call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
       end select
       call remark_peaks(peaks, case%model%observe_name, is_undamped(case), summary%remarks)
-      call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, error)
+      call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, &
+                            keeper%omega, keeper%cycle, error)
    end subroutine find_peaks
 
    !> How the case wants its points solved.

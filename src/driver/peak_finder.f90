@@ -17,20 +17,14 @@ module fw_peak_finder
    use fw_joint_modes, only: joint_mode_type
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
-   use fw_peak, only: found_bound
-   use fw_peak, only: found_jump
-   use fw_peak, only: found_row
-   use fw_peak, only: found_search
-   use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
    use fw_peak_rules, only: find_edge
    use fw_peak_rules, only: find_next
    use fw_peak_rules, only: highest_of
    use fw_peak_rules, only: is_bound
    use fw_peak_rules, only: is_maximum
-   use fw_peak_rules, only: lies_on_jump
+   use fw_peak_rules, only: list_peaks
    use fw_peak_rules, only: place_of_highest
-   use fw_peak_rules, only: width_of
    use fw_point, only: point_type
    use fw_samples, only: balance_point
    use fw_samples, only: new_sample
@@ -89,6 +83,7 @@ module fw_peak_finder
       procedure :: take
       procedure :: search
       procedure :: peaks
+      procedure :: go_to
       procedure :: clear
    end type peak_finder
 
@@ -468,54 +463,21 @@ contains
    subroutine peaks(self, list)
       class(peak_finder), intent(in) :: self
       type(peak_type), allocatable, intent(out) :: list(:)
-      type(peak_type), allocatable :: found(:)
-      integer :: i, k, n
 
-      allocate (list(0))
-      n = self%samples%n
-      if (n == 0) return
-      allocate (found(n*size(self%samples%item(1)%at%amplitude)))
-      n = 0
-      do i = 1, size(self%samples%item(1)%at%amplitude)
-         do k = 1, self%samples%n
-            if (.not. (is_maximum(self%samples, k, i) .or. is_bound(self%samples, k, i))) cycle
-            if (.not. allocated(self%samples%item(k)%at%coefficients)) cycle
-            n = n + 1
-            found(n) = describe(self, k, i)
-         end do
-      end do
-      deallocate (list)
-      allocate (list(n))
-      do k = 1, n
-         list(k) = found(k)
-      end do
+      call list_peaks(self%samples, self%failed, list)
    end subroutine peaks
 
-   !> What is known of a maximum.
-   function describe(self, k, i) result(peak)
-      class(peak_finder), intent(in) :: self
-      integer, intent(in) :: k, i
-      type(peak_type) :: peak
-      real(wp) :: omega, promise
-      logical :: done
+   !> Go on from the sample that is nearest to a frequency; `found` where there is one.
+   subroutine go_to(self, omega, found)
+      class(peak_finder), intent(inout) :: self
+      real(wp), intent(in) :: omega
+      logical, intent(out) :: found
+      integer :: place
 
-      associate (at => self%samples%item(k)%at)
-         peak%observed = i
-         peak%omega = at%omega
-         peak%amplitude = at%amplitude(i)
-         peak%coefficients = at%coefficients(:, i)
-         peak%bandwidth = width_of(self%samples, k, i)
-         peak%found_by = found_bound
-         if (k == 1 .or. k == self%samples%n) return
-         call find_next(self%samples, k, i, omega, promise, done)
-         peak%found_by = merge(found_row, found_search, at%row > 0)
-         if (lies_on_jump(self%samples, k, i)) peak%found_by = found_jump
-         if (.not. done .or. any(self%failed > self%samples%item(k - 1)%at%omega .and. &
-                                 self%failed < self%samples%item(k + 1)%at%omega)) then
-            peak%found_by = found_unresolved
-         end if
-      end associate
-   end function describe
+      place = nearest_to(self%samples, omega)
+      found = place > 0
+      if (found) call self%strategy%recall(self%samples%item(place)%at%memory)
+   end subroutine go_to
 
    !> Samples stand behind pointers.
    subroutine clear(self)

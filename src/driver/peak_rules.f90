@@ -2,6 +2,12 @@
 !> well enough, where to look next, and how wide it is.
 module fw_peak_rules
    use fw_kinds, only: wp
+   use fw_peak, only: found_bound
+   use fw_peak, only: found_jump
+   use fw_peak, only: found_row
+   use fw_peak, only: found_search
+   use fw_peak, only: found_unresolved
+   use fw_peak, only: peak_type
    use fw_samples, only: sample_list
    use fw_samples, only: sample_type
    use fw_samples, only: swing_of
@@ -10,7 +16,7 @@ module fw_peak_rules
    private
 
    public :: is_maximum, is_bound, highest_of, place_of_highest
-   public :: find_next, width_of, find_edge, lies_on_jump, negligible
+   public :: find_next, find_edge, negligible, list_peaks
 
    !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
    real(wp), parameter :: round_off = 1.0e-7_wp
@@ -223,5 +229,62 @@ contains
       inside = merge(2, samples%n - 1, k == 1)
       is_bound = samples%item(k)%at%amplitude(i) >= samples%item(inside)%at%amplitude(i)
    end function is_bound
+
+   !> The maxima of every quantity by ascending frequency, and the ends of the range where the
+   !> amplitude still rises.
+   subroutine list_peaks(samples, failed, list)
+      type(sample_list), intent(in) :: samples
+      !> Frequencies at which rows failed [rad/s].
+      real(wp), intent(in) :: failed(:)
+      type(peak_type), allocatable, intent(out) :: list(:)
+      type(peak_type), allocatable :: found(:)
+      integer :: i, k, n
+
+      allocate (list(0))
+      n = samples%n
+      if (n == 0) return
+      allocate (found(n*size(samples%item(1)%at%amplitude)))
+      n = 0
+      do i = 1, size(samples%item(1)%at%amplitude)
+         do k = 1, samples%n
+            if (.not. (is_maximum(samples, k, i) .or. is_bound(samples, k, i))) cycle
+            if (.not. allocated(samples%item(k)%at%coefficients)) cycle
+            n = n + 1
+            found(n) = describe(samples, failed, k, i)
+         end do
+      end do
+      deallocate (list)
+      allocate (list(n))
+      do k = 1, n
+         list(k) = found(k)
+      end do
+   end subroutine list_peaks
+
+   !> What is known of a maximum.
+   function describe(samples, failed, k, i) result(peak)
+      type(sample_list), intent(in) :: samples
+      real(wp), intent(in) :: failed(:)
+      integer, intent(in) :: k, i
+      type(peak_type) :: peak
+      real(wp) :: omega, promise
+      logical :: done
+
+      associate (at => samples%item(k)%at)
+         peak%observed = i
+         peak%omega = at%omega
+         peak%amplitude = at%amplitude(i)
+         peak%coefficients = at%coefficients(:, i)
+         peak%bandwidth = width_of(samples, k, i)
+         peak%found_by = found_bound
+         if (k == 1 .or. k == samples%n) return
+         call find_next(samples, k, i, omega, promise, done)
+         peak%found_by = merge(found_row, found_search, at%row > 0)
+         if (lies_on_jump(samples, k, i)) peak%found_by = found_jump
+         if (.not. done .or. any(failed > samples%item(k - 1)%at%omega .and. &
+                                 failed < samples%item(k + 1)%at%omega)) then
+            peak%found_by = found_unresolved
+         end if
+      end associate
+   end function describe
 
 end module fw_peak_rules

@@ -6,6 +6,7 @@ module fw_point_solver
    use fw_case, only: case_type
    use fw_interrupt, only: stop_run
    use fw_contact_data, only: memory_carried
+   use fw_cycle_recovery, only: recover_cycle
    use fw_error, only: error_type
    use fw_guess, only: free_guess
    use fw_guess, only: stuck_guess
@@ -145,6 +146,7 @@ contains
          call recover_histories(system, size(system%balance, 1), self%x, &
             self%method%harmonics%n_harmonics, point)
       end if
+      if (request%cycle) call recover_cycle(system, size(system%balance, 1), self%x, point)
       if (report%converged .and. request%stability) then
          call self%stability%find(case, system, self%x, point, error)
          if (allocated(error)) return

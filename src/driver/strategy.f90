@@ -1,7 +1,9 @@
 !> How the point at a frequency is solved: with the harmonics of the case, with as many as it needs,
 !> to a given accuracy, or by integration in time.
 module fw_strategy
+   use fw_case, only: analysis_time
    use fw_case, only: case_type
+   use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
@@ -13,6 +15,7 @@ module fw_strategy
    private
 
    public :: point_strategy, point_request, new_request, note_time_limit, solver_memory
+   public :: keeps_cycles
 
    !> What is asked of a point.
    type :: point_request
@@ -22,6 +25,8 @@ module fw_strategy
       logical :: fallback = .true.
       !> Floquet multipliers; contact forces, states and energies; histories over the period.
       logical :: stability = .false., contact = .false., histories = .false.
+      !> One period of the pairs that dissipate most.
+      logical :: cycle = .false.
       !> What may end the work on it; null where nothing does.
       class(interrupt_type), pointer :: interrupt => null()
       !> Derivatives by parameters.
@@ -147,7 +152,17 @@ contains
       request%stability = case%sweep%stability
       request%contact = case%output%contact
       request%histories = case%output%histories
+      request%cycle = keeps_cycles(case)
       request%sensitivity = case%sensitivity%is_wanted()
    end function new_request
+
+   !> Whether every point keeps one period of its pairs: where none could be solved again, as it
+   !> depends on those before or takes too long.
+   pure logical function keeps_cycles(case)
+      type(case_type), intent(in) :: case
+
+      keeps_cycles = case%output%contact .and. case%contact%n_pairs > 0 .and. &
+                     (case%contact%memory == memory_carried .or. case%analysis == analysis_time)
+   end function keeps_cycles
 
 end module fw_strategy

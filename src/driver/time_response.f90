@@ -9,6 +9,7 @@ module fw_time_response
    use fw_kinds, only: wp
    use fw_case, only: analysis_frf
    use fw_case, only: case_type
+   use fw_cycle_recovery, only: cycle_of_histories
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -141,6 +142,7 @@ contains
                              case%harmonics%n_harmonics, point, error, request%interrupt)
       if (allocated(error)) return
       ! The integration leaves all; the request says what of it a row has.
+      if (request%cycle) call cycle_of_histories(point)
       if (.not. request%histories) then
          deallocate (point%history)
          if (allocated(point%force_history)) deallocate (point%force_history, point%slip_history)

@@ -7,6 +7,7 @@ module fw_peak_group
    use fw_hdf5, only: write_attribute
    use fw_hdf5, only: write_dataset
    use fw_kinds, only: wp
+   use fw_pair_cycle, only: pair_cycle
    use fw_peak, only: found_words
    use fw_peak, only: peak_type
    use fw_result_labels, only: label_dataset
@@ -14,7 +15,7 @@ module fw_peak_group
    implicit none (type, external)
    private
 
-   public :: write_peaks
+   public :: write_peaks, write_peak_cycle
 
 contains
 
@@ -84,5 +85,29 @@ contains
       end subroutine label
 
    end subroutine write_peaks
+
+   !> One period at the highest peak of the pairs that dissipate most.
+   subroutine write_peak_cycle(file, omega, cycle, unit_system, error)
+      type(hdf5_file), intent(in) :: file
+      !> [rad/s]
+      real(wp), intent(in) :: omega
+      type(pair_cycle), intent(in) :: cycle
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      call write_dataset(file, '/peak/cycle/omega', [omega], error)
+      if (allocated(error)) return
+      ! Counted from 0 in a file.
+      call write_dataset(file, '/peak/cycle/pair', cycle%pair - 1, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/cycle/relative_displacement', cycle%displacement, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/cycle/force', cycle%force, error)
+      if (.not. allocated(error)) call label_dataset(file, '/peak/cycle/omega', unit_system, error)
+      if (.not. allocated(error)) call label_dataset(file, '/peak/cycle/pair', unit_system, error)
+      if (.not. allocated(error)) call label_dataset(file, '/peak/cycle/relative_displacement', &
+                                                     unit_system, error)
+      if (.not. allocated(error)) call label_dataset(file, '/peak/cycle/force', unit_system, error)
+   end subroutine write_peak_cycle
 
 end module fw_peak_group

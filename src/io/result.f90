@@ -25,6 +25,8 @@ module fw_result
    use fw_mode_group, only: mode_table
    use fw_mode_group, only: write_mode
    use fw_peak, only: peak_type
+   use fw_pair_cycle, only: pair_cycle
+   use fw_peak_group, only: write_peak_cycle
    use fw_peak_group, only: write_peaks
    use fw_point, only: point_type
    use fw_result_labels, only: label_dataset
@@ -147,18 +149,25 @@ contains
    end subroutine copy_points
 
    !> What is known of the maxima of the response.
-   subroutine add_peaks(self, peaks, n_harmonics, unit_system, error)
+   subroutine add_peaks(self, peaks, n_harmonics, unit_system, omega, cycle, error)
       class(result_writer), intent(inout) :: self
       type(peak_type), intent(in) :: peaks(:)
       !> Of the case.
       integer, intent(in) :: n_harmonics
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
+      !> One period of the pairs at the highest of them, where it is known, and its frequency
+      !> [rad/s].
+      real(wp), intent(in) :: omega
+      type(pair_cycle), allocatable, intent(in) :: cycle
       type(error_type), allocatable, intent(out) :: error
 
       if (self%file%id < 0) return
       !$omp critical (fretwear_io)
       call write_peaks(self%file, peaks, n_harmonics, unit_system, error)
+      if (allocated(cycle) .and. .not. allocated(error)) then
+         call write_peak_cycle(self%file, omega, cycle, unit_system, error)
+      end if
       !$omp end critical (fretwear_io)
    end subroutine add_peaks
 

@@ -36,6 +36,12 @@ module fw_result_labels
       label_type('/peak/coefficients', '<length>', 'peak coefficient', &
                  'Fourier coefficients 0, c1, s1, ... of the quantity'), &
       label_type('/peak/observed', '', 'peak', 'observed quantity, its column from 0'), &
+      label_type('/peak/cycle/omega', 'rad/s', 'one', 'angular frequency of this period'), &
+      label_type('/peak/cycle/pair', '', 'cycle_pair', 'pairs that dissipate most, from 0'), &
+      label_type('/peak/cycle/relative_displacement', '<length>', &
+                 'time cycle_pair component', 'relative displacement (t1, t2, n)'), &
+      label_type('/peak/cycle/force', '<force>', 'time cycle_pair component', &
+                 'contact force (t1, t2, n), as the law gives it'), &
       label_type('/peak/found_by', '', 'peak', 'how it was found, an index into names'), &
       label_type('/bifurcation/omega', 'rad/s', 'bifurcation', 'angular frequency of the place'), &
       label_type('/bifurcation/error', 'rad/s', 'bifurcation', &

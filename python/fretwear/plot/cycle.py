@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ..cycle import Cycle
 from ..errors import InputError
@@ -28,22 +29,39 @@ from .style import (
 
 __all__ = ["plot_cycle", "plot_harmonics", "plot_hysteresis"]
 
+Floats = NDArray[np.float64]
+
 #: Instants of a period of an observed quantity.
 _INSTANTS = 256
 #: Pairs drawn unless others are asked for.
 _MOST_PAIRS = 6
 
 
+def _cycle_of(result: Result, point: int | None, pairs: Sequence[int] | None) -> Cycle:
+    """One period: at a point, or without one at the peak, where every sweep keeps the pairs that
+    dissipate most; with `histories`, or for other pairs, at the point of the largest amplitude."""
+    if point is None and "peak/cycle/force" in result and "history/force" not in result:
+        kept = result.peak_cycle
+        if pairs is None or set(pairs) <= set(kept.pairs.tolist()):
+            return kept
+    return result.cycle(choose_point(result, None) if point is None else point)
+
+
 def _chosen(result: Result, cycle: Cycle, point: int, pairs: Sequence[int] | None) -> list[int]:
-    """Pairs to draw: those asked for (from 0), or those that dissipate most."""
+    """Places in a cycle of the pairs to draw: those asked for (from 0), or those that dissipate
+    most."""
+    there = cycle.pairs.tolist()
     if pairs is not None:
-        wrong = [pair + 1 for pair in pairs if not 0 <= pair < cycle.force.shape[1]]
+        wrong = [pair + 1 for pair in pairs if pair not in there]
         if wrong:
-            raise InputError(f"{result.name}: pair {wrong[0]}: there are {cycle.force.shape[1]}, "
+            raise InputError(f"{result.name}: pair {wrong[0]}: there are {len(there)}, "
                              "counted from 1")
-        return list(pairs)
+        return [there.index(pair) for pair in pairs]
+    if len(there) < result.dissipation.shape[1]:
+        # Kept are those that dissipate most already.
+        return sorted(range(len(there)), key=there.__getitem__)
     order = np.argsort(-result.dissipation[point], kind="stable")
-    return sorted(int(pair) for pair in order[:_MOST_PAIRS])
+    return [there.index(pair) for pair in sorted(order[:_MOST_PAIRS].tolist())]
 
 
 def _direction(cycle: Cycle, pair: int) -> int:
@@ -52,8 +70,19 @@ def _direction(cycle: Cycle, pair: int) -> int:
     return int(np.argmax(extent[:2])) if extent[:2].any() else 2
 
 
-def _at(result: Result, point: int) -> str:
+def _at(result: Result, point: int, cycle: Cycle | None = None) -> str:
+    if cycle is not None and cycle.frequency != result.frequency[point]:
+        return f"the peak, {cycle.frequency:.6g} Hz"
     return f"point {point + 1}, {result.frequency[point]:.6g} Hz"
+
+
+def _at_peak(result: Result, cycle: Cycle, column: int) -> Floats | None:
+    """Coefficients of a quantity at the frequency of a cycle, where a peak of it holds them."""
+    if "peak/omega" not in result:
+        return None
+    same = np.flatnonzero((result["peak/omega"] / (2.0 * np.pi) == cycle.frequency)
+                          & (result["peak/observed"] == column))
+    return result["peak/coefficients"][same[0]] if len(same) else None
 
 
 def _highest(result: Result, point: int) -> int:
@@ -69,16 +98,17 @@ def plot_hysteresis(source: Source, point: int | None = None,
     ----------
     source : Result or path
         With contact. What is drawn is what the law gives, never a sum of harmonics: from the
-        histories (`&output histories`), or from the point solved once more.
+        period that a sweep keeps at its peak, from the histories (`&output histories`), or from
+        the point solved once more.
     point : int, optional
-        Point from 0; that of the largest amplitude without it.
+        Point from 0; the peak without it, or the point of the largest amplitude.
     pairs : sequence of int, optional
         Pairs from 0; the six that dissipate most without it. Of the two tangential directions
         the one of larger motion is drawn, of a pair without any the normal one.
     """
     result = as_result(source)
+    cycle = _cycle_of(result, point, pairs)
     point = choose_point(result, None) if point is None else point
-    cycle = result.cycle(point)
     drawn = _chosen(result, cycle, point, pairs)
     columns = min(3, len(drawn))
     rows = math.ceil(len(drawn) / columns)
@@ -87,7 +117,8 @@ def plot_hysteresis(source: Source, point: int | None = None,
     for axes, pair in zip(panels, drawn):
         c = _direction(cycle, pair)
         axes.plot(cycle.displacement[:, pair, c], cycle.force[:, pair, c], color=CURVE)
-        axes.set_title(f"{pair_name(result, pair)}, {DIRECTIONS[c]}", fontsize=10)
+        axes.set_title(f"{pair_name(result, int(cycle.pairs[pair]))}, {DIRECTIONS[c]}",
+                       fontsize=10)
         tidy(axes)
     # One unit for all panels, so that they can be compared.
     moved = largest_of(*(line.get_xdata() for axes in panels for line in axes.lines))
@@ -100,7 +131,7 @@ def plot_hysteresis(source: Source, point: int | None = None,
         axes.set_visible(False)
     figure.supxlabel(label("relative displacement", length), fontsize=10)
     figure.supylabel(label("contact force", force), fontsize=10)
-    figure.suptitle(f"Hysteresis at {_at(result, point)}", fontsize=11)
+    figure.suptitle(f"Hysteresis at {_at(result, point, cycle)}", fontsize=11)
     return figure
 
 
@@ -118,25 +149,36 @@ def plot_cycle(source: Source, point: int | None = None, pairs: Sequence[int] | 
         Observed quantity; the first of the file without it.
     """
     result = as_result(source)
-    point = choose_point(result, None) if point is None else point
     column = result.index(observe)
     has_contact = "contact/force" in result
+    highest = choose_point(result, None) if point is None else point
+    coefficients = result.coefficients[highest, :, column]
+    cycle = None
+    if has_contact:
+        cycle = _cycle_of(result, point, pairs)
+        if cycle.frequency != result.frequency[highest]:
+            at_peak = _at_peak(result, cycle, column)
+            if at_peak is None:  # another quantity than the first, whose peak it is
+                cycle = result.cycle(highest)
+            else:
+                coefficients = at_peak
+    point = highest
     figure = new_figure(8.0, 6.2 if has_contact else 3.8)
     panels = figure.subplots(2 if has_contact else 1, 1, sharex=True, squeeze=False).ravel()
     degrees = np.linspace(0.0, 360.0, _INSTANTS + 1)
-    series = synthesis(result.coefficients.shape[1], np.radians(degrees))
+    series = synthesis(len(coefficients), np.radians(degrees))
     units, name = units_of(result, "amplitude"), result.observed[column]
-    history = result.coefficients[point, :, column] @ series
+    history = coefficients @ series
     panels[0].plot(degrees, history, color=CURVE)
     panels[0].set_ylabel(label(name, scale_axis(panels[0].yaxis, largest_of(history), units)))
-    panels[0].set_title(f"One cycle at {_at(result, point)}", fontsize=11)
-    if has_contact:
-        cycle = result.cycle(point)
+    panels[0].set_title(f"One cycle at {_at(result, point, cycle)}", fontsize=11)
+    if cycle is not None:
         for k, pair in enumerate(_chosen(result, cycle, point, pairs)):
             c = _direction(cycle, pair)
             panels[1].plot(cycle.degrees, cycle.displacement[:, pair, c],
                            color=PALETTE[k % len(PALETTE)], linestyle=("-", "--")[k // 6 % 2],
-                           label=f"{pair_name(result, pair)}, {DIRECTIONS[c]}")
+                           label=f"{pair_name(result, int(cycle.pairs[pair]))}, "
+                                 f"{DIRECTIONS[c]}")
         moved = largest_of(*(line.get_ydata() for line in panels[1].lines))
         panels[1].set_ylabel(label("relative displacement",
                                    scale_axis(panels[1].yaxis, moved, units)))
