@@ -45,7 +45,7 @@ _BETWEEN_CALLS = 0.1
 
 def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool = True,
         progress: Progress | None = None, stop: Stop | None = None,
-        max_seconds: float | None = None) -> Result:
+        max_seconds: float | None = None, in_memory: bool = False) -> Result:
     """Run a case and open its result.
 
     The library computes in this process with the interpreter lock released; the numbers are those
@@ -69,6 +69,8 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         ten times a second, and stops the run by returning what is true.
     max_seconds : float, optional
         Stop the run after this time; the key `max_seconds` of `case` (default: no limit).
+    in_memory : bool, optional
+        Keep the result in memory and touch no file, whatever the case says.
 
     Returns
     -------
@@ -96,9 +98,12 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         case = case.replace(output={"file": os.path.abspath(file)})
     if max_seconds is not None:
         case = case.replace(case={"max_seconds": max_seconds})
+    if in_memory and file is not None:
+        raise InputError(f"file: is '{file}', but in_memory is set; one of the two")
+    in_memory = in_memory or not case.names_output
     tell = _Line() if progress is True else progress or None
     try:
-        return _run(case, tell, is_stopped, check=check, in_memory=not case.names_output)
+        return _run(case, tell, is_stopped, check=check, in_memory=in_memory)
     finally:
         if isinstance(tell, _Line):
             tell.end()

@@ -26,6 +26,7 @@ COMMANDS = {
     "export": ("export", "mesh with deformation, contact state and wear, for ParaView"),
     "import": ("importer", "a model file from the matrices of another program"),
     "optimise": ("design.optimise_command", "parameters that make a quantity smallest or largest"),
+    "explore": ("explore", "a page with sliders: curve, loops and flanks follow"),
     "study": ("study", "a parameter study on all local cores or a cluster"),
 }
 

@@ -1,0 +1,293 @@
+"""The page: sliders on the left; the curve, loops and the map of the flanks follow them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+from bokeh.document import Document
+from bokeh.events import Tap
+from bokeh.layouts import column, row
+from bokeh.models import ColumnDataSource, CustomJS, HoverTool, LinearColorMapper
+from bokeh.models.annotations import ColorBar, Title
+from bokeh.models.widgets import Button, Div, Select
+from bokeh.models.widgets import Slider as Handle
+from bokeh.plotting import figure
+from numpy.typing import NDArray
+
+from ..case import Case
+from ..errors import AbsentError, InputError
+from ..plot.flanks import find_flanks
+from ..plot.style import CURVE, PALETTE, label, scale, units_of
+from ..result import STATES, Result
+from .sliders import Slider, settings_of
+from .solver import Answer, Solver
+
+__all__ = ["Page"]
+
+_WIDTH = 300
+#: Pairs whose loops are drawn: those that dissipate most.
+_LOOPS = 3
+_GREY = "#9aa5b1"
+_WRAPPED = {"flex-wrap": "wrap"}
+#: What a screen reader reads; Bokeh gives its handles a role and a value, but no name.
+_NAME_THEM = """
+for (const [id, name] of Object.entries(names)) {
+  const view = Bokeh.index.find_one_by_id(id)
+  if (view == null) continue
+  const root = view.shadow_el ?? view.el
+  for (const handle of root.querySelectorAll(".noUi-handle, canvas"))
+    handle.setAttribute("aria-label", name)
+}
+"""
+
+
+class Page:
+    """One visitor's page of a case.
+
+    Parameters
+    ----------
+    document : bokeh Document
+        What the browser shows.
+    case : Case
+        A frequency sweep.
+    sliders : list of Slider
+        Keys to turn.
+    title : str
+        Heading.
+    max_seconds : float
+        Limit of one sweep.
+    """
+
+    def __init__(self, document: Document, case: Case, sliders: Sequence[Slider], title: str,
+                 max_seconds: float) -> None:
+        self._document, self._sliders = document, list(sliders)
+        self._result: Result | None = None
+        self._point: int | None = None
+        self._curve = ColumnDataSource({"x": [], "y": []})
+        self._first = ColumnDataSource({"x": [], "y": []})
+        self._missing = ColumnDataSource({"x": [], "y": []})
+        self._chosen = ColumnDataSource({"x": [], "y": []})
+        self._loops = [ColumnDataSource({"x": [], "y": []}) for _ in range(_LOOPS)]
+        self._cells = ColumnDataSource({"x": [], "y": [], "w": [], "h": [], "share": [],
+                                        "name": []})
+        self._handles = [self._handle(slider) for slider in self._sliders]
+        self._observed = Select(title="observed", options=[], width=_WIDTH, visible=False)
+        self._state = Select(title="map shows the share of the period in", value="slip",
+                             options=_choices(STATES), width=_WIDTH)
+        self._words = Div(width=_WIDTH)
+        self._loop_title = Title(text="loops of the pairs that dissipate most")
+        self._map_title = Title(text="flanks")
+        self._build(title)
+        self._solver = Solver(case, self._later, max_seconds)
+        document.on_session_destroyed(lambda _context: self._solver.stop())
+        self._ask()
+
+    # ------------------------------------------------------------------ what is on the page
+
+    def _handle(self, slider: Slider) -> Handle:
+        handle = Handle(title=slider.title, start=slider.low, end=slider.high, step=slider.step,
+                        value=slider.value, width=_WIDTH - 20, margin=(6, 10, 6, 10),
+                        format="0" if slider.is_whole else "0." + slider.decimals * "0")
+        handle.on_change("value", lambda _name, _old, _new: self._ask())
+        return handle
+
+    def _build(self, title: str) -> None:
+        tools = "pan,wheel_zoom,box_zoom,reset,save"
+        self._response = figure(height=330, sizing_mode="stretch_width", tools=tools,
+                                title="response (click a point for its loops)",
+                                x_axis_label="frequency [Hz]", y_axis_label="amplitude")
+        self._response.line("x", "y", source=self._first, color=_GREY, line_dash="dashed",
+                            legend_label="as the case has it")
+        now = self._response.line("x", "y", source=self._curve, color=CURVE, line_width=2,
+                                  legend_label="now")
+        self._response.scatter("x", "y", source=self._missing, marker="x", size=8,
+                               color="#c0392b")
+        self._response.scatter("x", "y", source=self._chosen, size=9, color=PALETTE[1])
+        self._response.add_tools(HoverTool(renderers=[now], tooltips=[("frequency", "@x{0.0000}"),
+                                                                      ("amplitude", "@y")]))
+        # Above the curves, where it covers none of them on a narrow screen.
+        legend = self._response.legend[0]
+        legend.orientation, legend.click_policy = "horizontal", "hide"
+        legend.border_line_color = None
+        self._response.add_layout(legend, "above")
+        self._response.on_event(Tap, self._tapped)
+        self._loop = figure(height=280, sizing_mode="stretch_width", min_width=300, tools=tools,
+                            title=self._loop_title)
+        for source, colour in zip(self._loops, PALETTE):
+            self._loop.line("x", "y", source=source, color=colour, line_width=2)
+        colours = LinearColorMapper(palette="Viridis256", low=0.0, high=1.0)
+        self._map = figure(height=280, sizing_mode="stretch_width", min_width=300,
+                           tools=tools + ",hover", title=self._map_title,
+                           tooltips=[("pair", "@name"), ("share", "@share{0.00}")])
+        self._map.rect("x", "y", width="w", height="h", source=self._cells, line_color="white",
+                       fill_color={"field": "share", "transform": colours})
+        self._map.add_layout(ColorBar(color_mapper=colours, width=10), "right")
+        self._map.axis.visible, self._map.grid.visible = False, False
+        self._observed.on_change("value", lambda _name, _old, _new: self._draw())
+        self._state.on_change("value", lambda _name, _old, _new: self._draw_map())
+        back = Button(label="back to the case", width=_WIDTH)
+        back.on_click(self._back)
+        heading = Div(text=f"<h1 style='font-size:1.15rem;margin:0'>{escape(title)}</h1>",
+                      sizing_mode="stretch_width")
+        side = column(*self._handles, self._observed, self._state, back, self._words,
+                      width=_WIDTH + 20)
+        # Side by side where there is room, one below the other on a telephone.
+        contact = row(self._loop, self._map, sizing_mode="stretch_width", styles=_WRAPPED)
+        pictures = column(self._response, contact, sizing_mode="stretch_width",
+                          styles={"flex": "1 1 320px"})
+        body = row(side, pictures, sizing_mode="stretch_width", styles=_WRAPPED)
+        self._document.add_root(column(heading, body, sizing_mode="stretch_width"))
+        self._document.title = title
+        names = {handle.id: slider.title for handle, slider in zip(self._handles, self._sliders)}
+        names |= {self._response.id: "frequency response", self._loop.id: "contact loops",
+                  self._map.id: "map of the flanks"}
+        self._document.js_on_event("document_ready",
+                                   CustomJS(args={"names": names}, code=_NAME_THEM))
+
+    # ------------------------------------------------------------------ what happens
+
+    def _ask(self) -> None:
+        self._solver.ask(settings_of(self._sliders, [handle.value for handle in self._handles]))
+        self._say("computing ...")
+
+    def _back(self) -> None:
+        for handle, slider in zip(self._handles, self._sliders):
+            handle.value = slider.value
+
+    def _later(self, answer: Answer) -> None:
+        """Called by the solver's thread: the page may change in its own only."""
+        self._document.add_next_tick_callback(lambda: self._show(answer))
+
+    def _show(self, answer: Answer) -> None:
+        if answer.result is None:
+            self._say(answer.words, "#c0392b")
+            return
+        self._result = answer.result
+        if not self._observed.options:
+            self._observed.options = _choices(answer.result.observed)
+            self._observed.value = answer.result.observed[0]
+            self._observed.visible = len(answer.result.observed) > 1
+        self._draw()
+        if not self._first.data["x"] and answer.is_final:
+            self._first.data = dict(self._curve.data)
+        place, height = self._highest()
+        text = f"highest {height:.4g} {units_of(answer.result, 'amplitude')} at {place:.5g} Hz"
+        if not answer.is_final:
+            text += " (few points; more follow)"
+        self._say(f"{text}; {answer.seconds:.2f} s" + (f". {answer.words}" if answer.words else ""))
+
+    def _say(self, words: str, colour: str = "#1c2733") -> None:
+        self._words.text = (f"<p role='status' aria-live='polite' style='color:{colour}'>"
+                            f"{escape(words)}</p>")
+
+    def _tapped(self, event: Any) -> None:
+        """Choose the point nearest to a click."""
+        if self._result is None:
+            return
+        self._point = int(np.argmin(np.abs(self._result.frequency - event.x)))
+        self._draw_point()
+
+    # ------------------------------------------------------------------ drawing
+
+    def _amplitude(self) -> NDArray[np.float64]:
+        assert self._result is not None
+        return self._result.amplitude_of(self._observed.value)
+
+    def _highest(self) -> tuple[float, float]:
+        assert self._result is not None
+        omega, height = self._result.maximum(self._observed.value)
+        return omega / (2.0 * np.pi), height
+
+    def _draw(self) -> None:
+        result = self._result
+        if result is None:
+            return
+        amplitude = np.where(result.converged, self._amplitude(), np.nan)
+        order = np.argsort(result.frequency, kind="stable")
+        self._curve.data = {"x": result.frequency[order].tolist(),
+                            "y": amplitude[order].tolist()}
+        failed = result.frequency[~result.converged]
+        self._missing.data = {"x": failed.tolist(), "y": [0.0] * len(failed)}
+        self._response.yaxis.axis_label = label(f"amplitude of {self._observed.value}",
+                                                units_of(result, "amplitude"))
+        self._point = None
+        self._draw_point()
+
+    def _draw_point(self) -> None:
+        """The chosen point, or the highest row, with its loops and its map."""
+        result = self._result
+        if result is None or not result.converged.any():
+            return
+        amplitude = self._amplitude()
+        if self._point is None:
+            self._point = int(np.nanargmax(np.where(result.converged, amplitude, np.nan)))
+        self._chosen.data = {"x": [float(result.frequency[self._point])],
+                             "y": [float(amplitude[self._point])]}
+        self._draw_loops()
+        self._draw_map()
+
+    def _draw_loops(self) -> None:
+        result, point = self._result, self._point
+        for source in self._loops:
+            source.data = {"x": [], "y": []}
+        if result is None or point is None or "contact/dissipation" not in result:
+            return
+        try:
+            cycle = result.cycle(point)
+        except AbsentError as absent:
+            self._loop_title.text = str(absent)
+            return
+        moved, length = scale(float(np.abs(cycle.displacement).max()),
+                              units_of(result, "amplitude"))
+        pressed, force = scale(float(np.abs(cycle.force).max()), units_of(result, "contact/force"))
+        pairs = np.argsort(-result.dissipation[point], kind="stable")[:_LOOPS]
+        for source, pair in zip(self._loops, pairs):
+            c = int(np.argmax(np.ptp(cycle.displacement[:, pair], axis=0)))
+            source.data = {"x": (moved * cycle.displacement[:, pair, c]).tolist(),
+                           "y": (pressed * cycle.force[:, pair, c]).tolist()}
+        self._loop_title.text = (f"pairs {', '.join(str(pair + 1) for pair in pairs)} at "
+                                 f"{result.frequency[point]:.5g} Hz")
+        self._loop.xaxis.axis_label = label("relative displacement", length)
+        self._loop.yaxis.axis_label = label("contact force", force)
+
+    def _draw_map(self) -> None:
+        result, point = self._result, self._point
+        if result is None or point is None or "contact/fraction" not in result:
+            return
+        share = result.fraction[point, :, STATES.index(self._state.value)]
+        x, y, width, height = _places(result)
+        self._cells.data = {"x": x.tolist(), "y": y.tolist(), "w": width.tolist(),
+                            "h": height.tolist(), "share": share.tolist(),
+                            "name": [str(pair + 1) for pair in range(result.n_pairs)]}
+        self._map_title.text = (f"{self._state.value}, share of the period at "
+                                f"{result.frequency[point]:.5g} Hz")
+
+
+def _choices(names: Sequence[str]) -> list[str | tuple[Any, str]]:
+    """Names as a Select takes them."""
+    return [*names]
+
+
+def _places(result: Result) -> tuple[NDArray[np.float64], ...]:
+    """Centre and size of the cell of every pair: flanks side by side, or all pairs in a row."""
+    n = result.n_pairs
+    x, y = np.arange(1.0, n + 1.0), np.zeros(n)
+    width, height = np.full(n, 0.9), np.ones(n)
+    try:
+        flanks = find_flanks(result)
+    except InputError:
+        return x, y, width, height
+    left = 0.0
+    for flank in flanks:
+        size = np.where(np.isnan(flank.size), np.nanmax(np.append(flank.size, 0.0)) or 1.0,
+                        flank.size)
+        low = (flank.place - 0.5 * size).min(axis=0)
+        right = (flank.place + 0.5 * size).max(axis=0)[0]
+        x[flank.pairs] = left + flank.place[:, 0] - low[0]
+        y[flank.pairs] = flank.place[:, 1] - low[1]
+        width[flank.pairs], height[flank.pairs] = size.T
+        left += 1.15 * (right - low[0])
+    return x, y, width, height

@@ -1,0 +1,140 @@
+"""Which keys of a case get a slider, and how far it goes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from .._native import namelist_values
+from ..case import Case
+from ..errors import InputError
+
+__all__ = ["Slider", "read_slider", "settings_of", "usual_sliders"]
+
+#: Keys that get a slider unasked where the case has them, and what the page calls them.
+_USUAL = {
+    "load%harmonic_scale": "factor of the vibratory load",
+    "contact%mu": "friction coefficient",
+    "contact%normal_load": "normal load",
+    "contact%gap": "gap",
+    "model%rotation_speed": "rotation speed [rad/s]",
+    "harmonics%n_harmonics": "harmonics",
+}
+#: How far a slider goes on both sides of the value of the case, as a factor.
+_REACH = 4.0
+_MOST_HARMONICS = 15
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A key of the namelist with a range.
+
+    Attributes
+    ----------
+    key : str
+        ``group%key``.
+    title : str
+        What the page calls it.
+    low, high, step, value : float
+        In the units of the key.
+    is_whole : bool
+        Whole numbers only.
+    """
+
+    key: str
+    title: str
+    low: float
+    high: float
+    step: float
+    value: float
+    is_whole: bool = False
+
+    @property
+    def decimals(self) -> int:
+        """Decimals of its values, two more than its step has."""
+        return 0 if self.is_whole else max(1, 2 - math.floor(math.log10(self.step) + 1e-9))
+
+
+def usual_sliders(case: Case) -> list[Slider]:
+    """Sliders of what most people turn, as far as the case has one value for all pairs."""
+    values = namelist_values(case.namelist())
+    found = []
+    for key, title in _USUAL.items():
+        value = _single(values, key)
+        if value is None or (value == 0.0 and key != "contact%gap"):
+            continue
+        if key == "harmonics%n_harmonics":
+            found.append(Slider(key, title, 1, max(_MOST_HARMONICS, int(value)), 1, value, True))
+        elif value != 0.0:
+            low, high = sorted((value / _REACH, value * _REACH))
+            found.append(_even(key, title, low, high, value))
+    return found
+
+
+def read_slider(text: str, case: Case) -> Slider:
+    """A slider as the command line has it: ``group%key=low:high``.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or the case has no single number there.
+    """
+    key, _, limits = text.partition("=")
+    low_text, _, high_text = limits.partition(":")
+    try:
+        low, high = float(low_text), float(high_text)
+    except ValueError:
+        raise InputError(f"slider '{text}': must be group%key=low:high, such as "
+                         "contact%mu=0.1:0.8") from None
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise InputError(f"slider '{text}': its ends must be finite, the lower one first")
+    values = namelist_values(case.namelist())
+    value = _single(values, key)
+    if key in values and value is None:
+        raise InputError(f"slider '{text}': {key} is {', '.join(values[key][:3])} in the case; "
+                         "a slider needs one number")
+    title = _USUAL.get(key, key)
+    if value is None:
+        value = low
+    if key in values and _is_whole(values[key][0]) and low == int(low) and high == int(high):
+        return Slider(key, title, low, high, 1, min(max(value, low), high), True)
+    return _even(key, title, low, high, value)
+
+
+def settings_of(sliders: list[Slider], values: list[float]) -> dict[str, Any]:
+    """Groups of a case with the values of its sliders."""
+    groups: dict[str, Any] = {}
+    for slider, value in zip(sliders, values):
+        group, _, key = slider.key.partition("%")
+        # The group &model is called `structure` in Python, where `model` is the first argument.
+        place = groups.setdefault("structure" if group == "model" else group, {})
+        place[key] = round(value) if slider.is_whole else round(value, slider.decimals)
+    return groups
+
+
+def _single(values: dict[str, list[str]], key: str) -> float | None:
+    """The value of a key that is one number, or the same for all pairs."""
+    texts = values.get(key, [])
+    if len(set(texts)) != 1:
+        return None
+    try:
+        return float(texts[0])
+    except ValueError:
+        return None
+
+
+def _is_whole(text: str) -> bool:
+    return text.lstrip("+-").isdigit()
+
+
+def _even(key: str, title: str, low: float, high: float, value: float) -> Slider:
+    """About a hundred steps of a round size, between ends that are multiples of it."""
+    raw = (high - low) / 100.0
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = power * min((1.0, 2.0, 5.0, 10.0), key=lambda digit: abs(digit - raw / power))
+    first = step * math.floor(low / step + 1e-9)
+    if first <= 0.0 < low:
+        first = low
+    last = first + step * math.ceil((high - first) / step - 1e-9)
+    return Slider(key, title, first, last, step, min(max(value, first), last))
