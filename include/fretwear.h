@@ -94,15 +94,28 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
                   "contact/tangential_stiffness", "contact/normal_stiffness"
    3 * n_pairs:   "contact/position", pair after pair
    m * n_dof:     "load/harmonic_cosine", "load/harmonic_sine", a load of m harmonics each, harmonic
-                  after harmonic */
+                  after harmonic
+   Of sectors, with "cyclic/n_sectors" before them; complex numbers are two values each, matrices
+   come row after row:
+   2 * k * k:     "nodal_diameter/K/mass", before the others of nodal diameter K, of order k; then
+                  the same with stiffness, damping, stiffness_rotation, coriolis. Then n_dof of the
+                  model counts the displacements in front, and there is no "mass" and "stiffness"
+   2 * k:         "nodal_diameter/K/load/static", likewise cosine, sine
+   2 * k * rows:  "nodal_diameter/K/observe/matrix"
+   2 * a * a:     "aero/sector/M" or "aero/nodal_diameter/M"
+   a * n_dof:     "aero/modes"
+   The right interface is exp(-2 pi i K/N) times the left one: conjugate the other sign. */
 int fw_put_reals(fw_handle handle, const char *name, size_t n, const double *values);
 
 /* 3 * n_pairs: "contact/side_1" (required where there are pairs), "contact/side_2"; the signed
    numbers, from 1, of the dofs (t1, t2, n) of a pair, 0 for none or the ground.
-   m: "load/harmonic", the harmonics 0, 1, .. of the loads above. */
+   m: "load/harmonic", the harmonics 0, 1, .. of the loads above.
+   Of sectors: 1: "cyclic/n_sectors"; "cyclic/left" and "cyclic/right", as many each; n_pairs:
+   "contact/sector_2". */
 int fw_put_integers(fw_handle handle, const char *name, size_t n, const int *values);
 
-/* Observe a linear combination of the dofs (n = n_dof). Without any, every dof is observed. */
+/* Observe a linear combination of the dofs (n = n_dof). Without any, every dof is observed. With
+   n = 0 only the name is given: the rows are those of nodal_diameter/K/observe/matrix. */
 int fw_observe(fw_handle handle, const char *name, size_t n, const double *row);
 
 /* Callbacks; NULL removes one. `user` is passed on as it is. */

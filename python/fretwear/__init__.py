@@ -54,12 +54,13 @@ from .errors import (
     OutputError,
     RunInterrupted,
 )
-from .model import ContactPairs, Model, Sectors, Spring
+from .model import ContactPairs, Model, Spring
 from .result import Result
+from .sectors import Air, NodalDiameter, Sectors
 from .steps import Point, Steps
 
-__all__ = ["AbsentError", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
-           "FretwearError", "InputError", "Model", "OutputError", "Point",
+__all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
+           "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
            "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "frf",
            "optimise", "run", "wear"]
 

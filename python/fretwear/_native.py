@@ -130,7 +130,8 @@ class Session:
         No copy is made of arrays whose elements lie in one piece. Matrices are symmetric, so that
         their order does not matter; of the others the last index runs fastest.
         """
-        rows_matter = name.startswith("contact/") or name == "coriolis"
+        rows_matter = name.startswith(("contact/", "nodal_diameter/", "aero/")) or (
+            name == "coriolis")
         flat = values.ravel(order="C" if rows_matter else "K")
         put = self._core.put_integers if flat.dtype.kind == "i" else self._core.put_reals
         self._checked(put(self._handle, name, flat))

@@ -11,13 +11,14 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arguments import array, dofs, text
+from ._arguments import array, dofs, text, whole
 from ._namelist import literal
 from ._native import Session
 from .errors import InputError, OutputError
 from .model_file import FORMAT, strings, write_model_file
+from .sectors import Sectors, read_sectors
 
-__all__ = ["ContactPairs", "Model", "Sectors", "Spring"]
+__all__ = ["ContactPairs", "Model", "Spring"]
 
 Floats = NDArray[np.float64]
 
@@ -108,36 +109,6 @@ class Spring:
     sector_2: int = 0
 
 
-@dataclass(frozen=True)
-class Sectors:
-    """What makes a model one of equal sectors around an axis.
-
-    The wave that runs around it is a matter of the case: ``cyclic={"engine_order": 4}``.
-
-    Parameters
-    ----------
-    n_sectors : int
-        Sectors.
-    left, right : (n_interface,) int
-        Dofs of one interface, counted from 1, and of the other, which moves as the left one of the
-        next sector; there a negative number takes the dof with its sign turned. None where only
-        contact joins the sectors.
-    """
-
-    n_sectors: int
-    left: ArrayLike = ()
-    right: ArrayLike = ()
-
-    def checked(self, n_dof: int) -> Sectors:
-        """The same with arrays that fit each other; raises InputError where they do not."""
-        if not isinstance(self.n_sectors, (int, np.integer)) or self.n_sectors < 1:
-            raise InputError(f"sectors.n_sectors = {self.n_sectors!r}: must be a whole number "
-                             "from 1")
-        left = dofs("sectors.left", self.left, (None,), n_dof)
-        right = dofs("sectors.right", self.right, (len(left),), n_dof)
-        return Sectors(int(self.n_sectors), left, right)
-
-
 #: A dof number, counted from 1, or a row of factors, one per dof.
 Observation = Union[int, ArrayLike]
 
@@ -173,7 +144,8 @@ class Model:
         Harmonic of further loads, 0, 1, .., with the parts in phase with its cosine and its sine,
         a pair of (n_dof,) [force].
     sectors : Sectors, optional
-        Makes the model one of equal sectors around an axis.
+        Makes the model one of equal sectors around an axis. With matrices of nodal diameters M, C
+        and K are None.
     observe : mapping, optional
         Name of every observed quantity, with a dof number, counted from 1, or with a row of
         factors (n_dof,). Every dof without it.
@@ -187,7 +159,7 @@ class Model:
         definiteness are checked when a case is read.
     """
 
-    def __init__(self, M: ArrayLike, C: ArrayLike | None, K: ArrayLike, *,
+    def __init__(self, M: ArrayLike | None, C: ArrayLike | None, K: ArrayLike | None, *,
                  contact: ContactPairs | None = None, springs: Iterable[Spring] = (),
                  static: ArrayLike | None = None, cosine: ArrayLike | None = None,
                  sine: ArrayLike | None = None, stiffness_rotation: ArrayLike | None = None,
@@ -196,16 +168,16 @@ class Model:
                  harmonic: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
                  coriolis: ArrayLike | None = None,
                  title: str = "", unit_system: str = "") -> None:
-        n = self.n_dof = _order(M, C, K)
+        if sectors is not None and not isinstance(sectors, Sectors):
+            raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
+        n = self.n_dof = _order(M, C, K, sectors)
         if n == 0:
             raise InputError("K: is empty, must have at least one degree of freedom")
-        square = (n, n)
-        self._matrices = {"stiffness": array("K", K, square), "mass": array("M", M, square)}
-        for name, argument, value in (
-                ("damping", "C", C), ("stiffness_rotation", "stiffness_rotation",
-                                      stiffness_rotation), ("coriolis", "coriolis", coriolis)):
-            if value is not None:
-                self._matrices[name] = array(argument, value, square)
+        self._matrices = {
+            name: array(argument, value, (n, n)) for name, argument, value in (
+                ("stiffness", "K", K), ("mass", "M", M), ("damping", "C", C),
+                ("stiffness_rotation", "stiffness_rotation", stiffness_rotation),
+                ("coriolis", "coriolis", coriolis)) if value is not None}
         self._loads = {
             name: array(name, value, (n,)) for name, value in (
                 ("static", static), ("cosine", cosine), ("sine", sine),
@@ -221,10 +193,11 @@ class Model:
                                  "Spring")
             dofs(f"springs[{number}]", [spring.side_1, spring.side_2], (2,), n)
             array(f"springs[{number}].coefficient", spring.coefficient, ())
-        if sectors is not None and not isinstance(sectors, Sectors):
-            raise InputError(f"sectors: is a {type(sectors).__name__}, must be Sectors")
         self.sectors = None if sectors is None else sectors.checked(n)
         self._observe = None if observe is None else _rows(observe, n)
+        if observe is not None and self._diameter_names() is not None:
+            raise InputError("observe: is given beside rows of nodal diameters, must be one of "
+                             "both")
         self.title, self.unit_system = text("title", title), text("unit_system", unit_system)
 
     def __repr__(self) -> str:
@@ -237,7 +210,7 @@ class Model:
     @property
     def M(self) -> Floats:
         """Mass (n_dof, n_dof), read-only."""
-        return _read_only(self._matrices["mass"])
+        return self._matrix("mass")
 
     @property
     def C(self) -> Floats | None:
@@ -248,7 +221,12 @@ class Model:
     @property
     def K(self) -> Floats:
         """Stiffness (n_dof, n_dof), read-only."""
-        return _read_only(self._matrices["stiffness"])
+        return self._matrix("stiffness")
+
+    def _matrix(self, name: str) -> Floats:
+        if name not in self._matrices:
+            raise InputError(f"{name}: is that of nodal diameters, see sectors.diameters")
+        return _read_only(self._matrices[name])
 
     @property
     def stiffness_rotation(self) -> Floats | None:
@@ -331,14 +309,8 @@ class Model:
             kind = _text(file.attrs.get("format", ""))
             if kind != FORMAT:
                 raise InputError(f"{path}: format is '{kind}', expected '{FORMAT}'")
-            if "aero" in file:
-                raise InputError(f"{path}: holds forces of the air, which a Model does not: name "
-                                 "the file in the case (model%file)")
-            if "nodal_diameter" in file:
-                raise InputError(f"{path}: holds matrices of nodal diameters, which a Model does "
-                                 "not: name the file in the case (model%file)")
             for name in ("mass", "stiffness"):
-                if name not in file:
+                if name not in file and "nodal_diameter" not in file:
                     raise InputError(f"{path}: dataset /{name} is missing")
             found = {name: file[name][()] for name in (
                 "mass", "stiffness", "damping", "stiffness_rotation", "coriolis",
@@ -347,9 +319,9 @@ class Model:
             loads: dict[str, Any] = {argument: found.get(name) for name, argument in _LOADS.items()}
             try:
                 return cls(
-                    found["mass"], found.get("damping"), found["stiffness"],
+                    found.get("mass"), found.get("damping"), found.get("stiffness"),
                     contact=_contact_of(found), observe=_observed_of(file), **loads,
-                    sectors=_sectors_of(file), harmonic=_waves_of(file),
+                    sectors=read_sectors(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
                     coriolis=found.get("coriolis"),
                     title=_text(file.attrs.get("title", "")),
@@ -378,8 +350,7 @@ class Model:
         pairs = {f"contact/{name}": values for name in _IN_NAMELIST
                  if (values := getattr(self.contact, name, None)) is not None}
         try:
-            groups = {} if self.sectors is None else {
-                "cyclic": {"n_sectors": self.sectors.n_sectors}}
+            groups = {} if self.sectors is None else {"cyclic": self.sectors.attributes()}
             write_model_file(path, {**self._datasets(), **pairs}, title=self.title,
                              unit_system=self.unit_system, groups=groups)
         except OSError as error:
@@ -400,46 +371,42 @@ class Model:
                 value = getattr(self.contact, name.split("/")[1])
                 if value is not None:
                     found[name] = strings(value) if name == "contact/patch" else value
-        if self.sectors is not None and len(np.asarray(self.sectors.left)) > 0:
-            found["cyclic/left"] = np.asarray(self.sectors.left)
-            found["cyclic/right"] = np.asarray(self.sectors.right)
+        if self.sectors is not None:
+            found.update(self.sectors.datasets())
         if self._observe is not None:
             found["observe/name"] = strings(self._observe[0])
             found["observe/matrix"] = self._observe[1]
+        elif (names := self._diameter_names()) is not None:
+            found["observe/name"] = strings(names)
         return found
+
+    def _diameter_names(self) -> tuple[str, ...] | None:
+        return None if self.sectors is None else self.sectors.names()
 
     # ------------------------------------------------------------------ to the library
 
     def give_to(self, session: Session) -> tuple[tuple[str, str], ...]:
         """Hand the model to a session; returns the keys that say the rest of it."""
         session.new_model(self.n_dof, self.n_pairs)
+        if self.sectors is not None:
+            session.put("cyclic/n_sectors", np.array([self.sectors.n_sectors], dtype=np.int32))
         for name, values in self._datasets().items():
-            if not name.startswith(_NO_PARTS) and values.dtype.kind in "if":
+            if not name.startswith("observe/") and values.dtype.kind in "if":
                 session.put(name, values)
         for name in ("title", "unit_system"):
             if getattr(self, name):
                 session.put_texts(name, [getattr(self, name)])
         if self._observe is not None:
             session.observe(self._observe[0], self._observe[1].T)
+        elif (names := self._diameter_names()) is not None:
+            session.observe(names, np.zeros((0, len(names)), order="F"))
         settings = self._spring_settings()
         if self.contact is not None:
             if self.contact.patch is not None:
                 session.put_texts("contact/patch", self.contact.patch)
             settings += [(f"contact%{name}", literal(getattr(self.contact, name)))
-                         for name in (*_IN_NAMELIST, "sector_2")
-                         if getattr(self.contact, name) is not None]
-        return tuple(settings + self._sector_settings())
-
-    def _sector_settings(self) -> list[tuple[str, str]]:
-        if self.sectors is None:
-            return []
-        settings = [("cyclic%n_sectors", literal(self.sectors.n_sectors))]
-        n = len(np.asarray(self.sectors.left))
-        if n > 0:
-            settings += [("cyclic%n_interface", literal(n)),
-                         ("cyclic%left", literal(self.sectors.left)),
-                         ("cyclic%right", literal(self.sectors.right))]
-        return settings
+                         for name in _IN_NAMELIST if getattr(self.contact, name) is not None]
+        return tuple(settings)
 
     def _spring_settings(self) -> list[tuple[str, str]]:
         if not self.springs:
@@ -451,16 +418,24 @@ class Model:
 
 _CONTACT = tuple(f"contact/{name}" for name in (
     "side_1", "side_2", "sector_2", "mu", "gap", "area", "position", "patch"))
-#: What a session takes as keys of the namelist, or by a call of its own.
-_NO_PARTS = ("observe/", "cyclic/", "contact/sector_2")
 #: Constants that a session takes as keys, so that one of another law is refused.
 _IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness")
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
 
 
-def _order(M: ArrayLike, C: ArrayLike | None, K: ArrayLike) -> int:
+def _order(M: ArrayLike | None, C: ArrayLike | None, K: ArrayLike | None,
+           sectors: Sectors | None) -> int:
     """Number of dofs: that of two of the three matrices, so that the third is refused."""
+    if sectors is not None and sectors.diameters is not None:
+        if not (M is None and C is None and K is None):
+            raise InputError("M, C and K: are given beside sectors.diameters, must be None")
+        if sectors.n_physical is None:
+            raise InputError("sectors.n_physical: is missing, must be the number of displacements "
+                             "in front of the coordinates of all nodal diameters")
+        return whole("sectors.n_physical", sectors.n_physical, 1)
+    if M is None or K is None:
+        raise InputError("M and K: are None, must be matrices, or sectors must have diameters")
     mass, stiffness = len(array("M", M, (None, None))), len(array("K", K, (None, None)))
     if C is None and mass != stiffness:
         raise InputError(f"M and K: are of order {mass} and {stiffness}, must be the same")
@@ -488,7 +463,9 @@ def _waves_of(file: h5py.File) -> dict[int, tuple[ArrayLike, ArrayLike]] | None:
     if "load/harmonic" not in file:
         return None
     harmonics = file["load/harmonic"][()]
-    zero = np.zeros((len(harmonics), len(file["mass"])))
+    shapes = [file[name].shape for part in ("cosine", "sine")
+              if (name := f"load/harmonic_{part}") in file]
+    zero = np.zeros(shapes[0] if shapes else (len(harmonics), 0))
     cosine, sine = (file[name][()] if (name := f"load/harmonic_{part}") in file else zero
                     for part in ("cosine", "sine"))
     found: dict[int, tuple[ArrayLike, ArrayLike]] = {}
@@ -525,14 +502,6 @@ def _contact_of(found: Mapping[str, Any]) -> ContactPairs | None:
     return ContactPairs(found["contact/side_1"], **parts, patch=names)
 
 
-def _sectors_of(file: h5py.File) -> Sectors | None:
-    if "cyclic" not in file:
-        return None
-    group = file["cyclic"]
-    sides = {name: group[name][()] for name in ("left", "right") if name in group}
-    return Sectors(int(group.attrs["n_sectors"]), **sides)
-
-
 def _whole_numbers(name: str, values: ArrayLike, n: int) -> NDArray[np.int64]:
     """One for each of n, or one for all."""
     found = np.asarray(values)
@@ -542,7 +511,7 @@ def _whole_numbers(name: str, values: ArrayLike, n: int) -> NDArray[np.int64]:
 
 
 def _observed_of(file: h5py.File) -> dict[str, Observation] | None:
-    if "observe/name" not in file:
+    if "observe/matrix" not in file and "observe/dof" not in file:
         return None
     names = [_text(name) for name in file["observe/name"][()]]
     if "observe/matrix" in file:

@@ -224,7 +224,8 @@ contains
       end if
    end function c_put_integers
 
-   !> A row of n = n_dof factors, by which the displacements of the dofs are added up.
+   !> A row of n = n_dof factors, by which the displacements of the dofs are added up; none where it
+   !> stands with the nodal diameters.
    integer(c_int) function c_observe(handle, name, n, row) bind(c, name='fw_observe') result(status)
       type(c_ptr), value :: handle, name, row
       integer(c_size_t), value :: n
@@ -232,7 +233,9 @@ contains
       real(c_double), pointer :: array(:)
 
       call take_text(name, name_text)
-      if (allocated(name_text) .and. c_associated(row) .and. n >= 0_c_size_t) then
+      if (allocated(name_text) .and. n == 0_c_size_t) then
+         status = int(call_observe(id_of(handle), name_text, [real(c_double) ::]), c_int)
+      else if (allocated(name_text) .and. c_associated(row) .and. n >= 0_c_size_t) then
          call c_f_pointer(row, array, [n])
          status = int(call_observe(id_of(handle), name_text, array), c_int)
       else

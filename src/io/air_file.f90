@@ -1,9 +1,10 @@
 !> Forces of the air in a model file: complex matrices of influence by the motion of every sector,
 !> or of every nodal diameter, on the amplitudes of rows of motion.
 module fw_air_file
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_cyclic_data, only: influence_type
    use fw_cyclic_file, only: read_complex
+   use fw_cyclic_parts, only: add_influence
+   use fw_cyclic_parts, only: finish_influence
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -29,8 +30,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(influence_type) :: found
       real(wp), allocatable :: modes(:, :)
-      character(:), allocatable :: group
-      integer :: i, n
+      character(:), allocatable :: group, message
 
       if (.not. file%exists('/aero')) return
       found%by_diameter = file%exists(by_diameter)
@@ -44,23 +44,16 @@ contains
       if (found%by_diameter) group = by_diameter
       call read_matrices(file, group, n_sectors, found, error)
       if (allocated(error)) return
-      n = size(found%matrix, 1)
       if (file%exists('/aero/modes')) then
-         call read_matrix(file, '/aero/modes', n_dof, modes, error, n_rows=n)
+         call read_matrix(file, '/aero/modes', n_dof, modes, error, n_rows=size(found%matrix, 1))
          if (allocated(error)) return
          ! Rows as h5py shows them.
          found%modes = modes
-      else if (n /= n_dof) then
-         ! Without rows, each dof is one.
-         call fatal_error(error, file%path//': matrices of '//group//' are of order '// &
-                          to_text(n)//', expected '//to_text(n_dof)//', the dofs, or '// &
-                          '/aero/modes, the motions that they are of', status_input)
+      end if
+      call finish_influence(found, n_dof, message)
+      if (allocated(message)) then
+         call fatal_error(error, file%path//': matrices of '//group//' '//message, status_input)
          return
-      else
-         allocate (found%modes(n, n), source=0.0_wp)
-         do i = 1, n
-            found%modes(i, i) = 1.0_wp
-         end do
       end if
       allocate (air, source=found)
    end subroutine read_air_file
@@ -72,9 +65,9 @@ contains
       integer, intent(in) :: n_sectors
       type(influence_type), intent(inout) :: air
       type(error_type), allocatable, intent(out) :: error
-      complex(wp), allocatable :: matrix(:, :), longer(:, :, :)
-      character(:), allocatable :: name
-      integer :: k, n
+      complex(wp), allocatable :: matrix(:, :)
+      character(:), allocatable :: name, message
+      integer :: k
 
       ! By name: nothing says how many there are, nor in what order.
       allocate (air%number(0))
@@ -83,28 +76,11 @@ contains
          if (.not. file%exists(name)) cycle
          call read_complex(file, name, .false., matrix, error)
          if (allocated(error)) return
-         n = size(matrix, 1)
-         if (size(air%number) > 0) n = size(air%matrix, 1)
-         if (n == 0 .or. any(shape(matrix) /= n)) then
-            call dataset_failure(file, name, 'is '//to_text(size(matrix, 1))//' x '// &
-                                 to_text(size(matrix, 2))//', expected square matrices of one '// &
-                                 'order', error)
-            return
-         else if (.not. all(ieee_is_finite(abs(matrix)))) then
-            call dataset_failure(file, name, 'holds a number that is not finite', error)
+         call add_influence(air, k, n_sectors, matrix, message)
+         if (allocated(message)) then
+            call dataset_failure(file, name, message, error)
             return
          end if
-         if (any(air%number == k - n_sectors)) then
-            call dataset_failure(file, name, 'is the same sector or wave as '// &
-                                 to_text(k - n_sectors)//' around '//to_text(n_sectors)// &
-                                 ' sectors, expected one of both', error)
-            return
-         end if
-         allocate (longer(n, n, size(air%number) + 1))
-         if (size(air%number) > 0) longer(:, :, :size(air%number)) = air%matrix
-         longer(:, :, size(air%number) + 1) = matrix
-         call move_alloc(longer, air%matrix)
-         air%number = [air%number, k]
       end do
       if (size(air%number) > 0) return
       call fatal_error(error, file%path//': '//group//' holds no matrix named by a number from '// &

@@ -2,7 +2,10 @@
 !> diameter. Files that have `phase = 'advance'` tie u_right = exp(2 pi i k/N) u_left, the other way
 !> round: what they hold is conjugated as it is read.
 module fw_cyclic_file
-   use fw_cyclic_data, only: influence_type
+   use fw_cyclic_parts, only: check_physical
+   use fw_cyclic_parts, only: check_rows
+   use fw_cyclic_parts, only: cyclic_parts
+   use fw_cyclic_parts, only: nodal_parts
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
@@ -18,31 +21,7 @@ module fw_cyclic_file
    implicit none (type, external)
    private
 
-   public :: cyclic_parts, nodal_parts, read_complex, read_cyclic_file
-
-   !> Of one nodal diameter; a component is not allocated where the file has none.
-   type :: nodal_parts
-      complex(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
-      complex(wp), allocatable :: stiffness_rotation(:, :)
-      complex(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
-      complex(wp), allocatable :: observe(:, :)
-      !> Per rotation speed.
-      complex(wp), allocatable :: coriolis(:, :)
-   end type nodal_parts
-
-   type :: cyclic_parts
-      !> 0: the model is no sector.
-      integer :: n_sectors = 0
-      integer, allocatable :: left(:), right(:)
-      !> Sector of side 2 of the pairs (n_pairs).
-      integer, allocatable :: sector_2(:)
-      !> Displacements in front of the coordinates of all nodal diameters; 0 where there are none.
-      integer :: n_physical = 0
-      !> Nodal diameter k at place k + 1.
-      type(nodal_parts), allocatable :: nodal(:)
-      !> Forces of the air.
-      type(influence_type), allocatable :: air
-   end type cyclic_parts
+   public :: read_complex, read_cyclic_file
 
    character(*), parameter :: group = '/cyclic'
 
@@ -151,18 +130,11 @@ contains
                                 .or. .not. file%exists('/observe'))) return
       call read_text(file, '/observe/name', names, error)
       if (allocated(error)) return
-      do k = 0, size(parts%nodal) - 1
-         associate (nodal => parts%nodal(k + 1))
-            if (.not. allocated(nodal%mass)) cycle
-            if (allocated(nodal%observe)) then
-               if (size(nodal%observe, 1) == size(names)) cycle
-            end if
-            call fatal_error(error, file%path//': /nodal_diameter/'//to_text(k)// &
-                             '/observe/matrix must have a row for each of the '// &
-                             to_text(size(names))//' names of /observe/name', status_input)
-            return
-         end associate
-      end do
+      call check_rows(parts, size(names), k)
+      if (k < 0) return
+      call fatal_error(error, file%path//': /nodal_diameter/'//to_text(k)// &
+                       '/observe/matrix must have a row for each of the '// &
+                       to_text(size(names))//' names of /observe/name', status_input)
    end subroutine check_observed
 
    subroutine read_diameter(file, name, turns, n_physical, nodal, error)
@@ -173,16 +145,17 @@ contains
       integer, intent(in) :: n_physical
       type(nodal_parts), intent(inout) :: nodal
       type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: message
       integer :: n
 
       n = 0
       call read_square('mass', .true., nodal%mass)
       if (allocated(error)) return
       n = size(nodal%mass, 1)
-      if (n_physical < 1 .or. n_physical > n) then
-         call fatal_error(error, file%path//': attribute n_physical of /cyclic is '// &
-                          to_text(n_physical)//', expected from 1 to '//to_text(n)// &
-                          ', the order of '//name//'mass', status_input)
+      call check_physical(n_physical, n, name//'mass', message)
+      if (allocated(message)) then
+         call fatal_error(error, file%path//': attribute n_physical of /cyclic '//message, &
+                          status_input)
          return
       end if
       call read_square('stiffness', .true., nodal%stiffness)

@@ -11,6 +11,12 @@ module fw_memory_model
    use fw_error, only: status_usage
    use fw_kinds, only: i8
    use fw_kinds, only: wp
+   use fw_memory_sectors, only: check_memory_sectors
+   use fw_memory_sectors, only: is_sector_part
+   use fw_memory_sectors, only: put_sector_integers
+   use fw_memory_sectors, only: put_sector_reals
+   use fw_memory_sectors, only: sector_integers
+   use fw_memory_sectors, only: sector_reals
    use fw_model_file, only: file_model_type
    use fw_text, only: string_type
    use fw_text, only: to_text
@@ -84,8 +90,14 @@ contains
       character(*), intent(in) :: name
       real(wp), intent(in) :: values(:)
       type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: message
       integer :: rows, columns
 
+      if (is_sector_part(name)) then
+         call put_sector_reals(name, values, self%n_dof, self%parts%cyclic, message)
+         if (allocated(message)) call fatal_error(error, name//' '//message, status_input)
+         return
+      end if
       ! Loads; the other kinds change it.
       rows = self%n_dof
       columns = 1
@@ -98,8 +110,8 @@ contains
          ! As many as there are harmonics, which may be given later.
          columns = size(values)/rows
       else if (.not. any(matrix_names == name) .and. .not. any(load_names == name)) then
-         call unknown_name(name, [matrix_names, load_names, wave_names, &
-                                 pair_names], 'real', error)
+         call unknown_name(name, [matrix_names, load_names, wave_names, pair_names, &
+                                  sector_reals], 'real', error)
          return
       end if
       ! The product in 64 bits: n_dof**2 passes the range of 32.
@@ -155,9 +167,14 @@ contains
       character(*), intent(in) :: name
       integer, intent(in) :: values(:)
       type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: message
 
-      if (.not. any(integer_names == name)) then
-         call unknown_name(name, integer_names, 'integer', error)
+      if (any(sector_integers == name)) then
+         call put_sector_integers(name, values, self%n_pairs, self%parts%cyclic, message)
+         if (allocated(message)) call fatal_error(error, name//' '//message, status_input)
+         return
+      else if (.not. any(integer_names == name)) then
+         call unknown_name(name, [integer_names, sector_integers], 'integer', error)
          return
       end if
       if (name == 'load/harmonic') then
@@ -207,7 +224,8 @@ contains
       call self%observe_all(names, reshape(row, [size(row), 1]), error)
    end subroutine observe
 
-   !> Add observed quantities, a column of factors each (n_dof, n_observed).
+   !> Add observed quantities, a column of factors each (n_dof, n_observed); no factors at all where
+   !> the rows stand with the nodal diameters.
    subroutine observe_all(self, names, columns, error)
       class(memory_model_type), intent(inout) :: self
       type(string_type), intent(in) :: names(:)
@@ -218,21 +236,28 @@ contains
 
       ! All are checked before any is added.
       do i = 1, size(names)
-         call check_size(names(i)%text, size(columns, 1, kind=i8), self%n_dof, 1, error)
+         if (size(columns, 1) > 0) then
+            call check_size(names(i)%text, size(columns, 1, kind=i8), self%n_dof, 1, error)
+         end if
          if (.not. allocated(error) .and. len_trim(names(i)%text) == 0) then
             call fatal_error(error, 'the name of an observed quantity is empty', status_input)
          end if
          if (allocated(error)) return
       end do
       associate (parts => self%parts)
-         if (.not. allocated(parts%observe_name)) then
-            allocate (parts%observe_name(0))
-            allocate (parts%observe_matrix(0, self%n_dof))
-         end if
+         if (.not. allocated(parts%observe_name)) allocate (parts%observe_name(0))
          n = size(parts%observe_name)
+         if (n > 0 .and. size(names) > 0 .and. &
+             (allocated(parts%observe_matrix) .neqv. size(columns, 1) > 0)) then
+            call fatal_error(error, 'some observed quantities have factors and some none: must '// &
+                             'be all or none', status_input)
+            return
+         end if
          do i = 1, size(names)
             call append(parts%observe_name, trim(names(i)%text))
          end do
+         if (size(columns, 1) == 0) return
+         if (.not. allocated(parts%observe_matrix)) allocate (parts%observe_matrix(0, self%n_dof))
          allocate (rows(n + size(names), self%n_dof))
          rows(:n, :) = parts%observe_matrix
          ! Stored by rows, as in a model file; the caller's factors stand in columns.
@@ -245,11 +270,25 @@ contains
    subroutine check(self, error)
       class(memory_model_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: missing
+      character(:), allocatable :: message, missing
+      integer :: n_names
 
       missing = ''
-      if (.not. allocated(self%parts%mass)) missing = 'mass'
-      if (.not. allocated(self%parts%stiffness)) missing = 'stiffness'
+      associate (parts => self%parts)
+         n_names = 0
+         if (allocated(parts%observe_name)) n_names = size(parts%observe_name)
+         call check_memory_sectors(self%n_dof, n_names, allocated(parts%observe_matrix), &
+                                   allocated(parts%mass) .or. allocated(parts%stiffness), &
+                                   parts%cyclic, message)
+         if (allocated(message)) then
+            call fatal_error(error, message, status_input)
+            return
+         end if
+         if (.not. allocated(parts%cyclic%nodal)) then
+            if (.not. allocated(parts%mass)) missing = 'mass'
+            if (.not. allocated(parts%stiffness)) missing = 'stiffness'
+         end if
+      end associate
       if (self%n_pairs > 0 .and. .not. allocated(self%parts%side_1)) missing = 'contact/side_1'
       if (len(missing) > 0) then
          call fatal_error(error, 'the model in memory lacks '//missing, status_input)

@@ -5,8 +5,8 @@
 !> (i, j) is the one h5py calls [i-1, j-1].
 module fw_model_file
    use fw_air_file, only: read_air_file
-   use fw_cyclic_file, only: cyclic_parts
    use fw_cyclic_file, only: read_cyclic_file
+   use fw_cyclic_parts, only: cyclic_parts
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input

@@ -3,7 +3,7 @@
 module fw_read_cyclic
    use fw_contact_data, only: contact_type, spring_type
    use fw_cyclic_data, only: cyclic_type
-   use fw_cyclic_file, only: cyclic_parts
+   use fw_cyclic_parts, only: cyclic_parts
    use fw_cyclic_keys, only: bind_interfaces, bind_sectors, no_order
    use fw_laws, only: facts_of
    use fw_force_law, only: law_facts

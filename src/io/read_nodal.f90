@@ -2,7 +2,7 @@
 !> checks, rotation, damping, loads and observed quantities of each.
 module fw_read_nodal
    use fw_cyclic_data, only: nodal_matrices
-   use fw_cyclic_file, only: nodal_parts
+   use fw_cyclic_parts, only: nodal_parts
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: model_type
