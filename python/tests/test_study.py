@@ -21,7 +21,8 @@ from fretwear.errors import FretwearError, InputError
 from fretwear.study import read_plan, read_table, run_study
 from fretwear.study.plan import override
 from fretwear.study.pool import run_jobs
-from fretwear.study.run import Job, identify, recorded, run_job
+from fretwear.study.execution import run_job
+from fretwear.study.run import Job, identify, recorded
 
 # Two runs solved to 1e-8 each.
 SIMILAR = 1e-6
@@ -195,10 +196,12 @@ quantities = ["n_converged"]
 """
 
 
-def test_interrupted_and_taken_up_again(study: Study) -> None:
+@pytest.mark.parametrize("program", [f'program = "{PROGRAM}"\n', ""])
+def test_interrupted_and_taken_up_again(study: Study, program: str) -> None:
     """Ctrl-C ends the runs at work, keeps what is complete, and leaves no process behind."""
     study.write(LONG)
     text = study.path.read_text().replace("n_points\" = 11", "n_points\" = 4001")
+    text = text.replace(f'program = "{PROGRAM}"\n', program)
     study.path.write_text(text)
     process = subprocess.Popen(
         [sys.executable, "-m", "fretwear", "study", str(study.path), "-q", "--workers", "2"],
@@ -242,9 +245,29 @@ def test_a_run_that_was_killed_is_repeated(study: Study) -> None:
     assert changed == {path.with_suffix(".h5").name for path in records[:3]}
 
 
-def test_time_limit(study: Study) -> None:
+def test_in_process_as_by_program(study: Study) -> None:
+    """Runs of the library in this process give the table that started programs give."""
+    study.write(GRID.format(table="study.h5"))
+    assert study() == 0
+    by_program, before = study.table(), study.results()
+    text = study.path.read_text().replace(f'program = "{PROGRAM}"\n', "")
+    study.path.write_text(text)
+    assert study() == 0
+    assert study.results() == before, "the runs are the same, whoever carries them out"
+    for path in (study.folder / "study").iterdir():
+        path.unlink()
+    assert study() == 0
+    here = study.table()
+    assert here.keys() == by_program.keys()
+    for name in here.keys() - {"seconds"}:
+        np.testing.assert_array_equal(here[name], by_program[name])
+
+
+@pytest.mark.parametrize("program", [f'program = "{PROGRAM}"\n', ""])
+def test_time_limit(study: Study, program: str) -> None:
     study.write(LONG)
     text = study.path.read_text().replace("n_points\" = 11", "n_points\" = 1000001")
+    text = text.replace(f'program = "{PROGRAM}"\n', program)
     study.path.write_text(text.replace("workers = 2", "workers = 2\ntimeout = 0.3"))
     plan = read_plan(study.path)
     records = run_study(type(plan)(**{**vars(plan), "points": plan.points[:2]}))
@@ -339,7 +362,7 @@ def test_values_reach_the_program_to_the_last_bit(study: Study) -> None:
                    {"contact%normal_load": value, "contact%side_1": (1, 0, 0)},
                    {"case%title": "it's", "solver%fallback": False}, 0.0)
     assert isinstance(job, Job)
-    assert job.overrides == ("case%title='it''s'", "solver%fallback=.false.",
+    assert tuple(override(key, one) for key, one in job.settings.items()) == ("case%title='it''s'", "solver%fallback=.false.",
                              "contact%normal_load=0.30000000000000004", "contact%side_1=1, 0, 0")
     assert override("sweep%n_points", 3) == "sweep%n_points=3"
     assert recorded(job) is None

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, metavar="N",
                         help="runs at once on this machine (default: run.workers, else all cores)")
     parser.add_argument("--scheduler", metavar="WHERE",
-                        help="'processes', 'dask' or the address of a Dask scheduler")
+                        help="'threads', 'processes', 'dask' or the address of a Dask scheduler")
     parser.add_argument("--table-only", action="store_true",
                         help="run nothing; write the table from what is there")
     parser.add_argument("--quantities", action="store_true",

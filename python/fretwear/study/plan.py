@@ -62,12 +62,14 @@ class Plan:
     workers : int
         Runs at once; 0: as many as there are cores.
     scheduler : str
-        'processes' on this machine; 'dask' for a Dask cluster on this machine; else the address
-        of a Dask scheduler, such as "tcp://head:8786".
+        'threads': in this process; 'processes': a program for each run on this machine; 'dask': a
+        Dask cluster on this machine; else the address of a Dask scheduler, such as
+        "tcp://head:8786".
     timeout : float
         Longest time of a run [s]; 0: no limit.
     program : str
-        `fw_run`; '': the one of this installation.
+        `fw_run` to start for each run; '': none but with 'processes', which finds that of this
+        installation.
     """
 
     path: Path
@@ -78,7 +80,7 @@ class Plan:
     fixed: dict[str, Setting] = field(default_factory=dict)
     quantities: list[str] = field(default_factory=lambda: list(_QUANTITIES))
     workers: int = 0
-    scheduler: str = "processes"
+    scheduler: str = "threads"
     timeout: float = 0.0
     program: str = ""
 
@@ -124,7 +126,7 @@ def read_plan(path: str | Path) -> Plan:
         path, case, results, _points(reader, content), target,
         reader.settings(content.get("fixed", {}), "fixed"), quantities,
         reader.take(run, "workers", int, 0, "run."),
-        reader.take(run, "scheduler", str, "processes", "run."),
+        reader.take(run, "scheduler", str, "threads", "run."),
         float(reader.take(run, "timeout", (int, float), 0.0, "run.")),
         reader.take(run, "program", str, "", "run."))
     if plan.workers < 0 or plan.timeout < 0.0:

@@ -11,7 +11,8 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import InputError
-from .run import Job, Record, RunStopped, run_job
+from .execution import run_job
+from .run import Job, Record, RunStopped
 
 __all__ = ["core_count", "run_jobs"]
 
@@ -31,7 +32,8 @@ def run_jobs(jobs: Sequence[Job], scheduler: str, workers: int) -> Iterator[Reco
     jobs : sequence of Job
         No two of one name.
     scheduler : str
-        'processes', 'dask', or the address of a Dask scheduler.
+        'threads' and 'processes' of this machine (what a job names), 'dask', or the address of a
+        Dask scheduler.
     workers : int
         Runs at once on this machine.
 
@@ -40,14 +42,14 @@ def run_jobs(jobs: Sequence[Job], scheduler: str, workers: int) -> Iterator[Reco
     Closing the iterator, or Ctrl-C, ends the runs of this machine; those of a cluster that have
     begun come to their end and leave their records, the others are cancelled.
     """
-    if scheduler == "processes":
+    if scheduler in ("threads", "processes"):
         yield from _run_here(jobs, workers)
     else:
         yield from _run_on_dask(jobs, scheduler, workers)
 
 
 def _run_here(jobs: Sequence[Job], workers: int) -> Iterator[Record]:
-    """Every run is a process of its own; the threads only wait for them."""
+    """A run occupies a thread, in the library or waiting for its program."""
     stop = threading.Event()
     with ThreadPoolExecutor(workers) as pool:
         waiting: set[Future[Record]] = {pool.submit(run_job, job, stop) for job in jobs}

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from .execution import check_program, find_program
 from .plan import Plan
 from .pool import core_count, run_jobs
-from .run import Job, Record, check_program, find_program, identify, recorded
+from .run import Job, Record, identify, recorded
 from .table import build_table, need_writer, write_table
 
 __all__ = ["Progress", "run_study"]
@@ -43,10 +44,13 @@ def run_study(plan: Plan, progress: Progress | None = None, *,
         Ctrl-C; the runs that were complete are kept, and stand in the table.
     """
     need_writer(plan.table)
-    program, workers = find_program(plan.program), plan.workers or core_count()
+    by_program = bool(plan.program) or plan.scheduler == "processes"
+    program = find_program(plan.program) if by_program else ""
+    workers = plan.workers or core_count()
     case, folder = plan.case.resolve(), plan.results.resolve()
 
-    check_program(program)
+    if program:
+        check_program(program)
     found = [identify(program, case, folder, point, plan.fixed, plan.timeout)
              for point in plan.points]
     points: dict[str, list[int]] = {}  # by the name of the run: some points may be the same
