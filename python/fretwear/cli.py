@@ -20,6 +20,7 @@ __all__ = ["COMMANDS", "main"]
 
 #: Subcommand: module below `fretwear`, and what it does.
 COMMANDS = {
+    "modes": ("natural_modes", "natural frequencies, free and stuck, beside the sweep"),
     "plot": ("plot", "pictures of a result file"),
     "compare": ("compare", "two result files beside each other"),
     "report": ("report", "one self-contained HTML page of a result file"),

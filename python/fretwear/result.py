@@ -15,6 +15,7 @@ from .bifurcation import Bifurcation, read_bifurcations
 from .case import Case
 from .cycle import Cycle, read_cycle, read_peak_cycle
 from .errors import AbsentError, InputError, OutputError
+from .natural_modes import NaturalModes, read_natural_modes
 from .nonlinear_mode import NonlinearMode, read_mode
 from .peaks import Peak, read_peaks
 from .result_file import Quantity, ResultFile, plain_text
@@ -327,6 +328,11 @@ class Result(ResultFile):
         Undecided: a multiplier is as near to the unit circle as its error (`"floquet/error"`).
         """
         return self["floquet/stable"].astype(int)
+
+    @property
+    def modes(self) -> NaturalModes:
+        """Natural frequencies, free and stuck, of a run with `analysis = 'modes'`."""
+        return read_natural_modes(self)
 
     @property
     def bifurcations(self) -> list[Bifurcation]:

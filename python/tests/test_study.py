@@ -19,9 +19,9 @@ from project import PROGRAM, ROOT
 from fretwear.cli import main
 from fretwear.errors import FretwearError, InputError
 from fretwear.study import read_plan, read_table, run_study
+from fretwear.study.execution import run_job
 from fretwear.study.plan import override
 from fretwear.study.pool import run_jobs
-from fretwear.study.execution import run_job
 from fretwear.study.run import Job, identify, recorded
 
 # Two runs solved to 1e-8 each.
