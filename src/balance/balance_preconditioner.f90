@@ -19,7 +19,9 @@ contains
       !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
       !$omp if(self%problem%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%problem%fourier%n_retained
-         call build_harmonic(self, h)
+         if (h == self%preconditioner%left_out) cycle
+         call self%fill_harmonic(h, 0, self%preconditioner%harmonic(h))
+         call self%preconditioner%harmonic(h)%factor()
       end do
       !$omp end parallel do
       self%preconditioner%n = self%active%n_active
@@ -31,9 +33,7 @@ contains
    end procedure build_preconditioner
 
    !> One harmonic: Z_n and the mean of what the forces add to it, scaled for single precision.
-   subroutine build_harmonic(self, h)
-      type(balance_state), intent(inout) :: self
-      integer, intent(in) :: h
+   module procedure fill_harmonic
       !> Z_n of rows and columns in use; of one harmonic at a time, so that memory holds no more.
       complex(wp), allocatable :: stiffness(:, :)
       integer :: k
@@ -41,10 +41,8 @@ contains
       allocate (stiffness(self%active%n_used, self%active%n_active))
       ! Rows in use, not only the active ones: add_rows takes rows of A of pinned coordinates too.
       call self%problem%structure%active_block(self%structure_state, h, stiffness)
-      call self%preconditioner%harmonic(h)%reserve(self%active%n_active, &
-                                                   largest_diagonal(stiffness))
-      associate (m => self%preconditioner%harmonic(h)%matrix, na => self%active%n_active, &
-                 scale => self%preconditioner%harmonic(h)%scale)
+      call factors%reserve(self%active%n_active + n_more, largest_diagonal(stiffness))
+      associate (m => factors%matrix, na => self%active%n_active, scale => factors%scale)
          m(:na, :na) = cmplx(scale*stiffness(:na, :), kind=sp)
          do k = 1, self%problem%forces%n_laws
             call add_mean_forces(self, self%problem%forces%entry(k), self%work(k), h, scale, &
@@ -54,8 +52,7 @@ contains
             m(:na, :na) = m(:na, :na) + cmplx(scale*self%shift(:, :, h), kind=sp)
          end if
       end associate
-      call self%preconditioner%harmonic(h)%factor()
-   end subroutine build_harmonic
+   end procedure fill_harmonic
 
    !> Largest diagonal entry of the stiffness in absolute value.
    pure real(wp) function largest_diagonal(stiffness)
@@ -213,7 +210,7 @@ contains
       !$omp parallel do default(none) shared(self) private(h) &
       !$omp if(self%problem%structure%n_coordinates >= coordinates_for_threads)
       do h = 1, self%problem%fourier%n_retained
-         call solve_kept(self, h)
+         if (h /= self%preconditioner%left_out) call solve_kept(self, h)
       end do
       !$omp end parallel do
       do h = 1, self%problem%fourier%n_retained

@@ -21,6 +21,7 @@ module fw_balance_state
    use fw_fourier, only: to_real
    use fw_kept_factors, only: kept_factors
    use fw_parameter_system, only: parameter_system
+   use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_structure_operator, only: structure_state
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
@@ -68,6 +69,7 @@ module fw_balance_state
       procedure :: expand
       procedure :: apply
       procedure :: build_preconditioner
+      procedure :: fill_harmonic
       procedure :: preconditioner_fits
       procedure :: precondition
       procedure :: assemble
@@ -131,6 +133,13 @@ module fw_balance_state
       module subroutine build_preconditioner(self)
          class(balance_state), intent(inout) :: self
       end subroutine build_preconditioner
+
+      !> The matrix of one harmonic, not factored, with room for rows and columns behind it.
+      module subroutine fill_harmonic(self, h, n_more, factors)
+         class(balance_state), intent(in) :: self
+         integer, intent(in) :: h, n_more
+         type(preconditioner_lu_type), intent(inout) :: factors
+      end subroutine fill_harmonic
 
       !> Find the active coordinates in the preconditioner from before.
       module subroutine place_kept(self)

@@ -13,6 +13,8 @@ module fw_kept_factors
       !> Coordinates for which they were built (first n entries).
       integer :: n = 0
       integer, allocatable :: coordinate(:)
+      !> A harmonic whose factors another system has, bordered (its place); 0 for none.
+      integer :: left_out = 0
       !> Whether they were built with a shift.
       logical :: shifted = .false.
       !> Place there of each active coordinate, 0 for one that has become active since; prediction

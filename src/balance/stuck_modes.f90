@@ -2,13 +2,18 @@
 !> their springs, rigid ones held; nonlinear springs as their slopes. Nonlinear modes start from
 !> them, and are them below the onset of slip.
 !>
-!> First real ones without damping, which are numbered; then the one in question with its damping
-!> and the self-excitation xi that cancels it,
+!> First those without damping, which are numbered; then the one in question with its damping and
+!> the self-excitation xi that cancels it,
 !>
 !>   (K - theta M + i omega C) U = 0,   theta = omega^2 + i omega xi,   exact whatever the damping.
+!>
+!> Of a cyclic structure they are waves of the nodal diameter of harmonic 1, with Hermitian K and M;
+!> what the air adds to K and Coriolis forces to C is left to the mode in question, too.
 module fw_stuck_modes
    use fw_balance_state, only: balance_state
    use fw_force_law, only: pair_open
+   use fw_hermitian, only: real_form
+   use fw_hermitian, only: solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
    use fw_linalg, only: solve_symmetric_eigen
@@ -20,9 +25,11 @@ module fw_stuck_modes
    type :: stuck_modes
       !> Of the elastic modes in ascending order: frequencies [rad/s] (n_modes) and shapes in the
       !> coordinates, of any size (n_coordinates, n_modes).
-      real(wp), allocatable :: omega(:), shape(:, :)
-      !> K with its stuck pairs, M and C of the coordinates.
-      real(wp), allocatable, private :: stiffness(:, :), mass(:, :), damping(:, :)
+      real(wp), allocatable :: omega(:)
+      complex(wp), allocatable :: shape(:, :)
+      !> K with its stuck pairs, M and C of the coordinates, rows of the observed quantities.
+      complex(wp), allocatable, private :: stiffness(:, :), mass(:, :), damping(:, :)
+      complex(wp), allocatable :: observe(:, :)
       !> Coordinates that rigid pairs do not hold.
       integer, allocatable, private :: free(:)
    contains
@@ -38,8 +45,8 @@ module fw_stuck_modes
 
 contains
 
-   !> The modes where the balance was evaluated last: at rest. Nothing of its
-   !> structure is condensed; it stands at a frequency above 0 without self-excitation.
+   !> The modes where the balance was evaluated last: at rest. Nothing of its structure is condensed
+   !> in harmonic 1.
    subroutine find_stuck_modes(system, modes, done, slides)
       type(balance_state), intent(in) :: system
       type(stuck_modes), intent(out) :: modes
@@ -47,26 +54,22 @@ contains
       logical, intent(out) :: done
       !> Pairs hold nothing tangentially (default: they do).
       logical, intent(in), optional :: slides
-      complex(wp), allocatable :: block(:, :)
       logical, allocatable :: held(:)
-      real(wp) :: omega
       integer :: first, h, j, m
 
-      m = system%problem%structure%n_coordinates
-      omega = system%frequency()
-      h = findloc(system%problem%fourier%harmonic, 1, dim=1)
-      allocate (block(m, m), modes%mass(m, m), held(m))
-      call system%problem%structure%mass(modes%mass)
-      call system%problem%structure%block(system%structure_state, h, block)
-      ! Z_1 = K - omega^2 M + i omega C, and C alone in its imaginary part.
-      modes%damping = aimag(block)/omega
+      associate (structure => system%problem%structure)
+         m = structure%n_coordinates
+         h = findloc(system%problem%fourier%harmonic, 1, dim=1)
+         allocate (modes%stiffness(m, m), modes%observe(structure%n_observed, m), held(m))
+         allocate (modes%mass, modes%damping, mold=modes%stiffness)
+         call structure%parts(h, modes%stiffness, modes%mass, modes%damping, modes%observe)
+      end associate
       held = .false.
       first = 1
       if (present(slides)) first = merge(3, 1, slides)
-      call add_laws(system, h, first, block, held)
-      modes%stiffness = real(block, wp) + omega**2*modes%mass
+      call add_laws(system, h, first, modes%stiffness, held)
       modes%free = pack([(j, j=1, m)], .not. held)
-      call solve_real(modes, done)
+      call solve_undamped(modes, done)
    end subroutine find_stuck_modes
 
    !> Slopes of all laws; rigid pairs that bear hold their coordinates.
@@ -124,21 +127,24 @@ contains
    end function slope_of
 
    !> M x = value (K + shift M) x, so that massless coordinates are no exception.
-   subroutine solve_real(self, done)
+   subroutine solve_undamped(self, done)
       type(stuck_modes), intent(inout) :: self
       logical, intent(out) :: done
-      real(wp), allocatable :: k(:, :), m(:, :), values(:), vectors(:, :), square(:)
+      complex(wp), allocatable :: k(:, :), m(:, :), vectors(:, :)
+      real(wp), allocatable :: values(:), square(:)
       real(wp) :: shift
       integer, allocatable :: order(:)
       integer :: j, trial
 
       k = self%stiffness(self%free, self%free)
+      ! Forces of the air are not Hermitian.
+      k = 0.5_wp*(k + conjg(transpose(k)))
       m = self%mass(self%free, self%free)
       done = size(self%free) > 0
       if (.not. done) return
       do trial = 1, size(shift_trials)
-         shift = shift_trials(trial)*norm2(k)/max(norm2(m), tiny(1.0_wp))
-         call solve_symmetric_eigen(m, k + shift*m, values, vectors, done)
+         shift = shift_trials(trial)*norm2(abs(k))/max(norm2(abs(m)), tiny(1.0_wp))
+         call solve_pencil(m, k + shift*m, values, vectors, done)
          if (done) exit
       end do
       if (.not. done) return
@@ -150,88 +156,103 @@ contains
       order = pack(order, square > rigid*shift)
       square = 1.0_wp/values(order) - shift
       self%omega = sqrt(square)
-      allocate (self%shape(size(self%stiffness, 1), size(order)), source=0.0_wp)
+      allocate (self%shape(size(self%stiffness, 1), size(order)), source=(0.0_wp, 0.0_wp))
       self%shape(self%free, :) = vectors(:, order)
-   end subroutine solve_real
+   end subroutine solve_undamped
+
+   !> Real matrices have real modes, and take a quarter of the time.
+   subroutine solve_pencil(a, b, values, vectors, done)
+      complex(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp), allocatable, intent(out) :: values(:)
+      complex(wp), allocatable, intent(out) :: vectors(:, :)
+      logical, intent(out) :: done
+      real(wp), allocatable :: real_vectors(:, :)
+
+      if (any(abs(aimag(a)) > 0.0_wp) .or. any(abs(aimag(b)) > 0.0_wp)) then
+         call solve_hermitian_eigen(a, b, values, vectors, done)
+      else
+         call solve_symmetric_eigen(real(a, wp), real(b, wp), values, real_vectors, done)
+         if (done) vectors = cmplx(real_vectors, kind=wp)
+      end if
+   end subroutine solve_pencil
 
    !> A mode with its damping, by Newton's method on the complex shape, omega and xi, which starts
-   !> at the real one; b^T U = 1 holds throughout.
-   subroutine refine(self, number, row, omega, self_excitation, cosine, sine, done)
+   !> at the one without; b^T U = 1 holds throughout.
+   subroutine refine(self, number, row, omega, self_excitation, shape, done)
       class(stuck_modes), intent(in) :: self
       integer, intent(in) :: number
       !> The row b (n_coordinates).
-      real(wp), intent(in) :: row(:)
+      complex(wp), intent(in) :: row(:)
       !> [rad/s]
       real(wp), intent(out) :: omega, self_excitation
-      !> U = cosine - i sine (n_coordinates).
-      real(wp), intent(out) :: cosine(:), sine(:)
+      !> U (n_coordinates).
+      complex(wp), intent(out) :: shape(:)
       logical, intent(out) :: done
       integer, parameter :: most_steps = 30
       !> Steps of this part of the unknowns are round-off.
       real(wp), parameter :: small = 1.0e-13_wp
       type(lu_type) :: lu
-      real(wp) :: step(2*size(self%free) + 2), shape(size(self%free))
+      complex(wp) :: u(size(self%free))
+      complex(wp), dimension(size(self%free), size(self%free)) :: k, m, c
+      real(wp) :: step(2*size(self%free) + 2)
       logical :: singular
-      integer :: k, n
+      integer :: j, n
 
       n = size(self%free)
-      shape = self%shape(self%free, number)/dot_product(row, self%shape(:, number))
+      k = self%stiffness(self%free, self%free)
+      m = self%mass(self%free, self%free)
+      c = self%damping(self%free, self%free)
+      u = self%shape(self%free, number)/sum(row*self%shape(:, number))
       omega = self%omega(number)
-      self_excitation = dot_product(shape, matmul(self%damping(self%free, self%free), shape))/ &
-                        dot_product(shape, matmul(self%mass(self%free, self%free), shape))
-      cosine = 0.0_wp
-      sine = 0.0_wp
-      cosine(self%free) = shape
+      self_excitation = real(dot_product(u, matmul(c, u)), wp)/real(dot_product(u, matmul(m, u)), &
+                                                                    wp)
       done = .false.
       call lu%reserve(2*n + 2)
-      do k = 1, most_steps
-         call fill(self, row, omega, self_excitation, cosine(self%free), sine(self%free), &
+      do j = 1, most_steps
+         call fill(k, m, c, row(self%free), omega, self_excitation, u, &
                    lu%matrix(:2*n + 2, :2*n + 2), step)
          call lu%factor(singular)
          if (singular) return
          call lu%solve(step)
-         cosine(self%free) = cosine(self%free) - step(:n)
-         sine(self%free) = sine(self%free) - step(n + 1:2*n)
+         u = u - cmplx(step(:n), step(n + 1:2*n), wp)
          omega = omega - step(2*n + 1)
          self_excitation = self_excitation - step(2*n + 2)
-         done = norm2(step(:2*n)) <= small*norm2(cosine) .and. &
+         done = norm2(step(:2*n)) <= small*norm2(abs(u)) .and. &
                 maxval(abs(step(2*n + 1:))) <= small*abs(omega)
-         if (done) return
+         if (done) exit
       end do
       ! Ill-conditioned modes stop short of round-off of their best digits.
-      done = maxval(abs(step(2*n + 1:))) <= sqrt(small)*abs(omega)
+      if (.not. done) done = maxval(abs(step(2*n + 1:))) <= sqrt(small)*abs(omega)
+      shape = (0.0_wp, 0.0_wp)
+      shape(self%free) = u
    end subroutine refine
 
-   !> Matrix and residual of a step: real and imaginary part of (K - theta M + i omega C) U, with
-   !> U = c - i s, theta = omega^2 + i omega xi, then b^T c - 1 and b^T s.
-   subroutine fill(self, row, omega, xi, c, s, matrix, r)
-      type(stuck_modes), intent(in) :: self
-      real(wp), intent(in) :: row(:), omega, xi, c(:), s(:)
+   !> Matrix and residual of a step in real and imaginary parts: of (K - theta M + i omega C) U,
+   !> theta = omega^2 + i omega xi, then of b^T U - 1.
+   subroutine fill(k, m, c, row, omega, xi, u, matrix, r)
+      complex(wp), intent(in) :: k(:, :), m(:, :), c(:, :), row(:), u(:)
+      real(wp), intent(in) :: omega, xi
       real(wp), intent(out) :: matrix(:, :), r(:)
-      real(wp), allocatable :: z_real(:, :), z_imag(:, :), m(:, :), damping(:, :)
+      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+      complex(wp) :: z(size(u), size(u)), part(size(u)), condition
       integer :: n
 
-      n = size(self%free)
-      m = self%mass(self%free, self%free)
-      damping = self%damping(self%free, self%free)
-      z_real = self%stiffness(self%free, self%free) - omega**2*m
-      z_imag = omega*damping - omega*xi*m
+      n = size(u)
+      z = k - cmplx(omega**2, omega*xi, wp)*m + i*omega*c
       matrix = 0.0_wp
-      ! (Z_r + i Z_i)(c - i s) = Z_r c + Z_i s + i (Z_i c - Z_r s).
-      matrix(:n, :n) = z_real
-      matrix(:n, n + 1:2*n) = z_imag
-      matrix(n + 1:2*n, :n) = z_imag
-      matrix(n + 1:2*n, n + 1:2*n) = -z_real
-      matrix(:n, 2*n + 1) = matmul(-2.0_wp*omega*m, c) + matmul(damping - xi*m, s)
-      matrix(n + 1:2*n, 2*n + 1) = matmul(damping - xi*m, c) + matmul(2.0_wp*omega*m, s)
-      matrix(:n, 2*n + 2) = -omega*matmul(m, s)
-      matrix(n + 1:2*n, 2*n + 2) = -omega*matmul(m, c)
-      matrix(2*n + 1, :n) = row(self%free)
-      matrix(2*n + 2, n + 1:2*n) = row(self%free)
-      r(:n) = matmul(z_real, c) + matmul(z_imag, s)
-      r(n + 1:2*n) = matmul(z_imag, c) - matmul(z_real, s)
-      r(2*n + 1) = dot_product(row(self%free), c) - 1.0_wp
-      r(2*n + 2) = dot_product(row(self%free), s)
+      matrix(:2*n, :2*n) = real_form(z)
+      part = i*matmul(c, u) - cmplx(2.0_wp*omega, xi, wp)*matmul(m, u)
+      matrix(:n, 2*n + 1) = real(part, wp)
+      matrix(n + 1:2*n, 2*n + 1) = aimag(part)
+      part = -i*omega*matmul(m, u)
+      matrix(:n, 2*n + 2) = real(part, wp)
+      matrix(n + 1:2*n, 2*n + 2) = aimag(part)
+      matrix(2*n + 1:, :2*n) = real_form(reshape(row, [1, n]))
+      part = matmul(z, u)
+      r(:n) = real(part, wp)
+      r(n + 1:2*n) = aimag(part)
+      condition = sum(row*u) - 1.0_wp
+      r(2*n + 1:) = [real(condition, wp), aimag(condition)]
    end subroutine fill
 
 end module fw_stuck_modes

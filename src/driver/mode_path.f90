@@ -7,7 +7,6 @@ module fw_mode_path
    use fw_mode_system, only: mode_system
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
-   use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_options
    implicit none (type, external)
    private
@@ -52,7 +51,8 @@ contains
 
       self%system => system
       self%newton%options = options
-      self%newton%options%linear = linear_lu
+      ! A step that GMRES leaves unsolved may lead to another curve.
+      self%newton%linear%lu_follows = .true.
       self%newton%options%max_iterations = min(options%max_iterations, most_iterations)
       allocate (self%y(system%n, 3), source=0.0_wp)
    end subroutine start

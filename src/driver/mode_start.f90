@@ -49,8 +49,8 @@ module fw_mode_start
       real(wp), allocatable :: stuck_omega(:), sliding_omega(:)
       !> The stuck motion as unknowns of the mode.
       real(wp), allocatable :: y(:)
-      !> Vibratory load of the case, cosine and sine (n_coordinates, 2) [force].
-      real(wp), allocatable :: load(:, :)
+      !> Vibratory load of the case, harmonic 1 (n_coordinates) [force].
+      complex(wp), allocatable :: load(:)
    contains
       procedure :: build
       procedure :: departs
@@ -58,8 +58,9 @@ module fw_mode_start
 
    !> Two frequencies nearer than this part of them are one: the plane of the motion is free.
    real(wp), parameter :: same_frequency = 1.0e-6_wp
-   !> Unknowns of a dense factorization that takes seconds and below 1 GB; both grow fast.
-   integer, parameter :: most_unknowns = 6000
+   !> Unknowns of a dense factorization that takes seconds and below 1 GB; both grow fast. Dofs
+   !> whose linear modes take as long.
+   integer, parameter :: most_unknowns = 6000, most_dofs = 3000
    !> Part of its size below which a mode has a node.
    real(wp), parameter :: node = 1.0e-8_wp
    !> Change of the shares of the period that is no round-off of the march.
@@ -77,11 +78,9 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
       type(stuck_modes) :: modes
-      real(wp), allocatable :: x(:), row(:)
+      real(wp), allocatable :: x(:)
 
       self%case = case
-      ! Everything stays in the linear problem, which has two borders.
-      self%case%solver%skips = .false.
       self%case%sweep%start = rough_frequency(case)
       call check_size(case, error)
       if (.not. allocated(error)) call at_rest(self, x, modes, error)
@@ -94,8 +93,7 @@ contains
          if (allocated(error)) return
       end if
       call note_frequencies(self, modes)
-      call observed_row(self%balance, row)
-      call take_mode(self, modes, x, row, error)
+      call take_mode(self, modes, x, error)
       if (.not. allocated(error)) call find_onset(self)
    end subroutine build
 
@@ -109,18 +107,27 @@ contains
       end if
    end function rough_frequency
 
-   !> The matrix of a step is dense, of all dofs and coefficients.
+   !> Nothing is condensed: linear modes of all dofs, a matrix of them for each harmonic, and
+   !> directions of GMRES.
    subroutine check_size(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: n
+      real(wp), parameter :: directions = 70.0_wp
+      real(wp) :: n, nh
 
-      n = real(case%model%n_dof, wp)*(2*case%harmonics%n_harmonics + 1)
-      call require_memory(2.0_wp*n**2, "analysis = 'mode' with "//to_text(case%model%n_dof)// &
+      n = real(case%model%n_dof, wp)
+      nh = real(case%harmonics%n_harmonics + 1, wp)
+      if (case%model%n_dof > most_dofs) then
+         call fatal_error(error, "case%analysis = 'mode' condenses nothing: the model has "// &
+                          to_text(case%model%n_dof)//' dofs, '//to_text(most_dofs)// &
+                          ' at most; reduce it (fretwear reduce)', status_input)
+         return
+      end if
+      call require_memory(3.0_wp*nh*n**2 + 2.0_wp*directions*nh*n, &
+                          "analysis = 'mode' with "//to_text(case%model%n_dof)// &
                           ' dofs and harmonics%n_harmonics = '// &
                           to_text(case%harmonics%n_harmonics), &
-                          'reduce the model (fretwear import --reduce), or take fewer '// &
-                          'harmonics', error)
+                          'reduce the model (fretwear reduce), or take fewer harmonics', error)
    end subroutine check_size
 
    pure logical function any_rigid(problem)
@@ -151,11 +158,10 @@ contains
                           "linear structure take 'modes'", status_input)
          return
       end if
-      if (self%balance%n > most_unknowns) then
-         call fatal_error(error, "case%analysis = 'mode' factors a dense matrix of all "// &
-                          'unknowns: '//to_text(self%balance%n)//' here, '// &
-                          to_text(most_unknowns)//' at most; reduce the model (fretwear '// &
-                          'reduce), or take fewer harmonics', status_input)
+      if (self%case%solver%linear == linear_lu .and. self%balance%n > most_unknowns) then
+         call fatal_error(error, "solver%linear = 'lu' with case%analysis = 'mode' factors a "// &
+                          'dense matrix of all unknowns: '//to_text(self%balance%n)//' here, '// &
+                          to_text(most_unknowns)//" at most; leave it to 'auto'", status_input)
          return
       end if
       call take_load(self)
@@ -166,7 +172,6 @@ contains
       call stuck_guess(self%balance, x)
       guess = x
       newton%options = self%case%solver
-      newton%options%linear = linear_lu
       newton%options%tolerance = max(rest_tolerance, self%case%solver%tolerance)
       call newton%solve(self%balance, x, report)
       if (.not. report%converged) x = guess
@@ -199,18 +204,12 @@ contains
       if (done) self%sliding_omega = sliding%omega
    end subroutine note_frequencies
 
-   !> The load that a response of the same case has, as coefficients of harmonic 1.
+   !> The load that a response of the same case has.
    subroutine take_load(self)
       class(mode_start), intent(inout) :: self
-      integer :: h
 
-      if (allocated(self%load)) deallocate (self%load)
-      allocate (self%load(self%problem%structure%n_coordinates, 2))
-      associate (structure => self%balance%structure_state)
-         h = findloc(self%problem%fourier%harmonic, 1, dim=1)
-         ! F = Fc - i Fs.
-         self%load(:, 1) = real(structure%load(:, h), wp)
-         self%load(:, 2) = -aimag(structure%load(:, h))
+      associate (h => findloc(self%problem%fourier%harmonic, 1, dim=1))
+         self%load = self%balance%structure_state%load(:, h)
       end associate
    end subroutine take_load
 
@@ -251,52 +250,29 @@ contains
       end associate
    end subroutine choose
 
-   !> The row of the first observed quantity in the coordinates: nothing is condensed, so that it
-   !> is the same in all harmonics; one coordinate in each of them at a time.
-   subroutine observed_row(balance, row)
-      type(balance_state), intent(inout) :: balance
-      real(wp), allocatable, intent(out) :: row(:)
-      complex(wp), allocatable :: q(:, :), observed(:, :)
-      integer :: first, h, m, n
-
-      m = balance%problem%structure%n_coordinates
-      n = balance%problem%fourier%n_retained
-      allocate (row(m), q(m, n), observed(balance%problem%structure%n_observed, n))
-      do first = 1, m, n
-         q = (0.0_wp, 0.0_wp)
-         do h = 1, min(n, m - first + 1)
-            q(first + h - 1, h) = (1.0_wp, 0.0_wp)
-         end do
-         call balance%problem%structure%recover(balance%structure_state, q, observed)
-         do h = 1, min(n, m - first + 1)
-            row(first + h - 1) = real(observed(1, h), wp)
-         end do
-      end do
-   end subroutine observed_row
-
    !> The mode with its damping, and the system of its curve at the lowest amplitude.
-   subroutine take_mode(self, modes, x, row, error)
+   subroutine take_mode(self, modes, x, error)
       class(mode_start), intent(inout), target :: self
       type(stuck_modes), intent(in) :: modes
-      real(wp), intent(in) :: x(:), row(:)
+      real(wp), intent(in) :: x(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), dimension(size(row)) :: cosine, sine, about
+      complex(wp), dimension(size(modes%observe, 2)) :: shape, about
       logical :: done
 
       ! Without phase of its own where the first observed quantity does not move.
-      about = row
+      about = modes%observe(1, :)
       associate (phi => modes%shape(:, self%number))
-         if (abs(dot_product(row, phi)) <= node*norm2(row)*norm2(phi)) then
+         if (abs(sum(about*phi)) <= node*norm2(abs(about))*norm2(abs(phi))) then
             if (self%case%mode%control == control_observed) then
                call fatal_error(error, 'output%observe: the first observed quantity is at a '// &
                                 'node of mode '//to_text(self%number)//': name another, or '// &
                                 "take &mode control = 'modal'", status_input)
                return
             end if
-            about = phi
+            about = conjg(phi)
          end if
       end associate
-      call modes%refine(self%number, about, self%omega, self%self_excitation, cosine, sine, done)
+      call modes%refine(self%number, about, self%omega, self%self_excitation, shape, done)
       if (.not. done) then
          call fatal_error(error, '&mode number = '//to_text(self%number)//': the mode with its '// &
                           'damping was not found (overdamped, or next to another): check the '// &
@@ -304,57 +280,39 @@ contains
          return
       end if
       call new_mode_system(self%balance, self%case%mode%control, self%omega, &
-                           self%case%mode%end*maxval(abs(cosine)), row, self%system)
-      call scale_mode(self, x, cosine, sine)
+                           self%case%mode%end*maxval(abs(real(shape, wp))), self%system)
+      call scale_mode(self, x, shape)
    end subroutine take_mode
 
    !> A mode of amplitude one, and the sizes to which residuals are compared.
-   subroutine scale_mode(self, x, cosine, sine)
+   subroutine scale_mode(self, x, shape)
       class(mode_start), intent(inout) :: self
-      real(wp), intent(in) :: x(:), cosine(:), sine(:)
+      real(wp), intent(in) :: x(:)
+      !> U_1 (n_coordinates).
+      complex(wp), intent(in) :: shape(:)
       type(error_type), allocatable :: ignored
       real(wp), allocatable :: q(:)
-      complex(wp), allocatable :: shape(:, :)
+      complex(wp), allocatable :: amplitude(:, :)
       real(wp) :: modal
-      integer :: h, m
+      integer :: m
 
-      m = size(cosine)
+      m = size(shape)
       associate (fourier => self%problem%fourier, system => self%system)
          system%amplitude = 1.0_wp
-         allocate (shape(m, fourier%n_retained), source=(0.0_wp, 0.0_wp))
-         h = findloc(fourier%harmonic, 1, dim=1)
-         shape(:, h) = cmplx(cosine, -sine, wp)
+         modal = 1.0_wp
+         if (system%control /= control_observed) modal = sqrt(real(dot_product(shape, &
+                                                              matmul(system%mass, shape)), wp))
+         allocate (amplitude(m, fourier%n_retained), source=(0.0_wp, 0.0_wp))
+         amplitude(:, system%first) = shape/modal
          allocate (q(size(x)), self%y(system%n))
-         call to_real(fourier, m, shape, q)
+         call to_real(fourier, m, amplitude, q)
          if (fourier%has_constant()) q(:m) = x(:m)
          call system%from_balance(q, self%omega, self%self_excitation, self%y)
-         if (system%control /= control_observed) then
-            modal = system%modal_amplitude(self%y)
-            if (fourier%has_constant()) then
-               self%y(m + 1:size(x)) = self%y(m + 1:size(x))/modal
-            else
-               self%y(:size(x)) = self%y(:size(x))/modal
-            end if
-            cosine_and_sine: associate (c => cosine/modal, s => sine/modal)
-               call set_inertia(c, s)
-            end associate cosine_and_sine
-         else
-            call set_inertia(cosine, sine)
-         end if
+         system%inertia = self%omega**2*norm2(abs(matmul(system%mass, shape)))/modal
          call system%remember(self%y)
          system%static_load = static_size(self%balance)
          call system%set_parameter(log(self%case%mode%start), ignored)
       end associate
-
-   contains
-
-      subroutine set_inertia(c, s)
-         real(wp), intent(in) :: c(:), s(:)
-
-         self%system%inertia = self%omega**2*hypot(norm2(matmul(self%system%mass, c)), &
-                                                   norm2(matmul(self%system%mass, s)))
-      end subroutine set_inertia
-
    end subroutine scale_mode
 
    !> Static loads, and what interferences would press with [force].

@@ -102,7 +102,8 @@ contains
       harmonics = case%harmonics
       if (present(of_level)) harmonics = of_level
       ! A perturbation moves what no load moves.
-      skip_idle = case%solver%skips .and. .not. case%sweep%stability
+      skip_idle = case%solver%skips .and. .not. case%sweep%stability .and. &
+                  case%analysis /= analysis_mode
       call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
       ! No load moves a mode, and none has to.

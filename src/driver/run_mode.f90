@@ -5,6 +5,8 @@ module fw_run_mode
    use, intrinsic :: ieee_arithmetic, only: ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
+   use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
    use fw_continuation, only: arclength_type
    use fw_continuation, only: branch_point
    use fw_error, only: error_type
@@ -30,7 +32,6 @@ module fw_run_mode
    use fw_sinks, only: writer_sink
    use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: continuation_natural
-   use fw_solver_options, only: linear_lu
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -284,28 +285,21 @@ contains
    subroutine turn(start, y)
       type(mode_start), intent(in) :: start
       real(wp), intent(inout), target, contiguous :: y(:)
-      real(wp), pointer :: q(:, :)
-      complex(wp) :: first, factor
-      real(wp), allocatable :: cosine(:)
-      integer :: h, k, m
+      complex(wp), allocatable :: amplitude(:, :)
+      complex(wp) :: first
+      integer :: h, m
 
       m = start%problem%structure%n_coordinates
-      associate (fourier => start%problem%fourier)
-         q(1:m, 1:fourier%n_coefficients) => y(:start%balance%n)
-         k = fourier%column(findloc(fourier%harmonic, 1, dim=1))
-         first = cmplx(dot_product(start%system%observed, q(:, k)), &
-                       -dot_product(start%system%observed, q(:, k + 1)), wp)
+      associate (f => start%problem%fourier)
+         first = sum(start%system%observed*start%system%motion(y))
          if (.not. abs(first) > 0.0_wp) return
          first = first/abs(first)
-         do h = 1, fourier%n_retained
-            if (fourier%harmonic(h) == 0) cycle
-            factor = conjg(first)**fourier%harmonic(h)
-            k = fourier%column(h)
-            cosine = q(:, k)
-            ! (c - i s) factor.
-            q(:, k) = real(factor, wp)*cosine + aimag(factor)*q(:, k + 1)
-            q(:, k + 1) = real(factor, wp)*q(:, k + 1) - aimag(factor)*cosine
+         allocate (amplitude(m, f%n_retained))
+         call amplitudes_of(f%harmonic, f%column, m, y, m, amplitude)
+         do h = 1, f%n_retained
+            amplitude(:, h) = conjg(first)**f%harmonic(h)*amplitude(:, h)
          end do
+         call coefficients_of(f%harmonic, f%column, m, m, amplitude, y)
       end associate
    end subroutine turn
 
@@ -326,8 +320,9 @@ contains
       call settle_phase(curve, y, report, error)
       if (allocated(error)) return
       associate (branch => curve%branch)
+         ! The tangent of the branch takes the whole derivative.
+         curve%start%system%reduced = .false.
          branch%options = case%solver
-         branch%options%linear = linear_lu
          branch%start = log(case%mode%start)
          branch%finish = log(case%mode%end)
          branch%max_points = case%mode%max_points
@@ -363,19 +358,18 @@ contains
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      real(wp), allocatable :: y(:), cosine(:), sine(:)
+      real(wp), allocatable :: y(:)
+      complex(wp), allocatable :: before(:)
 
       associate (system => curve%start%system)
          y = found%x
          report = found%report
-         cosine = system%before_cosine
-         sine = system%before_sine
+         before = system%before
          call system%set_parameter(found%p, error)
          if (.not. allocated(error)) call settle_phase(curve, y, report, error)
          if (.not. allocated(error)) call add_row(case, curve, y, report, served_by_arclength, &
                                                   state, error)
-         system%before_cosine = cosine
-         system%before_sine = sine
+         system%before = before
       end associate
    end subroutine add_turned_row
 
@@ -394,10 +388,13 @@ contains
       integer(int64) :: now, rate
 
       y = unknowns
-      call turn(curve%start, y)
       associate (system => curve%start%system, balance => curve%start%balance)
          allocate (q(balance%n), r(system%n))
-         call system%residual(y, r)
+         ! Where the control holds the phase Newton's method has left the system at this point.
+         if (system%control /= control_observed .or. served_by /= served_by_newton) then
+            call turn(curve%start, y)
+            call system%residual(y, r)
+         end if
          call system%to_balance(y, q, row%omega, row%self_excitation)
          point%omega = row%omega
          point%converged = report%converged
@@ -428,17 +425,8 @@ contains
    real(wp) function modal_force(start, y) result(force)
       type(mode_start), intent(in) :: start
       real(wp), intent(in) :: y(:)
-      integer :: c, m
 
-      m = start%problem%structure%n_coordinates
-      associate (fourier => start%problem%fourier)
-         c = (fourier%column(findloc(fourier%harmonic, 1, dim=1)) - 1)*m
-      end associate
-      ! (c + i s) . (Fc - i Fs).
-      associate (cosine => y(c + 1:c + m), sine => y(c + m + 1:c + 2*m), f => start%load)
-         force = abs(cmplx(dot_product(cosine, f(:, 1)) + dot_product(sine, f(:, 2)), &
-                           dot_product(sine, f(:, 1)) - dot_product(cosine, f(:, 2)), wp))
-      end associate
+      force = abs(dot_product(start%system%motion(y), start%load))
    end function modal_force
 
    !> Keep two rows between which the self-excitation changes its sign.

@@ -194,7 +194,7 @@ contains
       call case%pseudo_time%bind_keys(reader)
       call case%wear%bind_keys(reader, case%analysis == analysis_wear)
       call case%time%bind_keys(reader)
-      call read_mode(reader, case%analysis, case%mode, case%solver)
+      call read_mode(reader, case%analysis, case%mode)
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)
       call read_observed(reader, raw, case%model)

@@ -9,8 +9,6 @@ module fw_read_options
    use fw_kinds, only: wp, pi
    use fw_mode_options, only: mode_options
    use fw_reader, only: reader_type
-   use fw_solver_options, only: linear_krylov
-   use fw_solver_options, only: solver_options
    use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength
    use fw_text, only: to_text
    use fw_values, only: number_text
@@ -128,12 +126,10 @@ contains
    end subroutine refuse_sweep
 
    !> Group &mode; a frequency leaves in rad/s.
-   subroutine read_mode(reader, analysis, options, solver)
+   subroutine read_mode(reader, analysis, options)
       type(reader_type), intent(inout) :: reader
       integer, intent(in) :: analysis
       type(mode_options), intent(inout) :: options
-      !> Group &solver, as it was read.
-      type(solver_options), intent(inout) :: solver
 
       call options%bind_keys(reader, analysis == analysis_mode)
       if (options%unit == unit_hertz) options%near = 2.0_wp*pi*options%near
@@ -147,7 +143,6 @@ contains
       else
          call reader%amend('mode', 'near', '')
       end if
-      call settle_solver(reader, solver)
       if (reader%given('mode', 'start') .and. reader%given('mode', 'end') .and. &
           options%end <= options%start) then
          call reader%refuse('mode', 'end', '= '//number_text(options%end)//': must be above '// &
@@ -159,24 +154,6 @@ contains
                             ' factors: at most '//to_text(most_scales)//' are served')
       end if
    end subroutine read_mode
-
-   !> The one matrix of a mode is factored whole.
-   subroutine settle_solver(reader, solver)
-      type(reader_type), intent(inout) :: reader
-      type(solver_options), intent(inout) :: solver
-      character(*), parameter :: with = " does not go with case%analysis = 'mode', which "
-
-      if (solver%linear == linear_krylov) then
-         call reader%refuse('solver', 'linear', "= 'krylov'"//with//'factors a dense matrix of '// &
-                            "all unknowns: leave it out or use 'lu'")
-      end if
-      if (reader%given('solver', 'skips') .and. solver%skips) then
-         call reader%refuse('solver', 'skips', '= .true.'//with//'leaves nothing out: leave it '// &
-                            'out or give .false.')
-      end if
-      solver%skips = .false.
-      call reader%amend('solver', 'skips', '.false.')
-   end subroutine settle_solver
 
    !> A list stands for start, end and n_points.
    subroutine take_list(reader, analysis, options)

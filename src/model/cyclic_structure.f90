@@ -68,6 +68,7 @@ module fw_cyclic_structure
       procedure :: static_stiffness
       procedure :: split
       procedure :: mass
+      procedure :: parts
       procedure :: held_modes
       procedure :: magnitudes
       procedure :: scale_loads
@@ -541,6 +542,31 @@ contains
 
       matrix = real(self%basis(of_first_harmonic(self))%blocks(:self%n_coordinates, :, 2), wp)
    end subroutine mass
+
+   !> Of the nodal diameter of the harmonic, for its wave; Coriolis with the damping, the air with
+   !> the stiffness.
+   pure subroutine parts(self, h, stiffness, mass, damping, observe)
+      class(cyclic_structure), intent(in) :: self
+      integer, intent(in) :: h
+      complex(wp), intent(out) :: stiffness(:, :), mass(:, :), damping(:, :), observe(:, :)
+
+      associate (m => self%n_coordinates, b => self%basis(self%basis_of(h)))
+         stiffness = b%blocks(:m, :, 1)
+         mass = b%blocks(:m, :, 2)
+         damping = (0.0_wp, 0.0_wp)
+         if (b%n_blocks == 3) damping = b%blocks(:m, :, 3)
+         if (allocated(b%coriolis)) damping = damping + b%coriolis(:m, :m)
+         observe = b%observe_q
+         if (self%conjugated(h)) then
+            stiffness = conjg(stiffness)
+            mass = conjg(mass)
+            damping = conjg(damping)
+            observe = conjg(observe)
+         end if
+         if (allocated(b%aero) .and. self%harmonic(h) > 0) stiffness = stiffness + &
+            b%aero(:m, :m, merge(2, 1, self%conjugated(h)))
+      end associate
+   end subroutine parts
 
    pure integer function of_first_harmonic(self) result(basis)
       class(cyclic_structure), intent(in) :: self

@@ -67,6 +67,7 @@ module fw_plain_structure
       procedure :: static_stiffness
       procedure :: split
       procedure :: mass
+      procedure :: parts
       procedure :: held_modes
       procedure :: magnitudes
       procedure :: scale_loads
@@ -629,6 +630,21 @@ contains
 
       matrix = self%basis%blocks(:self%n_coordinates, :, 2)
    end subroutine mass
+
+   !> The same in all harmonics.
+   pure subroutine parts(self, h, stiffness, mass, damping, observe)
+      class(plain_structure), intent(in) :: self
+      integer, intent(in) :: h
+      complex(wp), intent(out) :: stiffness(:, :), mass(:, :), damping(:, :), observe(:, :)
+
+      associate (unused => h, m => self%n_coordinates, b => self%basis)
+         stiffness = cmplx(b%blocks(:m, :, 1), kind=wp)
+         mass = cmplx(b%blocks(:m, :, 2), kind=wp)
+         damping = (0.0_wp, 0.0_wp)
+         if (b%n_blocks == 3) damping = cmplx(b%blocks(:m, :, 3), kind=wp)
+         observe = cmplx(b%observe_q, kind=wp)
+      end associate
+   end subroutine parts
 
    !> Of D_j: omega = sqrt(k/m), half width zeta omega = c/(2 m). Static modes (m = 0) and free ones
    !> (k = 0) do not vibrate.

@@ -60,6 +60,7 @@ module fw_structure_operator
       procedure(read_static), deferred :: static_stiffness
       procedure(split_one), deferred :: split
       procedure(read_mass), deferred :: mass
+      procedure(read_parts), deferred :: parts
       procedure(list_modes), deferred :: held_modes
       procedure(sum_magnitudes), deferred :: magnitudes
       procedure(multiply_loads), deferred :: scale_loads
@@ -180,6 +181,17 @@ module fw_structure_operator
          class(structure_operator), intent(in) :: self
          real(wp), intent(out) :: matrix(:, :)
       end subroutine read_mass
+
+      !> What a harmonic is made of, without what is condensed: K, M and C of the coordinates
+      !> (n_coordinates, n_coordinates), and rows of the observed quantities (n_observed,
+      !> n_coordinates).
+      pure subroutine read_parts(self, h, stiffness, mass, damping, observe)
+         import :: structure_operator, wp
+         class(structure_operator), intent(in) :: self
+         !> Place of the harmonic among those in use.
+         integer, intent(in) :: h
+         complex(wp), intent(out) :: stiffness(:, :), mass(:, :), damping(:, :), observe(:, :)
+      end subroutine read_parts
 
       !> Modes of the structure with its relative coordinates held, as it vibrates while all of its
       !> contact sticks: angular frequencies and half-power half widths [rad/s] (n_modes).
