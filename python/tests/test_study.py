@@ -362,8 +362,9 @@ def test_values_reach_the_program_to_the_last_bit(study: Study) -> None:
                    {"contact%normal_load": value, "contact%side_1": (1, 0, 0)},
                    {"case%title": "it's", "solver%fallback": False}, 0.0)
     assert isinstance(job, Job)
-    assert tuple(override(key, one) for key, one in job.settings.items()) == ("case%title='it''s'", "solver%fallback=.false.",
-                             "contact%normal_load=0.30000000000000004", "contact%side_1=1, 0, 0")
+    assert [override(key, one) for key, one in job.settings.items()] == [
+        "case%title='it''s'", "solver%fallback=.false.",
+        "contact%normal_load=0.30000000000000004", "contact%side_1=1, 0, 0"]
     assert override("sweep%n_points", 3) == "sweep%n_points=3"
     assert recorded(job) is None
     record = run_job(job)
