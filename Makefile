@@ -77,7 +77,7 @@ lint: build/deps.stamp ## linters of the Fortran and the Python code, type check
 keys: build ## tables of keys in the user guide, settings of the Python package
 	@$(PYTHON) tools/write_keys.py $(BUILD)/fw_run
 
-docs: build/deps.stamp ## reference of library and Python package, in build/docs
+docs: build/deps.stamp ## documents as a site, references of library and package: build/docs
 	@$(PYTHON) tools/build_docs.py build/docs
 
 wheel: build/deps.stamp ## a wheel that needs no compiler and no library, tried: build/wheel

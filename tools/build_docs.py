@@ -1,18 +1,21 @@
 #!/usr/bin/env python3
-"""Build the reference of the library (FORD) and of the Python package (Sphinx), offline.
+"""Build the documents as a site, the reference of the library (FORD) and that of the Python
+package (Sphinx), offline.
 
-    tools/build_docs.py OUTPUT_DIRECTORY [fortran] [python]
+    tools/build_docs.py OUTPUT_DIRECTORY [site] [fortran] [python]
 
-Both come from the comments of the sources alone; nothing has to be compiled. Any warning is an
-error, and no page may ask another host for a script or a style.
+The references come from the comments of the sources alone; nothing has to be compiled. Any warning
+is an error, and no page may ask another host for a script or a style.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -56,14 +59,47 @@ def build_python(target: Path) -> list[str]:
     return []
 
 
-BUILDERS = {"fortran": build_fortran, "python": build_python}
+def build_site(target: Path) -> list[str]:
+    """The documents of the tree with a search; links into the tree are downloads."""
+    with tempfile.TemporaryDirectory() as folder:
+        stage = Path(folder)
+        for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff"):
+            shutil.copy(ROOT / name, stage)
+        for name in ("docs", "example"):
+            shutil.copytree(ROOT / name, stage / name,
+                            ignore=shutil.ignore_patterns("*.h5", "api", "site"))
+        for name in ("conf.py", "contents.md"):
+            shutil.copy(ROOT / "docs" / "site" / name, stage)
+        for page in stage.rglob("*.md"):
+            page.write_text(_whole_links(page.read_text(encoding="utf-8"), page.parent),
+                            encoding="utf-8")
+        run(sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html",
+            "-D", "root_doc=contents", "-d", stage / "_build", stage, target)
+    shutil.copy(target / "README.html", target / "index.html")
+    return []
+
+
+#: Target of a Markdown link, without its anchor.
+_TARGET = re.compile(r"(?<=\]\()([^)#: ]+)(?=[)#])")
+
+
+def _whole_links(text: str, folder: Path) -> str:
+    """A link to a folder leads to its page, as it does where the tree is read."""
+    def led(match: re.Match[str]) -> str:
+        page = folder / match.group(1) / "README.md"
+        return f"{match.group(1).rstrip('/')}/README.md" if page.is_file() else match.group(1)
+    return _TARGET.sub(led, text)
+
+
+BUILDERS = {"site": build_site, "fortran": build_fortran, "python": build_python}
 
 
 def main() -> None:
-    """Build what is asked for, both without a word."""
+    """Build what is asked for, all without a word."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("output", type=Path, help="directory of the pages")
-    parser.add_argument("parts", nargs="*", metavar="fortran|python", help="both by default")
+    parser.add_argument("parts", nargs="*", metavar="site|fortran|python",
+                        help="all by default")
     options = parser.parse_args()
     for part in options.parts or BUILDERS:
         if part not in BUILDERS:

@@ -66,3 +66,15 @@ def test_the_package_has_its_reference(tmp_path: Path) -> None:
           for page in pages.glob("*.html"))) == set()
     assert "fretwear.Result.amplitude_of" in found or (
         "fretwear.result.Result.amplitude_of" in found)
+
+
+@pytest.mark.skipif(find_spec("sphinx") is None or find_spec("myst_parser") is None,
+                    reason="Sphinx or MyST is not installed")
+def test_the_documents_are_a_site_with_a_search(tmp_path: Path) -> None:
+    """Every document is a page; its links and anchors lead somewhere, or Sphinx would warn."""
+    pages = build("site", tmp_path)
+    for document in [*ROOT.glob("docs/*.md"), *ROOT.glob("docs/benchmarks/*.md"),
+                     *ROOT.glob("example/*/README.md"), ROOT / "README.md"]:
+        assert (pages / document.relative_to(ROOT).with_suffix(".html")).is_file()
+    assert "A first case" in (pages / "index.html").read_text(encoding="utf-8")
+    assert "hysteresi" in (pages / "searchindex.js").read_text(encoding="utf-8")
