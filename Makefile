@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint keys docs clean
-.PHONY: fuzz wheel ways sensitivities stops
+.PHONY: fuzz wheel ways sensitivities calibration stops
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -71,7 +71,7 @@ lint: build/deps.stamp ## linters of the Fortran and the Python code, type check
 	@$(PYTHON) tools/comment_share.py
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench tools docs \
-	   test/builds test/cyclic test/fretting test/legacy test/modes test/rest test/rigid \
+	   test/builds test/cyclic test/design test/fretting test/legacy test/modes test/rest test/rigid \
 	   test/robustness test/stress test/verify
 
 keys: build ## tables of keys in the user guide, settings of the Python package
@@ -149,6 +149,10 @@ rest: build ## where pairs of the velocity law come to rest, also of a program B
 slow: build ## slow stick-slip, also of a program BEFORE, written to docs/robustness.md
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/rigid/slow_family.py \
 	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
+
+calibration: build ## parameters of 100 noisy measurements found again, in docs/design.md
+	PYTHONPATH=python:$(BUILD)/python $(PYTHON) test/design/calibration_trials.py \
+	   -o docs/design.md
 
 sensitivities: build ## derivatives of 200 random cases against differences, in docs/robustness.md
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/sensitivity_family.py -o docs/robustness.md

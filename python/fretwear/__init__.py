@@ -45,7 +45,7 @@ __version__: str = "0.1.0"
 from .analyses import frf, run, wear
 from .bifurcation import Bifurcation
 from .case import Case
-from .design import optimise
+from .design import calibrate, optimise
 from .errors import (
     AbsentError,
     ConvergenceError,
@@ -61,8 +61,8 @@ from .steps import Point, Steps
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
-           "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "frf",
-           "optimise", "run", "wear"]
+           "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "calibrate",
+           "frf", "optimise", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

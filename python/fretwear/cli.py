@@ -27,6 +27,7 @@ COMMANDS = {
     "export": ("export", "mesh with deformation, contact state and wear, for ParaView"),
     "import": ("importer", "a model file from the matrices of another program"),
     "optimise": ("design.optimise_command", "parameters that make a quantity smallest or largest"),
+    "calibrate": ("design.calibrate_command", "parameters of a case from measured curves"),
     "explore": ("explore", "a page with sliders: curve, loops and flanks follow"),
     "study": ("study", "a parameter study on all local cores or a cluster"),
 }

@@ -53,6 +53,28 @@ def test_relative(slipping: fw.Result) -> None:
         found.relative("largest", "contact%gap", k)
 
 
+def test_it_prints_as_a_table(slipping: fw.Result) -> None:
+    found = slipping.sensitivities
+    lines = repr(found).splitlines()
+    assert len(lines) == 2 + 5 and lines[1].split() == [
+        "quantity", "value", "deviation", "contact%mu", "load%harmonic_scale"]
+    row = next(line for line in lines if line.startswith("largest[u2]")).split()
+    k = int(np.argmax(slipping.amplitude[:, 1]))
+    assert float(row[1]) == pytest.approx(slipping.amplitude[k, 1], rel=1e-4)
+    assert float(row[3]) == pytest.approx(
+        found.relative("largest", "contact%mu", k, 1).sum(), abs=1e-4)
+    assert "<td>largest[u2]</td>" in found._repr_html_()
+
+
+def test_what_is_missing_is_said(slipping: fw.Result) -> None:
+    found = slipping.sensitivities
+    with pytest.raises(fw.AbsentError, match="there are by contact%mu, load%harmonic_scale"):
+        found["largest"]["contact%gap"]
+    with pytest.raises(fw.AbsentError, match="there are of dissipation, first_harmonic, largest"):
+        found["wear_volume"]
+    assert "wear_volume" not in found and "contact%gap" not in found["largest"]
+
+
 def test_absent(tmp_path) -> None:  # type: ignore[no-untyped-def]
     linear = fw.frf(fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0]), 0.5, 1.5, 3)
     with pytest.raises(fw.AbsentError, match="sensitivity%parameters"):

@@ -13,7 +13,7 @@ from ..case import Case
 from ..errors import ConvergenceError, InputError
 from .objectives import Evaluation, Objective, new_objective
 from .one_parameter import descend
-from .parameters import Bounds, Unknowns
+from .parameters import Bounds, Unknowns, bound_pairs
 
 __all__ = ["Optimum", "as_case", "optimise", "several"]
 
@@ -139,7 +139,7 @@ def optimise(case: Case | str, *, minimise: Objective | None = None,
     if (minimise is None) == (maximise is None):
         raise InputError("minimise, maximise: give one of the two")
     case, over = as_case(case), several(over)
-    unknowns = Unknowns(case, over, _pairs(bounds, len(over)), factors=factors)
+    unknowns = Unknowns(case, over, bound_pairs(bounds, len(over)), factors=factors)
     what = minimise if minimise is not None else maximise
     assert what is not None  # checked above
     if progress is True:
@@ -379,11 +379,3 @@ def several(texts: str | Sequence[str]) -> list[str]:
     """A list of one name, or of several."""
     return [texts] if isinstance(texts, str) else list(texts)
 
-
-def _pairs(bounds: Bounds, n: int) -> list[tuple[float, float]]:
-    array = np.array(bounds, dtype=float)
-    if n == 1 and array.shape == (2,):
-        array = array[None]
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise InputError("bounds: must be a pair (low, high) for each parameter")
-    return [(float(low), float(high)) for low, high in array]

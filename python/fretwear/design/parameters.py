@@ -14,7 +14,7 @@ from .._native import namelist_values
 from ..case import Case
 from ..errors import InputError
 
-__all__ = ["Bounds", "Unknowns", "case_values", "differentiated", "has_parts"]
+__all__ = ["Bounds", "Unknowns", "bound_pairs", "case_values", "differentiated", "has_parts"]
 
 Floats = NDArray[np.float64]
 #: Lower and upper bound, of one parameter or of each.
@@ -203,6 +203,16 @@ def differentiated(case: Case, keys: Sequence[str], quantities: Sequence[str]) -
         settings["deviation"] = [0.0] * len(keys)  # of other parameters, it may be
     change: Any = {"sensitivity": settings}
     return case.replace(**change)
+
+
+def bound_pairs(bounds: Bounds, n: int) -> list[tuple[float, float]]:
+    """Bounds of each of n parameters, from those or from the one pair."""
+    pairs = np.array(bounds, dtype=float)
+    if n == 1 and pairs.shape == (2,):
+        pairs = pairs[None]
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise InputError("bounds: must be a pair (low, high) for each parameter")
+    return [(float(low), float(high)) for low, high in pairs]
 
 
 def _parse(text: str) -> tuple[str, int | None, int | None]:
