@@ -23,14 +23,14 @@ from .result import Result
 if TYPE_CHECKING:
     from typing import Literal
 
-    from .settings import CaseGroup, Groups, Sweep, Wear
+    from .settings import CaseGroup, Groups, Mode, Sweep, Wear
 
     if sys.version_info >= (3, 11):
         from typing import Unpack
     else:
         from typing_extensions import Unpack
 
-__all__ = ["frf", "run", "wear"]
+__all__ = ["frf", "mode", "run", "run_in_memory", "wear"]
 
 #: Called with the number of points done and of points to come (0: not known); True for a line on
 #: the standard error.
@@ -215,6 +215,57 @@ def wear(model: ModelLike, frequency: float, coefficient: float,
         settings["scheme"] = scheme
     _refuse_twice("wear", settings, groups.get("wear", {}))
     case = _case(model, {"analysis": "wear"}, sweep, groups).replace(wear=settings)
+    return run(case, file, check=check, progress=progress)
+
+
+def mode(model: ModelLike, start: float, end: float, n_points: int | None = None, *,
+         number: int | None = None, control: Literal["observed", "modal"] | None = None,
+         continuation: Literal["natural", "arclength"] | None = None,
+         file: str | Path | None = None, check: bool = True, progress: Progress | None = None,
+         **groups: Unpack[Groups]) -> Result:
+    """A nonlinear mode: its frequency and damping over its amplitude.
+
+    Parameters
+    ----------
+    model : Model, str or Path
+        The structure, or the path of a model file.
+    start, end : float
+        Lowest and highest amplitude, as `control` has it.
+    n_points : int, optional
+        Points, evenly spaced in the logarithm of the amplitude; of a branch it sets its longest
+        step.
+    number : int, optional
+        Of the elastic modes of the structure with its closed pairs stuck, from 1.
+    control : {'observed', 'modal'}, optional
+        Amplitude of the first harmonic of the first observed quantity (default), or modal.
+    continuation : {'natural', 'arclength'}, optional
+        Points at given amplitudes, or a branch through folds (default).
+    file, check, progress
+        See `run`.
+    **groups
+        Further settings by group, see `Case`; such as ``mode={"synthesis": [1.0, 2.0]}``.
+
+    Returns
+    -------
+    Result
+        With `mode`, a `NonlinearMode`.
+
+    Raises
+    ------
+    InputError, OutputError, ConvergenceError, RunInterrupted
+        See `run`.
+    """
+    settings: Mode = {"start": start, "end": end}
+    if n_points is not None:
+        settings["n_points"] = n_points
+    if number is not None:
+        settings["number"] = number
+    if control is not None:
+        settings["control"] = control
+    if continuation is not None:
+        settings["continuation"] = continuation
+    _refuse_twice("mode", settings, groups.get("mode", {}))
+    case = _case(model, {"analysis": "mode"}, {}, groups).replace(mode=settings)
     return run(case, file, check=check, progress=progress)
 
 

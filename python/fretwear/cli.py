@@ -3,13 +3,15 @@
 A module offers ``add_arguments(parser)``, which adds its arguments to an argparse parser, and
 ``main(options) -> int``, which does the work and returns the exit status. It may raise a
 `FretwearError`. Exit status: 0 done, 2 usage, 3 bad input, 4 not converged, 5 a file cannot be
-read or written, 130 interrupted, 1 anything else.
+read or written, 130 interrupted, 141 nobody reads the output any more, 1 anything else.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -17,6 +19,9 @@ from . import __version__
 from .errors import FretwearError, OutputError
 
 __all__ = ["COMMANDS", "main"]
+
+#: What a shell makes of SIGPIPE.
+_BROKEN_PIPE = 141
 
 #: Subcommand: module below `fretwear`, and what it does.
 COMMANDS = {
@@ -38,13 +43,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     options = _parser(words).parse_args(words)
     try:
-        return int(options.run(options))
+        status = int(options.run(options))
+        sys.stdout.flush()
     except FretwearError as error:
         return _complain(options.command, error, error.exit_status)
+    except BrokenPipeError:
+        # Who reads the output has seen enough, such as `head`: no error of ours. What is left in
+        # the buffer has nowhere to go, which the interpreter would remark at its end.
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _BROKEN_PIPE
     except OSError as error:
         return _complain(options.command, error, OutputError.exit_status)
     except KeyboardInterrupt:
         return _complain(options.command, "interrupted", 130)
+    return status
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:

@@ -185,6 +185,10 @@ def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
         rows += [(f"peak of {name}", height,
                   units_of(result, "amplitude")),
                  (f"frequency of this peak, near point {peak + 1}", omega / (2.0 * np.pi), "Hz")]
+        if "sensitivity/deviation/largest" in result:
+            spread = result["sensitivity/deviation/largest"][peak, result.index(name)]
+            rows.append((f"standard deviation of the amplitude, at point {peak + 1}",
+                         float(spread), units_of(result, "amplitude")))
         if name == result.observed[0] and "contact/fraction" in result:
             shares = result.fraction[peak].mean(axis=0)
             rows += [(f"pairs and period in {state}, at this peak", float(share), "")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -28,6 +30,17 @@ def _copy(result: Result, path: Path) -> Path:
 def test_a_result_equals_itself(coarse: Result, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", str(coarse.path), str(coarse.path)]) == 0
     assert "the same within 1e-06" in capsys.readouterr().out
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(coarse: Result) -> None:
+    """As in `fretwear compare a.h5 b.h5 | head -1`: nobody reads when the lines come."""
+    command = [sys.executable, "-m", "fretwear", "compare", coarse.path, coarse.path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          text=True) as process:
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == ""
+        assert process.wait() == 141
 
 
 def test_every_difference_is_its_number(coarse: Result, rough: Result) -> None:

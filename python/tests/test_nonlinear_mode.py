@@ -10,7 +10,7 @@ import pytest
 
 import fretwear as fw
 from fretwear.cli import main
-from fretwear.plot import fitting, plot_mode
+from fretwear.plot import fitting, plot_backbone, plot_mode
 
 #: Limit cycles of the exact motion (test/modes/mode_references.json): amplitude, frequency.
 UNSTABLE_ABOVE = [(0.7164337865536, 1.3226517322658298, True),
@@ -65,6 +65,16 @@ def test_modal_amplitudes() -> None:
     assert np.isnan(mode.onset) and mode.limit_cycles == ()
 
 
+def test_by_the_function(fluttering: fw.Result) -> None:
+    contact = fw.ContactPairs([[1, 0, 0]], mu=1.0, normal_load=0.5, tangential_stiffness=1.0)
+    again = fw.mode(fw.Model([[1.0]], [[-0.2]], [[1.0]], contact=contact), 0.1, 10.0, 41,
+                    continuation="natural", contact={"law": "penalty"},
+                    harmonics={"n_harmonics": 7})
+    np.testing.assert_array_equal(again.omega, fluttering.omega)
+    with pytest.raises(fw.InputError, match="set by an argument of the function already"):
+        fw.mode(fw.Model([[1.0]], [[0.1]], [[1.0]]), 0.1, 1.0, mode={"start": 0.2})
+
+
 def test_absent() -> None:
     linear = fw.frf(fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0]), 0.5, 1.5, 3)
     with pytest.raises(fw.AbsentError, match="case%analysis = 'mode'"):
@@ -76,7 +86,7 @@ def test_no_period_of_the_contact(fluttering: fw.Result) -> None:
     """Solved again as a response it would be another motion: refused, and no picture of it."""
     with pytest.raises(fw.AbsentError, match="nonlinear mode keeps no histories"):
         fluttering.cycle(20)
-    assert set(fitting(fluttering)) == {"mode", "harmonics", "convergence"}
+    assert set(fitting(fluttering)) == {"mode", "backbone", "harmonics", "convergence"}
 
 
 def test_picture(fluttering: fw.Result, tmp_path: Path) -> None:
@@ -91,3 +101,33 @@ def test_picture(fluttering: fw.Result, tmp_path: Path) -> None:
     assert main(["plot", str(tmp_path / "mode.h5"), "--kind", "mode", "-o",
                  str(tmp_path / "mode.png")]) == 0
     assert (tmp_path / "mode.png").stat().st_size > 5000
+
+
+def test_backbone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Responses put together from the mode have their tops on it, sweeps near it."""
+    contact = fw.ContactPairs([[1, 0, 0]], mu=1.0, normal_load=0.5, tangential_stiffness=1.0)
+    model = fw.Model([[1.0]], [[0.02]], [[1.0]], contact=contact, cosine=[0.1])
+    shared: Any = {"contact": {"law": "penalty"}, "harmonics": {"n_harmonics": 3}}
+    curve = fw.mode(model, 0.1, 10.0, 81, continuation="natural", mode={"synthesis": [1.0, 5.0]},
+                    **shared)
+    swept = fw.frf(model, 0.8, 1.6, 41, load={"harmonic_scale": 5.0}, **shared)
+    (axes,) = plot_backbone([swept, curve]).axes
+    dashed = [line for line in axes.lines if line.get_linestyle() == "--"]
+    assert len(dashed) == 2 and axes.get_yscale() == "log"
+    x, y = dashed[1].get_xdata(), dashed[1].get_ydata()
+    top = int(np.argmax(y))
+    assert y[top] == pytest.approx(np.exp(np.interp(
+        0.0, np.log(curve["mode/resonant_scale"][20:] / 5.0), np.log(curve.mode.amplitude[20:]))),
+        rel=1e-2)
+    assert np.isfinite(x).all() and (np.diff(x[:top]) > -1e-3).all()
+    peak = np.abs(swept.harmonic(1)).max()
+    assert y[top] == pytest.approx(peak, rel=0.03)
+    # Alone, by the command, and refused without a mode.
+    curve.save(tmp_path / "mode.h5")
+    swept.save(tmp_path / "swept.h5")
+    out = str(tmp_path / "backbone.png")
+    paths = [str(tmp_path / "mode.h5"), str(tmp_path / "swept.h5")]
+    assert main(["plot", *paths, "--kind", "backbone", "-o", out]) == 0
+    assert main(["plot", paths[0], "--kind", "backbone", "-o", out]) == 0
+    assert main(["plot", paths[1], paths[1], "--kind", "backbone", "-o", out]) == 3
+    assert "no result is of a mode" in capsys.readouterr().err

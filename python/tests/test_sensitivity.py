@@ -7,7 +7,8 @@ import pytest
 
 import fretwear as fw
 from fretwear.cli import main
-from fretwear.plot import fitting, plot_sensitivity
+from fretwear.plot import Choices, fitting, plot_response, plot_sensitivity
+from fretwear.report import render_report
 
 
 @pytest.fixture(scope="module")
@@ -98,3 +99,16 @@ def test_picture(slipping: fw.Result, tmp_path) -> None:  # type: ignore[no-unty
     assert main(["plot", str(tmp_path / "slipping.h5"), "--kind", "sensitivity", "-o",
                  str(tmp_path / "bars.png")]) == 0
     assert (tmp_path / "bars.png").stat().st_size > 5000
+
+
+def test_band_of_the_deviation(slipping: fw.Result) -> None:
+    upper = plot_response(slipping, "u2").axes[0]
+    (band,) = upper.collections
+    heights = band.get_paths()[0].vertices[:, 1]
+    spread = slipping.sensitivities.deviation["largest"][:, 1]
+    assert heights.max() == pytest.approx((slipping.amplitude[:, 1] + spread).max())
+    assert heights.min() == pytest.approx((slipping.amplitude[:, 1] - spread).min())
+    peak = slipping.peak("u1")
+    page = render_report(slipping, Choices())
+    assert f"standard deviation of the amplitude, at point {peak + 1}" in page
+    assert f"{slipping.sensitivities.deviation['largest'][peak, 0]:.6g}" in page

@@ -6,6 +6,7 @@
 `fretwear plot` is in `fretwear.plot.command`.
 """
 
+from .backbone import plot_backbone
 from .campaigns import plot_campbell, plot_damping, read_damping
 from .command import add_arguments, main
 from .convergence import plot_convergence
@@ -27,8 +28,8 @@ from .together import plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
-           "half_power_damping", "main", "plot_campbell", "plot_convergence", "plot_cycle",
-           "plot_damping", "plot_flanks", "plot_harmonics", "plot_hysteresis", "plot_mode",
-           "plot_nodal_diameters", "plot_response", "plot_responses", "plot_safe",
-           "plot_sensitivity", "plot_table", "plot_wave", "plot_wear_bars",
-           "plot_wear_evolution", "plot_wear_maps", "read_damping", "read_response"]
+           "half_power_damping", "main", "plot_backbone", "plot_campbell", "plot_convergence",
+           "plot_cycle", "plot_damping", "plot_flanks", "plot_harmonics", "plot_hysteresis",
+           "plot_mode", "plot_nodal_diameters", "plot_response", "plot_responses", "plot_safe",
+           "plot_sensitivity", "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution",
+           "plot_wear_maps", "read_damping", "read_response"]

@@ -12,6 +12,7 @@ from ..errors import AbsentError, InputError, OutputError
 from ..result import Result
 from ..rows import choose_point
 from ..study.table import is_table
+from .backbone import plot_backbone
 from .campaigns import plot_campbell, plot_damping
 from .kinds import KINDS, Choices, fitting
 from .table import plot_table
@@ -42,8 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="result with every pair stuck, drawn dashed in the response")
     parser.add_argument("--modal-mass", type=float, metavar="M",
                         help="modal mass at the observed quantity: damping from the dissipation")
-
-
     parser.add_argument("--speed", type=float, metavar="OMEGA",
                         help="rotation speed [rad/s] of the line in a SAFE diagram")
     parser.add_argument("--nodal-diameter", type=int, metavar="K",
@@ -51,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 #: What is drawn of several results.
-TOGETHER = ("response", "campbell", "damping")
+TOGETHER = ("response", "backbone", "campbell", "damping")
 
 
 def main(options: argparse.Namespace) -> int:
@@ -77,8 +76,8 @@ def _draw_together(options: argparse.Namespace) -> int:
     if kind == "campbell":
         figure = plot_campbell(options.result, options.nodal_diameter)
     else:
-        draw = plot_responses if kind == "response" else plot_damping
-        figure = draw(options.result, options.observe)
+        draw = {"response": plot_responses, "backbone": plot_backbone, "damping": plot_damping}
+        figure = draw[kind](options.result, options.observe)
     return _save(figure, options.output, stem)
 
 
@@ -139,6 +138,9 @@ def _kinds(result: Result, text: str | None) -> list[str]:
         return fitting(result)
     names = [name.strip() for name in text.split(",")]
     for name in names:
+        if name in TOGETHER and name not in KINDS:
+            raise InputError(f"--kind {name}: is drawn of several results: name two or more, at "
+                             f"several {'speeds' if name == 'campbell' else 'loads'}")
         if name not in KINDS:
             raise InputError(f"--kind {name}: must be among {', '.join(KINDS)}")
     return names

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from ..result import Result
+from .backbone import plot_backbone
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
@@ -113,6 +114,7 @@ KINDS: dict[str, Kind] = {
                  lambda r: _has_diameters(r) and rotation_speed(r) > 0.0,
                  lambda r, c: plot_safe(r, c.speed)),
     "mode": Kind("Nonlinear mode", _is_mode, lambda r, c: plot_mode(r)),
+    "backbone": Kind("Backbone of the mode", _is_mode, lambda r, c: plot_backbone(r, c.observe)),
     "sensitivity": Kind(
         "What the parameters do", lambda r: _has("sensitivity/value/first_harmonic")(r) or _has(
             "sensitivity/value/dissipation")(r),

@@ -61,6 +61,8 @@ class Response:
         Of the amplitude; "" where they are not known.
     maximum : (float, float) or None
         Where the curve is highest [Hz], and how high, between the points too.
+    deviation : (n_points,) or None
+        Standard deviation of the amplitude to first order, of runs with `sensitivity%deviation`.
     bifurcations : tuple of (str, float, float)
         Kind, frequency [Hz] and amplitude of every place where it turns or its stability changes.
     """
@@ -75,6 +77,7 @@ class Response:
     units: str = ""
     maximum: tuple[float, float] | None = None
     bifurcations: tuple[tuple[str, float, float], ...] = ()
+    deviation: Floats | None = None
 
     @property
     def is_branch(self) -> bool:
@@ -115,7 +118,14 @@ def read_response(source: Source, observe: str | None = None) -> Response:
         None if loss is None else loss.sum(axis=1),
         result.stable if "floquet/stable" in result else None, units_of(result, "amplitude"),
         _maximum(result, column),
-        tuple((b.kind, b.frequency, float(b.amplitude[column])) for b in result.bifurcations))
+        tuple((b.kind, b.frequency, float(b.amplitude[column])) for b in result.bifurcations),
+        _deviation(result, column))
+
+
+def _deviation(result: Result, column: int) -> Floats | None:
+    if "sensitivity/deviation/largest" not in result:
+        return None
+    return np.asarray(result["sensitivity/deviation/largest"][:, column])
 
 
 def _maximum(result: Result, column: int) -> tuple[float, float] | None:
@@ -194,7 +204,8 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
     friction as ``friction_damping`` defines it (the half-power width of the peak where that cannot
     be evaluated). Points that did not converge are crosses, unstable ones are drawn thin
     and dashed on shaded ground, those whose stability is undecided are ringed. Folds, period
-    doublings and other bifurcations have markers. The lower panel shows stick, slip and open
+    doublings and other bifurcations have markers. With `sensitivity%deviation` a band shows the
+    amplitude give or take its standard deviation. The lower panel shows stick, slip and open
     fractions, averaged over the pairs; along a branch that folds, against the number of the point.
 
     Parameters
@@ -233,6 +244,10 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
         axes.plot(stuck.frequency, np.where(stuck.converged, stuck.amplitude, np.nan), "--",
                   color="0.45", linewidth=1.3, label="stuck (linear)")
     good = np.where(response.converged, response.amplitude, np.nan)
+    if response.deviation is not None:
+        axes.fill_between(response.frequency, np.maximum(good - response.deviation, 0.0),
+                          good + response.deviation, color=CURVE, alpha=0.18, linewidth=0,
+                          label="one standard deviation, to first order")
     unstable = (np.zeros(len(good), dtype=bool) if response.stable is None
                 else response.stable == 0)
     axes.plot(response.frequency, np.where(unstable, np.nan, good), "-", marker=".",
@@ -246,6 +261,8 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
     largest = float(np.nanmax(good, initial=response.maximum[1] if response.maximum else 0.0))
     if stuck is not None:
         largest = max(largest, float(np.nanmax(stuck.amplitude[stuck.converged], initial=0.0)))
+    if response.deviation is not None:
+        largest = max(largest, float(np.nanmax(good + response.deviation, initial=0.0)))
     if bad.any():
         height = np.where(np.isfinite(response.amplitude), response.amplitude, 0.0)
         # A failed point may hold anything: kept inside the picture of the valid ones.
@@ -255,7 +272,8 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
                   label=f"not converged ({bad.sum()})")
     axes.set_ylabel(label(f"amplitude of {response.name}",
                           scale_axis(axes.yaxis, largest, response.units)))
-    axes.set_ylim(0.0, 1.12 * largest or None)
+    # Above a band there is no room at its sides for what is written.
+    axes.set_ylim(0.0, (1.12 if response.deviation is None else 1.3) * largest or None)
     tidy(axes)
     axes.legend(frameon=False, loc="upper left")
     return largest
