@@ -19,6 +19,7 @@ module fw_peak_finder
    use fw_kinds, only: wp
    use fw_peak, only: peak_type
    use fw_peak_rules, only: find_edge
+   use fw_peak_rules, only: find_gap
    use fw_peak_rules, only: find_next
    use fw_peak_rules, only: highest_of
    use fw_peak_rules, only: is_bound
@@ -194,6 +195,7 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
       integer :: k, budget
+      logical :: more
 
       if (.not. self%is_active) return
       ! There a point depends on those before, or takes too long.
@@ -207,8 +209,12 @@ contains
          if (allocated(error)) return
       end do
       call look_inside(self, case, budget, error)
-      if (.not. allocated(error)) call climb(self, case, budget, error)
-      if (.not. allocated(error)) call measure_widths(self, case, budget, error)
+      more = .true.
+      do while (more .and. .not. allocated(error))
+         call climb(self, case, budget, error)
+         if (.not. allocated(error)) call measure_widths(self, case, budget, error)
+         if (.not. allocated(error)) call look_beyond(self, case, budget, more, error)
+      end do
       ! What becomes a row now is known here already.
       self%is_active = .false.
    end subroutine search
@@ -358,6 +364,36 @@ contains
          end do
       end do
    end subroutine measure_widths
+
+   !> Solve beyond what is known of the highest peaks, where they may go on; `more` where one does.
+   subroutine look_beyond(self, case, budget, more, error)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: budget
+      logical, intent(out) :: more
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: omega
+      integer :: i, k, from, trial
+      logical :: found
+
+      more = .false.
+      if (self%samples%n < 3) return
+      do i = 1, size(self%samples%item(1)%at%amplitude)
+         do trial = 1, most_trials
+            k = place_of_highest(self%samples, i)
+            if (.not. is_maximum(self%samples, k, i) .or. self%n_solved >= budget) exit
+            call find_gap(self%samples, k, i, omega, from, found)
+            if (.not. found) exit
+            associate (at => self%samples%item(from)%at)
+               if (at%n_failed >= most_failures) exit
+               omega = at%omega + (omega - at%omega)*0.5_wp**at%n_failed
+            end associate
+            call solve_at(self, case, omega, budget, error, from)
+            if (allocated(error)) return
+            more = more .or. place_of_highest(self%samples, i) /= k
+         end do
+      end do
+   end subroutine look_beyond
 
    !> The maximum that is not known well enough and may be the highest, relative to what is known of
    !> its quantity.

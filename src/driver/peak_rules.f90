@@ -16,7 +16,7 @@ module fw_peak_rules
    private
 
    public :: is_maximum, is_bound, highest_of, place_of_highest
-   public :: find_next, find_edge, negligible, list_peaks
+   public :: find_next, find_edge, find_gap, negligible, list_peaks
 
    !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
    real(wp), parameter :: round_off = 1.0e-7_wp
@@ -25,8 +25,12 @@ module fw_peak_rules
    !> A peak is known where the parabola promises no more than this, relative.
    real(wp), parameter :: small_gain = 1.0e-4_wp
    !> A neighbour of at least this part of the height belongs to the peak: what is left of the
-   !> parabola, of third order in the distance, is below the gain there.
-   real(wp), parameter :: near = 0.9_wp
+   !> parabola, of third order in the distance, is below the gain there. And that of a peak which may
+   !> be the highest: three points of two peaks side by side look like one.
+   real(wp), parameter :: near = 0.9_wp, nearest = 0.97_wp
+   !> A fall to this part of the height, over a way so many times as long as what is known of the
+   !> peak, may hide more of it.
+   real(wp), parameter :: deep = 0.5_wp, far_beyond = 8.0_wp
    !> Samples closer than this, relative, are one frequency.
    real(wp), parameter :: same_frequency = 1.0e-7_wp
    !> Part of an interval that is kept between samples.
@@ -61,14 +65,16 @@ contains
       !> Rise above the mean position that may be found.
       real(wp), intent(out) :: promise
       logical, intent(out) :: done
-      real(wp) :: curvature, vertex
+      real(wp) :: curvature, vertex, share
       logical :: left_is_known, right_is_known
 
+      share = near
+      if (samples%item(k)%at%amplitude(i) >= near*highest_of(samples, i)) share = nearest
       associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
                  right => samples%item(k + 1)%at)
          call vertex_of(left, middle, right, i, vertex, promise, curvature)
-         left_is_known = side_is_known(left, middle, right, i)
-         right_is_known = side_is_known(right, middle, left, i)
+         left_is_known = side_is_known(left, middle, right, i, share)
+         right_is_known = side_is_known(right, middle, left, i, share)
          omega = within(vertex, left%omega, middle%omega, right%omega)
          done = promise <= (1.0_wp + small_gain)*swing_of(middle, i, middle%mean(i))
          if (.not. done) then
@@ -79,9 +85,9 @@ contains
          done = left_is_known .and. right_is_known
          if (done) return
          if (right_is_known) then
-            omega = beside(left, middle, i, curvature)
+            omega = beside(left, middle, i, curvature, share)
          else
-            omega = beside(right, middle, i, curvature)
+            omega = beside(right, middle, i, curvature, share)
          end if
          done = abs(omega - middle%omega) <= same_frequency*middle%omega
       end associate
@@ -89,29 +95,34 @@ contains
 
    !> Whether nothing higher can lie between the middle and a neighbour: it belongs to the peak, or
    !> what rises towards the middle from the other side cannot gain more on the way.
-   pure logical function side_is_known(side, middle, other, i) result(known)
+   pure logical function side_is_known(side, middle, other, i, share) result(known)
       type(sample_type), intent(in) :: side, middle, other
       integer, intent(in) :: i
+      !> Of the height, from which on a neighbour belongs to the peak.
+      real(wp), intent(in) :: share
       real(wp) :: slope, swing
 
       swing = swing_of(middle, i, middle%mean(i))
-      known = swing_of(side, i, middle%mean(i)) >= near*swing .or. &
+      known = swing_of(side, i, middle%mean(i)) >= share*swing .or. &
               abs(side%omega - middle%omega) <= same_frequency*middle%omega
-      if (known .or. swing_of(other, i, middle%mean(i)) < near*swing) return
+      if (known .or. swing_of(other, i, middle%mean(i)) < share*swing) return
       slope = (middle%amplitude(i) - other%amplitude(i))/ &
               max(abs(middle%omega - other%omega), tiny(1.0_wp))
       known = slope*abs(side%omega - middle%omega) <= small_gain*swing
    end function side_is_known
 
    !> A frequency towards a neighbour that is far below, where the peak would have fallen a little.
-   pure real(wp) function beside(side, middle, i, curvature) result(omega)
+   pure real(wp) function beside(side, middle, i, curvature, share) result(omega)
       type(sample_type), intent(in) :: side, middle
       integer, intent(in) :: i
       real(wp), intent(in) :: curvature
-      !> Rise of 1/A**2 that is looked for, as a part of itself.
-      real(wp), parameter :: rise = 0.15_wp
-      real(wp) :: distance, half
+      !> What a neighbour should have of the height, at least.
+      real(wp), intent(in) :: share
+      !> Of the rise of 1/A**2 up to there.
+      real(wp), parameter :: inside = 0.65_wp
+      real(wp) :: distance, half, rise
 
+      rise = inside*(1.0_wp/share**2 - 1.0_wp)
       half = 0.5_wp*abs(side%omega - middle%omega)
       distance = half
       if (curvature > 0.0_wp) then
@@ -128,6 +139,43 @@ contains
 
       inside = min(max(omega, left + margin*(middle - left)), right - margin*(right - middle))
    end function within
+
+   !> A place beyond what is known of a peak, where the response falls far on a long way that no
+   !> solution is known of: the peak may go on there.
+   pure subroutine find_gap(samples, k, i, omega, from, found)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      !> [rad/s]
+      real(wp), intent(out) :: omega
+      !> The sample before it.
+      integer, intent(out) :: from
+      logical, intent(out) :: found
+      real(wp), parameter :: onwards = 2.0_wp
+      real(wp) :: peak, mean, known
+      integer :: direction, j
+
+      omega = 0.0_wp
+      from = 0
+      found = .false.
+      mean = samples%item(k)%at%mean(i)
+      peak = swing_of(samples%item(k)%at, i, mean)
+      do direction = -1, 1, 2
+         j = k
+         do
+            j = j + direction
+            if (j < 1 .or. j > samples%n) exit
+            if (swing_of(samples%item(j)%at, i, mean) < near*peak) exit
+         end do
+         from = j - direction
+         if (j < 1 .or. j > samples%n .or. from == k) cycle
+         if (swing_of(samples%item(j)%at, i, mean) > deep*peak) cycle
+         known = abs(samples%item(from)%at%omega - samples%item(k)%at%omega)
+         found = abs(samples%item(j)%at%omega - samples%item(from)%at%omega) > far_beyond*known
+         if (.not. found) cycle
+         omega = samples%item(from)%at%omega + direction*onwards*known
+         return
+      end do
+   end subroutine find_gap
 
    !> Whether the response falls from the peak all at once.
    pure logical function lies_on_jump(samples, k, i)
@@ -267,7 +315,8 @@ contains
       integer, intent(in) :: k, i
       type(peak_type) :: peak
       real(wp) :: omega, promise
-      logical :: done
+      logical :: done, has_gap
+      integer :: from
 
       associate (at => samples%item(k)%at)
          peak%observed = i
@@ -278,9 +327,12 @@ contains
          peak%found_by = found_bound
          if (k == 1 .or. k == samples%n) return
          call find_next(samples, k, i, omega, promise, done)
+         ! Lower ones are not looked at so closely.
+         has_gap = place_of_highest(samples, i) == k
+         if (has_gap) call find_gap(samples, k, i, omega, from, has_gap)
          peak%found_by = merge(found_row, found_search, at%row > 0)
          if (lies_on_jump(samples, k, i)) peak%found_by = found_jump
-         if (.not. done .or. any(failed > samples%item(k - 1)%at%omega .and. &
+         if (.not. done .or. has_gap .or. any(failed > samples%item(k - 1)%at%omega .and. &
                                  failed < samples%item(k + 1)%at%omega)) then
             peak%found_by = found_unresolved
          end if

@@ -30,6 +30,16 @@ def test_a_nonlinear_peak_is_that_of_a_fine_sweep_or_has_a_remark(tmp_path, seed
     assert remark or true is None or peak == pytest.approx(true, rel=peak_family.RIGHT)
 
 
+@pytest.mark.parametrize(("seed", "true"), [(297, 4.270588), (417, 0.597972)])
+def test_two_peaks_side_by_side_are_not_taken_for_one(tmp_path, seed, true):
+    """A resonance that goes on behind a dip, which falls from there all at once, and two humps that
+    three rows show as one: `fine_peak` of these takes minutes."""
+    groups = peak_family.nonlinear(seed)[0]
+    run(tmp_path, groups)
+    peak, remark = peak_family.reported(tmp_path / "case.h5")
+    assert remark or peak == pytest.approx(true, rel=peak_family.RIGHT)
+
+
 def test_rows_stay_those_that_were_asked_for(tmp_path):
     groups, _ = peak_family.linear(1)
     sweep = groups["sweep"]
