@@ -163,7 +163,7 @@ scars: build ## steady states of wear against a march of cycles, also of a progr
 
 peaks: build ## reported peaks of random sweeps, also of a program BEFORE, written to docs/robustness.md
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/peaks.py \
-	   $(if $(BEFORE),--before $(BEFORE)) -o docs/robustness.md
+	   $(if $(BEFORE),--before $(BEFORE)) --state build/peaks.jsonl -o docs/robustness.md
 
 bifurcations: build ## bifurcations of 200 random branches against shooting, in docs/robustness.md
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/bifurcations/bifurcations.py -o

@@ -25,8 +25,8 @@ module fw_peak_rules
    !> A peak is known where the parabola promises no more than this, relative.
    real(wp), parameter :: small_gain = 1.0e-4_wp
    !> A neighbour of at least this part of the height belongs to the peak: what is left of the
-   !> parabola, of third order in the distance, is below the gain there. And that of a peak which may
-   !> be the highest: three points of two peaks side by side look like one.
+   !> parabola, of third order in the distance, is below the gain there. And the same of a peak that
+   !> may be the highest: three points of two peaks side by side look like one.
    real(wp), parameter :: near = 0.9_wp, nearest = 0.97_wp
    !> A fall to this part of the height, over a way so many times as long as what is known of the
    !> peak, may hide more of it.

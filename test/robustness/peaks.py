@@ -1,8 +1,11 @@
 """Counts of reported peaks: right, with a remark, wrong without a word; docs/robustness.md.
 
-    python test/robustness/peaks.py --before OTHER/fw_run -o docs/robustness.md
+    python test/robustness/peaks.py --before OTHER/fw_run [--state FILE] -o docs/robustness.md
+
+What the judge finds goes into the state, line by line: it goes on where it was stopped.
 """
 import argparse
+import json
 import sys
 import tempfile
 from collections import Counter
@@ -27,7 +30,20 @@ def verdict(folder, groups, true, program):
     return WORDS[1] if remark else WORDS[2]
 
 
-def count(number, programs):
+def judged(folder, seed, groups, ratio, state):
+    """The highest amplitude of a fine sweep, looked up where it is known already."""
+    known = {}
+    if state and state.exists():
+        known = dict(json.loads(line) for line in state.read_text().splitlines())
+    if seed not in known:
+        known[seed] = peak_family.fine_peak(folder, groups, ratio)
+        if state:
+            with state.open("a") as file:
+                file.write(json.dumps([seed, known[seed]]) + "\n")
+    return known[seed]
+
+
+def count(number, programs, state=None):
     """Verdicts by family and program. Cases whose fine sweep fails, or that never move, are left
     out."""
     counts = Counter()
@@ -39,7 +55,7 @@ def count(number, programs):
                 family = "linear chain"
             else:
                 groups, family, ratio = peak_family.nonlinear(seed)
-                true = peak_family.fine_peak(folder, groups, ratio)
+                true = judged(folder, seed, groups, ratio, state)
             if not true:
                 counts[family, "left out"] += 1
                 continue
@@ -64,10 +80,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=500)
     parser.add_argument("--before", help="program to compare with")
+    parser.add_argument("--state", type=Path, help="goes on where a run with this file stopped")
     parser.add_argument("-o", "--output", type=Path, help="document with the section `peaks`")
     options = parser.parse_args()
     programs = {"now": PROGRAM} | ({"before": options.before} if options.before else {})
-    lines = table(count(options.count, programs), programs)
+    lines = table(count(options.count, programs, options.state), programs)
     print("\n".join(lines))
     if options.output:
         write_section("peaks", lines, options.output)
