@@ -100,7 +100,7 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
    2 * k * k:     "nodal_diameter/K/mass", before the others of nodal diameter K, of order k; then
                   the same with stiffness, damping, stiffness_rotation, coriolis. Then n_dof of the
                   model counts the displacements in front, and there is no "mass" and "stiffness"
-   2 * k:         "nodal_diameter/K/load/static", likewise cosine, sine
+   2 * k:         "nodal_diameter/K/load/static", likewise cosine, sine, static_rotation
    2 * k * rows:  "nodal_diameter/K/observe/matrix"
    2 * a * a:     "aero/sector/M" or "aero/nodal_diameter/M"
    a * n_dof:     "aero/modes"

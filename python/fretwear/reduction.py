@@ -9,6 +9,9 @@ With Y = K_a^-1 B^T and S = B Y:
   structure with every pair stuck, and Psi^T f is the exact static contact force;
 * Phi^T K Psi = 0, so the stiffness of q = (u_r, eta) is block diagonal.
 
+Complex Hermitian matrices, of a sector tied in a nodal diameter, are taken as well; T is the
+conjugate transpose then.
+
 Rows of B are relative displacements u_r = u_side1 - u_side2 of the contact pairs, nodes or patch
 averages, in any frame. They become the first degrees of freedom of the reduced model. Units are
 those of the model and must be consistent: [F/L] stiffness, [M] mass.
@@ -30,7 +33,8 @@ from .errors import InputError
 
 __all__ = ["Bonded", "Reduction", "bonded_basis", "reduce"]
 
-Floats = NDArray[np.float64]
+#: Real, or complex where one of the matrices is.
+Floats = NDArray[Any]
 Matrix = Union[sp.sparray, sp.spmatrix, Floats]
 
 # Right-hand sides treated at once: fine flanks have thousands, each as long as the full model.
@@ -73,30 +77,35 @@ class Bonded:
 
     def __init__(self, stiffness: sp.csr_array, contact: sp.csr_array, kappa: float) -> None:
         self.stiffness, self.contact, self.kappa = stiffness, contact, kappa
-        augmented = sp.csc_matrix(stiffness + kappa * (contact.T @ contact))
+        augmented = sp.csc_matrix(stiffness + kappa * (contact.conj().T @ contact))
         self._factors = _factor(augmented)
-        self._flexible = np.empty(contact.shape[::-1], order="F")
+        self._flexible = np.empty(contact.shape[::-1], dtype=augmented.dtype, order="F")
         for block in _blocks(contact.shape[0]):
-            self._flexible[:, block] = self._factors.solve(contact[block].toarray().T)
+            self._flexible[:, block] = self._solve(contact[block].toarray().conj().T)
         compliance = contact @ self._flexible
-        compliance = 0.5 * (compliance + compliance.T)
+        compliance = 0.5 * (compliance + compliance.conj().T)
         _check_independent(compliance)
         self._compliance = la.cho_factor(compliance)
 
     def constraint_modes(self) -> Floats:
         """Static shapes Psi of unit contact coordinates, (n, n_r)."""
-        return la.cho_solve(self._compliance, self._flexible.T).T
+        return la.cho_solve(self._compliance, self._flexible.conj().T).conj().T
 
     def contact_stiffness(self) -> Floats:
         """K_rr [F/L], (n_r, n_r): zero for motions that the contact alone holds."""
         n = self.contact.shape[0]
         inverse = la.cho_solve(self._compliance, np.eye(n))
-        return 0.5 * (inverse + inverse.T) - self.kappa * np.eye(n)
+        return 0.5 * (inverse + inverse.conj().T) - self.kappa * np.eye(n)
 
     def solve(self, load: Floats) -> Floats:
         """Static displacement of the bonded structure under loads (n,) or (n, k)."""
-        free = self._factors.solve(np.ascontiguousarray(load))
-        return free - self._flexible @ la.cho_solve(self._compliance, self._flexible.T @ load)
+        free = self._solve(load)
+        return free - self._flexible @ la.cho_solve(self._compliance,
+                                                    self._flexible.conj().T @ load)
+
+    def _solve(self, load: Floats) -> Floats:
+        """With nothing stuck; factors and right-hand sides are of one type."""
+        return self._factors.solve(np.ascontiguousarray(load, dtype=self._factors.U.dtype))
 
     def modes(self, mass: sp.csr_array, n_modes: int) -> tuple[Floats, Floats]:
         """Lowest modes with every pair stuck.
@@ -118,13 +127,18 @@ class Bonded:
         n = mass.shape[0]
         # A fixed start without any symmetry: the same modes, with the same signs, every time.
         start = 1.0 + np.cos(np.arange(n) ** 1.1)
-        flexibility = spl.LinearOperator((n, n), matvec=self.solve, dtype=np.float64)
+        kind = self._flexible.dtype
+        flexibility = spl.LinearOperator((n, n), matvec=self.solve, dtype=kind)
         # With sigma and OPinv the first argument only gives shape and type; it is never applied.
-        values, shapes = spl.eigsh(mass, k=n_modes, M=mass, sigma=0.0, OPinv=flexibility,
-                                   v0=self.solve(mass @ start), tol=0.0)
+        values, shapes = spl.eigsh(mass.astype(kind), k=n_modes, M=mass, sigma=0.0,
+                                   OPinv=flexibility, v0=self.solve(mass @ start), tol=0.0)
+        if kind.kind == "c":
+            # Of close frequencies the shapes of a complex pencil are not orthogonal.
+            values, mix = la.eigh(_gram(shapes, self.stiffness), _gram(shapes, mass))
+            shapes = shapes @ mix
         order = np.argsort(values)
-        shapes = shapes[:, order] * np.sign(start @ (mass @ shapes[:, order]))
-        return np.sqrt(values[order]), shapes
+        return np.sqrt(values[order]), shapes[:, order] * _turned(
+            start @ (mass @ shapes[:, order]))
 
 
 @dataclass(frozen=True)
@@ -148,14 +162,14 @@ class Reduction:
 
     def matrix(self, full: Matrix) -> Floats:
         """T^T A T of a symmetric matrix (n, n), symmetric to the last bit."""
-        product = np.empty((self.basis.shape[1],) * 2)
+        product = np.empty((self.basis.shape[1],) * 2, dtype=self.basis.dtype)
         for block in _blocks(len(product)):
-            product[:, block] = self.basis.T @ (full @ self.basis[:, block])
-        return 0.5 * (product + product.T)
+            product[:, block] = self.basis.conj().T @ (full @ self.basis[:, block])
+        return 0.5 * (product + product.conj().T)
 
     def load(self, full: Floats) -> Floats:
         """T^T f of loads (n,) or (n, k)."""
-        return self.basis.T @ full
+        return self.basis.conj().T @ full
 
     def row(self, full: Matrix) -> Floats:
         """Observation rows (k, n) of the full model, on the reduced coordinates."""
@@ -224,8 +238,8 @@ def reduce(mass: Matrix, stiffness: Matrix, contact: Matrix, *, damping: Matrix 
     Parameters
     ----------
     mass, stiffness : (n, n) sparse or dense
-        Symmetric, on the free degrees of freedom [M], [F/L]. The mass may be singular, and the
-        stiffness for motions that the contact holds.
+        Symmetric or Hermitian, on the free degrees of freedom [M], [F/L]. The mass may be singular,
+        and the stiffness for motions that the contact holds.
     contact : (n_r, n) sparse or dense
         Rows of B: relative displacements u_side1 - u_side2 of the pairs, linearly independent.
     damping : (n, n) sparse or dense, optional
@@ -271,14 +285,14 @@ def _attachments(bonded: Bonded, mass: sp.csr_array, loads: Floats,
                  shapes: Floats) -> tuple[Floats, Floats]:
     """Attachment vectors (n, k), orthogonal to the modes and each other, and their stiffness."""
     static = bonded.solve(loads)
-    compliance = np.einsum("ij,ij->j", loads, static)
+    compliance = np.einsum("ij,ij->j", loads.conj(), static).real
     used = compliance > 0.0
     loads, static, compliance = loads[:, used], static[:, used], compliance[used]
     if not loads.shape[1]:
         return np.empty((len(loads), 0)), np.empty(0)
-    rest = static - bonded.solve(mass @ (shapes @ (shapes.T @ loads)))
+    rest = static - bonded.solve(mass @ (shapes @ (shapes.conj().T @ loads)))
     for _ in range(2):  # the second pass removes the round-off of the first
-        rest -= shapes @ (shapes.T @ (mass @ rest))
+        rest -= shapes @ (shapes.conj().T @ (mass @ rest))
     rest /= np.sqrt(compliance)
     values, vectors = la.eigh(_gram(rest, bonded.stiffness))
     kept = values > _ATTACHED
@@ -287,14 +301,20 @@ def _attachments(bonded: Bonded, mass: sp.csr_array, loads: Floats,
     # A vector without mass stays as it is: it answers statically.
     scale = np.where(values > _ATTACHED * np.abs(values).max(initial=0.0), values, 1.0)
     rest = rest @ (vectors / np.sqrt(scale))
-    work = rest.T @ loads
-    sign = np.sign(work[np.arange(len(work)), np.abs(work).argmax(axis=1)])
-    return rest * np.where(sign == 0.0, 1.0, sign), 1.0 / scale
+    work = rest.conj().T @ loads
+    largest = work[np.arange(len(work)), np.abs(work).argmax(axis=1)]
+    return rest * _turned(largest.conj()), 1.0 / scale
+
+
+def _turned(values: Floats) -> Floats:
+    """Factors of unit size that make the values positive."""
+    size = np.abs(values)
+    return np.where(size > 0.0, np.conj(values) / np.where(size > 0.0, size, 1.0), 1.0)
 
 
 def _gram(vectors: Floats, matrix: sp.csr_array) -> Floats:
-    product = vectors.T @ (matrix @ vectors)
-    return 0.5 * (product + product.T)
+    product = vectors.conj().T @ (matrix @ vectors)
+    return 0.5 * (product + product.conj().T)
 
 
 def _bonded(stiffness: sp.csr_array, contact: sp.csr_array, kappa: float | None) -> Bonded:
@@ -303,11 +323,11 @@ def _bonded(stiffness: sp.csr_array, contact: sp.csr_array, kappa: float | None)
         return Bonded(stiffness, contact, kappa)
     # Stiffness that the rows meet when nothing else moves: of the order of the contact stiffness,
     # and above it.
-    size = np.asarray(contact.multiply(contact).sum(axis=1)).ravel()
-    met = np.asarray(contact.multiply(contact @ stiffness).sum(axis=1)).ravel()
+    size, met = (np.asarray(contact.conj().multiply(rows).sum(axis=1)).ravel().real
+                 for rows in (contact, contact @ stiffness))
     guess = float(np.median(met / size**2))
     bonded = Bonded(stiffness, contact, guess)
-    found = float(np.median(np.diag(bonded.contact_stiffness())))
+    found = float(np.median(np.diag(bonded.contact_stiffness()).real))
     if 0.0 < found < guess / _KAPPA_RATIO:
         return Bonded(stiffness, contact, found)
     return bonded
@@ -321,7 +341,7 @@ def _factor(matrix: sp.csc_matrix) -> Any:
                            options={"SymmetricMode": True})
     except RuntimeError as error:
         raise InputError(f"{_FREE}: {error}") from None
-    pivots = factors.U.diagonal()[factors.perm_c]
+    pivots = factors.U.diagonal()[factors.perm_c].real
     size = np.abs(matrix.diagonal())
     share = pivots / np.where(size > 0.0, size, 1.0)
     lost = np.flatnonzero(share < _SINGULAR)
@@ -342,7 +362,8 @@ _FREE = ("motions remain that neither the contact nor the supports hold (rigid-b
 def _check_independent(compliance: Floats) -> None:
     """Refuse contact coordinates that depend on one another."""
     size = np.sqrt(np.abs(np.diag(compliance)))
-    _, order, rank, _ = la.lapack.dpstrf(compliance / np.outer(size, size), tol=_DEPENDENT)
+    scaled = compliance / np.outer(size, size)
+    _, order, rank, _ = la.get_lapack_funcs("pstrf", (scaled,))(scaled, tol=_DEPENDENT)
     if rank < len(compliance):
         rows: Sequence[int] = sorted(int(row) for row in order[rank:])
         raise InputError(f"{len(rows)} of {len(compliance)} contact rows depend on the others "
@@ -368,7 +389,7 @@ def _check_shapes(n: int, mass: sp.csr_array, stiffness: sp.csr_array, contact: 
 def _columns(loads: ArrayLike | None, n: int, name: str) -> Floats:
     if loads is None:
         return np.empty((n, 0))
-    columns = np.asarray(loads, dtype=float)
+    columns = np.asarray(loads, dtype=np.result_type(np.asarray(loads), float))
     if columns.shape[:1] != (n,) or columns.ndim > 2:
         raise InputError(f"{name} has the shape {columns.shape}; expected ({n},) or ({n}, k)")
     return columns.reshape(n, -1)

@@ -33,8 +33,9 @@ class NodalDiameter:
         Viscous damping, and stiffness per square of the rotation speed, Hermitian.
     coriolis : (n, n) complex, optional
         Per rotation speed, skew-Hermitian.
-    static, cosine, sine : (n,) complex, optional
-        Loads in these coordinates, in place of those of the model.
+    static, cosine, sine, static_rotation : (n,) complex, optional
+        Loads in these coordinates, in place of those of the model; the last per square of the
+        rotation speed.
     observe : mapping, optional
         Name of every observed quantity, with a row of factors (n,) complex; then all nodal
         diameters have the same names.
@@ -48,6 +49,7 @@ class NodalDiameter:
     static: ArrayLike | None = None
     cosine: ArrayLike | None = None
     sine: ArrayLike | None = None
+    static_rotation: ArrayLike | None = None
     observe: Mapping[str, ArrayLike] | None = None
 
     def checked(self, number: int) -> NodalDiameter:
@@ -202,7 +204,7 @@ class Sectors:
 
 _MATRICES = {"M": "mass", "K": "stiffness", "C": "damping",
              "stiffness_rotation": "stiffness_rotation", "coriolis": "coriolis"}
-_LOADS = {name: f"load/{name}" for name in ("static", "cosine", "sine")}
+_LOADS = {name: f"load/{name}" for name in ("static", "cosine", "sine", "static_rotation")}
 
 
 def _whole(values: ArrayLike) -> ArrayLike:
@@ -246,6 +248,10 @@ def read_sectors(file: h5py.File) -> Sectors | None:
 
 
 def _read_air(group: h5py.Group) -> Air:
+    for name in ("frequency", "matrix"):
+        if name in group:
+            raise InputError(f"/aero/{name}: is there, but forces of the air do not depend on "
+                             "frequency here")
     parts: dict[str, Any] = {
         argument: {int(m): _complexes(matrix[()]) for m, matrix in group[name].items()}
         for argument, name in (("by_sector", "sector"), ("by_diameter", "nodal_diameter"))

@@ -21,6 +21,11 @@ SMALL = DiskParameters(n_sectors=12, blade_angle=8.0, disk_rows=1, blade_rows=1,
                        side_columns=1, radial_patches=1, axial_patches=1, n_modes=20)
 #: Frequencies of the same matrices in another order, of a condition of 1e7.
 SAME = 1e-7
+#: Modes of the same tied matrices by two solvers (measured 1.4e-12).
+EXACT = 1e-9
+#: A pair that holds, and one of the elastic law.
+STUCK = "'dlft'"
+ELASTIC = "'penalty' tangential_stiffness = 2e4 normal_stiffness = 3e4"
 #: Of the lowest families, with the modes that the reduction leaves out.
 REDUCED = 1e-3
 
@@ -145,6 +150,71 @@ def test_pairs_reach_the_next_sector(full: FullDisk, folder: Path, tmp_path: Pat
             assert sides.min() > 0 and len(set(sides.tolist())) == 6
             # Sector matrices: displacements of the nodes themselves, also where it is reduced.
             assert (sides > 36).all() or not more
+
+
+@pytest.fixture(scope="module")
+def pairs(full: FullDisk, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Options of a pair between the shrouds of neighbours, loads and an observed quantity."""
+    path = tmp_path_factory.mktemp("pairs")
+    rows = full.rows[2 * full.n_interface:]
+    ends = [full.free[rows[[k]].tocoo().col[0]] // 3 + 1 for k in (0, 3)]
+    tokens = [[f"{node}:{c}" for c in (1, 2, 3)] for node in ends]
+    (path / "pairs.csv").write_text(
+        "side_1_t1, side_1_t2, side_1_n, side_2_t1, side_2_t2, side_2_n, mu, gap, sector_2\n"
+        + ", ".join([*tokens[0], *tokens[1], "0.3, -1e-3, 1"]) + "\n")
+    (path / "loads.csv").write_text(f"dof, cosine, sine, static_rotation\n{ends[0]}:2, 0.3, 0.1, 0"
+                                    f"\n{ends[1]}:1, 0, 0.2, 1e-9\n")
+    return ["--frames", "cartesian", "-q", "--pairs", str(path / "pairs.csv"), "--loads",
+            str(path / "loads.csv"), "--observe", f"tip={ends[0]}:2"]
+
+
+def test_every_nodal_diameter_on_its_own(folder: Path, pairs: list[str], tmp_path: Path) -> None:
+    """Stuck frequencies are those of the whole; open ones and responses tend to them with modes."""
+    main(command(folder, *pairs, "-o", str(tmp_path / "whole.h5")))
+
+    def run(name: str, n_modes: int = 3) -> dict[str, np.ndarray]:
+        found = {}
+        for analysis, sweep in (("modes", ""), ("frf", "&sweep start = 900 end = 1500 unit = 'Hz' "
+                                                "n_points = 7 /")):
+            (tmp_path / "case.nml").write_text(
+                f"&case analysis = '{analysis}' /\n&model source = 'hdf5' file = '{name}.h5' "
+                "rayleigh_stiffness = 1e-6 rotation_speed = 100 /\n&contact law = "
+                f"{STUCK if analysis == 'modes' else ELASTIC} /\n&cyclic engine_order = 2 "
+                f"n_modes = {n_modes} /\n&harmonics n_harmonics = 3 /\n{sweep}\n")
+            subprocess.run([PROGRAM, "-q", "-o", tmp_path / "result.h5", tmp_path / "case.nml"],
+                           check=True)
+            with h5py.File(tmp_path / "result.h5") as file:
+                for key in ("modes/open", "modes/closed", "coefficients"):
+                    if key in file:
+                        found[key] = file[key][()]
+        return found
+
+    whole = run("whole")
+    errors = []
+    for n_modes in (6, 24):
+        name = f"reduced_{n_modes}"
+        assert main(command(folder, *pairs, "--reduce", str(n_modes), "--by-diameter", "-o",
+                            str(tmp_path / f"{name}.h5"))) == 0
+        with h5py.File(tmp_path / f"{name}.h5") as file:
+            assert sorted(map(int, file["nodal_diameter"])) == list(range(7))
+            assert file["cyclic"].attrs["n_physical"] == 3
+            assert len(file["nodal_diameter/3/mass"]) <= 3 + n_modes + 4
+        found = run(name)
+        assert found["modes/closed"] == pytest.approx(whole["modes/closed"], rel=EXACT)
+        assert (found["modes/open"] >= whole["modes/open"] * (1.0 - EXACT)).all()
+        scale = np.abs(whole["coefficients"]).max()
+        errors.append([np.abs(found["modes/open"] / whole["modes/open"] - 1.0).max(),
+                       np.abs(found["coefficients"] - whole["coefficients"]).max() / scale])
+    assert (np.array(errors[1]) < 1e-3).all()
+    assert (np.array(errors[1]) < 0.1 * np.array(errors[0])).all()
+
+
+def test_nodal_diameters_need_pairs_and_modes(folder: Path, pairs: list[str],
+                                              capsys: pytest.CaptureFixture[str]) -> None:
+    for options, words in ((["--by-diameter", "--reduce", "3"], "contact pairs"),
+                           ([*pairs, "--by-diameter"], "--reduce")):
+        assert main(command(folder, *options, "-o", "never.h5")) == 3
+        assert words in capsys.readouterr().err
 
 
 def test_what_is_refused(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

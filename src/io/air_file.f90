@@ -18,6 +18,7 @@ module fw_air_file
 
    public :: read_air_file
 
+   character(*), parameter :: by_frequency(*) = [character(15) :: '/aero/frequency', '/aero/matrix']
    character(*), parameter :: by_sector = '/aero/sector', by_diameter = '/aero/nodal_diameter'
 
 contains
@@ -31,8 +32,17 @@ contains
       type(influence_type) :: found
       real(wp), allocatable :: modes(:, :)
       character(:), allocatable :: group, message
+      integer :: i
 
       if (.not. file%exists('/aero')) return
+      do i = 1, size(by_frequency)
+         if (.not. file%exists(trim(by_frequency(i)))) cycle
+         ! Left out, the answer would be that of another air.
+         call dataset_failure(file, trim(by_frequency(i)), 'is there, but forces of the air do '// &
+                              'not depend on frequency here: give those of the frequency that '// &
+                              'matters as /aero/sector/M or /aero/nodal_diameter/K', error)
+         return
+      end do
       found%by_diameter = file%exists(by_diameter)
       if (found%by_diameter .eqv. file%exists(by_sector)) then
          call fatal_error(error, file%path//': /aero holds '// &

@@ -166,6 +166,7 @@ contains
       if (.not. allocated(error)) call read_load('load/static', nodal%load_static)
       if (.not. allocated(error)) call read_load('load/cosine', nodal%load_cosine)
       if (.not. allocated(error)) call read_load('load/sine', nodal%load_sine)
+      if (.not. allocated(error)) call read_load('load/static_rotation', nodal%load_static_rotation)
       if (allocated(error) .or. .not. file%exists(name//'observe/matrix')) return
       call read_complex(file, name//'observe/matrix', turns, nodal%observe, error)
       if (allocated(error)) return

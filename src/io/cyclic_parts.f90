@@ -16,6 +16,8 @@ module fw_cyclic_parts
       complex(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
       complex(wp), allocatable :: stiffness_rotation(:, :)
       complex(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
+      !> Per square of the rotation speed.
+      complex(wp), allocatable :: load_static_rotation(:)
       complex(wp), allocatable :: observe(:, :)
       !> Per rotation speed.
       complex(wp), allocatable :: coriolis(:, :)

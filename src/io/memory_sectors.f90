@@ -145,6 +145,8 @@ contains
          call take_load(values, n, parts%load_cosine, message)
       case ('load/sine')
          call take_load(values, n, parts%load_sine, message)
+      case ('load/static_rotation')
+         call take_load(values, n, parts%load_static_rotation, message)
       case ('observe/matrix')
          if (modulo(size(values), 2*n) /= 0) then
             message = 'has '//to_text(size(values))//' values: must be a multiple of '// &
@@ -154,8 +156,8 @@ contains
          end if
       case default
          message = 'is no part of a nodal diameter: must be mass, stiffness, damping, '// &
-                   'stiffness_rotation, coriolis, load/static, load/cosine, load/sine or '// &
-                   'observe/matrix'
+                   'stiffness_rotation, coriolis, load/static, load/cosine, load/sine, '// &
+                   'load/static_rotation or observe/matrix'
       end select
    end subroutine put_diameter
 

@@ -125,7 +125,8 @@ contains
          if (allocated(parts%stiffness_rotation)) then
             nodal%stiffness = nodal%stiffness + options%rotation_speed**2* &
                               hermitian(parts%stiffness_rotation)
-         else if (.not. (allocated(raw%load_static_rotation) .or. allocated(parts%coriolis))) then
+         else if (.not. (allocated(raw%load_static_rotation) .or. allocated(parts%coriolis) .or. &
+                         allocated(parts%load_static_rotation))) then
             call reader%refuse('model', 'rotation_speed', 'is given, but the model has no '// &
                                'stiffness_rotation: remove it')
          end if
@@ -166,8 +167,12 @@ contains
       call take(2, 'cosine', raw%load_cosine, parts%load_cosine)
       call take(3, 'sine', raw%load_sine, parts%load_sine)
       associate (f => nodal%load(:, 1))
-         if (allocated(raw%load_static_rotation)) f(:raw%cyclic%n_physical) = &
-            f(:raw%cyclic%n_physical) + options%rotation_speed**2*raw%load_static_rotation
+         if (allocated(parts%load_static_rotation)) then
+            f = f + options%rotation_speed**2*parts%load_static_rotation
+         else if (allocated(raw%load_static_rotation)) then
+            f(:raw%cyclic%n_physical) = f(:raw%cyclic%n_physical) + &
+                                        options%rotation_speed**2*raw%load_static_rotation
+         end if
          f = options%static_scale*f
       end associate
       nodal%load(:, 2:) = options%harmonic_scale*nodal%load(:, 2:)

@@ -350,6 +350,18 @@ def test_refusals(tmp_path, spoil, words):
         assert word in message
 
 
+@pytest.mark.parametrize("name", ["aero/frequency", "aero/matrix"])
+def test_air_over_frequency_is_refused(tmp_path, name):
+    case = whirling(6)
+    write_sector(tmp_path / "model.h5", case)
+    with h5py.File(tmp_path / "model.h5", "a") as file:
+        file[name] = np.ones(2)
+    done = run(tmp_path, groups_of(case), status=3)
+    assert f"/{name}" in done.stderr and "do not depend on frequency" in done.stderr
+    with pytest.raises(fretwear.InputError, match="do not depend on frequency"):
+        Model.from_hdf5(tmp_path / "model.h5")
+
+
 def test_a_nodal_diameter_that_is_missing(tmp_path):
     case = whirling(6, air="nodal_diameter", n_sectors=7, engine_order=2)
     del case["air"]["matrix"][-3]

@@ -65,6 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", choices=FRAMES, default=FRAMES[0],
                         help="of the components of interface nodes; Cartesian ones are turned "
                              "(default: cylindrical)")
+    parser.add_argument("--by-diameter", action="store_true",
+                        help="reduce the sector on its own in every nodal diameter, without its "
+                             "interfaces")
     parser.add_argument("--title", default="", help="title of the model")
     parser.add_argument("--unit-system", default="", metavar="TEXT",
                         help="such as mm-tonne-s-N or m-kg-s-N; with one of these two, sizes are "
@@ -83,7 +86,8 @@ def main(options: argparse.Namespace) -> int:
     found = [Finding("note", "files", note) for note in model.notes] + check_model(model)
     wrong = [finding for finding in found if finding.kind == "error"]
     if not wrong and options.check and options.reduce is not None:
-        model_datasets(model, options.reduce)  # says what a reduction would refuse
+        # Says what a reduction would refuse.
+        model_datasets(model, options.reduce, options.by_diameter)
     for finding in found:
         if finding.kind == "warning" or (finding.kind == "note" and not options.quiet):
             print(finding, file=sys.stdout if options.check else sys.stderr)
@@ -93,7 +97,7 @@ def main(options: argparse.Namespace) -> int:
         print(f"no errors in {model.dofs.n} degrees of freedom, "
               f"{0 if model.pairs is None else len(model.pairs)} pairs")
         return 0
-    for finding in save(model, options.output, options.reduce):
+    for finding in save(model, options.output, options.reduce, options.by_diameter):
         if finding.kind == "warning" or not options.quiet:
             print(finding, file=sys.stderr)
     return 0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..model_file import strings, write_model_file
 from ..reduction import reduce
+from .diameters import reduce_diameters
 from .finding import Finding
 from .labels import Dofs
 from .matrices import read_matrices
@@ -213,7 +214,8 @@ def drop(model: FullModel, *, empty: bool) -> FullModel:
                f"degrees of freedom are left out; {len(kept)} remain"])
 
 
-def model_datasets(model: FullModel, n_modes: int | None) -> dict[str, NDArray[Any]]:
+def model_datasets(model: FullModel, n_modes: int | None,
+                   by_diameter: bool = False) -> dict[str, NDArray[Any]]:
     """Datasets of the model file by name.
 
     Parameters
@@ -223,10 +225,14 @@ def model_datasets(model: FullModel, n_modes: int | None) -> dict[str, NDArray[A
     n_modes : int or None
         Reduce to the contact coordinates, so many bonded modes and the attachment vectors of
         the loads; None: leave the degrees of freedom as they are.
+    by_diameter : bool
+        Reduce a sector on its own in every nodal diameter.
     """
     symmetric = {role: (matrix + matrix.T) * 0.5 for role, matrix in model.matrices.items()}
     observed = _observed(model)
     cyclic = model.interfaces is not None
+    if by_diameter:
+        return _by_diameter(model, symmetric, n_modes)
     if cyclic and model.pairs is not None and model.pairs.rows is not None:
         raise InputError("pairs of sectors need degrees of freedom of their own on both sides: "
                          "columns side_1_t1 ... side_2_n and sector_2")
@@ -318,6 +324,20 @@ def _observed(model: FullModel) -> sp.csr_array:
                         (len(signed), model.dofs.n))
 
 
+def _by_diameter(model: FullModel, matrices: dict[str, sp.csr_array],
+                 n_modes: int | None) -> dict[str, NDArray[Any]]:
+    """Complex matrices of every nodal diameter; pairs have no sides any more but rows."""
+    if n_modes is None:
+        raise InputError("--by-diameter goes with --reduce N_MODES")
+    sectors, data = reduce_diameters(model, matrices, n_modes, _observed(model))
+    data |= sectors.datasets()
+    if model.pairs is not None:
+        data |= _pair_values(replace(model.pairs, sector_2=None))
+    if model.observe:
+        data["observe/name"] = strings(model.observe)
+    return data
+
+
 def _pair_values(pairs: Pairs) -> dict[str, NDArray[Any]]:
     values = {"mu": pairs.mu, "gap": pairs.gap, "area": pairs.area, "position": pairs.position,
               "patch": None if pairs.patch is None else strings(pairs.patch),
@@ -325,14 +345,17 @@ def _pair_values(pairs: Pairs) -> dict[str, NDArray[Any]]:
     return {f"contact/{name}": value for name, value in values.items() if value is not None}
 
 
-def save(model: FullModel, path: str | Path, n_modes: int | None = None) -> list[Finding]:
+def save(model: FullModel, path: str | Path, n_modes: int | None = None,
+         by_diameter: bool = False) -> list[Finding]:
     """Write the model file of a checked model; returns what is to be known about it."""
-    data = model_datasets(model, n_modes)
+    data = model_datasets(model, n_modes, by_diameter)
+    groups = {} if model.interfaces is None else {
+        "cyclic": {"n_sectors": model.interfaces.n_sectors}}
+    if by_diameter:
+        groups["cyclic"]["n_physical"] = int(data["contact/side_1"].max())
     write_model_file(path, data, title=model.title or Path(path).stem,
-                     unit_system=model.unit_system,
-                     groups=None if model.interfaces is None else {
-                         "cyclic": {"n_sectors": model.interfaces.n_sectors}})
-    n = len(data["mass"])
+                     unit_system=model.unit_system, groups=groups)
+    n = max(len(values) for name, values in data.items() if name.split("/")[-1] == "mass")
     found = [Finding("note", str(path), f"{n} degrees of freedom, "
                      f"{0 if model.pairs is None else len(model.pairs)} pairs, loads "
                      + (", ".join(name for name in LOADS if name in model.loads) or "none"))]

@@ -25,7 +25,7 @@ from .tables import read_table
 if TYPE_CHECKING:
     from .build import FullModel
 
-__all__ = ["FRAMES", "Interfaces", "check_interfaces", "in_sector_frames", "read_interfaces",
+__all__ = ["FRAMES", "Interfaces", "check_interfaces", "in_sector_frames", "read_interfaces", "tie",
            "tied_spectrum"]
 
 Floats = NDArray[np.float64]
@@ -132,14 +132,20 @@ def in_sector_frames(model: FullModel, interfaces: Interfaces) -> FullModel:
 
 def tied_spectrum(model: FullModel, interfaces: Interfaces) -> Spectrum | None:
     """Lowest modes that all sectors make alike (nodal diameter 0)."""
-    n = model.dofs.n
-    kept = np.setdiff1d(np.arange(n), interfaces.right - 1)
-    column = np.concatenate((np.arange(len(kept)), np.searchsorted(kept, interfaces.left - 1)))
-    tie = sp.csr_array((np.ones(n), (np.concatenate((kept, interfaces.right - 1)), column)),
-                       shape=(n, len(kept)))
-    mass, stiffness = (sp.csr_array(tie.T @ model.matrices[role] @ tie)
+    alike = tie(interfaces, model.dofs.n)
+    mass, stiffness = (sp.csr_array(alike.T @ model.matrices[role] @ alike)
                        for role in ("mass", "stiffness"))
     return lowest_modes(mass, stiffness)
+
+
+def tie(interfaces: Interfaces, n: int, factor: complex = 1.0) -> sp.csr_array:
+    """From the degrees of freedom but the right ones to all of them (n, n_kept): right ones move as
+    left ones times a factor."""
+    kept = np.setdiff1d(np.arange(n), interfaces.right - 1)
+    column = np.concatenate((np.arange(len(kept)), np.searchsorted(kept, interfaces.left - 1)))
+    values = np.concatenate((np.ones(len(kept)), np.full(len(interfaces.right), factor)))
+    return sp.csr_array((values, (np.concatenate((kept, interfaces.right - 1)), column)),
+                        shape=(n, len(kept)))
 
 
 def check_interfaces(interfaces: Interfaces, alone: Spectrum, tied: Spectrum) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, OutputError
 from .labels import Dofs
 
-__all__ = ["LOADS", "Pairs", "contact_rows", "read_loads", "read_pairs", "read_table"]
+__all__ = ["LOADS", "Pairs", "contact_rows", "read_loads", "read_pairs", "read_table", "side_rows"]
 
 Floats = NDArray[np.float64]
 
@@ -162,16 +162,22 @@ def contact_rows(pairs: Pairs, n: int) -> tuple[sp.csr_array, NDArray[np.int32]]
     """
     if pairs.rows is not None:
         return pairs.rows, pairs.side_1
+    one, two, number = side_rows(pairs, n)
+    return sp.csr_array(one - two), number
+
+
+def side_rows(pairs: Pairs, n: int) -> tuple[sp.csr_array, sp.csr_array, NDArray[np.int32]]:
+    """Displacements of side 1 and of side 2 of pairs by degrees of freedom, and their numbers as
+    those of `contact_rows`."""
     number = np.zeros_like(pairs.side_1)
     there = (pairs.side_1 != 0) | (pairs.side_2 != 0)
     number[there] = np.arange(1, there.sum() + 1)
-    entries: list[tuple[int, int, float]] = []
-    for sides, factor in ((pairs.side_1, 1.0), (pairs.side_2, -1.0)):
-        entries += [(int(row) - 1, abs(int(dof)) - 1, factor * math.copysign(1.0, dof))
-                    for row, dof in zip(number[there], sides[there]) if dof != 0]
-    row, column, value = (np.array(part) for part in zip(*entries))
-    return sp.csr_array((value, (row.astype(int), column.astype(int))),
-                        (int(there.sum()), n)), number
+    found = []
+    for sides in (pairs.side_1[there], pairs.side_2[there]):
+        row = np.flatnonzero(sides)
+        found.append(sp.csr_array((np.sign(sides[row]).astype(float),
+                                   (row, np.abs(sides[row]) - 1)), (int(there.sum()), n)))
+    return found[0], found[1], number
 
 
 def read_loads(path: str | Path, dofs: Dofs) -> dict[str, Floats]:
