@@ -22,6 +22,7 @@ from .result_file import Quantity, ResultFile, plain_text
 from .sensitivity import Sensitivities, read_sensitivities
 
 if TYPE_CHECKING:
+    import pyvista
     import xarray
 
 __all__ = ["DIRECTIONS", "STATES", "Quantity", "Result"]
@@ -469,6 +470,35 @@ class Result(ResultFile):
         return read_peaks(self)
 
     # ------------------------------------------------------------------ notebooks
+
+    def to_pyvista(self, point: int | None = None, phase: float | None = None, *,
+                   sectors: int = 1, axis: str = "z") -> pyvista.UnstructuredGrid:
+        """The mesh of the model with the motion and the contact at one point, for PyVista.
+
+        `grid.warp_by_vector("displacement", factor=50).plot(scalars="slip")` shows it.
+
+        Parameters
+        ----------
+        point, phase, sectors, axis
+            See `fretwear.export.export_mesh`.
+
+        Returns
+        -------
+        pyvista.UnstructuredGrid
+            Point and cell data as there.
+
+        Raises
+        ------
+        InputError
+            No mesh belongs to the model, or PyVista is not installed.
+        """
+        from .export import export_mesh
+
+        try:
+            import pyvista
+        except ImportError:
+            raise InputError("to_pyvista needs pyvista: pip install pyvista") from None
+        return pyvista.wrap(export_mesh(self, point, phase, sectors=sectors, axis=axis))
 
     def to_xarray(self) -> xarray.Dataset:
         """Everything with one row per point or per wear step, with coordinates and units.

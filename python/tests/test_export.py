@@ -244,3 +244,14 @@ def test_sectors_on_the_command_line(disk: Result, coarse: Result, tmp_path: Pat
     assert "there are 36" in capsys.readouterr().err
     assert main(["export", str(disk.path), target, "--sectors", "2", "--axis", "w"]) == 3
     assert "must be x, y, z" in capsys.readouterr().err
+
+
+def test_pyvista_gets_the_same_mesh(coarse: Result) -> None:
+    pytest.importorskip("pyvista")
+    mesh, grid = export_mesh(coarse, phase=30.0), coarse.to_pyvista(phase=30.0)
+    np.testing.assert_array_equal(grid.points, mesh.points)
+    assert grid.n_cells == sum(len(block.data) for block in mesh.cells)
+    np.testing.assert_array_equal(grid.point_data["displacement"],
+                                  mesh.point_data["displacement"])
+    slip = np.concatenate(mesh.cell_data["slip"])
+    np.testing.assert_array_equal(grid.cell_data["slip"], slip)
