@@ -1,6 +1,7 @@
 !> fw_run: read a case, run it, report. The only place that ends the program.
 program fw_run_program
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+   use fw_blas, only: describe_blas, slow_kernel
    use fw_case, only: case_type
    use fw_cli, only: cli_options, get_arguments, parse_arguments
    use fw_error, only: error_type, status_ok
@@ -31,6 +32,7 @@ contains
       type(string_type), allocatable :: arguments(:)
       type(cli_options) :: options
       type(error_type), allocatable :: error
+      character(80) :: blas
 
       call get_arguments(arguments)
       call parse_arguments(arguments, options, error)
@@ -41,7 +43,8 @@ contains
          else if (options%keys) then
             call show_keys(options, error)
          else if (options%version) then
-            write (output_unit, '(a)') 'fw_run '//version
+            call describe_blas(blas)
+            write (output_unit, '(a)') 'fw_run '//version, 'BLAS: '//trim(blas)
          else
             call run(options, status, error)
          end if
@@ -104,7 +107,22 @@ contains
       do i = 1, size(outcome%summary)
          write (output_unit, '(a)') outcome%summary(i)%text
       end do
+      call report_blas(options%verbose)
    end subroutine run
+
+   !> The BLAS where it is asked for, and its remedy where it is slow.
+   subroutine report_blas(verbose)
+      logical, intent(in) :: verbose
+      character(80) :: text, kernel, better
+      logical :: is_slow
+
+      call describe_blas(text)
+      call slow_kernel(is_slow, kernel, better)
+      if (verbose .or. is_slow) write (output_unit, '(a, t19, a)') 'BLAS', trim(text)
+      if (is_slow) write (output_unit, '(a, t19, a)') 'slow BLAS', 'kernel '//trim(kernel)// &
+         ' lacks vectors of this processor: set OPENBLAS_CORETYPE='//trim(better)// &
+         ' in the environment, or install a newer OpenBLAS'
+   end subroutine report_blas
 
    !> One line of the standard error for each line of the message.
    subroutine report(error, status)

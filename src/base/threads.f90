@@ -31,14 +31,15 @@ module fw_threads
    integer(c_int) :: blas_before = 1_c_int
 
    interface
-      integer(c_int) function openblas_get_num_threads() bind(c)
+      integer(c_int) function get_blas_threads() bind(c, name='fretwear_blas_threads')
          import :: c_int
-      end function openblas_get_num_threads
+      end function get_blas_threads
 
-      subroutine openblas_set_num_threads(n) bind(c)
+      ! Of a BLAS that is not OpenBLAS it does nothing (blas_kernel.c).
+      subroutine set_blas_threads(n) bind(c, name='fretwear_set_blas_threads')
          import :: c_int
          integer(c_int), value :: n
-      end subroutine openblas_set_num_threads
+      end subroutine set_blas_threads
    end interface
 
 contains
@@ -52,8 +53,8 @@ contains
       if (n_threads > 0) call omp_set_num_threads(n_threads)
       !$omp critical (fretwear_threads)
       if (n_open == 0) then
-         blas_before = openblas_get_num_threads()
-         call openblas_set_num_threads(1_c_int)
+         blas_before = get_blas_threads()
+         call set_blas_threads(1_c_int)
       end if
       n_open = n_open + 1
       !$omp end critical (fretwear_threads)
@@ -66,7 +67,7 @@ contains
       call omp_set_num_threads(self%outer)
       !$omp critical (fretwear_threads)
       n_open = n_open - 1
-      if (n_open == 0) call openblas_set_num_threads(blas_before)
+      if (n_open == 0) call set_blas_threads(blas_before)
       !$omp end critical (fretwear_threads)
    end subroutine leave
 

@@ -1,6 +1,7 @@
 """Options, exit statuses and what goes to which stream."""
 import json
 import os
+from pathlib import Path
 
 import pytest
 
@@ -8,7 +9,26 @@ import pytest
 def test_version(fw_run):
     done = fw_run("--version")
     assert done.returncode == 0
-    assert done.stdout.startswith("fw_run ") and done.stdout.count(".") == 2
+    first, second = done.stdout.splitlines()
+    assert first.startswith("fw_run ") and first.count(".") == 2
+    # Which kernel runs decides on speed by three: whoever reports a time can see it.
+    assert second.startswith("BLAS: ")
+
+
+def test_the_blas_is_named(fw_run, monkeypatch):
+    """With -v, and where its kernel lacks what the processor has, with the remedy."""
+    assert "\nBLAS   " in fw_run("-v", "case.nml").stdout
+    flags = Path("/proc/cpuinfo")
+    if not flags.exists() or " avx2 " not in flags.read_text(encoding="utf-8"):
+        pytest.skip("a processor without AVX2 has no kernel below what it can do")
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Prescott")
+    done = fw_run("case.nml")
+    if "kernel Prescott" not in done.stdout:
+        pytest.skip("not an OpenBLAS with several kernels")
+    assert "slow BLAS         kernel Prescott lacks vectors" in done.stdout
+    assert "OPENBLAS_CORETYPE=" in done.stdout
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    assert "slow BLAS" not in fw_run("case.nml").stdout
 
 
 @pytest.mark.parametrize("option", ["--help", "-h"])

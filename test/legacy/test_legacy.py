@@ -336,7 +336,7 @@ def test_version(prefix, tmp_path):
     source.write_text('#include <stdio.h>\n#include <fretwear.h>\nint main(void) { '
                       'printf("%s %d", fw_get_version(), '
                       'fw_get_interface_version() == FW_INTERFACE_VERSION); return 0; }\n')
-    version = run(prefix / "bin" / "fw_run", "--version").split()[-1]
+    version = run(prefix / "bin" / "fw_run", "--version").split()[1]
     assert run(compile_c(source, prefix, tmp_path)) == f"{version} 1"
     for package in ("fretwear", "fretwear-static"):
         assert run("pkg-config", "--modversion", package,
