@@ -3,8 +3,12 @@
 !> Rows not given (skipped) read as NaN for reals and 0 otherwise. A chunk holds about 64 kB, so
 !> that a flush, which writes whole chunks, stays cheap, and never more rows than are expected.
 !> Only the chunk that grows is kept in memory: HDF5 would keep a megabyte of each dataset.
+!>
+!> Where rows may wait they are gathered here, up to a chunk, and written together: HDF5 takes
+!> as long for a chunk as for a row.
 module fw_hdf5_append
    use, intrinsic :: iso_c_binding, only: c_int8_t
+   use, intrinsic :: iso_c_binding, only: c_f_pointer
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_c_binding, only: c_ptr
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
@@ -63,10 +67,18 @@ module fw_hdf5_append
    type :: growing_dataset
       !> Rows so far, those that were skipped included.
       integer :: n_rows = 0
+      !> Rows wait for `drain` (or until they fill a chunk): for files that are drained before each
+      !> flush. Set after `create`.
+      logical :: waits = .false.
       integer(hid_t), private :: id = -1_hid_t, type_id = -1_hid_t
       character(:), allocatable, private :: name
       !> Dimensions of a row in the order of Fortran, then 1 for the row itself.
       integer(hsize_t), allocatable, private :: row(:)
+      !> Rows that the file knows of; bytes of the last rows, which it does not have yet, their
+      !> number and the most of them.
+      integer, private :: n_stored = 0
+      integer(c_int8_t), allocatable, private :: waiting(:)
+      integer, private :: n_waiting = 0, most_waiting = 1
    contains
       procedure :: create
       procedure :: is_created
@@ -81,7 +93,9 @@ module fw_hdf5_append
       procedure, private :: append_integer, append_logical
       !> One row of reals whose elements follow one another.
       procedure :: append_flat
-      procedure, private :: append_raw, grow
+      !> `call dataset%drain(file, error)`: write what waits.
+      procedure :: drain
+      procedure, private :: append_raw
    end type growing_dataset
 
 contains
@@ -120,6 +134,7 @@ contains
       end if
       call h5screate_simple_f(size(limit), [self%row(:size(row_shape)), 0_hsize_t], space, &
                               status, limit)
+      self%most_waiting = int(chunk(size(chunk)))
       access = cache_of_one(self, product(chunk))
       call new_dataset(file, name, self%type_id, space, self%id, error, creation, access)
       call h5sclose_f(space, status)
@@ -156,7 +171,12 @@ contains
       integer, intent(in) :: n
       type(error_type), allocatable, intent(out) :: error
 
-      if (n > 0) call self%grow(file, n, error)
+      if (n <= 0) return
+      ! What waits are the last rows, without gaps.
+      call self%drain(file, error)
+      if (allocated(error)) return
+      self%n_rows = self%n_rows + n
+      if (.not. self%waits) call self%drain(file, error)
    end subroutine skip
 
    !> Append the first n rows of the dataset of the same name in another file, bit by bit; nothing
@@ -226,7 +246,7 @@ contains
             return
          end if
       end if
-      call self%append_raw(file, int(self%row(:rank - 1)), self%type_id, c_loc(buffer), error)
+      call self%append_raw(file, int(self%row(:rank - 1)), buffer, error)
    end subroutine copy_row
 
    !> Put row order(k) in the place of row k, bit by bit; nothing where this was never created.
@@ -241,6 +261,8 @@ contains
       integer :: status, k, n
 
       if (self%id < 0) return
+      call self%drain(file, error)
+      if (allocated(error)) return
       if (self%n_rows == 0 .or. product(self%row) == 0) return
       if (size(order) /= self%n_rows) then
          call dataset_failure(file, self%name, 'has another number of rows', error)
@@ -259,12 +281,14 @@ contains
       if (status < 0) call dataset_failure(file, self%name, 'cannot be sorted (disk full?)', error)
    end subroutine permute
 
-   !> Release the handles; harmless where nothing was created.
+   !> Release the handles; harmless where nothing was created. Who wants to know whether the last
+   !> rows could be written drains before.
    subroutine close(self)
       class(growing_dataset), intent(inout) :: self
       integer :: status
 
       if (self%id < 0) return
+      call write_waiting(self, status)
       call h5dclose_f(self%id, status)
       call h5tclose_f(self%type_id, status)
       self%id = -1_hid_t
@@ -316,7 +340,8 @@ contains
       real(wp), intent(in), target :: values(product(dims))
       type(error_type), allocatable, intent(out) :: error
 
-      call self%append_raw(file, dims, h5kind_to_type(wp, h5_real_kind), c_loc(values), error)
+      call self%append_raw(file, dims, bytes_of(c_loc(values), &
+                                                  storage_size(values)/8*size(values)), error)
    end subroutine append_flat
 
    !> One whole number a row.
@@ -328,8 +353,8 @@ contains
       integer, target :: buffer
 
       buffer = values
-      call self%append_raw(file, [integer ::], h5kind_to_type(kind(0), h5_integer_kind), &
-                           c_loc(buffer), error)
+      call self%append_raw(file, [integer ::], bytes_of(c_loc(buffer), &
+                                                            storage_size(buffer)/8), error)
    end subroutine append_integer
 
    !> One truth value a row, a byte in the file.
@@ -338,23 +363,29 @@ contains
       type(hdf5_file), intent(in) :: file
       logical, intent(in) :: values
       type(error_type), allocatable, intent(out) :: error
-      integer(c_int8_t), target :: buffer
+      integer(c_int8_t) :: buffer
 
       buffer = merge(1_c_int8_t, 0_c_int8_t, values)
-      call self%append_raw(file, [integer ::], self%type_id, c_loc(buffer), error)
+      call self%append_raw(file, [integer ::], [buffer], error)
    end subroutine append_logical
 
-   !> One row from an address, of a given type in memory and a shape that is checked.
-   subroutine append_raw(self, file, dims, memory_type, address, error)
+   !> Memory as bytes.
+   function bytes_of(address, n) result(bytes)
+      type(c_ptr), intent(in) :: address
+      integer, intent(in) :: n
+      integer(c_int8_t), pointer :: bytes(:)
+
+      call c_f_pointer(address, bytes, [n])
+   end function bytes_of
+
+   !> One row from its bytes, which are those of the file, of a shape that is checked.
+   subroutine append_raw(self, file, dims, bytes, error)
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       integer, intent(in) :: dims(:)
-      integer(hid_t), intent(in) :: memory_type
-      type(c_ptr), intent(in) :: address
+      integer(c_int8_t), intent(in) :: bytes(:)
       type(error_type), allocatable, intent(out) :: error
-      integer(hid_t) :: memory, space
-      integer(hsize_t) :: start(size(self%row))
-      integer :: status, ignored, n
+      integer :: n
 
       n = size(self%row)
       if (size(dims) /= n - 1) then
@@ -362,41 +393,69 @@ contains
       else if (any(dims /= self%row(:n - 1))) then
          call dataset_failure(file, self%name, 'takes rows of another shape', error)
       end if
+      if (allocated(error)) return
+      if (self%n_waiting == self%most_waiting) then
+         call self%drain(file, error)
+         if (allocated(error)) return
+      end if
       ! A row of size 0 still counts as one.
-      if (.not. allocated(error)) call self%grow(file, 1, error)
-      if (allocated(error) .or. product(self%row) == 0) return
+      self%n_rows = self%n_rows + 1
+      if (product(self%row) > 0) then
+         n = size(bytes)
+         if (.not. allocated(self%waiting)) allocate (self%waiting(n*self%most_waiting))
+         self%waiting(self%n_waiting*n + 1:(self%n_waiting + 1)*n) = bytes
+         self%n_waiting = self%n_waiting + 1
+      end if
+      if (.not. self%waits) call self%drain(file, error)
+   end subroutine append_raw
+
+   !> Write the rows that wait. Nothing where nothing was created.
+   subroutine drain(self, file, error)
+      class(growing_dataset), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(error_type), allocatable, intent(out) :: error
+      integer :: status
+
+      if (self%id < 0) return
+      call write_waiting(self, status)
+      if (status < 0) call dataset_failure(file, self%name, 'cannot take row '// &
+                                           to_text(self%n_rows)//' (disk full?)', error)
+   end subroutine drain
+
+   !> New rows read as the fill value until they are written.
+   subroutine write_waiting(self, status)
+      class(growing_dataset), intent(inout), target :: self
+      integer, intent(out) :: status
+      type(c_ptr) :: address
+      integer(hid_t) :: memory, space
+      integer(hsize_t) :: extent(size(self%row)), start(size(self%row))
+      integer :: ignored, n
+
+      status = 0
+      n = size(self%row)
+      extent = self%row
+      if (self%n_stored < self%n_rows) then
+         extent(n) = self%n_rows
+         call h5dset_extent_f(self%id, extent, status)
+         if (status < 0) return
+         self%n_stored = self%n_rows
+      end if
+      if (self%n_waiting == 0) return
       start = 0
-      ! HDF5 counts from 0, and `grow` has counted the row already.
-      start(n) = self%n_rows - 1
+      ! HDF5 counts from 0.
+      start(n) = self%n_rows - self%n_waiting
+      extent(n) = self%n_waiting
+      ! Written or given up, whatever comes of it.
+      self%n_waiting = 0
       call h5dget_space_f(self%id, space, status)
-      call h5sselect_hyperslab_f(space, h5s_select_set_f, start, self%row, status)
-      call h5screate_simple_f(n, self%row, memory, status)
-      call h5dwrite_f(self%id, memory_type, address, status, memory, space)
+      call h5sselect_hyperslab_f(space, h5s_select_set_f, start, extent, status)
+      call h5screate_simple_f(n, extent, memory, status)
+      address = c_loc(self%waiting)
+      call h5dwrite_f(self%id, self%type_id, address, status, memory, space)
       ! Closed whatever came of the writing, or handles would leak with a full disk.
       call h5sclose_f(memory, ignored)
       call h5sclose_f(space, ignored)
-      if (status < 0) call dataset_failure(file, self%name, 'cannot be written (disk full?)', error)
-   end subroutine append_raw
-
-   !> The new rows read as the fill value until they are written.
-   subroutine grow(self, file, n, error)
-      class(growing_dataset), intent(inout) :: self
-      type(hdf5_file), intent(in) :: file
-      integer, intent(in) :: n
-      type(error_type), allocatable, intent(out) :: error
-      integer(hsize_t) :: extent(size(self%row))
-      integer :: status
-
-      extent = self%row
-      extent(size(extent)) = self%n_rows + n
-      call h5dset_extent_f(self%id, extent, status)
-      if (status >= 0) then
-         self%n_rows = self%n_rows + n
-      else
-         call dataset_failure(file, self%name, 'cannot take row '// &
-                              to_text(self%n_rows + n), error)
-      end if
-   end subroutine grow
+   end subroutine write_waiting
 
    !> At least one, however large it is.
    integer(hsize_t) function rows_per_chunk(self, expected_rows) result(rows)

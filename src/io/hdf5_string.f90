@@ -22,6 +22,10 @@ module fw_hdf5_string
    use hdf5, only: h5dwrite_f
    use hdf5, only: h5dget_type_f
    use hdf5, only: h5dvlen_reclaim_f
+   use hdf5, only: h5pclose_f
+   use hdf5, only: h5pcreate_f
+   use hdf5, only: h5pset_buffer_f
+   use hdf5, only: h5p_dataset_xfer_f
    use hdf5, only: h5p_default_f
    use hdf5, only: h5screate_simple_f
    use hdf5, only: h5sclose_f
@@ -42,6 +46,8 @@ module fw_hdf5_string
 
    !> A longer fixed length is damage, not a name.
    integer(size_t), parameter :: max_length = 2_size_t**24
+   !> Room for the addresses of texts on their way into a file [bytes].
+   integer(hsize_t), parameter :: text_buffer = 4096_hsize_t
 
    interface
       pure function c_strlen(text) bind(c, name='strlen') result(n)
@@ -151,7 +157,7 @@ contains
       integer, intent(out) :: status
       character(kind=c_char), allocatable, target :: buffer(:)
       type(c_ptr), target :: texts(size(strings))
-      integer(hid_t) :: type_id
+      integer(hid_t) :: type_id, transfer_list
       integer :: i, j, at, ignored
 
       ! All strings in one buffer, each with its null, and addresses into it.
@@ -169,7 +175,11 @@ contains
       if (is_attribute) then
          call h5awrite_f(id, type_id, c_loc(texts), status)
       else
-         call h5dwrite_f(id, type_id, c_loc(texts), status)
+         ! HDF5 would clear a megabyte for the addresses of a few texts.
+         call h5pcreate_f(h5p_dataset_xfer_f, transfer_list, ignored)
+         call h5pset_buffer_f(transfer_list, text_buffer, ignored)
+         call h5dwrite_f(id, type_id, c_loc(texts), status, xfer_prp=transfer_list)
+         call h5pclose_f(transfer_list, ignored)
       end if
       call h5tclose_f(type_id, ignored)
    end subroutine put_strings

@@ -280,7 +280,8 @@ contains
       integer(int64) :: start
 
       call system_clock(start)
-      call self%file%flush(error)
+      call self%rows%drain(self%file, error)
+      if (.not. allocated(error)) call self%file%flush(error)
       call system_clock(self%last_flush)
       self%flush_duration = self%last_flush - start
    end subroutine flush_file
@@ -314,7 +315,10 @@ contains
       integer, intent(in), optional :: sampling
       type(error_type), allocatable :: close_error
 
-      call write_attribute(self%file, '/', 'elapsed', elapsed, error)
+      call self%rows%drain(self%file, error)
+      if (.not. allocated(error)) then
+         call write_attribute(self%file, '/', 'elapsed', elapsed, error)
+      end if
       if (present(skipped) .and. .not. allocated(error)) then
          if (size(skipped) > 0) call write_attribute(self%file, '/', 'skipped', skipped, error)
       end if

@@ -56,6 +56,7 @@ module fw_result_rows
       procedure :: append
       procedure :: copy
       procedure :: sort
+      procedure :: drain
       procedure :: close
    end type row_set
 
@@ -189,7 +190,8 @@ contains
       integer, allocatable :: order(:)
       integer :: i, k
 
-      call read_dataset(file, '/omega', omega, error)
+      call self%drain(file, error)
+      if (.not. allocated(error)) call read_dataset(file, '/omega', omega, error)
       if (allocated(error)) return
       if (descending) omega = -omega
       ! By insertion: few rows are out of place.
@@ -205,6 +207,21 @@ contains
          if (allocated(error)) return
       end do
    end subroutine sort
+
+   !> Bring all rows into the file, where they wait to be written together. Harmless before the rows
+   !> are created.
+   subroutine drain(self, file, error)
+      class(row_set), intent(inout) :: self
+      type(hdf5_file), intent(in) :: file
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      if (.not. allocated(self%columns)) return
+      do i = 1, size(self%columns)
+         call self%columns(i)%dataset%drain(file, error)
+         if (allocated(error)) return
+      end do
+   end subroutine drain
 
    !> Harmless before the rows are created.
    subroutine close(self)
@@ -231,6 +248,7 @@ contains
       name = '/'//trim(self%quantity%name)
       call self%dataset%create(file, name, self%quantity%kind_of, self%row_shape, error, expected)
       if (allocated(error)) return
+      self%dataset%waits = .true.
       call label_quantity(file, self%quantity, case%model%unit_system, error)
       if (allocated(error) .or. .not. self%quantity%is_served_by) return
       do i = 1, size(words)
