@@ -417,15 +417,29 @@ contains
       type(force_workspace), intent(inout) :: work
       integer :: i
 
-      !$omp parallel do default(none) shared(self, entry, map, n_mapped, vector, work) private(i) &
-      !$omp schedule(static) if(size(work%state) >= pairs_for_threads)
+      if (size(work%state) < pairs_for_threads) then
+         do i = 1, size(work%state)
+            call multiply_one(i)
+         end do
+         return
+      end if
+      !$omp parallel do default(none) shared(work) private(i) schedule(static)
       do i = 1, size(work%state)
-         if (work%linear_state(i) == pair_open) cycle
-         call gather_inputs(self, entry, i, map, n_mapped, vector, &
-                            work%linear_rests(i), work%input(:, i))
-         call multiply_derivative_of(work, i)
+         call multiply_one(i)
       end do
       !$omp end parallel do
+
+   contains
+
+      subroutine multiply_one(i)
+         integer, intent(in) :: i
+
+         if (work%linear_state(i) == pair_open) return
+         call gather_inputs(self, entry, i, map, n_mapped, vector, work%linear_rests(i), &
+                            self%scratch%active_out, work%input(:, i))
+         call multiply_derivative_of(work, i)
+      end subroutine multiply_one
+
    end subroutine multiply_element
 
    !> Outputs of all elements from their inputs.
@@ -456,7 +470,7 @@ contains
    end subroutine multiply_derivative_of
 
    !> Derivative of the prediction of an element: k B d v, and - B A v where it takes the balance.
-   subroutine gather_inputs(self, entry, element, map, n_mapped, vector, rests, inputs)
+   subroutine gather_inputs(self, entry, element, map, n_mapped, vector, rests, balance, inputs)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: element
@@ -464,6 +478,8 @@ contains
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
       logical, intent(in) :: rests
+      !> A v, rows in use.
+      real(wp), intent(in) :: balance(:, :)
       real(wp), intent(out) :: inputs(self%problem%fourier%n_coefficients, size(entry%row, 1))
       integer :: c, row, place
 
@@ -481,7 +497,7 @@ contains
             if (p%has_inertia) call turn_row(self, p, element, c, .false., inputs(:, c))
             if (.not. p%takes_balance) cycle
             place = self%active%place(self%problem%incidence%coordinate_of(row))
-            if (place > 0) inputs(:, c) = inputs(:, c) - self%scratch%active_out(place, :)
+            if (place > 0) inputs(:, c) = inputs(:, c) - balance(place, :)
          end do
       end associate
    end subroutine gather_inputs
@@ -555,18 +571,5 @@ contains
          end do
       end do
    end subroutine add_outputs
-
-   !> Column by column: few unknowns, or springs, or a check of the product.
-   module procedure assemble
-      real(wp) :: unit(size(matrix, 2))
-      integer :: j, n
-
-      n = self%active%n_linear
-      do j = 1, n
-         unit(:n) = 0.0_wp
-         unit(j) = 1.0_wp
-         call self%apply(unit(:n), matrix(:n, j))
-      end do
-   end procedure assemble
 
 end submodule fw_balance_linear

@@ -16,14 +16,17 @@ contains
    module procedure build_preconditioner
       integer :: h
 
-      !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
-      !$omp if(self%problem%structure%n_coordinates >= coordinates_for_threads)
-      do h = 1, self%problem%fourier%n_retained
-         if (h == self%preconditioner%left_out) cycle
-         call self%fill_harmonic(h, 0, self%preconditioner%harmonic(h))
-         call self%preconditioner%harmonic(h)%factor()
-      end do
-      !$omp end parallel do
+      if (self%problem%structure%n_coordinates < coordinates_for_threads) then
+         do h = 1, self%problem%fourier%n_retained
+            call build_harmonic(self, h)
+         end do
+      else
+         !$omp parallel do default(none) shared(self) private(h) schedule(dynamic)
+         do h = 1, self%problem%fourier%n_retained
+            call build_harmonic(self, h)
+         end do
+         !$omp end parallel do
+      end if
       self%preconditioner%n = self%active%n_active
       self%preconditioner%coordinate(:self%active%n_active) = &
          self%active%used(:self%active%n_active)
@@ -31,6 +34,16 @@ contains
       self%preconditioner%place(:self%active%n_active) = [(h, h=1, self%active%n_active)]
       self%preconditioner%shifted = allocated(self%shift)
    end procedure build_preconditioner
+
+   !> Factors of one harmonic, but for the one that an augmented system builds with its borders.
+   subroutine build_harmonic(self, h)
+      type(balance_state), intent(inout) :: self
+      integer, intent(in) :: h
+
+      if (h == self%preconditioner%left_out) return
+      call self%fill_harmonic(h, 0, self%preconditioner%harmonic(h))
+      call self%preconditioner%harmonic(h)%factor()
+   end subroutine build_harmonic
 
    !> One harmonic: Z_n and the mean of what the forces add to it, scaled for single precision.
    module procedure fill_harmonic
@@ -207,12 +220,17 @@ contains
 
       na = self%active%n_active
       call active_to_complex(self, na, vector)
-      !$omp parallel do default(none) shared(self) private(h) &
-      !$omp if(self%problem%structure%n_coordinates >= coordinates_for_threads)
-      do h = 1, self%problem%fourier%n_retained
-         if (h /= self%preconditioner%left_out) call solve_kept(self, h)
-      end do
-      !$omp end parallel do
+      if (self%problem%structure%n_coordinates < coordinates_for_threads) then
+         do h = 1, self%problem%fourier%n_retained
+            if (h /= self%preconditioner%left_out) call solve_kept(self, h)
+         end do
+      else
+         !$omp parallel do default(none) shared(self) private(h)
+         do h = 1, self%problem%fourier%n_retained
+            if (h /= self%preconditioner%left_out) call solve_kept(self, h)
+         end do
+         !$omp end parallel do
+      end if
       do h = 1, self%problem%fourier%n_retained
          k = self%problem%fourier%column(h)
          vector((k - 1)*na + 1:k*na) = real(self%scratch%complex_in(:na, h), wp)

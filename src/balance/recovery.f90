@@ -4,8 +4,6 @@ module fw_recovery
    use fw_kinds, only: wp
    use fw_kinds, only: pi
    use fw_fourier, only: coefficient_count
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
    use fw_balance_state, only: balance_state
    use fw_fourier, only: to_complex
    use fw_point, only: point_type
@@ -129,7 +127,6 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       integer, intent(in) :: n_harmonics
       type(point_type), intent(inout) :: point
-      type(fourier_type) :: all_harmonics
       real(wp), allocatable :: force(:, :, :)
       integer :: n_pairs, pairs, h, k, n
 
@@ -138,10 +135,10 @@ contains
       allocate (force(n_pairs, 3, coefficient_count(n_harmonics)))
       ! Harmonics were left out: those come from the law, the retained ones follow below.
       if (system%problem%fourier%n_retained <= n_harmonics) then
-         all_harmonics = new_fourier(n_harmonics, system%problem%fourier%n_time)
+         call system%scratch%make_all_harmonics(n_harmonics, system%problem%fourier%n_time)
          call system%problem%forces%entry(pairs)%law%coefficients(system%work(pairs), &
                                                                   system%problem%fourier, &
-                                                          all_harmonics, force)
+                                                          system%scratch%all_harmonics, force)
       end if
       do h = 1, system%problem%fourier%n_retained
          n = system%problem%fourier%harmonic(h)
@@ -193,14 +190,14 @@ contains
       real(wp), intent(in) :: q(m, *)
       integer, intent(in) :: n_harmonics
       type(point_type), intent(inout) :: point
-      type(fourier_type) :: all_harmonics
       real(wp), allocatable :: slip(:, :), slip_time(:, :)
       integer :: k, n_pairs, n_time, pairs
 
       n_pairs = system%problem%n_pairs
       n_time = system%problem%fourier%n_time
-      all_harmonics = new_fourier(n_harmonics, n_time)
-      point%history = matmul(transpose(all_harmonics%synthesis), point%coefficients)
+      call system%scratch%make_all_harmonics(n_harmonics, n_time)
+      point%history = matmul(transpose(system%scratch%all_harmonics%synthesis), &
+                             point%coefficients)
       if (n_pairs == 0) return
       allocate (slip(3*n_pairs, system%problem%fourier%n_coefficients))
       allocate (slip_time(3*n_pairs, n_time))
@@ -231,11 +228,7 @@ contains
       n_grid = points_per_wave*max(1, n_harmonics)
       spacing = 2.0_wp*pi/real(n_grid, wp)
       allocate (grid(0:n_grid + 1))
-      do k = 1, n_grid
-         call evaluate(coefficients, k*spacing, grid(k), slope, curvature)
-      end do
-      grid(0) = grid(n_grid)
-      grid(n_grid + 1) = grid(1)
+      call evaluate_grid(coefficients, n_grid, grid)
       on_grid = maxval(abs(grid))
       largest = on_grid
       do k = 1, n_grid
@@ -275,9 +268,7 @@ contains
       spacing = 2.0_wp*pi/real(n_grid, wp)
       largest = largest_magnitude(coefficients)
       allocate (grid(0:n_grid + 1))
-      do k = 0, n_grid + 1
-         call evaluate(coefficients, k*spacing, grid(k), slope, curvature)
-      end do
+      call evaluate_grid(coefficients, n_grid, grid)
       n_peaks = 0
       angle = 0.0_wp
       side = 0.0_wp
@@ -300,6 +291,39 @@ contains
          side(n_peaks) = sign(1.0_wp, value)
       end do
    end subroutine peak_angles
+
+   !> u at n_grid angles of a period, a multiple of 4, and one beyond each end. Of all angles at
+   !> once, so that a processor turns several waves by one instruction.
+   pure subroutine evaluate_grid(coefficients, n_grid, grid)
+      real(wp), intent(in) :: coefficients(:)
+      integer, intent(in) :: n_grid
+      real(wp), intent(out) :: grid(0:n_grid + 1)
+      real(wp), dimension(0:n_grid - 1) :: turn_c, turn_s, c, s
+      real(wp) :: before
+      integer :: k, n, quarter
+
+      quarter = n_grid/4
+      do k = 0, quarter - 1
+         turn_c(k) = cos(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
+         turn_s(k) = sin(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
+      end do
+      do k = quarter, n_grid - 1
+         turn_c(k) = -turn_s(k - quarter)
+         turn_s(k) = turn_c(k - quarter)
+      end do
+      c = 1.0_wp
+      s = 0.0_wp
+      grid = coefficients(1)
+      do n = 1, (size(coefficients) - 1)/2
+         do k = 0, n_grid - 1
+            before = c(k)
+            c(k) = before*turn_c(k) - s(k)*turn_s(k)
+            s(k) = before*turn_s(k) + s(k)*turn_c(k)
+            grid(k) = grid(k) + coefficients(2*n)*c(k) + coefficients(2*n + 1)*s(k)
+         end do
+      end do
+      grid(n_grid:) = grid(:1)
+   end subroutine evaluate_grid
 
    !> u, u' and u'' at an angle, by turning a unit vector from harmonic to harmonic.
    pure subroutine evaluate(coefficients, tau, value, slope, curvature)

@@ -160,7 +160,7 @@ contains
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       type(friction_room), intent(inout) :: room
-      integer :: first, n_blocks, block, k, pair
+      integer :: n_blocks, block, k
 
       call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time, &
                            work%fft)
@@ -171,18 +171,18 @@ contains
       ! Before the march: what counts as repeated is relative to the largest prediction.
       call work%measure_scale()
       n_blocks = (self%n_elements + block_size - 1)/block_size
-      !$omp parallel do default(none) shared(self, work, room, n_blocks, fourier) &
-      !$omp private(first, block, pair) schedule(static) if(self%n_elements >= pairs_for_threads)
-      do block = 1, n_blocks
-         first = (block - 1)*block_size + 1
-         call march(self, work, room, fourier%n_time, first, &
-                    min(first + block_size - 1, self%n_elements))
-         if (self%facts%remembers .or. .not. fourier%has_constant()) cycle
-         do pair = first, min(first + block_size - 1, self%n_elements)
-            call lead_to_rest(self, work, room, fourier%n_time, pair)
+      if (self%n_elements < pairs_for_threads) then
+         do block = 1, n_blocks
+            call follow_block(self, work, room, fourier, block)
          end do
-      end do
-      !$omp end parallel do
+      else
+         !$omp parallel do default(none) shared(self, work, room, n_blocks, fourier) &
+         !$omp private(block) schedule(static)
+         do block = 1, n_blocks
+            call follow_block(self, work, room, fourier, block)
+         end do
+         !$omp end parallel do
+      end if
       call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft)
       call classify(room, work)
       if (work%measures_slip) then
@@ -193,6 +193,24 @@ contains
          where (work%rests) work%slip = 0.0_wp
       end if
    end subroutine evaluate_at_instants
+
+   !> The march of a block of pairs, to its rest where the law has no memory of positions.
+   subroutine follow_block(self, work, room, fourier, block)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(friction_room), intent(inout) :: room
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: block
+      integer :: first, last, pair
+
+      first = (block - 1)*block_size + 1
+      last = min(first + block_size - 1, self%n_elements)
+      call march(self, work, room, fourier%n_time, first, last)
+      if (self%facts%remembers .or. .not. fourier%has_constant()) return
+      do pair = first, last
+         call lead_to_rest(self, work, room, fourier%n_time, pair)
+      end do
+   end subroutine follow_block
 
    !> State of every pair over the whole march.
    pure subroutine classify(room, work)

@@ -5,6 +5,9 @@ submodule(fw_friction) fw_friction_derivative
    use fw_correction_derivative, only: limit_derivative
    use fw_correction_derivative, only: march_derivative
    use fw_lapack, only: dgemm
+   use fw_one_direction, only: condition
+   use fw_one_direction, only: follow_one_direction
+   use fw_one_direction, only: project_one_direction
    use fw_sampled_turn, only: limit_is_unique
    use fw_slip, only: slip_gradient
    implicit none (type, external)
@@ -12,6 +15,24 @@ submodule(fw_friction) fw_friction_derivative
    !> Distance from the friction cone, as a part of the largest predicted force, that round-off
    !> leaves of a pair that has settled on it.
    real(wp), parameter :: touch = 1.0e-10_wp
+
+   !> Room for the derivative of one pair.
+   type :: derivative_room
+      !> Of a limit that is the only one: derivative of the position at the instants by that at the
+      !> start (2, 2, n_time), and (1 - that of a turn)^-1.
+      real(wp), allocatable :: by_start(:, :, :)
+      real(wp) :: inverse(2, 2) = 0.0_wp
+      !> d lambda_t by inputs (coefficient, component), for each tangential component and instant.
+      real(wp), allocatable :: rows(:, :, :, :)
+      !> d x at the end by inputs (coefficient, component, tangential component).
+      real(wp), allocatable :: dx(:, :, :)
+      real(wp), allocatable :: weight(:, :, :)
+      !> Predicted forces (3, n_time).
+      real(wp), allocatable :: y(:, :)
+      !> Of a pair with one tangential direction: predicted forces, and what follows (n_time).
+      real(wp), allocatable :: y_t(:), y_n(:)
+      type(condition), allocatable :: at(:)
+   end type derivative_room
 
 contains
 
@@ -36,104 +57,188 @@ contains
       type(fourier_type), intent(in) :: fourier
       type(friction_room), intent(in) :: room
       type(force_workspace), intent(inout) :: work
-      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :)
-      real(wp), allocatable :: by_start(:, :, :), weight(:, :, :)
-      real(wp) :: x(2)
-      integer :: c, i, nc
-      logical :: unique
+      type(derivative_room) :: of_pairs
+      type(derivative_room), allocatable :: of_pair
+      integer :: i
 
-      nc = fourier%n_coefficients
-      !$omp parallel default(none) shared(self, fourier, room, work, nc) &
-      !$omp private(rows, dx, y, by_start, weight, x, c, i, unique) &
-      !$omp if(self%n_elements >= pairs_for_threads)
+      if (self%n_elements < pairs_for_threads) then
+         do i = 1, self%n_elements
+            if (work%state(i) == pair_mixed) call differentiate_pair(self, fourier, room, i, work, &
+                                                                     of_pairs)
+         end do
+         return
+      end if
+      !$omp parallel default(none) shared(self, fourier, room, work) private(i, of_pair)
       ! Of one pair at a time, for each thread: of all pairs it would be the largest array of the
       ! program.
-      ! 6 n_coefficients n_time numbers a thread.
-      allocate (rows(nc, 3, 2, fourier%n_time), dx(nc, 3, 2), y(3, fourier%n_time))
-      allocate (by_start(2, 2, fourier%n_time), weight(2, 2, nc))
+      allocate (of_pair)
       !$omp do schedule(dynamic)
       do i = 1, self%n_elements
-         if (work%state(i) /= pair_mixed) cycle
-         y = work%prediction_time(i, :, :)
-         if (work%rests(i)) then
-            ! As of a law with memory, of the prediction with its mean.
-            do c = 1, 2
-               y(c, :) = y(c, :) + work%mean(i, c)
-            end do
-         end if
-         call derive(self, fourier, room%settled(i), work, i, y, x, rows, dx, unique, by_start)
-         call project(work%jacobian(:, :, i), fourier, rows, y(3, :), self%present(3, i))
-         if (unique) call project_start(work%jacobian(:, :, i), fourier, dx, by_start, weight)
-         if (.not. work%measures_slip) cycle
-         if (work%rests(i)) then
-            work%slip_derivative(:, i) = 0.0_wp
-            cycle
-         end if
-         ! The path of slip needs the rows themselves, not only their projections.
-         if (unique) call add_start(3*nc, fourier%n_time, by_start, dx, rows)
-         call slip_gradient(fourier%n_time, nc, fourier%synthesis, y, self%mu(i), &
-                            self%present(:, i), self%facts%remembers, x, rows, &
-                            work%slip_derivative(:, i))
+         if (work%state(i) == pair_mixed) call differentiate_pair(self, fourier, room, i, work, &
+                                                                  of_pair)
       end do
       !$omp end do
       !$omp end parallel
    end subroutine differentiate_pairs
 
-   !> Derivative of the friction of a pair at the instants. A limit that is the only one (unique)
-   !> has a derivative of its own, dx, whose part in the rows is left to `project_start`; any other
-   !> carries that of the way to it.
-   subroutine derive(self, fourier, settled, work, pair, y, x, rows, dx, unique, by_start)
+   subroutine differentiate_pair(self, fourier, room, i, work, of_pair)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(friction_room), intent(in) :: room
+      integer, intent(in) :: i
+      type(force_workspace), intent(inout) :: work
+      type(derivative_room), intent(inout) :: of_pair
+
+      if (.not. work%measures_slip .and. count(self%present(1:2, i)) == 1) then
+         call differentiate_one_direction(self, fourier, room%settled(i), i, work, of_pair)
+      else
+         call differentiate_rows(self, fourier, room%settled(i), i, work, of_pair)
+      end if
+   end subroutine differentiate_pair
+
+   !> Of a pair with one tangential direction whose path of slip nobody asks for.
+   subroutine differentiate_one_direction(self, fourier, settled, i, work, of_pair)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      logical, intent(in) :: settled
+      integer, intent(in) :: i
+      type(force_workspace), intent(inout) :: work
+      type(derivative_room), intent(inout) :: of_pair
+      real(wp) :: x(2)
+      integer :: nc, t, place
+      logical :: unique
+
+      nc = fourier%n_coefficients
+      if (.not. allocated(of_pair%at)) then
+         allocate (of_pair%at(fourier%n_time), of_pair%y_t(fourier%n_time))
+         allocate (of_pair%y_n(fourier%n_time))
+      end if
+      t = merge(1, 2, self%present(1, i))
+      of_pair%y_t = work%prediction_time(i, t, :)
+      ! A pair at rest is as of a law with memory, of the prediction with its mean.
+      if (work%rests(i)) of_pair%y_t = of_pair%y_t + work%mean(i, t)
+      of_pair%y_n = work%prediction_time(i, 3, :)
+      call find_start(self, fourier, settled, work, i, of_pair, x, unique)
+      place = (t - 1)*nc + 1
+      work%jacobian(:, :, i) = 0.0_wp
+      call follow_one_direction(fourier%n_time, merge(1, work%turns(i), unique), of_pair%y_t, &
+                                of_pair%y_n, self%mu(i), &
+                                merge(touch*work%scale(i), 0.0_wp, unique), &
+                                self%facts%remembers .or. work%rests(i), unique, x(t), of_pair%at)
+      call project_one_direction(fourier%n_time, nc, fourier%synthesis, fourier%analysis, &
+                                 of_pair%at, self%present(3, i), 3*nc, &
+                                 work%jacobian(place, place, i), &
+                                 work%jacobian(2*nc + 1, place, i))
+      call project_normal(work%jacobian(:, :, i), fourier, of_pair%y_n, self%present(3, i))
+   end subroutine differentiate_one_direction
+
+   !> Where the march that is differentiated starts: at its limit, where that is the only one.
+   subroutine find_start(self, fourier, settled, work, pair, of_pair, x, unique)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       !> Whether the march ends at its limit.
       logical, intent(in) :: settled
       type(force_workspace), intent(in) :: work
       integer, intent(in) :: pair
-      real(wp), intent(in) :: y(3, fourier%n_time)
-      !> Corrected position at the end of the period.
+      type(derivative_room), intent(inout) :: of_pair
+      !> Corrected position.
       real(wp), intent(out) :: x(2)
-      !> d lambda_t by inputs (coefficient, component), for each tangential component and instant.
-      real(wp), intent(inout) :: rows(fourier%n_coefficients, 3, 2, fourier%n_time)
-      !> d x at the end by inputs (coefficient, component, tangential component).
-      real(wp), intent(inout) :: dx(fourier%n_coefficients, 3, 2)
       logical, intent(out) :: unique
-      !> Of a unique limit: derivative of the position at the instants by that at the start.
-      real(wp), intent(inout) :: by_start(2, 2, fourier%n_time)
-      real(wp) :: inverse(2, 2), z(2)
+      real(wp) :: z(2)
 
       unique = .false.
-      x = work%x(pair, :)
       if (settled) then
+         if (.not. allocated(of_pair%by_start)) allocate (of_pair%by_start(2, 2, fourier%n_time))
          ! The prediction in `work` is without its mean: the position goes back by it.
+         x = work%x(pair, :)
          z = x
          if (work%rests(pair)) z = x - work%mean(pair, :)
          call limit_is_unique(self%n_elements, fourier%n_time, pair, work%prediction_time, &
-                              self%mu(pair), touch*work%scale(pair), z, unique, inverse, by_start)
+                              self%mu(pair), touch*work%scale(pair), z, unique, of_pair%inverse, &
+                              of_pair%by_start)
       end if
+      if (.not. unique) x = work%x_start(pair, :)
+   end subroutine find_start
+
+   !> Of any pair, by the rows of the march.
+   subroutine differentiate_rows(self, fourier, settled, i, work, of_pair)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      logical, intent(in) :: settled
+      integer, intent(in) :: i
+      type(force_workspace), intent(inout) :: work
+      type(derivative_room), intent(inout) :: of_pair
+      real(wp) :: x(2)
+      integer :: c, nc
+      logical :: unique
+
+      nc = fourier%n_coefficients
+      ! 6 n_coefficients n_time numbers.
+      if (.not. allocated(of_pair%rows)) then
+         allocate (of_pair%rows(nc, 3, 2, fourier%n_time), of_pair%dx(nc, 3, 2))
+         allocate (of_pair%weight(2, 2, nc), of_pair%y(3, fourier%n_time))
+      end if
+      of_pair%y = work%prediction_time(i, :, :)
+      if (work%rests(i)) then
+         do c = 1, 2
+            of_pair%y(c, :) = of_pair%y(c, :) + work%mean(i, c)
+         end do
+      end if
+      call derive(self, fourier, settled, work, i, of_pair, x, unique)
+      call project(work%jacobian(:, :, i), fourier, of_pair%rows)
+      call project_normal(work%jacobian(:, :, i), fourier, of_pair%y(3, :), self%present(3, i))
+      if (unique) call project_start(work%jacobian(:, :, i), fourier, of_pair%dx, &
+                                     of_pair%by_start, of_pair%weight)
+      if (.not. work%measures_slip) return
+      if (work%rests(i)) then
+         work%slip_derivative(:, i) = 0.0_wp
+         return
+      end if
+      ! The path of slip needs the rows themselves, not only their projections.
+      if (unique) call add_start(3*nc, fourier%n_time, of_pair%by_start, of_pair%dx, of_pair%rows)
+      call slip_gradient(fourier%n_time, nc, fourier%synthesis, of_pair%y, self%mu(i), &
+                         self%present(:, i), self%facts%remembers, x, of_pair%rows, &
+                         work%slip_derivative(:, i))
+   end subroutine differentiate_rows
+
+   !> Derivative of the friction of a pair at the instants. A limit that is the only one (unique)
+   !> has a derivative of its own, dx, whose part in the rows is left to `project_start`; any other
+   !> carries that of the way to it.
+   subroutine derive(self, fourier, settled, work, pair, of_pair, x, unique)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      !> Whether the march ends at its limit.
+      logical, intent(in) :: settled
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: pair
+      !> Its rows and dx are set, and by_start of a unique limit, from y.
+      type(derivative_room), intent(inout) :: of_pair
+      !> Corrected position at the end of the period.
+      real(wp), intent(out) :: x(2)
+      logical, intent(out) :: unique
+
+      call find_start(self, fourier, settled, work, pair, of_pair, x, unique)
       if (unique) then
-         call limit_derivative(fourier%n_time, fourier%n_coefficients, fourier%synthesis, y, &
-                               self%mu(pair), touch*work%scale(pair), self%present(:, pair), &
-                               inverse, x, rows, dx)
+         call limit_derivative(fourier%n_time, fourier%n_coefficients, fourier%synthesis, &
+                               of_pair%y, self%mu(pair), touch*work%scale(pair), &
+                               self%present(:, pair), of_pair%inverse, x, of_pair%rows, of_pair%dx)
       else
          ! From the start once more, with derivatives, as many turns as the march took.
-         x = work%x_start(pair, :)
-         dx = 0.0_wp
+         of_pair%dx = 0.0_wp
          call march_derivative(fourier%n_time, fourier%n_coefficients, work%turns(pair), &
-                               fourier%synthesis, y, self%mu(pair), 0.0_wp, self%present(:, pair), &
-                               self%facts%remembers .or. work%rests(pair), x, rows, dx)
+                               fourier%synthesis, of_pair%y, self%mu(pair), 0.0_wp, &
+                               self%present(:, pair), &
+                               self%facts%remembers .or. work%rests(pair), x, of_pair%rows, &
+                               of_pair%dx)
       end if
    end subroutine derive
 
    !> From rows at the instants to the transposed derivative between coefficients.
-   subroutine project(jacobian, fourier, rows, y_n, has_normal)
+   subroutine project(jacobian, fourier, rows)
       type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
       real(wp), intent(in) :: rows(3*fourier%n_coefficients, 2, fourier%n_time)
-      real(wp), intent(in) :: y_n(:)
-      logical, intent(in) :: has_normal
-      integer :: nc, c, k, j
-      real(wp) :: factor
-      logical :: closes
+      integer :: nc, c
 
       nc = fourier%n_coefficients
       do c = 1, 2
@@ -142,6 +247,19 @@ contains
          call dgemm('N', 'T', 3*nc, nc, fourier%n_time, 1.0_wp, rows(1, c, 1), 6*nc, &
                     fourier%analysis, nc, 0.0_wp, jacobian(1, (c - 1)*nc + 1), 3*nc)
       end do
+   end subroutine project
+
+   !> The blocks whose output is normal.
+   subroutine project_normal(jacobian, fourier, y_n, has_normal)
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
+      real(wp), intent(in) :: y_n(:)
+      logical, intent(in) :: has_normal
+      integer :: nc, k, j
+      real(wp) :: factor
+      logical :: closes
+
+      nc = fourier%n_coefficients
       jacobian(:, 2*nc + 1:) = 0.0_wp
       if (.not. has_normal) return
       ! A pair that bears throughout keeps its coefficients; of any other, the instants of the
@@ -164,7 +282,7 @@ contains
       do j = 1, nc
          jacobian(2*nc + j, 2*nc + j) = jacobian(2*nc + j, 2*nc + j) + 1.0_wp
       end do
-   end subroutine project
+   end subroutine project_normal
 
    !> What the start of a turn adds to the projected rows: of rank two.
    subroutine project_start(jacobian, fourier, dx, by_start, weight)

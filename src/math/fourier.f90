@@ -77,20 +77,26 @@ contains
       call fill_operators(self)
    end function new_fourier
 
-   !> Angles are reduced in integer arithmetic, so that high harmonics keep full precision.
+   !> Angles are reduced in integer arithmetic, so that high harmonics keep full precision, and all
+   !> waves are made of n_time cosines and sines.
    pure subroutine fill_operators(self)
       type(fourier_type), intent(inout) :: self
-      integer :: i, k, n, column
-      real(wp) :: angle
+      real(wp), allocatable :: cosine(:), sine(:)
+      integer :: i, k, n, column, place
 
+      allocate (cosine(0:self%n_time - 1), sine(0:self%n_time - 1))
+      do k = 0, self%n_time - 1
+         cosine(k) = cos(2.0_wp*pi*real(k, wp)/real(self%n_time, wp))
+         sine(k) = sin(2.0_wp*pi*real(k, wp)/real(self%n_time, wp))
+      end do
       allocate (self%synthesis(self%n_coefficients, self%n_time))
       do k = 1, self%n_time
          do i = 1, self%n_retained
             n = self%harmonic(i)
             column = self%column(i)
-            angle = 2.0_wp*pi*real(modulo(n*(k - 1), self%n_time), wp)/real(self%n_time, wp)
-            self%synthesis(column, k) = cos(angle)
-            if (n > 0) self%synthesis(column + 1, k) = sin(angle)
+            place = modulo(n*(k - 1), self%n_time)
+            self%synthesis(column, k) = cosine(place)
+            if (n > 0) self%synthesis(column + 1, k) = sine(place)
          end do
       end do
       ! Discrete orthogonality: over the instants cos(n tau)**2 and sin(n tau)**2 add up to

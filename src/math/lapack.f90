@@ -9,7 +9,7 @@ module fw_lapack
    implicit none (type, external)
    private
 
-   public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
+   public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgetrf, claswp, ctrsv, zhegvd, zpotrf, zpotrs
    public :: zggev
 
@@ -22,6 +22,14 @@ module fw_lapack
          real(wp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
          real(wp), intent(inout) :: c(ldc, *)
       end subroutine dgemm
+
+      !> A = alpha x y^T + A.
+      pure subroutine dger(m, n, alpha, x, incx, y, incy, a, lda)
+         import :: wp
+         integer, intent(in) :: m, n, incx, incy, lda
+         real(wp), intent(in) :: alpha, x(*), y(*)
+         real(wp), intent(inout) :: a(lda, *)
+      end subroutine dger
 
       !> y = alpha op(a) x + beta y; with beta = 0 the old y is never read, and may be undefined.
       subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)

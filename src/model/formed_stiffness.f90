@@ -58,9 +58,15 @@ contains
       integer :: h
 
       n_failed = 0
+      if (basis%n_coordinates < coordinates_for_threads) then
+         do h = 1, size(harmonic)
+            call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), &
+                               load(:, h), n_failed)
+         end do
+         return
+      end if
       !$omp parallel do default(none) shared(self, basis, harmonic, theta, s, load) private(h) &
-      !$omp reduction(+:n_failed) schedule(dynamic) &
-      !$omp if(basis%n_coordinates >= coordinates_for_threads)
+      !$omp reduction(+:n_failed) schedule(dynamic)
       do h = 1, size(harmonic)
          call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), load(:, h), &
                             n_failed)
@@ -239,18 +245,51 @@ contains
       !> Coordinates and product (m, n_coefficients).
       real(wp), intent(in) :: q(m, *)
       real(wp), intent(inout) :: product(m, *)
-      integer :: h
 
       call amplitudes_of(harmonic, column, m, q, m, self%input)
-      !$omp parallel do default(none) shared(self, m, harmonic) private(h) &
-      !$omp if(m >= coordinates_for_threads)
-      do h = 1, size(harmonic)
-         call zgemv('N', m, m, one, self%matrix(1, 1, h), m, self%input(1, h), 1, zero, &
-                    self%output(1, h), 1)
-      end do
-      !$omp end parallel do
+      call multiply_harmonics(self, size(harmonic), m, m, self%matrix)
       call coefficients_of(harmonic, column, m, m, self%output, product)
    end subroutine multiply
+
+   !> output = matrix input of every harmonic.
+   subroutine multiply_harmonics(self, n_harmonics, n_rows, n_columns, matrix)
+      class(formed_stiffness), intent(inout) :: self
+      integer, intent(in) :: n_harmonics, n_rows, n_columns
+      complex(wp), intent(in) :: matrix(n_rows, n_columns, n_harmonics)
+      integer :: h
+
+      if (size(self%matrix, 1) < coordinates_for_threads) then
+         do h = 1, n_harmonics
+            call multiply_one(n_rows, n_columns, matrix(1, 1, h), self%input(1, h), &
+                              self%output(1, h))
+         end do
+         return
+      end if
+      !$omp parallel do default(none) private(h) &
+      !$omp shared(self, n_harmonics, n_rows, n_columns, matrix)
+      do h = 1, n_harmonics
+         call multiply_one(n_rows, n_columns, matrix(1, 1, h), self%input(1, h), self%output(1, h))
+      end do
+      !$omp end parallel do
+   end subroutine multiply_harmonics
+
+   !> output = matrix input; of a handful of rows without the way into a library.
+   subroutine multiply_one(n_rows, n_columns, matrix, input, output)
+      integer, intent(in) :: n_rows, n_columns
+      complex(wp), intent(in) :: matrix(n_rows, n_columns), input(n_columns)
+      complex(wp), intent(inout) :: output(n_rows)
+      integer, parameter :: few = 4
+      integer :: j
+
+      if (n_rows > few) then
+         call zgemv('N', n_rows, n_columns, one, matrix, n_rows, input, 1, zero, output, 1)
+         return
+      end if
+      output = zero
+      do j = 1, n_columns
+         output = output + matrix(:, j)*input(j)
+      end do
+   end subroutine multiply_one
 
    !> Copy the rows and columns in use, so that products run over contiguous memory.
    subroutine gather(self, n_active, n_used, used)
@@ -267,8 +306,6 @@ contains
          if (size(self%active) < n) deallocate (self%active)
       end if
       if (.not. allocated(self%active)) allocate (self%active(n))
-      !$omp parallel do default(none) shared(self, n_active, n_used, used) private(h, j, place) &
-      !$omp if(m >= coordinates_for_threads)
       do h = 1, size(self%matrix, 3)
          do j = 1, n_active
             ! One harmonic behind the other, each (n_used, n_active).
@@ -276,7 +313,6 @@ contains
             self%active(place + 1:place + n_used) = self%matrix(used(:n_used), used(j), h)
          end do
       end do
-      !$omp end parallel do
    end subroutine gather
 
    !> product = Z(used, active) v, the first n_used rows of product.
@@ -287,20 +323,13 @@ contains
       !> Coordinates of the columns (n_active, n_coefficients).
       real(wp), intent(in) :: v(n_active, *)
       real(wp), intent(inout) :: product(m, *)
-      integer :: h
 
       if (n_active == m) then
          call self%multiply(harmonic, column, m, v, product)
          return
       end if
       call amplitudes_of(harmonic, column, n_active, v, m, self%input)
-      !$omp parallel do default(none) shared(self, m, harmonic, n_used, n_active) private(h) &
-      !$omp if(m >= coordinates_for_threads)
-      do h = 1, size(harmonic)
-         call zgemv('N', n_used, n_active, one, self%active((h - 1)*n_used*n_active + 1), n_used, &
-                    self%input(1, h), 1, zero, self%output(1, h), 1)
-      end do
-      !$omp end parallel do
+      call multiply_harmonics(self, size(harmonic), n_used, n_active, self%active)
       call coefficients_of(harmonic, column, n_used, m, self%output, product)
    end subroutine multiply_active
 

@@ -109,8 +109,7 @@ contains
       !> At velocity level: what the mean position adds to P of a pair that comes to rest
       !> (n_pairs, 2); without it none is looked at.
       real(wp), intent(in), optional :: mean(:, :)
-      real(wp) :: start(2), at_rest(2)
-      integer :: c, i
+      integer :: i
       logical :: may_rest
 
       may_rest = present(mean)
@@ -122,12 +121,28 @@ contains
                     fourier%synthesis, fourier%n_coefficients, self%batch, &
                     fourier%n_coefficients, 0.0_wp, self%samples, fourier%n_time)
       end if
+      ! Not a parallel region where it does not pay: one of a single thread costs more than a pair.
+      if (self%n_pairs < pairs_for_threads) then
+         do i = 1, self%n_pairs
+            call evaluate_one(i)
+         end do
+         return
+      end if
       ! Pairs differ widely in the number of their events, hence dynamic; each is summed by one
       ! thread, so that the number of threads changes no bit.
-      !$omp parallel do default(none) private(c, i, start, at_rest) schedule(dynamic) &
-      !$omp shared(self, fourier, prediction, offset, x_start, force, x, mean, may_rest) &
-      !$omp if(self%n_pairs >= pairs_for_threads)
+      !$omp parallel do default(none) shared(self) private(i) schedule(dynamic)
       do i = 1, self%n_pairs
+         call evaluate_one(i)
+      end do
+      !$omp end parallel do
+
+   contains
+
+      subroutine evaluate_one(i)
+         integer, intent(in) :: i
+         real(wp) :: start(2), at_rest(2)
+         integer :: c
+
          at_rest = 0.0_wp
          if (may_rest) at_rest = mean(i, :)
          if (self%is_planar(i)) then
@@ -138,7 +153,7 @@ contains
                force(i, c, :) = self%planar(i)%force(:, c)
             end do
             x(i, :) = self%planar(i)%z_end
-            cycle
+            return
          end if
          call evaluate_pair(self%pair(i), fourier, self%batch(:, :, i), self%samples(:, :, i), &
                             offset(i), x_start(i, max(1, self%direction(i))), &
@@ -151,11 +166,11 @@ contains
          ! Where nothing rubs there is no position to move.
          x(i, :) = x_start(i, :)
          force(i, 3, :) = self%out(:, 2, i)
-         if (self%direction(i) == 0) cycle
+         if (self%direction(i) == 0) return
          force(i, self%direction(i), :) = self%out(:, 1, i)
          x(i, self%direction(i)) = self%pair(i)%path%z_end
-      end do
-      !$omp end parallel do
+      end subroutine evaluate_one
+
    end subroutine evaluate
 
    !> Coefficients of P and N and of their first two derivatives.
@@ -312,24 +327,44 @@ contains
       !> Derivatives of the friction paths (coefficient and component, pair), if they are wanted.
       real(wp), intent(inout), optional :: by_path(:, :)
       real(wp), allocatable :: block(:, :, :), path(:)
-      real(wp) :: start(2)
-      integer :: i, nc, t, n
+      integer :: i
 
-      nc = fourier%n_coefficients
-      n = 2*nc
-      !$omp parallel default(none) shared(self, fourier, wanted, x_start, jacobian, by_path) &
-      !$omp shared(nc, n) private(block, path, start, i, t) if(self%n_pairs >= pairs_for_threads)
-      allocate (block(nc, nc, 3), path(3*nc))
+      if (self%n_pairs < pairs_for_threads) then
+         allocate (block(fourier%n_coefficients, fourier%n_coefficients, 3))
+         allocate (path(3*fourier%n_coefficients))
+         do i = 1, self%n_pairs
+            if (wanted(i)) call linearize_one(i, block, path)
+         end do
+         return
+      end if
+      !$omp parallel default(none) shared(self, fourier, wanted) private(block, path, i)
+      allocate (block(fourier%n_coefficients, fourier%n_coefficients, 3))
+      allocate (path(3*fourier%n_coefficients))
       !$omp do schedule(dynamic)
-      ! Sections by component: rows 1.., nc + 1.., 2 nc + 1.. of the input, likewise of the output.
       do i = 1, self%n_pairs
-         if (.not. wanted(i)) cycle
+         if (wanted(i)) call linearize_one(i, block, path)
+      end do
+      !$omp end do
+      !$omp end parallel
+
+   contains
+
+      ! Sections by component: rows 1.., nc + 1.., 2 nc + 1.. of the input, likewise of the output.
+      subroutine linearize_one(i, block, path)
+         integer, intent(in) :: i
+         !> Room.
+         real(wp), intent(inout) :: block(:, :, :), path(:)
+         real(wp) :: start(2)
+         integer :: nc, t, n
+
+         nc = fourier%n_coefficients
+         n = 2*nc
          if (self%is_planar(i)) then
             start = x_start(i, :)
             call self%planar(i)%derivative(self%cells, fourier, start, present(by_path), &
                                            jacobian(:, :, i), path)
             if (present(by_path)) by_path(:, i) = path
-            cycle
+            return
          end if
          if (present(by_path)) call path_derivative(self, i, fourier, by_path(:, i))
          jacobian(:, :, i) = 0.0_wp
@@ -340,13 +375,12 @@ contains
             call collocate(self%pair(i), fourier, block)
          end if
          if (self%has_normal(i)) jacobian(n + 1:, n + 1:, i) = block(:, :, 3)
-         if (self%direction(i) == 0) cycle
+         if (self%direction(i) == 0) return
          t = (self%direction(i) - 1)*nc
          jacobian(t + 1:t + nc, t + 1:t + nc, i) = block(:, :, 1)
          if (self%has_normal(i)) jacobian(n + 1:, t + 1:t + nc, i) = block(:, :, 2)
-      end do
-      !$omp end do
-      !$omp end parallel
+      end subroutine linearize_one
+
    end subroutine linearize
 
    !> Derivative of the friction path of a pair with at most one tangential direction.
