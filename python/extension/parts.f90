@@ -1,6 +1,8 @@
 !> What Python asks of input: the structure of a case as it is computed, with what the namelist
 !> adds, scales and overrides, and the keys of a namelist that need not be a valid case any more.
 module fw_python_parts
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -20,6 +22,7 @@ module fw_python_parts
 
    character(*), parameter :: names = 'mass, stiffness, damping, load/static, load/cosine, '// &
                               'load/sine, load/wave_harmonic, load/wave_power, load/wave, '// &
+                              'coriolis, modal_damping, aero/modes, aero/stiffness, '// &
                               'contact/side_1, contact/side_2, contact/gap, '// &
                               'contact/depth, contact/mu, contact/normal_load, '// &
                               'contact/tangential_stiffness, contact/normal_stiffness, '// &
@@ -56,6 +59,15 @@ contains
             if (allocated(model%waves%power)) values = real(model%waves%power, wp)
          case ('load/wave')
             if (allocated(model%load_wave)) values = flat(model%load_wave)
+         case ('coriolis')
+            if (allocated(model%cyclic%coriolis)) values = flat(transpose(model%cyclic%coriolis))
+         case ('modal_damping')
+            ! Of sectors: that of other structures is in the damping.
+            values = [model%cyclic%modal_damping]
+         case ('aero/modes')
+            if (allocated(model%cyclic%air)) values = flat(transpose(model%cyclic%air%modes))
+         case ('aero/stiffness')
+            if (allocated(model%cyclic%air)) values = air_stiffness(case)
          case ('observe/matrix')
             if (allocated(model%observe_matrix)) values = flat(transpose(model%observe_matrix))
          case ('contact/side_1')
@@ -87,6 +99,29 @@ contains
       end associate
       if (.not. allocated(values)) allocate (values(0))
    end subroutine case_part
+
+   !> Stiffness of the air in harmonics 1 .. H (H, a, a, 2), real and imaginary part; NaN where it is
+   !> not known.
+   pure function air_stiffness(case) result(values)
+      type(case_type), intent(in) :: case
+      real(wp), allocatable :: values(:)
+      complex(wp), allocatable :: stiffness(:, :)
+      real(wp), allocatable :: parts(:, :, :, :)
+      integer :: a, h
+
+      associate (cyclic => case%model%cyclic)
+         a = size(cyclic%air%matrix, 1)
+         allocate (parts(2, a, a, case%harmonics%n_harmonics), &
+                   source=ieee_value(1.0_wp, ieee_quiet_nan))
+         do h = 1, case%harmonics%n_harmonics
+            call cyclic%air_stiffness(cyclic%nodal_diameter(h), stiffness)
+            if (.not. allocated(stiffness)) cycle
+            parts(1, :, :, h) = transpose(real(stiffness, wp))
+            parts(2, :, :, h) = transpose(aimag(stiffness))
+         end do
+      end associate
+      values = reshape(parts, [size(parts)])
+   end function air_stiffness
 
    !> Every key of a namelist as it is written there: 'group%key', how many values, the values.
    subroutine namelist_words(text, words, error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -15,7 +16,7 @@ from fretwear import InputError
 from fretwear.cli import main
 from fretwear.export import export_mesh, relative_displacement
 from fretwear.export.mesh import read_mesh
-from fretwear.export.recovery import recover_displacement
+from fretwear.export.recovery import read_structure, recover_displacement
 from fretwear.result import Result
 from fretwear.sector import FullModel, ReducedModel, write_model
 from fretwear.sector.assembly import Assembly
@@ -230,6 +231,35 @@ def test_relative_displacements_reach_the_next_sector(disk: Result) -> None:
         # Displacements of 0.05 mm are recovered to 1e-7 by least squares, then differ.
         assert force[:, pair, 2] == pytest.approx(expected, abs=73267.0 * 0.05 * 1e-7)
     assert (open_share == 0.0).any()
+
+
+def test_forces_of_coriolis_and_of_the_air_are_recovered(tmp_path: Path) -> None:
+    """The motion of the whole disk follows from the forces with all of the structure in them: what
+    is observed comes out again, and no longer without one of these parts."""
+    model = tmp_path / "disk.h5"
+    shutil.copy(DISK.parent / "disk.h5", model)
+    rng = np.random.default_rng(17)
+    with h5py.File(model, "a") as file:
+        mass = file["mass"][()]
+        n = len(mass)
+        g = np.triu(0.3 * mass * rng.normal(size=(n, n)), 1)
+        file["coriolis"] = g - g.T
+        file["aero/modes"] = file["observe/matrix"][()]
+        for m in (-1, 0, 1):
+            file[f"aero/sector/{m}"] = rng.normal(size=(2, 2, 2))
+    result = run(DISK, tmp_path / "wave.h5", "case%analysis=point", "sweep%start=1285",
+                 "solver%tolerance=1e-11", f"model%file='{model}'", "model%rotation_speed=500",
+                 "model%modal_damping=1e-3")
+    structure = read_structure(result)
+    moved = recover_displacement(result, structure)
+    assert moved @ structure.observe.T == pytest.approx(result.coefficients, rel=1e-6, abs=1e-9)
+    written = export_mesh(result, 0, 0.0, sectors=0)
+    assert np.isfinite(written.point_data["displacement"]).all()
+    whirl = structure.whirl
+    assert whirl is not None
+    for change in ({"coriolis": None}, {"air": np.zeros_like(whirl.air)}, {"modal_damping": 0.0}):
+        with pytest.raises(InputError, match="does not follow"):
+            recover_displacement(result, replace(structure, whirl=replace(whirl, **change)))
 
 
 def test_sectors_on_the_command_line(disk: Result, coarse: Result, tmp_path: Path,

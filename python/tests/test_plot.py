@@ -30,7 +30,7 @@ from fretwear.plot import (
     plot_wear_evolution,
     plot_wear_maps,
 )
-from fretwear.plot.flanks import find_flanks
+from fretwear.plot.flanks import _sizes, find_flanks
 from fretwear.plot.style import label_y, new_figure, scale
 from fretwear.result import Result
 from fretwear.rows import pair_fields, synthesis
@@ -170,6 +170,19 @@ def test_flanks_are_laid_out_by_position(coarse: Result) -> None:
         assert flank.place[:, 0] == pytest.approx(position[:, 2])
         # Higher on the map is further out on the disk.
         assert (np.diff(flank.place[:, 1]) * np.diff(position[:, 1]) >= 0.0).all()
+
+
+def test_cells_of_a_leaning_grid_have_no_slivers() -> None:
+    """Rows that lean against the directions of a picture are rows all the same."""
+    across, along = np.meshgrid(np.arange(3.0), np.arange(4.0))
+    place = np.column_stack((across.ravel() + 0.05 * along.ravel(),
+                             along.ravel() - 0.08 * across.ravel()))
+    assert _sizes(place) == pytest.approx(np.ones((12, 2)), abs=0.01)
+    scattered = np.random.default_rng(3).random((9, 2))
+    assert np.isnan(_sizes(scattered)).all()
+    # A grid with a hole keeps its cells.
+    assert _sizes(np.delete(np.column_stack((across.ravel(), along.ravel())), 5, axis=0)
+                  ) == pytest.approx(np.ones((11, 2)))
 
 
 def test_maps_hold_the_states_and_pressures(coarse: Result) -> None:

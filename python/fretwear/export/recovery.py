@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._native import Session, namelist_values
 from ..errors import AbsentError, InputError
 from ..result import Result
-from .wave import Wave, delayed, read_wave
+from .wave import Wave, Whirl, delayed, read_wave, read_whirl
 
 __all__ = ["Structure", "read_structure", "recover_displacement", "relative_displacement"]
 
@@ -52,6 +52,8 @@ class Structure:
         Both sides of the pairs: contact is their difference within one sector.
     wave : Wave or None
         Of a cyclic structure: then the structure is one sector.
+    whirl : Whirl or None
+        Of a cyclic structure: Coriolis forces, those of the air, modal damping.
     waves : tuple
         Further loads: harmonic, power of its frequency, cosine and sine part (n,) of each.
     """
@@ -67,6 +69,7 @@ class Structure:
     observe: Floats
     sides: tuple[Floats, Floats]
     wave: Wave | None = None
+    whirl: Whirl | None = None
     waves: tuple[tuple[int, int, Floats, Floats], ...] = ()
 
 
@@ -88,11 +91,12 @@ def read_structure(result: Result) -> Structure:
                                     for name in ("mass", "stiffness", "damping"))
         first, second = (_signed_rows(session.part(f"contact/{side}"), n)
                          for side in ("side_1", "side_2"))
+        wave = read_wave(result, len(first) // 3)
         return Structure(
             mass, stiffness, damping, static, session.part("load/cosine"),
             session.part("load/sine"), first - second, session.part("contact/gap"),
             session.part("observe/matrix").reshape(-1, n), (first, second),
-            read_wave(result, len(first) // 3), _waves(session, n))
+            wave, None if wave is None else read_whirl(session, n), _waves(session, n))
 
 
 def _waves(session: Session, n: int) -> tuple[tuple[int, int, Floats, Floats], ...]:
@@ -157,7 +161,10 @@ def recover_displacement(result: Result, structure: Structure | None = None,
             w = h * result.omega[point]
             z = s.stiffness - w**2 * s.mass + 1j * w * s.damping
             inner = (force[point, 2 * h - 1] - 1j * force[point, 2 * h]) @ rows.conj()
-            u = tie @ la.solve(tie.conj().T @ z @ tie, outer[point] - inner)
+            tied = tie.conj().T @ z @ tie
+            if s.whirl is not None:
+                tied += s.whirl.added(h, result.omega[point], tie, s.mass, s.stiffness)
+            u = tie @ la.solve(tied, outer[point] - inner)
             displacement[point, 2 * h - 1], displacement[point, 2 * h] = u.real, -u.imag
     _check(result, s, displacement, known & result.converged)
     return displacement

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import h5py
 import numpy as np
+import scipy.linalg as la
 from numpy.typing import NDArray
 
-from .._native import namelist_values
+from .._native import Session, namelist_values
 from ..errors import InputError
 from ..result import Result
 
-__all__ = ["Wave", "delayed", "read_wave", "turned"]
+__all__ = ["Wave", "Whirl", "delayed", "read_wave", "read_whirl", "turned"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -84,6 +85,55 @@ class Wave:
         turn = np.exp(-1j * harmonic * self.phase * np.repeat(self.sector_2, 3))
         found: Complexes = first - turn[:, None] * second
         return found
+
+
+@dataclass(frozen=True)
+class Whirl:
+    """Forces of a sector that its mass, damping and stiffness do not hold.
+
+    Attributes
+    ----------
+    coriolis : (n, n) or None
+        At speed, skew.
+    modes : (a, n)
+        Rows of motion that the air acts on.
+    air : (H, a, a)
+        Its complex stiffness in each harmonic from 1.
+    modal_damping : float
+        Fraction of critical damping of every mode of every nodal diameter.
+    """
+
+    coriolis: Floats | None
+    modes: Floats
+    air: Complexes
+    modal_damping: float
+
+    def added(self, harmonic: int, omega: float, tie: Complexes, mass: Floats,
+              stiffness: Floats) -> Complexes:
+        """Dynamic stiffness on the free dofs of a harmonic."""
+        n = tie.shape[1]
+        w = harmonic * omega
+        found = np.zeros((n, n), dtype=complex)
+        if self.coriolis is not None:
+            found += 1j * w * (tie.conj().T @ self.coriolis @ tie)
+        if len(self.air):
+            rows = self.modes @ tie
+            found += rows.conj().T @ self.air[harmonic - 1] @ rows
+        if self.modal_damping > 0.0:
+            tied = tie.conj().T @ mass @ tie
+            squares, shapes = la.eigh(tie.conj().T @ stiffness @ tie, tied)
+            sides = tied @ shapes
+            found += 2j * w * self.modal_damping * (
+                sides * np.sqrt(np.maximum(squares, 0.0))) @ sides.conj().T
+        return found
+
+
+def read_whirl(session: Session, n: int) -> Whirl:
+    """What a case has of these forces."""
+    coriolis, modes = session.part("coriolis"), session.part("aero/modes").reshape(-1, n)
+    air = session.part("aero/stiffness").reshape(-1, max(1, len(modes)), max(1, len(modes)), 2)
+    return Whirl(coriolis.reshape(n, n) if len(coriolis) else None, modes,
+                 air[..., 0] + 1j * air[..., 1], float(session.part("modal_damping")[0]))
 
 
 def read_wave(result: Result, n_pairs: int) -> Wave | None:

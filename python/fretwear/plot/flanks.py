@@ -41,6 +41,10 @@ _SHOWN = {
 }
 #: Numbers are written into the cells of flanks with no more pairs than this.
 _MOST_NUMBERS = 12
+#: Share of the extent within which places are in one row.
+_ROUND = 1e-6
+#: Places with more holes between them than this times their number are on no grid.
+_MOST_HOLES = 3
 
 
 @dataclass(frozen=True)
@@ -101,19 +105,51 @@ def _lay_out(name: str, pairs: NDArray[np.intp], position: Floats) -> Flank:
     place = np.column_stack((position[pairs] @ first, points @ second))
     names = tuple("xyz"[k] if abs(direction[k]) > 1.0 - 1e-6 else f"slope, rising in {'xyz'[k]}"
                   for k, direction in ((main, first), (across, second)))
-    return Flank(name, pairs, place, np.column_stack([_widths(column) for column in place.T]),
-                 (names[0], names[1]))
+    return Flank(name, pairs, place, _sizes(place), (names[0], names[1]))
 
 
-def _widths(values: Floats) -> Floats:
-    """Distance between neighbouring rows of a grid, for every point; 1 for a single row."""
-    digits = 6 - int(np.floor(np.log10(max(np.ptp(values), 1e-300))))
-    levels, inverse = np.unique(np.round(values, digits), return_inverse=True)
-    if len(levels) < 2:
+def _sizes(place: Floats) -> Floats:
+    """Cells (n, 2) of places on a grid; NaN where the places tell no size."""
+    span = np.maximum(np.ptp(place, axis=0), 1e-300)
+    levels = [_levels(column, _ROUND * wide) for column, wide in zip(place.T, span)]
+    # Rows of a grid that leans against these directions lie close together, not on each other.
+    gaps = [np.diff(np.sort(column)) / wide for column, wide in zip(place.T, span)]
+    for share in [0.0, *np.unique(np.round(np.concatenate(gaps), 6))]:
+        leaning = [_levels(column, (share + _ROUND) * wide)
+                   for column, wide in zip(place.T, span)]
+        if (leaning[0].max() + 1) * (leaning[1].max() + 1) == len(place) and all(
+                _apart(column, level) for column, level in zip(place.T, leaning)):
+            levels = leaning
+            break
+    if (levels[0].max() + 1) * (levels[1].max() + 1) > _MOST_HOLES * len(place):
+        return np.full(place.shape, np.nan)
+    return np.column_stack([_widths(column, level) for column, level in zip(place.T, levels)])
+
+
+def _levels(values: Floats, apart: float) -> NDArray[np.intp]:
+    """Number of the row of every value: a new one begins where the next is further."""
+    order = np.argsort(values)
+    found = np.empty(len(values), dtype=np.intp)
+    found[order] = np.concatenate(([0], np.cumsum(np.diff(values[order]) > apart)))
+    return found
+
+
+def _apart(values: Floats, level: NDArray[np.intp]) -> bool:
+    """Whether rows are further from each other than they are thick."""
+    ordered = np.sort(values)
+    step = np.diff(np.sort(level)) > 0
+    first, last = ordered[np.append(True, step)], ordered[np.append(step, True)]
+    return bool((last - first).max() <= (first[1:] - last[:-1]).min(initial=np.inf))
+
+
+def _widths(values: Floats, level: NDArray[np.intp]) -> Floats:
+    """Distance between neighbouring rows of a grid, for every point; NaN for a single row."""
+    if level.max() == 0:
         return np.full(len(values), np.nan)
-    middle = 0.5 * (levels[1:] + levels[:-1])
-    edges = np.concatenate(([2 * levels[0] - middle[0]], middle, [2 * levels[-1] - middle[-1]]))
-    return np.diff(edges)[inverse.ravel()]
+    rows = np.bincount(level, values) / np.bincount(level)
+    middle = 0.5 * (rows[1:] + rows[:-1])
+    edges = np.concatenate(([2 * rows[0] - middle[0]], middle, [2 * rows[-1] - middle[-1]]))
+    return np.diff(edges)[level]
 
 
 def _cells(flank: Flank, area: Floats | None) -> Floats:
