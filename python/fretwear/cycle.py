@@ -110,6 +110,9 @@ def _again(result: Result, point: int) -> Point:
     if values.get("case%analysis") == ["time"]:
         raise AbsentError(_excuse(result, point, "integration in time has no harmonic balance to "
                                   "solve"))
+    if values.get("case%analysis") == ["resonance"]:
+        raise AbsentError(f"{result.name}: a resonance over a parameter keeps no histories: run "
+                          "a point at the value of the parameter")
     if values.get("case%analysis") == ["mode"]:
         raise AbsentError(f"{result.name}: a nonlinear mode keeps no histories, and as a response "
                           "to a load it would be another motion")

@@ -19,6 +19,7 @@ from .natural_modes import NaturalModes, read_natural_modes
 from .nonlinear_mode import NonlinearMode, read_mode
 from .peaks import Peak, read_peaks
 from .result_file import Quantity, ResultFile, plain_text
+from .resonance import ResonanceTrack, read_resonance
 from .sensitivity import Sensitivities, read_sensitivities
 
 if TYPE_CHECKING:
@@ -356,6 +357,11 @@ class Result(ResultFile):
     def mode(self) -> NonlinearMode:
         """The curve of a nonlinear mode: amplitude, frequency, damping, limit cycles."""
         return read_mode(self)
+
+    @property
+    def resonance(self) -> ResonanceTrack:
+        """A resonance over a parameter: amplitude, frequency, curvature, the optimum."""
+        return read_resonance(self)
 
     # ------------------------------------------------------------------ wear
 

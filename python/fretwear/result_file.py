@@ -40,6 +40,8 @@ _REMEDIES = {
     "cyclic/": "give the case sectors (&cyclic n_sectors, engine_order)",
     "mode/": "run with case%analysis = 'mode'",
     "synthesis/": "run case%analysis = 'mode' with mode%synthesis",
+    "resonance/": "run with case%analysis = 'resonance'",
+    "parameter": "run with case%analysis = 'resonance'",
     "modes/": "run with case%analysis = 'modes'",
     "sensitivity/": "run with sensitivity%parameters",
     "peak/cycle/": "run a sweep with contact with this version of fretwear",

@@ -58,6 +58,8 @@ module fw_parameter_slopes
       real(wp), allocatable :: force(:, :, :)
       !> Complex amplitudes (n_observed, n_retained).
       complex(wp), allocatable :: observed(:, :)
+      !> Of the work F_1^H U_1, by parameters of matrices alone.
+      complex(wp) :: work = (0.0_wp, 0.0_wp)
    end type parameter_slope
 
    type :: slope_finder
@@ -72,6 +74,8 @@ module fw_parameter_slopes
       complex(wp), allocatable :: at_rest(:, :), field(:, :)
       !> The motion (n_coordinates * n_coefficients).
       real(wp), allocatable :: x(:)
+      !> Work of the load in harmonic 1 where all coordinates rest.
+      complex(wp) :: work_at_rest = (0.0_wp, 0.0_wp)
    contains
       procedure :: start
       procedure :: prepare
@@ -114,6 +118,7 @@ contains
       self%x = x
       rest = 0.0_wp
       call observe(state, rest, self%at_rest)
+      call find_work_at_rest(self, state)
       associate (problem => state%problem, m => state%problem%structure%n_coordinates)
          if (problem%structure%knows_field) then
             allocate (q(m, problem%fourier%n_retained))
@@ -133,6 +138,20 @@ contains
          end associate
       end associate
    end subroutine prepare
+
+   subroutine find_work_at_rest(self, state)
+      class(slope_finder), intent(inout) :: self
+      type(balance_state), intent(in) :: state
+      complex(wp), dimension(state%problem%structure%n_coordinates) :: rest, row
+      complex(wp) :: unused
+      integer :: h
+
+      h = findloc(state%problem%fourier%harmonic, 1, dim=1)
+      if (h == 0) return
+      rest = (0.0_wp, 0.0_wp)
+      call state%problem%structure%load_work(state%structure_state, h, rest, self%work_at_rest, &
+                                             unused, row)
+   end subroutine find_work_at_rest
 
    !> The slope by one parameter.
    subroutine find(self, state, parameter, slope)
@@ -170,6 +189,7 @@ contains
          end if
       end associate
       slope%residual = 0.0_wp
+      slope%work = (0.0_wp, 0.0_wp)
       slope%force = 0.0_wp
       slope%observed = (0.0_wp, 0.0_wp)
    end subroutine clear
@@ -340,6 +360,7 @@ contains
          rest = (0.0_wp, 0.0_wp)
          call s%complete_field(state%structure_state, rest, -change, field)
          call s%observe_field(field, slope%observed)
+         slope%work = s%field_work(state%structure_state, field)
       end associate
    end subroutine by_matrices
 

@@ -17,10 +17,17 @@ module fw_response_rows
 
    public :: response_row, new_rows, quantity_words, first_harmonic, largest, dissipation, &
              wear_volume, is_of_pairs
+   public :: value_words, resonance_omega, mode_omega, mode_damping_ratio
 
    character(*), parameter :: quantity_words(*) = &
       [character(14) :: 'first_harmonic', 'largest', 'dissipation', 'wear_volume']
    integer, parameter :: first_harmonic = 1, largest = 2, dissipation = 3, wear_volume = 4
+
+   !> All numbers that are differentiated: behind those that are chosen stand those that come with
+   !> an analysis, one for each point.
+   character(*), parameter :: value_words(*) = &
+      [character(18) :: quantity_words, 'resonance_omega', 'mode_omega', 'mode_damping_ratio']
+   integer, parameter :: resonance_omega = 5, mode_omega = 6, mode_damping_ratio = 7
 
    !> One number that is differentiated. What it does not depend on is not allocated.
    type :: response_row
@@ -40,11 +47,11 @@ module fw_response_rows
 
 contains
 
-   !> Whether a quantity belongs to the pairs, not to what is observed.
+   !> Whether a quantity is one number, of the pairs or of the motion, not of what is observed.
    elemental logical function is_of_pairs(quantity)
       integer, intent(in) :: quantity
 
-      is_of_pairs = quantity == dissipation .or. quantity == wear_volume
+      is_of_pairs = quantity >= dissipation
    end function is_of_pairs
 
    !> The rows of quantities at the motion x of a state, which has been evaluated there.

@@ -14,6 +14,8 @@ module fw_sensitivity_options
       integer, allocatable :: parameters(:)
       !> Numbers in quantity_words: all that the case has, unless some are given.
       integer, allocatable :: quantities(:)
+      !> Those of value_words that come with the analysis.
+      integer, allocatable :: further(:)
       !> Standard deviation of each parameter over its value; not allocated where none was given.
       real(wp), allocatable :: deviation(:)
    contains
@@ -40,6 +42,7 @@ contains
       has = self%is_wanted() .and. allocated(self%quantities)
       if (.not. has) return
       has = any(self%quantities == quantity) .or. quantity == of_itself
+      if (allocated(self%further)) has = has .or. any(self%further == quantity)
       if (parameter > 0) then
          has = has .and. any(self%parameters == parameter)
       else if (parameter /= of_itself) then

@@ -3,6 +3,7 @@
 module fw_parameter_problem
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
+   use fw_balance_state, only: new_balance_state
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
@@ -16,7 +17,7 @@ module fw_parameter_problem
    implicit none (type, external)
    private
 
-   public :: parameter_problem
+   public :: parameter_problem, renew_state
 
    type :: parameter_problem
       !> The case at the present value.
@@ -32,6 +33,7 @@ module fw_parameter_problem
       integer :: version = 0
    contains
       procedure :: start
+      procedure :: begin
       procedure :: bring
       procedure :: values_at
    end type parameter_problem
@@ -53,6 +55,16 @@ contains
       if (.not. by_factor) self%value = self%base(1)
    end subroutine start
 
+   !> Bring the case to a value before anything is built of it.
+   subroutine begin(self, value, error)
+      class(parameter_problem), intent(inout) :: self
+      real(wp), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_parameter(self%case, self%number, self%values_at(value), error)
+      if (.not. allocated(error)) self%value = value
+   end subroutine begin
+
    !> What the parameter is at a value or factor, each pair or spring its own.
    pure function values_at(self, value) result(values)
       class(parameter_problem), intent(in) :: self
@@ -63,59 +75,51 @@ contains
       if (self%by_factor) values = value*self%base
    end function values_at
 
-   !> Bring case, problem and state to a value or factor. The state goes to its frequency again
-   !> afterwards (set_frequency), and keeps its interrupt; solutions keep their unknowns, unless
-   !> the number of these is another.
+   !> Bring case, problem and a state of it to a value or factor. States are made anew, as
+   !> `renew_state` does with others of the problem; their unknowns stay those that they were,
+   !> unless the structure keeps other modes then.
    subroutine bring(self, value, problem, system, error)
       class(parameter_problem), intent(inout) :: self
       real(wp), intent(in) :: value
       type(balance_problem), intent(inout), target :: problem
       type(balance_state), intent(inout) :: system
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: ratio
-      real(wp), allocatable :: before(:)
+      type(balance_state), allocatable :: unused
+      real(wp), allocatable :: before(:), now(:)
 
       if (abs(value - self%value) <= 0.0_wp) return
       call get_parameter(self%case, self%number, before)
-      call put_parameter(self%case, self%number, self%values_at(value), error)
+      now = self%values_at(value)
+      call put_parameter(self%case, self%number, now, error)
       if (allocated(error)) return
       self%value = value
       self%version = self%version + 1
-      select case (self%number)
-      case (harmonic_scale, static_scale)
-         associate (now => self%values_at(value))
-            ratio = now(1)/before(1)
-         end associate
-         if (self%number == static_scale) then
-            call problem%structure%scale_loads(ratio, 1.0_wp)
-         else
-            call problem%structure%scale_loads(1.0_wp, ratio)
-         end if
-         system%structure_state%omega = -1.0_wp
-      case default
-         if (is_of_matrices(self%number)) then
-            call build_again(self%case, problem, system, error)
-         else
-            call renew_forces(self%case, problem)
-            call problem%forces%reserve(problem%fourier, system%work)
-         end if
-      end select
+      if (self%number == harmonic_scale) then
+         call problem%structure%scale_loads(1.0_wp, now(1)/before(1))
+      else if (self%number == static_scale) then
+         call problem%structure%scale_loads(now(1)/before(1), 1.0_wp)
+      else if (is_of_matrices(self%number)) then
+         allocate (unused)
+         call build_system(self%case, problem, unused, error)
+      else
+         call renew_forces(self%case, problem)
+      end if
+      if (.not. allocated(error)) call renew_state(problem, system)
    end subroutine bring
 
-   !> Matrices are condensed anew.
-   subroutine build_again(case, problem, system, error)
-      type(case_type), intent(in) :: case
-      type(balance_problem), intent(inout), target :: problem
-      type(balance_state), intent(inout) :: system
-      type(error_type), allocatable, intent(out) :: error
-      type(balance_state) :: new
+   !> A state of a problem that has changed, with the choices of the one before; it goes to its
+   !> frequency again (set_frequency).
+   subroutine renew_state(problem, state)
+      type(balance_problem), intent(in), target :: problem
+      type(balance_state), intent(inout) :: state
+      type(balance_state), allocatable :: new
 
-      call build_system(case, problem, new, error)
-      if (allocated(error)) return
-      new%interrupt => system%interrupt
-      new%reduced = system%reduced
-      new%load_share = system%load_share
-      system = new
-   end subroutine build_again
+      allocate (new)
+      call new_balance_state(problem, new)
+      new%interrupt => state%interrupt
+      new%reduced = state%reduced
+      new%load_share = state%load_share
+      state = new
+   end subroutine renew_state
 
 end module fw_parameter_problem

@@ -9,6 +9,7 @@ module fw_problem
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_mode
    use fw_case, only: analysis_point
+   use fw_case, only: analysis_resonance
    use fw_case, only: analysis_wear
    use fw_cyclic_structure, only: cyclic_structure
    use fw_cyclic_structure, only: means_none
@@ -121,6 +122,12 @@ contains
       if (case%analysis == analysis_frf) range = case%sweep%range()
       if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
          range = follow_range*range
+      end if
+      if (case%analysis == analysis_resonance) then
+         ! As far as the resonance may go.
+         range = case%sweep%range()
+         range = range + 0.5_wp*(range(2) - range(1))*[-1.0_wp, 1.0_wp]
+         range(1) = max(range(1), 0.1_wp*minval(case%sweep%range()))
       end if
       call turn_joint(case%model, case%contact, fourier%harmonic, joint, error)
       if (.not. allocated(error)) call new_structure(case, joint, laws, fourier, range, structure, &
@@ -320,7 +327,7 @@ contains
          locates_events = .not. is_planar(joint) .or. case%contact%n_pairs <= few_pairs
          return
       end if
-      if (case%analysis == analysis_mode) then
+      if (any(case%analysis == [analysis_mode, analysis_resonance])) then
          ! Instants put corners into curves whose derivatives are followed.
          locates_events = harmonics%n_time == 0
          return

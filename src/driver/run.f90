@@ -6,6 +6,7 @@ module fw_run
    use fw_combinations, only: check_combinations
    use fw_case, only: analysis_mode
    use fw_case, only: analysis_modes
+   use fw_case, only: analysis_resonance
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -22,6 +23,7 @@ module fw_run
    use fw_run_mode, only: check_mode_case
    use fw_run_mode, only: run_mode
    use fw_run_modes, only: run_modes
+   use fw_run_resonance, only: run_resonance
    use fw_run_state, only: run_state
    use fw_summary, only: summary_type
    use fw_summary, only: new_summary
@@ -104,6 +106,8 @@ contains
          call run_modes(case, writer, table, error)
       else if (case%analysis == analysis_mode) then
          call run_mode(case, observer, writer, summary, state, error)
+      else if (case%analysis == analysis_resonance) then
+         call run_resonance(case, observer, writer, summary, state, error)
       else if (case%analysis == analysis_wear) then
          call run_wear(case, restart, observer, writer, summary, state, error)
       else

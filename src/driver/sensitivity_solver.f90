@@ -23,6 +23,7 @@ module fw_sensitivity_solver
    use fw_point, only: point_sensitivity
    use fw_point, only: point_type
    use fw_remarks, only: remark_list
+   use fw_response_rows, only: resonance_omega
    use fw_sensitivity, only: sensitivity_finder
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: to_text
@@ -45,6 +46,8 @@ module fw_sensitivity_solver
       logical, private :: is_started = .false.
    contains
       procedure :: find
+      procedure :: renew
+      procedure :: follow
       procedure :: describe
       procedure :: remark
    end type sensitivity_solver
@@ -88,7 +91,7 @@ contains
 
       associate (finder => self%finder, options => case%sensitivity)
          finder%quantities = options%quantities
-         allocate (finder%parameters(0))
+         finder%parameters = [parameter_entry ::]
          do k = 1, size(options%parameters)
             associate (number => options%parameters(k))
                do i = 1, max(1, count_elements(case, number))
@@ -96,13 +99,71 @@ contains
                end do
             end associate
          end do
-         allocate (finder%mu(case%contact%n_pairs), source=0.0_wp)
+         finder%mu = spread(0.0_wp, 1, case%contact%n_pairs)
          if (case%contact%n_pairs > 0) finder%mu = case%contact%mu
          finder%wear_coefficient = max(case%wear%coefficient, 0.0_wp)
          finder%wears_by_energy = case%wear%law == wear_energy
       end associate
       self%is_started = .true.
    end subroutine start
+
+   !> The case has other values now, and its problem other constants.
+   subroutine renew(self, case)
+      class(sensitivity_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+
+      call self%finder%clear()
+      call start(self, case)
+   end subroutine renew
+
+   !> From derivatives at a held frequency to those along a resonance whose frequency follows the
+   !> parameters, and those of the frequency itself.
+   subroutine follow(self, case, by_omega, omega_by_parameter, point)
+      class(sensitivity_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      !> Derivatives of the quantities by the frequency (n_rows), and of the frequency by the
+      !> parameters (n_parameters).
+      real(wp), intent(in) :: by_omega(:), omega_by_parameter(:)
+      type(point_type), intent(inout) :: point
+      integer :: p
+
+      do p = 1, size(omega_by_parameter)
+         self%finder%derivative(:, p) = self%finder%derivative(:, p) + &
+                                        by_omega*omega_by_parameter(p)
+      end do
+      deallocate (point%sensitivity)
+      call lay_out(self, case, point)
+      call add_one(self, case, resonance_omega, point%omega, omega_by_parameter, point)
+   end subroutine follow
+
+   !> Derivatives of one number that is no row of the response.
+   subroutine add_one(self, case, quantity, value, derivative, point)
+      type(sensitivity_solver), intent(in) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: quantity
+      real(wp), intent(in) :: value
+      !> (n_parameters)
+      real(wp), intent(in) :: derivative(:)
+      type(point_type), intent(inout) :: point
+      type(point_sensitivity) :: block
+      integer :: p
+
+      block%quantity = quantity
+      associate (options => case%sensitivity, parameters => self%finder%parameters)
+         do p = 1, size(options%parameters)
+            block%parameter = options%parameters(p)
+            block%values = pack(derivative, parameters%number == options%parameters(p))
+            point%sensitivity = [point%sensitivity, block]
+         end do
+         block%parameter = of_itself
+         block%values = [value]
+         point%sensitivity = [point%sensitivity, block]
+         if (.not. allocated(options%deviation)) return
+         block%parameter = 0
+         block%values = [deviation_of(case, parameters, derivative)]
+         point%sensitivity = [point%sensitivity, block]
+      end associate
+   end subroutine add_one
 
    !> Values that a parameter has; 0 where it is one.
    pure integer function count_elements(case, number) result(n)
@@ -173,7 +234,8 @@ contains
             block%values = [real(wp) ::]
             do k = 1, size(finder%rows)
                if (finder%rows(k)%quantity /= options%quantities(q)) cycle
-               block%values = [block%values, deviation_of(case, finder, k)]
+               block%values = [block%values, deviation_of(case, finder%parameters, &
+                                                          finder%derivative(k, :))]
             end do
             point%sensitivity = [point%sensitivity, block]
          end do
@@ -189,17 +251,17 @@ contains
 
    !> To first order, parameters being independent of each other; all pairs (springs) share the
    !> deviation of theirs, as parts of one lot do.
-   pure real(wp) function deviation_of(case, finder, row) result(deviation)
+   pure real(wp) function deviation_of(case, parameters, derivative) result(deviation)
       type(case_type), intent(in) :: case
-      type(sensitivity_finder), intent(in) :: finder
-      integer, intent(in) :: row
+      type(parameter_entry), intent(in) :: parameters(:)
+      !> (n_parameters)
+      real(wp), intent(in) :: derivative(:)
       integer :: p
 
       deviation = 0.0_wp
       do p = 1, size(case%sensitivity%parameters)
          deviation = deviation + (case%sensitivity%deviation(p)* &
-                                  sum(finder%parameters%value*finder%derivative(row, :), &
-                                      mask=finder%parameters%number == &
+                                  sum(parameters%value*derivative, mask=parameters%number == &
                                       case%sensitivity%parameters(p)))**2
       end do
       deviation = sqrt(deviation)

@@ -15,8 +15,10 @@ module fw_summary
    use fw_peak, only: found_jump
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
+   use fw_parameters, only: parameter_key
    use fw_point, only: point_type
    use fw_remarks, only: remark_list
+   use fw_resonance_group, only: resonance_table
    use fw_run_state, only: run_state
    use fw_solver_options, only: solver_newton
    use fw_stability_verdict, only: verdict_stable
@@ -80,6 +82,7 @@ module fw_summary
       procedure :: describe_accuracy
       procedure :: describe_wear
       procedure :: describe_mode
+      procedure :: describe_resonance
       procedure :: note_restart
       procedure :: note_profile_change
       procedure :: lines
@@ -403,6 +406,47 @@ contains
                        //': the mode gains energy at every amplitude')
       end if
    end subroutine describe_mode
+
+   !> A resonance over a parameter: where it is smallest and largest, and at both ends.
+   subroutine describe_resonance(self, table, case)
+      class(summary_type), intent(inout) :: self
+      type(resonance_table), intent(in) :: table
+      type(case_type), intent(in) :: case
+      integer :: places(4), i
+      character(10), parameter :: words(4) = [character(10) :: ', first', ', last', ', smallest', &
+                                             ', largest']
+      character(24) :: key
+
+      allocate (self%mode(0))
+      if (.not. any_converged(table)) return
+      call parameter_key(case%resonance%parameter, key)
+      associate (row => table%row(:table%n))
+         places = [1, table%n, minloc(row%value, dim=1, mask=row%converged), &
+                   maxloc(row%value, dim=1, mask=row%converged)]
+         do i = 1, size(places)
+            call add_line(self%mode, trim(merge('resonance', '         ', i == 1)), &
+                          trim(exact(row(places(i))%value))//' at '// &
+                          trim(exact(row(places(i))%omega))//' rad/s for '//trim(key)//' = '// &
+                          to_text(row(places(i))%parameter)//trim(words(i)))
+         end do
+      end associate
+   end subroutine describe_resonance
+
+   pure logical function any_converged(table)
+      type(resonance_table), intent(in) :: table
+
+      any_converged = .false.
+      if (table%n > 0) any_converged = any(table%row(:table%n)%converged)
+   end function any_converged
+
+   !> A number that is meant to be read off.
+   pure function exact(value) result(text)
+      real(wp), intent(in) :: value
+      character(13) :: text
+
+      write (text, '(es13.6)') value
+      text = adjustl(text)
+   end function exact
 
    !> A number for the table.
    pure function short(value) result(text)

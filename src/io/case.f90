@@ -11,6 +11,7 @@ module fw_case
    use fw_model, only: model_type
    use fw_contact_data, only: contact_type, spring_type
    use fw_harmonics_options, only: harmonics_options
+   use fw_resonance_options, only: resonance_options
    use fw_sensitivity_options, only: sensitivity_options
    use fw_solver_options, only: solver_options, pseudo_time_options, sweep_options
    use fw_text, only: string_type
@@ -21,12 +22,13 @@ module fw_case
 
    public :: case_type, output_options
    public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
-             analysis_modes, analysis_mode
+             analysis_modes, analysis_mode, analysis_resonance
 
    character(*), parameter :: analysis_words(*) = &
-      [character(5) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode']
+      [character(9) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance']
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
-                         analysis_time = 4, analysis_modes = 5, analysis_mode = 6
+                         analysis_time = 4, analysis_modes = 5, analysis_mode = 6, &
+                         analysis_resonance = 7
 
    !> What is written (group &output).
    type :: output_options
@@ -70,6 +72,7 @@ module fw_case
       character(:), allocatable :: restart
       type(sensitivity_options) :: sensitivity
       type(mode_options) :: mode
+      type(resonance_options) :: resonance
       !> The parameter of fw_parameters that changes from point to point (0: none), and what the
       !> model is formed from, only where that changes its matrices.
       integer :: varied = 0
@@ -89,8 +92,8 @@ contains
       call keys%bind(key('title', 'stands in the result file', &
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
-                              'integration in time, natural frequencies, or a nonlinear '// &
-                              'mode'), self%analysis, analysis_words)
+                              'integration in time, natural frequencies, a nonlinear '// &
+                              'mode, or a resonance over a parameter'), self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)
       call keys%bind(key('max_seconds', 'time after which the run ends with the points that '// &

@@ -22,7 +22,7 @@ module fw_point_quantities
    use fw_patches, only: count_patches
    use fw_point, only: point_type
    use fw_response_rows, only: is_of_pairs
-   use fw_response_rows, only: quantity_words
+   use fw_response_rows, only: value_words
    use fw_sensitivity_options, only: of_itself
    use fw_solver_options, only: continuation_arclength
    use fw_text, only: string_type
@@ -146,21 +146,21 @@ contains
          character(16) :: of
          integer :: p, q
 
-         do q = 1, size(quantity_words)
+         do q = 1, size(value_words)
             of = merge('         ', ' observed', is_of_pairs(q))
             do p = 1, n_parameter_words
                call parameter_dataset(p, name)
-               call add('sensitivity/'//trim(quantity_words(q))//'/'//trim(name), r, '', &
+               call add('sensitivity/'//trim(value_words(q))//'/'//trim(name), r, '', &
                         'point'//trim(of)//trim(elements_of(p)), 'derivative of '// &
-                        trim(quantity_words(q))//' by '//trim(parameter_words(p)), nothing, always)
+                        trim(value_words(q))//' by '//trim(parameter_words(p)), nothing, always)
                list(size(list))%sensitivity = [q, p]
             end do
-            call add('sensitivity/deviation/'//trim(quantity_words(q)), r, '', &
-                     'point'//trim(of), 'standard deviation of '//trim(quantity_words(q)), &
+            call add('sensitivity/deviation/'//trim(value_words(q)), r, '', &
+                     'point'//trim(of), 'standard deviation of '//trim(value_words(q)), &
                      nothing, always)
             list(size(list))%sensitivity = [q, 0]
-            call add('sensitivity/value/'//trim(quantity_words(q)), r, '', 'point'//trim(of), &
-                     trim(quantity_words(q)), nothing, always)
+            call add('sensitivity/value/'//trim(value_words(q)), r, '', 'point'//trim(of), &
+                     trim(value_words(q)), nothing, always)
             list(size(list))%sensitivity = [q, of_itself]
          end do
          do p = 1, n_parameter_words

@@ -2,7 +2,7 @@
 module fw_read_case
    use fw_combinations, only: check_combinations
    use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_modes, analysis_point, &
-                      analysis_wear
+                      analysis_resonance, analysis_wear
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
@@ -17,6 +17,7 @@ module fw_read_case
    use fw_read_model, only: read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_mode, read_sweep
    use fw_read_output, only: read_output, read_observed
+   use fw_read_resonance, only: check_resonance, read_resonance
    use fw_read_sensitivity, only: check_sensitivity, finish_sensitivity, read_sensitivity
    use fw_read_worn, only: read_worn
    use fw_reader, only: reader_type, new_reader
@@ -48,7 +49,7 @@ module fw_read_case
       logical :: tries_files = .false.
    end type case_input
 
-   !> Harmonics of a nonlinear mode where nothing is said of them: frequencies to some 1e-5.
+   !> Harmonics of a nonlinear mode or resonance where nothing is said of them: frequencies to some 1e-5.
    integer, parameter :: usual_of_mode = 7
 
 contains
@@ -124,6 +125,7 @@ contains
       if (allocated(error)) return
       case%namelist = reader%effective()
       call check_combinations(case, error)
+      if (.not. allocated(error)) call check_resonance(case, error)
       if (.not. allocated(error)) call check_sensitivity(case, error)
    end subroutine read_groups
 
@@ -136,7 +138,7 @@ contains
       if (reader%given('harmonics', 'n_harmonics')) return
       if (reader%given('harmonics', 'accuracy')) return
       if (case%sensitivity%is_wanted()) return
-      if (case%analysis == analysis_mode) then
+      if (any(case%analysis == [analysis_mode, analysis_resonance])) then
          case%harmonics%n_harmonics = usual_of_mode
          call reader%amend('harmonics', 'n_harmonics', to_text(usual_of_mode))
          return
@@ -185,6 +187,7 @@ contains
       ! Sizes (n_dof, n_pairs, n_springs) are told before the arrays whose shapes name them.
       call case%bind_keys(reader)
       call read_sensitivity(reader, case%sensitivity)
+      call read_resonance(reader, case%analysis, case%resonance, case%varied)
       call read_structure(reader, path, case, raw, error, memory_model)
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)

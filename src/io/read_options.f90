@@ -3,7 +3,8 @@
 !> Single values have passed the range of their key already (fw_key_range). Here are the refusals
 !> that need two keys or the analysis, and what follows from other keys where one is left out.
 module fw_read_options
-   use fw_case, only: analysis_frf, analysis_mode, analysis_modes, analysis_time
+   use fw_case, only: analysis_frf, analysis_mode, analysis_modes, analysis_resonance, &
+                      analysis_time
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
                                    instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
@@ -93,7 +94,8 @@ contains
          call reader%require_group('sweep', &
                                    'the frequency: start (and end and n_points of a sweep)')
       end if
-      call options%bind_keys(reader, analysis == analysis_frf, has_frequency)
+      call options%bind_keys(reader, any(analysis == [analysis_frf, analysis_resonance]), &
+                             has_frequency)
       if (analysis == analysis_mode) call refuse_sweep(reader)
       call check_ends(reader, analysis, options)
       if (allocated(options%frequencies)) call take_list(reader, analysis, options)

@@ -1,6 +1,6 @@
 !> Group &sensitivity: which derivatives are wanted, and whether the case has them.
 module fw_read_sensitivity
-   use fw_case, only: case_type, analysis_frf, analysis_point
+   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_resonance
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_hbm
@@ -12,7 +12,7 @@ module fw_read_sensitivity
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
    use fw_response_rows, only: dissipation, first_harmonic, is_of_pairs, largest, &
-                               quantity_words, wear_volume
+                               quantity_words, resonance_omega, wear_volume
    use fw_sensitivity_options, only: sensitivity_options
    use fw_solver_options, only: solver_newton
    use fw_text, only: lower_case, string_type
@@ -36,7 +36,8 @@ contains
       call reader%open(group, 'derivatives of the response by parameters of the case')
       call reader%bind_list(key('parameters', 'what the response is differentiated by: '// &
                                 "'contact%mu', 'load%harmonic_scale', ...", &
-                                absent='none: no derivatives', only="analysis = 'frf', 'point'"), &
+                                absent='none: no derivatives', only="analysis = 'frf', 'point', "// &
+                                "'resonance'"), &
                             'names of parameters, such as contact%mu', size(parameter_words), &
                             words, is_text)
       call find_words(reader, 'parameters', words, parameter_words, options%parameters)
@@ -112,6 +113,7 @@ contains
             call reader%refuse('harmonics', 'n_harmonics', 'is missing: derivatives '// &
                                '(&sensitivity) are those of a balance of given harmonics')
          end if
+         if (case%analysis == analysis_resonance) options%further = [resonance_omega]
          if (size(options%quantities) > 0) return
          options%quantities = [first_harmonic, largest]
          if (case%contact%n_pairs == 0) return
@@ -131,8 +133,8 @@ contains
 
       if (.not. case%sensitivity%is_wanted()) return
       ! Carried positions depend on all points before.
-      if (all(case%analysis /= [analysis_frf, analysis_point])) then
-         with = "analysis = 'frf' or 'point'"
+      if (all(case%analysis /= [analysis_frf, analysis_point, analysis_resonance])) then
+         with = "analysis = 'frf', 'point' or 'resonance'"
       else if (case%harmonics%method /= method_hbm) then
          with = "harmonics%method = 'hbm'"
       else if (case%contact%memory == memory_carried) then

@@ -29,6 +29,9 @@ module fw_result
    use fw_peak_group, only: write_peak_cycle
    use fw_peak_group, only: write_peaks
    use fw_point, only: point_type
+   use fw_resonance_group, only: resonance_table
+   use fw_resonance_group, only: write_resonance
+   use fw_resonance_options, only: resonance_options
    use fw_result_labels, only: label_dataset
    use fw_result_part, only: create_part
    use fw_result_part, only: delete_part
@@ -70,6 +73,7 @@ module fw_result
       procedure :: add_remarks
       procedure :: add_modes
       procedure :: add_mode
+      procedure :: add_resonance
       procedure :: sort_points
       procedure :: flush
       procedure :: close
@@ -220,6 +224,21 @@ contains
       call write_mode(self%file, table, unit_system, error)
       !$omp end critical (fretwear_io)
    end subroutine add_mode
+
+   !> A resonance over a parameter, beside its points.
+   subroutine add_resonance(self, table, options, unit_system, error)
+      class(result_writer), intent(inout) :: self
+      type(resonance_table), intent(in) :: table
+      type(resonance_options), intent(in) :: options
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%id < 0) return
+      !$omp critical (fretwear_io)
+      call write_resonance(self%file, table, options, unit_system, error)
+      !$omp end critical (fretwear_io)
+   end subroutine add_resonance
 
    !> Bring the rows into the order of their frequencies.
    subroutine sort_points(self, descending, error)

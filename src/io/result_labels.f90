@@ -90,6 +90,15 @@ module fw_result_labels
                  'frequencies of the response put together, NaN: none'), &
       label_type('/synthesis/first_harmonic', '<length>', 'point', &
                  'amplitude of the first observed quantity'), &
+      label_type('/parameter', '', 'point', 'value of the parameter, or factor of it'), &
+      label_type('/resonance/value', '<length>', 'point', &
+                 'what is largest, of the first observed quantity'), &
+      label_type('/resonance/first_harmonic', '<length>', 'point', &
+                 'amplitude of the first observed quantity'), &
+      label_type('/resonance/phase', 'rad', 'point', &
+                 'of the first observed quantity behind the load'), &
+      label_type('/resonance/curvature', '', 'point', &
+                 'second derivative of the value by omega'), &
       label_type('/wear/depth_halved', '<length>', 'pair', &
                  'final wear depth with steps of half the size')]
 

@@ -3,6 +3,7 @@
 module fw_result_rows
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_mode
+   use fw_case, only: analysis_resonance
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -113,6 +114,8 @@ contains
          expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
       else if (case%analysis == analysis_mode) then
          expected_rows = case%mode%n_points
+      else if (case%analysis == analysis_resonance) then
+         expected_rows = case%resonance%n_points
       else if (case%analysis == analysis_frf) then
          expected_rows = max(1, case%sweep%n_points)
          if (case%sweep%continuation == continuation_arclength) then

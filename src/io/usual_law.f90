@@ -5,6 +5,7 @@ module fw_usual_law
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_mode
    use fw_case, only: analysis_point
+   use fw_case, only: analysis_resonance
    use fw_case, only: analysis_time
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
@@ -44,7 +45,7 @@ contains
 
       associate (h => case%harmonics, c => case%contact)
          goes = any(case%analysis == [analysis_frf, analysis_mode, analysis_point, &
-                                      analysis_wear]) .and. &
+                                      analysis_resonance, analysis_wear]) .and. &
                 h%method == method_hbm .and. h%sampling /= sampling_uniform .and. &
                 h%n_time == 0 .and. .not. h%adaptive .and. .not. case%output%histories .and. &
                 .not. any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)) .and. &

@@ -20,7 +20,9 @@ module fw_cyclic_structure
    use fw_sector_stiffness, only: derive_sector
    use fw_sector_stiffness, only: form_sector
    use fw_sector_stiffness, only: harmonic_point
+   use fw_sector_stiffness, only: observed_sector_slope
    use fw_sector_stiffness, only: recover_sector
+   use fw_sector_stiffness, only: work_of_sector
    use fw_structure_operator, only: by_frequency
    use fw_structure_operator, only: lay_out_coefficients
    use fw_structure_operator, only: structure_operator
@@ -72,6 +74,8 @@ module fw_cyclic_structure
       procedure :: held_modes
       procedure :: magnitudes
       procedure :: scale_loads
+      procedure :: observed_slope
+      procedure :: load_work
    end type cyclic_structure
 
    type, extends(structure_state) :: cyclic_state
@@ -621,5 +625,39 @@ contains
          end associate
       end do
    end subroutine scale_loads
+
+   subroutine observed_slope(self, state, q, slope)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp), intent(out) :: slope(:, :)
+      integer :: h
+
+      slope = (0.0_wp, 0.0_wp)
+      select type (state)
+      type is (cyclic_state)
+         do h = 1, size(self%harmonic)
+            if (self%harmonic(h) == 0) cycle
+            call observed_sector_slope(self%basis(self%basis_of(h)), state%point(h), &
+                                       slopes_of(state%point(h), 0.0_wp, by_frequency), q(:, h), &
+                                       slope(:, h))
+         end do
+      end select
+   end subroutine observed_slope
+
+   subroutine load_work(self, state, h, q, work, slope, row)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: work, slope
+      complex(wp), intent(out) :: row(:)
+
+      select type (state)
+      type is (cyclic_state)
+         call work_of_sector(self%basis(self%basis_of(h)), state%point(h), &
+                             slopes_of(state%point(h), 0.0_wp, by_frequency), q, work, slope, row)
+      end select
+   end subroutine load_work
 
 end module fw_cyclic_structure

@@ -23,6 +23,8 @@ module fw_plain_structure
    use fw_complex_form, only: coefficients_of
    use fw_formed_stiffness, only: form_block
    use fw_formed_stiffness, only: formed_stiffness
+   use fw_field_slopes, only: follow_frequency
+   use fw_field_slopes, only: work_of_load
    use fw_formed_stiffness, only: harmonic_load
    use fw_formed_stiffness, only: load_slope
    use fw_internal_block, only: internal_block
@@ -71,12 +73,15 @@ module fw_plain_structure
       procedure :: held_modes
       procedure :: magnitudes
       procedure :: scale_loads
+      procedure :: observed_slope
+      procedure :: load_work
       procedure :: whole_size
       procedure :: condense_field
       procedure :: complete_field
       procedure :: observe_field
       procedure :: observe_back
       procedure :: change_field
+      procedure :: field_work
    end type plain_structure
 
    type, extends(structure_state) :: plain_state
@@ -782,5 +787,48 @@ contains
          if (allocated(b%change_load)) b%change_load = static*b%change_load
       end associate
    end subroutine scale_loads
+
+   subroutine observed_slope(self, state, q, slope)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp), intent(out) :: slope(:, :)
+      complex(wp) :: x(self%basis%n_internal), x_slope(self%basis%n_internal)
+      integer :: h
+
+      slope = (0.0_wp, 0.0_wp)
+      if (self%basis%n_internal == 0) return
+      do h = 1, size(self%harmonic)
+         if (self%harmonic(h) == 0) cycle
+         call follow_frequency(self%basis, self%harmonic(h), state%omega, q(:, h), x, x_slope)
+         slope(:, h) = matmul(self%basis%observe_i, x_slope)
+      end do
+   end subroutine observed_slope
+
+   subroutine load_work(self, state, h, q, work, slope, row)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: work, slope
+      complex(wp), intent(out) :: row(:)
+
+      call work_of_load(self%basis, self%harmonic(h), state%omega, q, work, slope, row)
+   end subroutine load_work
+
+   pure complex(wp) function field_work(self, state, field) result(work)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: field(:, :)
+      integer :: h
+
+      work = (0.0_wp, 0.0_wp)
+      h = findloc(self%harmonic, 1, dim=1)
+      if (h == 0) return
+      associate (b => self%basis, m => self%n_coordinates)
+         work = sum(conjg(harmonic_load(b%load_q, b%waves, 1, state%omega))*field(:m, h)) + &
+                sum(conjg(harmonic_load(b%load_i, b%waves, 1, state%omega))*field(m + 1:, h))
+      end associate
+   end function field_work
 
 end module fw_plain_structure

@@ -13,6 +13,7 @@ module fw_sector_stiffness
    private
 
    public :: harmonic_point, form_sector, derive_sector, recover_sector
+   public :: observed_sector_slope, work_of_sector
 
    !> Where a harmonic stands: factors of K, M and C in Z = k K - theta M + i s C.
    type :: harmonic_point
@@ -124,6 +125,74 @@ contains
       observed = observed + matmul(turned(basis%observe_i, point), &
                                    modes_of(basis, point, internal, q))
    end subroutine recover_sector
+
+   !> Observed quantities by the frequency at held coordinates: the internal modes follow.
+   subroutine observed_sector_slope(basis, point, slopes, q, slope)
+      type(sector_reduction), intent(in) :: basis
+      !> `slopes` holds the derivatives of the factors.
+      type(harmonic_point), intent(in) :: point, slopes
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: slope(:)
+      complex(wp) :: x(basis%n_internal), x_slope(basis%n_internal)
+
+      slope = (0.0_wp, 0.0_wp)
+      if (basis%n_internal == 0) return
+      call follow_frequency(basis, point, slopes, q, x, x_slope)
+      slope = matmul(turned(basis%observe_i, point), x_slope)
+   end subroutine observed_sector_slope
+
+   !> x = D^-1 (F_i - Z_iq q) and x' = D^-1 (F_i' - Z_iq' q - D' x).
+   subroutine follow_frequency(basis, point, slopes, q, x, x_slope)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point, slopes
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: x(:), x_slope(:)
+      type(internal_type) :: internal
+      complex(wp) :: block(basis%n_internal, basis%n_coordinates), column(basis%n_internal, 1)
+      logical :: failed
+
+      call factor_internal(basis, point, internal, failed)
+      x = modes_of(basis, point, internal, q)
+      associate (m => basis%n_coordinates, n => basis%n_internal)
+         call combine_rows(basis, slopes, m + 1, m + n, .false., block)
+         call add_whirl(basis, slopes, m, 0, block)
+      end associate
+      column(:, 1) = slope_of(basis, basis%load_i, point, slopes) - matmul(block, q) - &
+                     internal_slope(basis, slopes, x)
+      call solve_internal(internal, 1, column)
+      x_slope = column(:, 1)
+   end subroutine follow_frequency
+
+   !> F^H u, its derivative by the frequency at held coordinates, and its row by them.
+   subroutine work_of_sector(basis, point, slopes, q, work, slope, row)
+      type(sector_reduction), intent(in) :: basis
+      type(harmonic_point), intent(in) :: point, slopes
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: work, slope
+      complex(wp), intent(out) :: row(:)
+      type(internal_type) :: internal
+      complex(wp) :: x(basis%n_internal), x_slope(basis%n_internal), f_i(basis%n_internal)
+      complex(wp), allocatable :: z_iq(:, :)
+      logical :: failed
+
+      row = conjg(load_of(basis, basis%load_q, point))
+      work = sum(row*q)
+      slope = sum(conjg(slope_of(basis, basis%load_q, point, slopes))*q)
+      if (basis%n_internal == 0) return
+      call follow_frequency(basis, point, slopes, q, x, x_slope)
+      f_i = conjg(load_of(basis, basis%load_i, point))
+      work = work + sum(f_i*x)
+      slope = slope + sum(f_i*x_slope) + &
+              sum(conjg(slope_of(basis, basis%load_i, point, slopes))*x)
+      associate (m => basis%n_coordinates, n => basis%n_internal)
+         allocate (z_iq(n, m))
+         call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
+         call add_whirl(basis, point, m, 0, z_iq)
+         call factor_internal(basis, point, internal, failed)
+         call solve_internal(internal, m, z_iq)
+      end associate
+      row = row - matmul(f_i, z_iq)
+   end subroutine work_of_sector
 
    !> x = D^-1 (F_i - Z_iq q).
    function modes_of(basis, point, internal, q) result(x)

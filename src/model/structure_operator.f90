@@ -64,12 +64,15 @@ module fw_structure_operator
       procedure(list_modes), deferred :: held_modes
       procedure(sum_magnitudes), deferred :: magnitudes
       procedure(multiply_loads), deferred :: scale_loads
+      procedure(derive_observed), deferred :: observed_slope
+      procedure(find_load_work), deferred :: load_work
       procedure :: whole_size
       procedure :: condense_field
       procedure :: complete_field
       procedure :: observe_field
       procedure :: observe_back
       procedure :: change_field
+      procedure :: field_work
    end type structure_operator
 
    abstract interface
@@ -219,6 +222,28 @@ module fw_structure_operator
          class(structure_operator), intent(inout) :: self
          real(wp), intent(in) :: static, vibration
       end subroutine multiply_loads
+
+      !> Derivative of the observed quantities by omega at held coordinates: what the condensed part
+      !> makes of it (n_observed, n_retained).
+      subroutine derive_observed(self, state, q, slope)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         complex(wp), intent(in) :: q(:, :)
+         complex(wp), intent(out) :: slope(:, :)
+      end subroutine derive_observed
+
+      !> Work of the load in the h-th harmonic, F^H u of the whole field, its derivative by omega
+      !> at held coordinates, and its row by them (n_coordinates).
+      subroutine find_load_work(self, state, h, q, work, slope, row)
+         import :: structure_operator, structure_state, wp
+         class(structure_operator), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         integer, intent(in) :: h
+         complex(wp), intent(in) :: q(:)
+         complex(wp), intent(out) :: work, slope
+         complex(wp), intent(out) :: row(:)
+      end subroutine find_load_work
    end interface
 
 contains
@@ -311,5 +336,16 @@ contains
                  unused_field => field)
       end associate
    end subroutine change_field
+
+   !> F_1^H u of a field in the first harmonic.
+   pure complex(wp) function field_work(self, state, field) result(work)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: field(:, :)
+
+      work = (0.0_wp, 0.0_wp)
+      associate (unused => self, unused_state => state, unused_field => field)
+      end associate
+   end function field_work
 
 end module fw_structure_operator

@@ -21,14 +21,14 @@ module fw_plane_system
       !> A point of the plane.
       real(wp), allocatable, private :: x_0(:)
       !> The last point.
-      real(wp), allocatable, private :: x(:)
+      real(wp), allocatable :: x(:)
       real(wp), private :: p_0 = 0.0_wp
       !> b (n) and b_p.
-      real(wp), allocatable, private :: border(:)
-      real(wp), private :: border_p = 0.0_wp
+      real(wp), allocatable :: border(:)
+      real(wp) :: border_p = 0.0_wp
       !> dR/dp at the last point (n), the same in the linear problem, and g_p there.
-      real(wp), allocatable, private :: slope(:), column(:)
-      real(wp), private :: corner_p = 0.0_wp
+      real(wp), allocatable :: slope(:), column(:)
+      real(wp) :: corner_p = 0.0_wp
       !> Scratch (n), (n_linear_inner).
       real(wp), allocatable, private :: whole(:), nothing(:)
    contains

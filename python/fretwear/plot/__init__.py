@@ -15,6 +15,7 @@ from .disks import plot_nodal_diameters, plot_safe, plot_wave
 from .flanks import plot_flanks
 from .kinds import KINDS, Choices, Kind, fitting
 from .mode import plot_mode
+from .resonance import plot_resonance
 from .response import (
     Response,
     friction_damping,
@@ -30,6 +31,7 @@ from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
            "half_power_damping", "main", "plot_backbone", "plot_campbell", "plot_convergence",
            "plot_cycle", "plot_damping", "plot_flanks", "plot_harmonics", "plot_hysteresis",
-           "plot_mode", "plot_nodal_diameters", "plot_response", "plot_responses", "plot_safe",
-           "plot_sensitivity", "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution",
-           "plot_wear_maps", "read_damping", "read_response"]
+           "plot_mode", "plot_nodal_diameters", "plot_resonance", "plot_response",
+           "plot_responses", "plot_safe", "plot_sensitivity", "plot_table", "plot_wave",
+           "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps", "read_damping",
+           "read_response"]

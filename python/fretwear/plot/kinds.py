@@ -14,6 +14,7 @@ from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave, rotation_speed
 from .flanks import plot_flanks
 from .mode import plot_mode
+from .resonance import plot_resonance
 from .response import plot_response
 from .sensitivity import plot_sensitivity
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
@@ -66,13 +67,17 @@ def _is_mode(result: Result) -> bool:
     return "mode/damping_ratio" in result
 
 
+def _is_resonance(result: Result) -> bool:
+    return "resonance/value" in result
+
+
 def _has_cycle(result: Result) -> bool:
     """Whether there are pairs that have a period to show."""
     if "contact/force" not in result or not (
             result.converged.any() or "history/force" in result):
         return False
-    # The contact of a nonlinear mode cannot be asked for again.
-    if _is_mode(result):
+    # The contact of a nonlinear mode, or of other values of a parameter, cannot be asked for again.
+    if _is_mode(result) or _is_resonance(result):
         return False
     # A wear analysis has one row of both for each of its steps.
     return "wear/depth" not in result or len(result.depth) == result.n_points
@@ -87,7 +92,7 @@ KINDS: dict[str, Kind] = {
     "response": Kind(
         "Frequency response",
         lambda r: ("omega" in r and r.n_points > 1 and "wear/depth" not in r
-                   and not _is_mode(r)),
+                   and not (_is_mode(r) or _is_resonance(r))),
         lambda r, c: plot_response(r, c.observe, linear=c.linear, modal_mass=c.modal_mass)),
     "cycle": Kind(
         "One cycle", lambda r: "coefficients" in r and r.n_points > 0 and (
@@ -115,6 +120,7 @@ KINDS: dict[str, Kind] = {
                  lambda r, c: plot_safe(r, c.speed)),
     "mode": Kind("Nonlinear mode", _is_mode, lambda r, c: plot_mode(r)),
     "backbone": Kind("Backbone of the mode", _is_mode, lambda r, c: plot_backbone(r, c.observe)),
+    "resonance": Kind("Resonance over a parameter", _is_resonance, lambda r, c: plot_resonance(r)),
     "sensitivity": Kind(
         "What the parameters do", lambda r: _has("sensitivity/value/first_harmonic")(r) or _has(
             "sensitivity/value/dissipation")(r),

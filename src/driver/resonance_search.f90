@@ -1,0 +1,159 @@
+!> A maximum of the response near a point of it, and how far it lies from others: Newton's method
+!> on dQ/ds along the curve, which folds do not stop; uphill where Q is not yet rounded.
+module fw_resonance_search
+   use fw_error, only: error_type
+   use fw_interrupt, only: stop_run
+   use fw_kinds, only: wp
+   use fw_newton, only: solver_report
+   use fw_response_curve, only: response_curve
+   implicit none (type, external)
+   private
+
+   public :: find_maximum, search_outcome
+   public :: outcome_found, outcome_unsolved, outcome_bound, outcome_minimum, outcome_words
+
+   !> What came of a search.
+   integer, parameter :: outcome_found = 1, outcome_unsolved = 2, outcome_bound = 3, &
+                         outcome_minimum = 4
+   character(*), parameter :: outcome_words(*) = &
+      [character(60) :: 'found', 'no solution was found near the one before', &
+       'the response is largest at a bound of &sweep, no resonance', &
+       'the response has no maximum there']
+
+   type :: search_outcome
+      integer :: kind = outcome_unsolved
+      !> Points that were looked at, and all iterations of Newton's method.
+      integer :: n_points = 0, iterations = 0
+      real(wp) :: residual = huge(1.0_wp)
+   end type search_outcome
+
+   !> Longest step: of omega over itself, of q over its size.
+   real(wp), parameter :: most_omega = 0.02_wp, most_moved = 0.3_wp
+   !> A step is the last below the first, or below the second where steps shrink no more.
+   real(wp), parameter :: arrived = 1.0e-10_wp, near = 1.0e-6_wp
+   !> Looks at most, and halvings of a step.
+   integer, parameter :: most_looks = 60, most_halvings = 8
+   !> Q may fall by this part, as round-off does.
+   real(wp), parameter :: round_off = 1.0e-10_wp
+
+contains
+
+   !> From the guess (q, omega) to a maximum of Q.
+   subroutine find_maximum(curve, guess, held, range, is_smooth, outcome, error)
+      type(response_curve), intent(inout) :: curve
+      real(wp), intent(in) :: guess(:)
+      !> Solve at the frequency of the guess first, not across the curve.
+      logical, intent(in) :: held
+      !> Lowest and highest frequency [rad/s].
+      real(wp), intent(in) :: range(2)
+      !> Whether the residual is smooth enough for the second derivative.
+      logical, intent(in) :: is_smooth
+      type(search_outcome), intent(out) :: outcome
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp), allocatable :: x(:), t(:), bend(:)
+      real(wp) :: ds, last, value
+      logical :: done
+      integer :: k
+
+      call solve_at(curve, guess, held, report, outcome, error)
+      if (allocated(error) .or. .not. report%converged) return
+      last = huge(1.0_wp)
+      do k = 1, most_looks
+         call curve%look(done, error)
+         if (allocated(error) .or. .not. done) return
+         outcome%n_points = outcome%n_points + 1
+         if (k > 1 .and. .not. is_smooth) call take_secant(curve, t, ds)
+         ds = step_of(curve)
+         if (abs(ds) <= arrived .or. (abs(ds) <= near .and. abs(ds) > 0.3_wp*last)) exit
+         last = abs(ds)
+         x = curve%x
+         t = curve%t
+         bend = curve%bend
+         value = curve%q%value
+         call go(curve, x, t, bend, value, ds, report, outcome, error)
+         if (allocated(error) .or. .not. report%converged) return
+         if (curve%omega() < range(1) .or. curve%omega() > range(2)) then
+            outcome%kind = outcome_bound
+            return
+         end if
+      end do
+      outcome%kind = outcome_found
+      if (k > most_looks) outcome%kind = outcome_unsolved
+      if (.not. curve%second < 0.0_wp) outcome%kind = outcome_minimum
+   end subroutine find_maximum
+
+   !> To the zero of dQ/ds where Q is rounded, else uphill, no further than steps may go.
+   pure real(wp) function step_of(curve) result(ds)
+      type(response_curve), intent(in) :: curve
+      real(wp) :: longest
+
+      longest = min(most_moved, most_omega*curve%omega()/max(abs(curve%t(size(curve%t))), &
+                                                            tiny(1.0_wp)))
+      if (curve%second < 0.0_wp) then
+         ds = max(-longest, min(longest, -curve%slope/curve%second))
+      else
+         ds = sign(longest, curve%slope)
+      end if
+   end function step_of
+
+   !> Laws that decide at instants have no second derivatives: that of Q between the last points.
+   subroutine take_secant(curve, before, ds)
+      type(response_curve), intent(inout) :: curve
+      !> Direction at the last point, and the step from there.
+      real(wp), intent(in) :: before(:), ds
+      real(wp) :: slope
+
+      ! Both lengths are sizes of the same point, all but.
+      if (.not. abs(ds) > 0.0_wp) return
+      slope = curve%slope_before*sign(1.0_wp, dot_product(before, curve%t))
+      curve%second = (curve%slope - slope)/(ds*sign(1.0_wp, dot_product(before, curve%t)))
+   end subroutine take_secant
+
+   !> One step, halved until a solution is found that is not lower.
+   subroutine go(curve, x, t, bend, value, ds, report, outcome, error)
+      type(response_curve), intent(inout) :: curve
+      real(wp), intent(in) :: x(:), t(:), bend(:), value
+      real(wp), intent(inout) :: ds
+      type(solver_report), intent(out) :: report
+      type(search_outcome), intent(inout) :: outcome
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: guess(size(x))
+      integer :: k
+
+      do k = 0, most_halvings
+         guess = x + ds*t
+         ! The bend is worth taking where it is a correction.
+         if (0.5_wp*ds**2*curve%size_of(bend) < abs(ds)) guess = guess + 0.5_wp*ds**2*bend
+         call solve_at(curve, guess, .false., report, outcome, error)
+         if (allocated(error)) return
+         if (report%converged) then
+            if (curve%size_of(curve%x - x) <= 3.0_wp*abs(ds) .and. &
+                curve%value_at() >= (1.0_wp - round_off)*value) return
+         end if
+         ds = 0.5_wp*ds
+         report%converged = .false.
+      end do
+      ! Nothing higher beside it: as good as there.
+      if (abs(ds) <= near) then
+         call solve_at(curve, x, .false., report, outcome, error)
+      end if
+   end subroutine go
+
+   subroutine solve_at(curve, guess, held, report, outcome, error)
+      type(response_curve), intent(inout) :: curve
+      real(wp), intent(in) :: guess(:)
+      logical, intent(in) :: held
+      type(solver_report), intent(out) :: report
+      type(search_outcome), intent(inout) :: outcome
+      type(error_type), allocatable, intent(out) :: error
+
+      call stop_run(curve%state%interrupt, error)
+      if (allocated(error)) return
+      call curve%correct(guess, report, error, held)
+      outcome%iterations = outcome%iterations + report%iterations
+      outcome%residual = report%residual
+      if (report%interrupted) call stop_run(curve%state%interrupt, error)
+   end subroutine solve_at
+
+end module fw_resonance_search

@@ -1,0 +1,358 @@
+!> Analysis 'resonance': a resonance as a function of a parameter.
+module fw_run_resonance
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_case, only: case_type
+   use fw_continuation, only: arclength_type
+   use fw_continuation, only: branch_point
+   use fw_error, only: error_type
+   use fw_error, only: status_stopped
+   use fw_kinds, only: pi
+   use fw_kinds, only: wp
+   use fw_model, only: model_type
+   use fw_observer, only: observer_type
+   use fw_parameters, only: parameter_words
+   use fw_point, only: point_type
+   use fw_point, only: served_by_arclength
+   use fw_point, only: served_by_newton
+   use fw_recovery, only: recover_point
+   use fw_resonance_group, only: resonance_row
+   use fw_resonance_group, only: resonance_table
+   use fw_resonance_options, only: condition_phase
+   use fw_resonance_remarks, only: remark_resonance
+   use fw_resonance_search, only: outcome_found
+   use fw_resonance_search, only: outcome_words
+   use fw_resonance_track, only: resonance_track
+   use fw_result, only: result_writer
+   use fw_run_state, only: run_state
+   use fw_sinks, only: observer_sink
+   use fw_sinks, only: sink_list
+   use fw_sinks, only: summary_sink
+   use fw_sinks, only: writer_sink
+   use fw_solver_options, only: continuation_arclength
+   use fw_summary, only: summary_type
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: run_resonance
+
+   !> A track at work.
+   type :: resonance_run
+      type(resonance_track) :: track
+      type(resonance_table) :: table
+      type(sink_list) :: sinks
+      type(observer_sink) :: to_observer
+      integer(int64) :: clock = 0
+      !> Largest change between points that no predictor explained.
+      real(wp) :: surprise = 0.0_wp
+   end type resonance_run
+
+contains
+
+   !> Follow the resonance from the first value to the last.
+   subroutine run_resonance(case, observer, writer, summary, state, error)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(result_writer), intent(inout), target :: writer
+      type(summary_type), intent(inout), target :: summary
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(resonance_run), allocatable, target :: run
+      type(writer_sink), target :: to_file
+      type(summary_sink), target :: to_summary
+      character(:), allocatable :: derivatives
+
+      allocate (run)
+      call run%track%start(case, error)
+      if (allocated(error)) return
+      to_file%writer => writer
+      to_summary%summary => summary
+      run%to_observer%observer => observer
+      if (case%resonance%continuation /= continuation_arclength) then
+         run%to_observer%n_points = case%resonance%n_points
+      end if
+      call run%sinks%add(to_file)
+      call run%sinks%add(to_summary)
+      call run%sinks%add(run%to_observer)
+      call observer%on_start(case%title, run%to_observer%n_points)
+      call system_clock(run%clock)
+      call follow(case, run, observer, summary, state, error)
+      if (allocated(error)) then
+         if (error%status == status_stopped) then
+            deallocate (error)
+            state%was_stopped = .true.
+            state%is_incomplete = .true.
+         end if
+      end if
+      call observer%on_end()
+      if (allocated(error)) return
+      call writer%add_resonance(run%table, case%resonance, case%model%unit_system, error)
+      associate (level => run%track%strategy%level)
+         call run%track%curve%linear%add_work(level%solver%method%newton%linear)
+         call run%track%curve%linear%add_work(run%track%curve%newton%linear)
+         call run%track%curve%linear%add_work(run%track%newton%linear)
+         call summary%describe_work(level%system, run%track%curve%linear, case%solver%kind, &
+                                    state%all_converged())
+      end associate
+      call summary%describe_resonance(run%table, case)
+      associate (solver => run%track%strategy%level%solver%sensitivity, &
+                 system => run%track%strategy%level%system)
+         call solver%describe(derivatives)
+         call summary%describe_sensitivity(derivatives)
+         call solver%remark(case, system, summary%remarks)
+      end associate
+   end subroutine run_resonance
+
+   !> The first resonance, and on from there.
+   subroutine follow(case, run, observer, summary, state, error)
+      type(case_type), intent(in) :: case
+      type(resonance_run), intent(inout), target :: run
+      class(observer_type), intent(inout), target :: observer
+      type(summary_type), intent(inout) :: summary
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+
+      call run%track%find_first(observer, error)
+      if (allocated(error)) return
+      if (run%track%outcome%kind /= outcome_found) then
+         call observer%on_message('no resonance to follow at '//place(case, run%track%mover%value) &
+                                  //': '//trim(outcome_words(run%track%outcome%kind))//'; give '// &
+                                  '&sweep a range with a maximum inside, or more points')
+         state%is_incomplete = .true.
+         call add_row(case, run, .false., served_by_newton, state, error)
+         return
+      end if
+      if (case%resonance%continuation == continuation_arclength) then
+         call along_branch(case, run, observer, state, error)
+      else
+         call along_values(case, run, observer, state, error)
+      end if
+      if (.not. allocated(error)) call remark_resonance(case, run%track, run%table, observer, &
+                                                        summary%remarks, error)
+   end subroutine follow
+
+   !> Name and value of the parameter.
+   function place(case, value) result(text)
+      type(case_type), intent(in) :: case
+      real(wp), intent(in) :: value
+      character(:), allocatable :: text
+
+      text = trim(parameter_words(case%resonance%parameter))//' = '//to_text(value)
+   end function place
+
+   !> Points at given values.
+   subroutine along_values(case, run, observer, state, error)
+      type(case_type), intent(in) :: case
+      type(resonance_run), intent(inout), target :: run
+      class(observer_type), intent(inout), target :: observer
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: reached
+      integer :: k
+
+      call add_row(case, run, .true., served_by_newton, state, error)
+      do k = 2, case%resonance%n_points
+         if (allocated(error)) return
+         call run%track%reach(case%resonance%value_of(k), reached, error)
+         if (allocated(error)) return
+         if (run%track%outcome%kind /= outcome_found) then
+            call end_early(case, observer, state, reached, &
+                           trim(outcome_words(run%track%outcome%kind)))
+            ! States are those of the last value that was reached.
+            call run%track%bring(reached, error)
+            return
+         end if
+         run%surprise = max(run%surprise, run%track%surprise)
+         call add_row(case, run, .true., served_by_newton, state, error)
+      end do
+   end subroutine along_values
+
+   !> Say where the resonance was lost short of its last value, and why it may have.
+   subroutine end_early(case, observer, state, value, reason)
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout) :: observer
+      type(run_state), intent(inout) :: state
+      real(wp), intent(in) :: value
+      character(*), intent(in) :: reason
+      character(:), allocatable :: why
+
+      state%is_incomplete = .true.
+      why = ''
+      if (case%resonance%continuation /= continuation_arclength) why = '; the resonance may '// &
+         "fold over the parameter, which condition = 'phase' with continuation = 'arclength' "// &
+         'follows, or leave the range of &sweep, from which it may go half its width'
+      call observer%on_message('the resonance was lost beyond '//place(case, value)//' of '// &
+                               to_text(case%resonance%end)//': '//reason//why)
+   end subroutine end_early
+
+   !> Points of the branch in the order in which it has them.
+   subroutine along_branch(case, run, observer, state, error)
+      type(case_type), intent(in) :: case
+      type(resonance_run), intent(inout), target :: run
+      class(observer_type), intent(inout), target :: observer
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(arclength_type) :: branch
+      type(branch_point) :: found
+      real(wp) :: y(size(run%track%x))
+      logical :: more
+
+      call add_row(case, run, .true., served_by_arclength, state, error)
+      if (allocated(error)) return
+      associate (r => case%resonance, track => run%track)
+         branch%options = track%newton%options
+         branch%start = r%coordinate_of(r%start)
+         branch%finish = r%coordinate_of(r%end)
+         branch%max_points = r%max_points
+         branch%step = 1.0_wp/real(r%n_points - 1, wp)
+         branch%longest = min(branch%longest, branch%step)
+         call track%phase%pack_point(track%x, y)
+         call branch%begin(track%phase, y, error)
+         do while (.not. allocated(error))
+            call branch%next(track%phase, found, more, error)
+            if (allocated(error) .or. .not. more) exit
+            call track%phase%set_parameter(found%p, error)
+            if (allocated(error)) exit
+            call track%phase%pack_point(found%x, track%x, back=.true.)
+            track%outcome%iterations = found%report%iterations
+            track%outcome%residual = found%report%residual
+            call add_branch_row(case, run, found, state, error)
+         end do
+         call track%newton%linear%add_work(branch%corrector%linear)
+         if (allocated(error) .or. branch%complete) return
+         call end_early(case, observer, state, track%mover%value, branch%ending)
+      end associate
+   end subroutine along_branch
+
+   !> The other states come to the value of a point first.
+   subroutine add_branch_row(case, run, found, state, error)
+      type(case_type), intent(in) :: case
+      type(resonance_run), intent(inout), target :: run
+      type(branch_point), intent(in) :: found
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      logical :: done
+
+      associate (track => run%track)
+         call track%curve%renew(track%strategy%level%system)
+         call track%renew_system()
+         track%curve%x = track%x
+         call track%curve%look(done, error)
+         if (allocated(error)) return
+         call add_row(case, run, found%report%converged, served_by_arclength, state, error)
+         if (allocated(error)) return
+         call track%phase%set_parameter(found%p, error)
+      end associate
+   end subroutine add_branch_row
+
+   !> A point of the result from the present resonance.
+   subroutine add_row(case, run, converged, served_by, state, error)
+      type(case_type), intent(in) :: case
+      type(resonance_run), intent(inout), target :: run
+      logical, intent(in) :: converged
+      integer, intent(in) :: served_by
+      type(run_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: point
+      type(resonance_row) :: row
+      real(wp), allocatable :: r(:)
+      integer(int64) :: now, rate
+      integer :: n
+
+      associate (track => run%track, system => run%track%strategy%level%system)
+         n = system%n
+         if (track%x(n + 1) <= 0.0_wp) return
+         call system%set_frequency(track%x(n + 1), error)
+         if (allocated(error)) return
+         allocate (r(n))
+         call system%residual(track%x(:n), r)
+         point%omega = track%x(n + 1)
+         point%converged = converged
+         point%residual = norm2(r)/system%reference
+         point%iterations = track%iterations
+         track%iterations = 0
+         if (converged) point%served_by = served_by
+         call recover_point(system, track%x(:n), case%harmonics%n_harmonics, case%output%contact, &
+                            point)
+         point%n_harmonics = case%harmonics%n_harmonics
+         point%n_time = system%problem%fourier%n_time
+         row%parameter = track%mover%value
+         row%omega = point%omega
+         row%converged = converged
+         row%first_harmonic = norm2(point%coefficients(2:3, 1))
+         row%value = track%curve%q%value
+         row%phase = phase_of(track%mover%case%model, point)
+         row%curvature = ieee_value(1.0_wp, ieee_quiet_nan)
+         if (converged) row%curvature = track%curve%curvature()
+         if (converged .and. case%sensitivity%is_wanted()) then
+            call differentiate(track, point, error)
+            if (allocated(error)) return
+         end if
+      end associate
+      call system_clock(now, rate)
+      point%seconds = real(now - run%clock, wp)/real(rate, wp)
+      run%clock = now
+      call run%sinks%take(point, error)
+      if (allocated(error)) return
+      call state%note(point)
+      call run%table%add(row)
+   end subroutine add_row
+
+   !> Derivatives along the resonance.
+   subroutine differentiate(track, point, error)
+      type(resonance_track), intent(inout), target :: track
+      type(point_type), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: by_omega(:), omega_by(:), unused(:)
+      logical :: done
+
+      associate (case => track%mover%case, level => track%strategy%level, &
+                 solver => track%strategy%level%solver%sensitivity, n => size(track%x) - 1)
+         call solver%renew(case)
+         call solver%find(case, level%system, track%x(:n), point, error)
+         if (allocated(error)) return
+         allocate (omega_by(size(solver%finder%parameters)))
+         allocate (unused, mold=omega_by)
+         ! Along the response first: the phase takes the state, which the curve has factored for.
+         call track%curve%rows_by_frequency(solver%finder, by_omega, error)
+         if (allocated(error)) return
+         if (case%resonance%condition == condition_phase) then
+            call track%phase%move_parameters(track%x, solver%finder%parameters, &
+                                             track%newton%linear, omega_by, done, error)
+         else
+            call track%curve%move_parameters(solver%finder%parameters, omega_by, unused, done, &
+                                             error)
+         end if
+         if (allocated(error)) return
+         if (.not. done) omega_by = ieee_value(1.0_wp, ieee_quiet_nan)
+         call solver%follow(case, by_omega, omega_by, point)
+      end associate
+   end subroutine differentiate
+
+   !> How far the first observed quantity is behind the load, in harmonic 1, where this is largest
+   !> [rad], in (-pi, pi].
+   pure real(wp) function phase_of(model, point) result(phase)
+      type(model_type), intent(in) :: model
+      type(point_type), intent(in) :: point
+      complex(wp) :: load(size(model%load_cosine))
+      integer :: i, w
+
+      load = cmplx(model%load_cosine, -model%load_sine, wp)
+      do w = 1, model%waves%n_waves()
+         if (model%waves%harmonic(w) /= 1) cycle
+         load = load + model%waves%factor(w, 1, point%omega)* &
+                cmplx(model%load_wave(:, 2*w - 1), -model%load_wave(:, 2*w), wp)
+      end do
+      phase = 0.0_wp
+      if (size(load) == 0) return
+      i = maxloc(abs(load), dim=1)
+      if (.not. abs(load(i)) > 0.0_wp) return
+      associate (u => cmplx(point%coefficients(2, 1), -point%coefficients(3, 1), wp))
+         if (abs(u) > 0.0_wp) phase = atan2(aimag(load(i)*conjg(u)), real(load(i)*conjg(u), wp))
+      end associate
+      if (phase <= -pi) phase = phase + 2.0_wp*pi
+   end function phase_of
+
+end module fw_run_resonance

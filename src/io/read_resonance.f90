@@ -1,0 +1,173 @@
+!> Group &resonance: which parameter a resonance is followed over, and whether the case has it.
+module fw_read_resonance
+   use fw_case, only: analysis_resonance, case_type
+   use fw_contact_data, only: memory_carried
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_harmonics_options, only: method_hbm
+   use fw_kinds, only: wp
+   use fw_parameter_checks, only: check_parameter
+   use fw_parameter_values, only: get_parameter
+   use fw_parameters, only: friction_coefficient, harmonic_scale, modal_damping, normal_load, &
+                            normal_stiffness, parameter_words, rotation_speed, static_scale, &
+                            tangential_stiffness
+   use fw_reader, only: reader_type
+   use fw_resonance_options, only: as_factor, condition_phase, resonance_options, &
+                                   spacing_log
+   use fw_solver_options, only: continuation_arclength, jacobian_analytic, solver_newton
+   use fw_values, only: number_text
+   implicit none (type, external)
+   private
+
+   public :: read_resonance, check_resonance
+
+   character(*), parameter :: group = 'resonance'
+
+contains
+
+   !> The keys, read before the model, which keeps what its matrices change by.
+   subroutine read_resonance(reader, analysis, options, varied)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: analysis
+      type(resonance_options), intent(inout) :: options
+      !> The parameter that changes from point to point; left alone where none does.
+      integer, intent(inout) :: varied
+
+      call options%bind_keys(reader, analysis == analysis_resonance)
+      if (analysis /= analysis_resonance) return
+      varied = options%parameter
+      if (.not. reader%given(group, 'parameter')) then
+         call reader%refuse(group, 'parameter', "is missing: name what the resonance is "// &
+                            "followed over, such as 'load%harmonic_scale' or "// &
+                            "'contact%normal_load'")
+      end if
+      if (options%continuation == continuation_arclength .and. &
+          options%condition /= condition_phase) then
+         call reader%refuse(group, 'continuation', "= 'arclength' goes with condition = "// &
+                            "'phase': give that, or continuation = 'natural'")
+      end if
+      call check_ends(reader, options)
+   end subroutine read_resonance
+
+   !> Ends that differ, with signs that go with the parameter and with the spacing.
+   subroutine check_ends(reader, options)
+      type(reader_type), intent(inout) :: reader
+      type(resonance_options), intent(in) :: options
+
+      if (.not. (reader%given(group, 'start') .and. reader%given(group, 'end'))) return
+      associate (low => min(options%start, options%end))
+         if (abs(options%end - options%start) <= epsilon(1.0_wp)*abs(options%start)) then
+            call reader%refuse(group, 'end', '= '//number_text(options%end)//': must differ '// &
+                               'from start')
+         else if (options%spacing == spacing_log .and. .not. low > 0.0_wp) then
+            call reader%refuse(group, 'spacing', "= 'log': start and end must be above 0; use "// &
+                               "'linear'")
+         else if (needs_more(options) .and. .not. low > 0.0_wp) then
+            call reader%refuse(group, 'start', 'and end must be above 0: '// &
+                               trim(parameter_words(options%parameter))//' is a factor or a '// &
+                               'stiffness')
+         else if (is_never_below(options) .and. low < 0.0_wp) then
+            call reader%refuse(group, 'start', 'and end must be at least 0: '// &
+                               trim(parameter_words(options%parameter))//' is never below')
+         end if
+      end associate
+   end subroutine check_ends
+
+   pure logical function needs_more(options)
+      type(resonance_options), intent(in) :: options
+
+      needs_more = any(options%parameter == [harmonic_scale, static_scale, tangential_stiffness, &
+                                             normal_stiffness])
+   end function needs_more
+
+   pure logical function is_never_below(options)
+      type(resonance_options), intent(in) :: options
+
+      is_never_below = any(options%parameter == [friction_coefficient, normal_load, &
+                                                 modal_damping, rotation_speed])
+   end function is_never_below
+
+   !> Refuse what a resonance over a parameter cannot be made of.
+   subroutine check_resonance(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: values(:)
+      character(len(parameter_words)) :: name
+
+      if (case%analysis /= analysis_resonance) return
+      call check_combination(case, error)
+      if (.not. allocated(error)) call check_parameter(case, case%resonance%parameter, &
+                                                       'resonance%parameter', error)
+      if (.not. allocated(error)) call check_load(case, error)
+      if (allocated(error)) return
+      call get_parameter(case, case%resonance%parameter, values)
+      name = parameter_words(case%resonance%parameter)
+      if (case%resonance%as == as_factor) then
+         if (any(abs(values) > 0.0_wp)) return
+         call fatal_error(error, "resonance%as = 'factor': "//trim(name)//' is 0 in the case, '// &
+                          "and so is every multiple of it; give as = 'value'", status_input)
+      else if (maxval(values) - minval(values) > epsilon(1.0_wp)*maxval(abs(values))) then
+         call fatal_error(error, "resonance%as = 'value': "//trim(name)//' differs from pair '// &
+                          "to pair (or spring to spring); give as = 'factor', which changes "// &
+                          'all of them together', status_input)
+      end if
+   end subroutine check_resonance
+
+   subroutine check_combination(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: with = " does not go with case%analysis = 'resonance': "
+      character(:), allocatable :: text
+
+      if (case%harmonics%method /= method_hbm) then
+         text = 'harmonics%method'//with//"use 'hbm'"
+      else if (case%harmonics%adaptive) then
+         text = 'harmonics%adaptive = .true.'//with//'give n_harmonics'
+      else if (case%harmonics%accuracy > 0.0_wp) then
+         text = 'harmonics%accuracy'//with//'give n_harmonics'
+      else if (case%solver%kind /= solver_newton) then
+         text = 'solver%kind'//with//"use 'newton'"
+      else if (case%solver%jacobian /= jacobian_analytic) then
+         text = "solver%jacobian = 'difference'"//with//"use 'analytic'"
+      else if (case%contact%memory == memory_carried .and. case%contact%n_pairs > 0) then
+         text = "contact%memory = 'carried'"//with//"use 'assembly'"
+      else if (case%output%histories) then
+         text = 'output%histories'//with//'leave it out'
+      else if (case%output%tail > 0) then
+         text = 'output%tail'//with//'take more n_harmonics'
+      else if (case%sweep%continuation == continuation_arclength) then
+         text = "sweep%continuation = 'arclength'"//with//"&sweep is where the first resonance "// &
+                "is looked for: use 'natural' (resonance%continuation follows folds)"
+      else if (case%sweep%stability) then
+         text = 'sweep%stability = .true.'//with//'leave it out'
+      else if (.not. abs(case%sweep%end - case%sweep%start) > 0.0_wp .or. &
+               case%sweep%n_points < 3) then
+         text = 'sweep%start, end and n_points must be a range of three points at least: a '// &
+                'resonance is looked for in it'
+      end if
+      if (allocated(text)) call fatal_error(error, text, status_input)
+   end subroutine check_combination
+
+   !> Without vibration there is no resonance; nor does a load of other harmonics do work in the
+   !> first.
+   subroutine check_load(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      logical :: acts, in_first
+
+      if (case%model%cyclic%is_cyclic) return
+      acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. any(abs(case%model%load_sine) > 0.0_wp)
+      in_first = acts
+      if (allocated(case%model%load_wave)) then
+         acts = acts .or. any(abs(case%model%load_wave) > 0.0_wp)
+         in_first = in_first .or. any(case%model%waves%harmonic == 1)
+      end if
+      if (.not. acts) then
+         call fatal_error(error, "case%analysis = 'resonance' needs a vibratory load: set "// &
+                          'load%cosine or load%sine', status_input)
+      else if (.not. in_first .and. case%resonance%condition == condition_phase) then
+         call fatal_error(error, "resonance%condition = 'phase': no load acts in harmonic 1; "// &
+                          "use 'amplitude'", status_input)
+      end if
+   end subroutine check_load
+
+end module fw_read_resonance
