@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint keys docs clean
-.PHONY: fuzz wheel ways sensitivities calibration stops
+.PHONY: fuzz wheel ways sensitivities resonances calibration stops
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -156,6 +156,10 @@ calibration: build ## parameters of 100 noisy measurements found again, in docs/
 
 sensitivities: build ## derivatives of 200 random cases against differences, in docs/robustness.md
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/sensitivity_family.py -o docs/robustness.md
+
+resonances: build ## resonances of 60 random cases over a parameter against sweeps, in docs/robustness.md
+	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/resonance/resonance_family.py \
+	   -o docs/robustness.md
 
 scars: build ## steady states of wear against a march of cycles, also of a program BEFORE
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/fretting/steady_states.py \

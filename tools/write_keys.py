@@ -14,6 +14,7 @@ import json
 import re
 import subprocess
 import sys
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -140,6 +141,19 @@ def annotation(name: str, key: dict[str, Any]) -> str:
             "list": "str | int | Sequence[str | int]"}[key["type"]]
 
 
+def wrapped(start: str, words: str, end: str = "") -> list[str]:
+    """A declaration in lines that are not too long."""
+    lines, line, indent = [], start, " " * (start.rindex(" ") + 1 + len("Literal["))
+    for k, word in enumerate(parts := words.split(", ")):
+        last = k == len(parts) - 1
+        text = word + (end if last else ",")
+        if k and len(line) + len(text) + 1 > WIDTH:
+            lines.append(line.rstrip())
+            line = indent
+        line += text if line in (start, indent) else f" {text}"
+    return [*lines, line]
+
+
 def comment(key: dict[str, Any]) -> list[str]:
     """Unit, default and help, as lines that the reference takes up."""
     text = f"[{key['unit']}] " if key.get("unit", "unit") != "unit" else ""
@@ -173,10 +187,20 @@ def settings(groups: Keys) -> str:
             line += f', "{name}"'
     text = [SETTINGS_HEAD, *lines, line + "]"]
     for group, content in groups.items():
-        text += ["", "", f"class {names[group]}(TypedDict, total=False):",
+        # Keys that are words of Python need the other form of declaration.
+        reserved = {name: key for name, key in content["keys"].items() if iskeyword(name)}
+        base = "TypedDict"
+        if reserved:
+            base = f"_{names[group]}"
+            text += ["", "", f'{base} = TypedDict("{base}", {{']
+            for name, key in reserved.items():
+                text += [*comment(key), *wrapped(f'    "{name}": ', annotation(name, key), ",")]
+            text += ["}, total=False)"]
+        text += ["", "", f"class {names[group]}({base}, total=False):",
                  f'    """Group &{group}: {content["help"]}."""', ""]
         for name, key in content["keys"].items():
-            text += [*comment(key), f"    {name}: {annotation(name, key)}"]
+            if name not in reserved:
+                text += [*comment(key), *wrapped(f"    {name}: ", annotation(name, key))]
     text += ["", "", "class Groups(TypedDict, total=False):",
              '    """All groups; `model` is the one that `structure` stands for where a model is '
              'an argument."""', ""]

@@ -22,14 +22,20 @@ module fw_resonance_remarks
 contains
 
    !> After the last point.
-   subroutine remark_resonance(case, track, table, observer, remarks, error)
+   subroutine remark_resonance(case, track, table, n_corners, observer, remarks, error)
       type(case_type), intent(in) :: case
       type(resonance_track), intent(inout), target :: track
       type(resonance_table), intent(in) :: table
+      !> Points at which the maximum is a corner.
+      integer, intent(in) :: n_corners
       class(observer_type), intent(inout), target :: observer
       type(remark_list), intent(inout) :: remarks
       type(error_type), allocatable, intent(out) :: error
 
+      if (n_corners > 0) call remarks%add('corner at the resonance', 'at '// &
+         to_text(n_corners)//' of '//to_text(table%n)//' points the response has a corner at '// &
+         'its maximum (a pair changes its state there, or contact is decided at instants): '// &
+         'frequencies are good to a millionth, and have no derivative')
       call remark_optimum(case, table, remarks)
       call remark_other_peak(case, track, table, observer, remarks, error)
    end subroutine remark_resonance

@@ -25,7 +25,19 @@ module fw_resonance_search
       !> Points that were looked at, and all iterations of Newton's method.
       integer :: n_points = 0, iterations = 0
       real(wp) :: residual = huge(1.0_wp)
+      !> The maximum is a corner: Q rises up to it and falls behind.
+      logical :: is_corner = .false.
    end type search_outcome
+
+   !> Points (q, omega) on either side of a maximum.
+   type :: bracket_type
+      real(wp), allocatable :: low(:), high(:)
+   contains
+      procedure :: take => take_point
+      procedure :: is_closed
+      procedure :: width
+      procedure :: middle
+   end type bracket_type
 
    !> Longest step: of omega over itself, of q over its size.
    real(wp), parameter :: most_omega = 0.02_wp, most_moved = 0.3_wp
@@ -33,6 +45,8 @@ module fw_resonance_search
    real(wp), parameter :: arrived = 1.0e-10_wp, near = 1.0e-6_wp
    !> Looks at most, and halvings of a step.
    integer, parameter :: most_looks = 60, most_halvings = 8
+   !> Looks after which a bracket is halved.
+   integer, parameter :: most_free = 8
    !> Q may fall by this part, as round-off does.
    real(wp), parameter :: round_off = 1.0e-10_wp
 
@@ -51,8 +65,8 @@ contains
       type(search_outcome), intent(out) :: outcome
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      real(wp), allocatable :: x(:), t(:), bend(:)
-      real(wp) :: ds, last, value
+      type(bracket_type) :: bracket
+      real(wp) :: ds, last
       logical :: done
       integer :: k
 
@@ -63,15 +77,17 @@ contains
          call curve%look(done, error)
          if (allocated(error) .or. .not. done) return
          outcome%n_points = outcome%n_points + 1
-         if (k > 1 .and. .not. is_smooth) call take_secant(curve, t, ds)
+         call bracket%take(curve)
          ds = step_of(curve)
          if (abs(ds) <= arrived .or. (abs(ds) <= near .and. abs(ds) > 0.3_wp*last)) exit
          last = abs(ds)
-         x = curve%x
-         t = curve%t
-         bend = curve%bend
-         value = curve%q%value
-         call go(curve, x, t, bend, value, ds, report, outcome, error)
+         outcome%is_corner = bracket%width(curve) <= near
+         if (outcome%is_corner) exit
+         if (bracket%is_closed() .and. (k > most_free .or. .not. is_smooth)) then
+            call solve_at(curve, bracket%middle(), .false., report, outcome, error)
+         else
+            call go(curve, ds, report, outcome, error)
+         end if
          if (allocated(error) .or. .not. report%converged) return
          if (curve%omega() < range(1) .or. curve%omega() > range(2)) then
             outcome%kind = outcome_bound
@@ -80,8 +96,46 @@ contains
       end do
       outcome%kind = outcome_found
       if (k > most_looks) outcome%kind = outcome_unsolved
-      if (.not. curve%second < 0.0_wp) outcome%kind = outcome_minimum
+      if (.not. (curve%second < 0.0_wp .or. outcome%is_corner)) outcome%kind = outcome_minimum
    end subroutine find_maximum
+
+   !> Q rises at one point and falls at the other.
+   subroutine take_point(self, curve)
+      class(bracket_type), intent(inout) :: self
+      type(response_curve), intent(in) :: curve
+
+      if (curve%slope > 0.0_wp) then
+         self%low = curve%x
+      else
+         self%high = curve%x
+      end if
+   end subroutine take_point
+
+   pure logical function is_closed(self)
+      class(bracket_type), intent(in) :: self
+
+      is_closed = allocated(self%low) .and. allocated(self%high)
+      if (.not. is_closed) return
+      ! Of one branch, on which the direction is that of the frequency.
+      associate (n => size(self%low))
+         is_closed = self%low(n) < self%high(n)
+      end associate
+   end function is_closed
+
+   pure real(wp) function width(self, curve)
+      class(bracket_type), intent(in) :: self
+      type(response_curve), intent(in) :: curve
+
+      width = huge(1.0_wp)
+      if (self%is_closed()) width = curve%size_of(self%high - self%low)
+   end function width
+
+   pure function middle(self) result(x)
+      class(bracket_type), intent(in) :: self
+      real(wp), allocatable :: x(:)
+
+      x = 0.5_wp*(self%low + self%high)
+   end function middle
 
    !> To the zero of dQ/ds where Q is rounded, else uphill, no further than steps may go.
    pure real(wp) function step_of(curve) result(ds)
@@ -97,30 +151,21 @@ contains
       end if
    end function step_of
 
-   !> Laws that decide at instants have no second derivatives: that of Q between the last points.
-   subroutine take_secant(curve, before, ds)
-      type(response_curve), intent(inout) :: curve
-      !> Direction at the last point, and the step from there.
-      real(wp), intent(in) :: before(:), ds
-      real(wp) :: slope
-
-      ! Both lengths are sizes of the same point, all but.
-      if (.not. abs(ds) > 0.0_wp) return
-      slope = curve%slope_before*sign(1.0_wp, dot_product(before, curve%t))
-      curve%second = (curve%slope - slope)/(ds*sign(1.0_wp, dot_product(before, curve%t)))
-   end subroutine take_secant
-
    !> One step, halved until a solution is found that is not lower.
-   subroutine go(curve, x, t, bend, value, ds, report, outcome, error)
+   subroutine go(curve, ds, report, outcome, error)
       type(response_curve), intent(inout) :: curve
-      real(wp), intent(in) :: x(:), t(:), bend(:), value
       real(wp), intent(inout) :: ds
       type(solver_report), intent(out) :: report
       type(search_outcome), intent(inout) :: outcome
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: guess(size(x))
+      real(wp), allocatable :: x(:), t(:), bend(:), guess(:)
+      real(wp) :: value
       integer :: k
 
+      x = curve%x
+      t = curve%t
+      bend = curve%bend
+      value = curve%q%value
       do k = 0, most_halvings
          guess = x + ds*t
          ! The bend is worth taking where it is a correction.

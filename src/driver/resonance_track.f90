@@ -51,9 +51,8 @@ module fw_resonance_track
       integer :: kept = 0
       !> Step that served last.
       real(wp) :: step = huge(1.0_wp)
-      !> Iterations so far, and change of Q that no predictor explained, over Q, at the last point.
+      !> Iterations since the last point.
       integer :: iterations = 0
-      real(wp) :: surprise = 0.0_wp
    contains
       procedure :: start
       procedure :: find_first
@@ -243,7 +242,6 @@ contains
             done = self%outcome%kind == outcome_found
             if (done) done = self%curve%size_of(self%x - self%y(:, 1)) <= most_moved
             if (done) then
-               self%surprise = self%curve%size_of(self%x - guess)
                call remember(self, next)
                reached = r%value_at(next)
                self%step = growth*min(self%step, whole)

@@ -45,6 +45,8 @@ module fw_response_curve
    real(wp), parameter :: krylov_tolerance = 1.0e-12_wp
    !> Step of the differences, as a change of q over its size: its square is their error.
    real(wp), parameter :: difference = 3.0e-5_wp
+   !> Part of what is observed that q counts for at least.
+   real(wp), parameter :: smallest_share = 1.0e-3_wp
 
    type :: response_curve
       !> As in fw_response_quantity, of the first observed quantity.
@@ -54,8 +56,6 @@ module fw_response_curve
       type(response_quantity) :: q
       !> dQ/ds and d2Q/ds2.
       real(wp) :: slope = 0.0_wp, second = 0.0_wp
-      !> dQ/ds at the point that was looked at before.
-      real(wp) :: slope_before = 0.0_wp
       type(newton_solver) :: newton
       type(linear_step_type) :: linear
       type(balance_state), pointer :: state => null()
@@ -67,6 +67,8 @@ module fw_response_curve
       !> Amplitudes of the first observed quantity along t, and its second derivative (n_retained).
       complex(wp), allocatable, private :: u_s(:)
       real(wp), private :: step = 0.0_wp
+      !> Size of q, where that is next to nothing (rigid pairs that stick) of what is observed.
+      real(wp), private :: q_size = 1.0_wp
    contains
       procedure :: start
       procedure :: renew
@@ -134,8 +136,7 @@ contains
       integer :: n
 
       n = size(change) - 1
-      length = hypot(norm2(change(:n))/max(norm2(self%x(:n)), tiny(1.0_wp)), &
-                     change(n + 1)/self%x(n + 1))
+      length = hypot(norm2(change(:n))/self%q_size, change(n + 1)/self%x(n + 1))
    end function size_of
 
    !> Newton's method from a guess, in the plane across the curve through it, or at its frequency
@@ -154,6 +155,8 @@ contains
          if (held .and. allocated(self%border)) deallocate (self%border)
       end if
       self%x = guess
+      ! Of the point that was looked at last, else of the guess.
+      if (.not. allocated(self%t)) self%q_size = max(norm2(guess(:n)), tiny(1.0_wp))
       call self%state%set_frequency(guess(n + 1), error)
       if (allocated(error)) return
       call cut_across(self)
@@ -181,7 +184,7 @@ contains
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: r(self%state%n), rhs(self%state%n + 1)
-      real(wp) :: change(self%state%n, -1:1)
+      real(wp) :: change(self%state%n, -1:1), scale
       complex(wp), allocatable :: u(:), u_ss(:), side(:, :)
       integer :: k, n
 
@@ -199,9 +202,17 @@ contains
       rhs(n + 1) = -self%state%reference
       call self%linear%solve_prepared(self%plane, rhs, krylov_tolerance, self%t, done)
       if (.not. done) return
-      ! Forward is up in frequency, where that says something.
-      if (self%t(n + 1) < 0.0_wp) self%t = -self%t
-      self%t = self%t/self%size_of(self%t)
+      call amplitudes_at(self%state, self%x, u)
+      call self%q%take(self%kind, self%problem%fourier%harmonic, u)
+      if (.not. allocated(self%u_s)) allocate (self%u_s, mold=u)
+      call observe_along(self%state, self%x, self%t, self%u_s)
+      self%q_size = max(norm2(self%x(:n)), smallest_share*norm2(abs(u)), tiny(1.0_wp))
+      ! Of length one in what moves most. Forward is up in frequency, where that says something.
+      scale = 1.0_wp/max(self%size_of(self%t), norm2(abs(self%u_s))/max(norm2(abs(u)), &
+                                                                        tiny(1.0_wp)))
+      if (self%t(n + 1) < 0.0_wp) scale = -scale
+      self%t = scale*self%t
+      self%u_s = scale*self%u_s
       self%step = difference
       allocate (side(size(self%problem%fourier%harmonic), -1:1))
       do k = -1, 1, 2
@@ -214,14 +225,9 @@ contains
       rhs(n + 1) = 0.0_wp
       call self%linear%solve_prepared(self%plane, rhs, krylov_tolerance, self%bend, done)
       if (.not. done) return
-      call amplitudes_at(self%state, self%x, u)
-      call self%q%take(self%kind, self%problem%fourier%harmonic, u)
-      if (.not. allocated(self%u_s)) allocate (self%u_s, mold=u)
       allocate (u_ss, mold=u)
-      call observe_along(self%state, self%x, self%t, self%u_s)
       call observe_along(self%state, self%x, self%bend, u_ss)
       u_ss = u_ss + (side(:, 1) - side(:, -1))/(2.0_wp*self%step)
-      self%slope_before = self%slope
       self%slope = self%q%slope(self%u_s)
       self%second = self%q%second(self%u_s, self%u_s, u_ss)
       call turn_border(self)
@@ -238,13 +244,14 @@ contains
       value = q%value
    end function value_at
 
-   !> d2Q/d omega2 where dQ/ds vanishes.
+   !> d2Q/d omega2 along the curve.
    pure real(wp) function curvature(self)
       class(response_curve), intent(in) :: self
 
       associate (n => size(self%t))
          curvature = -huge(1.0_wp)
-         if (abs(self%t(n)) > 0.0_wp) curvature = self%second/self%t(n)**2
+         if (abs(self%t(n)) > 0.0_wp) curvature = &
+            (self%second - self%slope*self%bend(n)/self%t(n))/self%t(n)**2
       end associate
    end function curvature
 
@@ -255,7 +262,7 @@ contains
 
       n = self%state%n
       associate (r => self%state%reference, b => self%border)
-         b(:n) = r*self%t(:n)/max(norm2(self%x(:n)), tiny(1.0_wp))**2
+         b(:n) = r*self%t(:n)/self%q_size**2
          b(n + 1) = r*self%t(n + 1)/self%x(n + 1)**2
       end associate
    end subroutine turn_border

@@ -45,8 +45,8 @@ module fw_run_resonance
       type(sink_list) :: sinks
       type(observer_sink) :: to_observer
       integer(int64) :: clock = 0
-      !> Largest change between points that no predictor explained.
-      real(wp) :: surprise = 0.0_wp
+      !> Maxima that are corners.
+      integer :: n_corners = 0
    end type resonance_run
 
 contains
@@ -129,7 +129,8 @@ contains
       else
          call along_values(case, run, observer, state, error)
       end if
-      if (.not. allocated(error)) call remark_resonance(case, run%track, run%table, observer, &
+      if (.not. allocated(error)) call remark_resonance(case, run%track, run%table, &
+                                                        run%n_corners, observer, &
                                                         summary%remarks, error)
    end subroutine follow
 
@@ -164,7 +165,6 @@ contains
             call run%track%bring(reached, error)
             return
          end if
-         run%surprise = max(run%surprise, run%track%surprise)
          call add_row(case, run, .true., served_by_newton, state, error)
       end do
    end subroutine along_values
@@ -291,6 +291,7 @@ contains
             if (allocated(error)) return
          end if
       end associate
+      if (converged .and. run%track%outcome%is_corner) run%n_corners = run%n_corners + 1
       call system_clock(now, rate)
       point%seconds = real(now - run%clock, wp)/real(rate, wp)
       run%clock = now
@@ -326,7 +327,8 @@ contains
                                              error)
          end if
          if (allocated(error)) return
-         if (.not. done) omega_by = ieee_value(1.0_wp, ieee_quiet_nan)
+         ! At a corner the frequency has no derivative that a second one would give.
+         if (.not. done .or. track%outcome%is_corner) omega_by = ieee_value(1.0_wp, ieee_quiet_nan)
          call solver%follow(case, by_omega, omega_by, point)
       end associate
    end subroutine differentiate

@@ -16,7 +16,7 @@ module fw_records
       !> What is accepted, in words.
       character(:), allocatable :: accepts
       !> The words of a word.
-      character(24), allocatable :: words(:)
+      character(32), allocatable :: words(:)
       !> The default as namelist text; unallocated where there is none.
       character(:), allocatable :: default
       !> The value in effect as namelist text; unallocated where there is none.
