@@ -27,6 +27,8 @@ KEYS = {
     "wear": ["scheme", "law", "order", "coefficient", "n_cycles", "max_depth_step",
              "error_tolerance", "steady_tolerance", "max_steps", "check_steps", "follow_resonance"],
     "time": ["n_periods", "steps_per_period"],
+    "resonance": ["parameter", "start", "end", "n_points", "spacing", "as", "condition", "quantity",
+                  "continuation", "max_points"],
     "mode": ["number", "near", "unit", "start", "end", "control", "n_points", "continuation",
              "max_points", "synthesis"],
     "output": ["file", "histories", "contact", "tail", "observe"],
