@@ -47,19 +47,22 @@ contains
 
    !> The modes where the balance was evaluated last: at rest. Nothing of its structure is condensed
    !> in harmonic 1.
-   subroutine find_stuck_modes(system, modes, done, slides)
+   subroutine find_stuck_modes(system, modes, done, slides, harmonic)
       type(balance_state), intent(in) :: system
       type(stuck_modes), intent(out) :: modes
       !> False where a part has neither stiffness nor mass.
       logical, intent(out) :: done
       !> Pairs hold nothing tangentially (default: they do).
       logical, intent(in), optional :: slides
+      !> Place of the harmonic whose waves are meant, the first where it is not given.
+      integer, intent(in), optional :: harmonic
       logical, allocatable :: held(:)
       integer :: first, h, j, m
 
       associate (structure => system%problem%structure)
          m = structure%n_coordinates
          h = findloc(system%problem%fourier%harmonic, 1, dim=1)
+         if (present(harmonic)) h = harmonic
          allocate (modes%stiffness(m, m), modes%observe(structure%n_observed, m), held(m))
          allocate (modes%mass, modes%damping, mold=modes%stiffness)
          call structure%parts(h, modes%stiffness, modes%mass, modes%damping, modes%observe)

@@ -26,15 +26,21 @@ contains
       type(mode_table), intent(in) :: table
       type(remark_list), intent(inout) :: remarks
       character(:), allocatable :: text
-      integer :: n_found
+      integer :: h, n_found
 
       if (table%n == 0) return
       text = ''
       n_found = 0
-      call note_meetings(start, table, start%stuck_omega, 'stuck', start%sliding_omega(:0), text, &
-                         n_found)
-      call note_meetings(start, table, start%sliding_omega, 'sliding', start%stuck_omega, text, &
-                         n_found)
+      do h = 1, start%problem%fourier%n_retained
+         if (start%problem%fourier%harmonic(h) < 2) cycle
+         call note_meetings(start, table, h, start%met(h)%stuck, 'stuck', &
+                            start%met(h)%sliding(:0), text, n_found)
+      end do
+      do h = 1, start%problem%fourier%n_retained
+         if (start%problem%fourier%harmonic(h) < 2) cycle
+         call note_meetings(start, table, h, start%met(h)%sliding, 'sliding', &
+                            start%met(h)%stuck, text, n_found)
+      end do
       if (n_found == 0) return
       if (n_found > most_named) text = text//' and '//to_text(n_found - most_named)//' more'
       call remarks%add('internal resonance', text//': a narrow tongue of the curve may be '// &
@@ -42,33 +48,35 @@ contains
                        "'arclength' and more n_points")
    end subroutine remark_internal
 
-   !> Meetings of all harmonics with the modes of one kind.
-   subroutine note_meetings(start, table, omega, kind, known, text, n_found)
+   !> Meetings of a harmonic with the modes of one kind.
+   subroutine note_meetings(start, table, h, omega, kind, known, text, n_found)
       type(mode_start), intent(in) :: start
       type(mode_table), intent(in) :: table
+      integer, intent(in) :: h
       !> Frequencies of the modes, and those that were asked for already [rad/s].
       real(wp), intent(in) :: omega(:), known(:)
       !> How their pairs are.
       character(*), intent(in) :: kind
       character(:), allocatable, intent(inout) :: text
       integer, intent(inout) :: n_found
-      integer :: h, j, k, n
+      integer :: j, k, n
 
-      do h = 1, start%problem%fourier%n_retained
-         n = start%problem%fourier%harmonic(h)
-         if (n < 2) cycle
-         do j = 1, size(omega)
-            if (any(abs(known - omega(j)) <= near*omega(j))) cycle
-            k = meeting(table, real(n, wp), omega(j))
-            if (k == 0) cycle
-            n_found = n_found + 1
-            if (n_found > most_named) cycle
-            if (n_found > 1) text = text//', '
-            text = text//to_text(n)//' omega meets mode '//to_text(j)
-            if (start%problem%n_pairs > 0) text = text//' with '//kind//' pairs'
-            text = text//' ('//trim(short(omega(j)))//' rad/s) near the amplitude '// &
-                   trim(short(table%row(k)%amplitude))
-         end do
+      n = start%problem%fourier%harmonic(h)
+      do j = 1, size(omega)
+         if (any(abs(known - omega(j)) <= near*omega(j))) cycle
+         k = meeting(table, real(n, wp), omega(j))
+         if (k == 0) cycle
+         n_found = n_found + 1
+         if (n_found > most_named) cycle
+         if (n_found > 1) text = text//', '
+         text = text//to_text(n)//' omega meets mode '//to_text(j)
+         associate (cyclic => start%case%model%cyclic)
+            if (cyclic%is_cyclic) text = text//' of nodal diameter '// &
+                                         to_text(cyclic%nodal_diameter(n))
+         end associate
+         if (start%problem%n_pairs > 0) text = text//' with '//kind//' pairs'
+         text = text//' ('//trim(short(omega(j)))//' rad/s) near the amplitude '// &
+                trim(short(table%row(k)%amplitude))
       end do
    end subroutine note_meetings
 

@@ -28,6 +28,11 @@ module fw_mode_start
 
    public :: mode_start
 
+   !> Frequencies of linear modes with stuck and with sliding pairs [rad/s].
+   type :: joint_frequencies
+      real(wp), allocatable :: stuck(:), sliding(:)
+   end type joint_frequencies
+
    !> Everything that a curve needs; not to be moved once it is built.
    type :: mode_start
       !> The case, as the structure of a mode is built from it.
@@ -45,8 +50,8 @@ module fw_mode_start
       !> With stuck pairs there is no mode: this is the one with sliding pairs, which the curve
       !> tends to at high amplitudes.
       logical :: slides = .false.
-      !> Frequencies of the linear modes with stuck and with sliding pairs [rad/s].
-      real(wp), allocatable :: stuck_omega(:), sliding_omega(:)
+      !> Those that each harmonic may meet (n_retained).
+      type(joint_frequencies), allocatable :: met(:)
       !> The stuck motion as unknowns of the mode.
       real(wp), allocatable :: y(:)
       !> Vibratory load of the case, harmonic 1 (n_coordinates) [force].
@@ -86,8 +91,9 @@ contains
       if (.not. allocated(error)) call at_rest(self, x, modes, error)
       if (.not. allocated(error)) call choose(self, modes, error)
       if (allocated(error)) return
-      if (any_rigid(self%problem)) then
-         ! Their numbers of the method are those of the structure near the frequency of the mode.
+      if (any_rigid(self%problem) .or. self%case%model%cyclic%is_cyclic) then
+         ! Their numbers of the method are those of the structure near the frequency of the mode;
+         ! waves of other nodal diameters that harmonics may meet stay as coordinates.
          self%case%sweep%start = modes%omega(self%number)
          call at_rest(self, x, modes, error)
          if (allocated(error)) return
@@ -97,14 +103,28 @@ contains
       if (.not. allocated(error)) call find_onset(self)
    end subroutine build
 
-   !> A frequency of the structure's order [rad/s].
+   !> A frequency of the structure's order [rad/s]; of a cyclic one far below, so that no modes of
+   !> other nodal diameters are kept for it.
    pure real(wp) function rough_frequency(case) result(omega)
       type(case_type), intent(in) :: case
+      real(wp), parameter :: far_below = 1.0e-3_wp
+      real(wp) :: stiffness, mass
 
       omega = 1.0_wp
-      if (norm2(case%model%mass) > 0.0_wp .and. norm2(case%model%stiffness) > 0.0_wp) then
-         omega = sqrt(norm2(case%model%stiffness)/norm2(case%model%mass))
-      end if
+      associate (cyclic => case%model%cyclic)
+         if (cyclic%has_nodal()) then
+            associate (nodal => cyclic%nodal(abs(cyclic%nodal_diameter(1)) + 1))
+               if (.not. allocated(nodal%mass)) return
+               stiffness = norm2(abs(nodal%stiffness))
+               mass = norm2(abs(nodal%mass))
+            end associate
+         else
+            stiffness = norm2(case%model%stiffness)
+            mass = norm2(case%model%mass)
+         end if
+         if (mass > 0.0_wp .and. stiffness > 0.0_wp) omega = sqrt(stiffness/mass)
+         if (cyclic%is_cyclic) omega = far_below*omega
+      end associate
    end function rough_frequency
 
    !> Nothing is condensed: linear modes of all dofs, a matrix of them for each harmonic, and
@@ -114,17 +134,24 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: directions = 70.0_wp
       real(wp) :: n, nh
+      integer :: m
 
-      n = real(case%model%n_dof, wp)
+      m = case%model%n_dof
+      if (case%model%cyclic%has_nodal()) then
+         associate (nodal => case%model%cyclic%nodal(abs(case%model%cyclic%nodal_diameter(1)) + 1))
+            if (allocated(nodal%mass)) m = size(nodal%mass, 1)
+         end associate
+      end if
+      n = real(m, wp)
       nh = real(case%harmonics%n_harmonics + 1, wp)
-      if (case%model%n_dof > most_dofs) then
+      if (m > most_dofs) then
          call fatal_error(error, "case%analysis = 'mode' condenses nothing: the model has "// &
-                          to_text(case%model%n_dof)//' dofs, '//to_text(most_dofs)// &
+                          to_text(m)//' dofs, '//to_text(most_dofs)// &
                           ' at most; reduce it (fretwear reduce)', status_input)
          return
       end if
       call require_memory(3.0_wp*nh*n**2 + 2.0_wp*directions*nh*n, &
-                          "analysis = 'mode' with "//to_text(case%model%n_dof)// &
+                          "analysis = 'mode' with "//to_text(m)// &
                           ' dofs and harmonics%n_harmonics = '// &
                           to_text(case%harmonics%n_harmonics), &
                           'reduce the model (fretwear reduce), or take fewer harmonics', error)
@@ -186,22 +213,32 @@ contains
                        status_input)
    end subroutine at_rest
 
-   !> Frequencies that harmonics of the curve may meet.
+   !> Frequencies that harmonics of the curve may meet: of a cyclic structure each has its own nodal
+   !> diameter.
    subroutine note_frequencies(self, modes)
       class(mode_start), intent(inout) :: self
       type(stuck_modes), intent(in) :: modes
-      type(stuck_modes) :: sliding
+      type(stuck_modes) :: other
       logical :: done
+      integer :: h
 
-      allocate (self%stuck_omega(0), self%sliding_omega(0))
-      if (self%slides) then
-         self%sliding_omega = modes%omega
-         return
-      end if
-      self%stuck_omega = modes%omega
-      if (self%problem%n_pairs == 0) return
-      call find_stuck_modes(self%balance, sliding, done, slides=.true.)
-      if (done) self%sliding_omega = sliding%omega
+      allocate (self%met(self%problem%fourier%n_retained))
+      do h = 1, size(self%met)
+         if (h > 1 .and. .not. self%case%model%cyclic%is_cyclic) then
+            self%met(h) = self%met(1)
+            cycle
+         end if
+         allocate (self%met(h)%stuck(0), self%met(h)%sliding(0))
+         if (self%slides) then
+            self%met(h)%sliding = modes%omega
+            cycle
+         end if
+         call find_stuck_modes(self%balance, other, done, harmonic=h)
+         if (done) self%met(h)%stuck = other%omega
+         if (self%problem%n_pairs == 0) cycle
+         call find_stuck_modes(self%balance, other, done, slides=.true., harmonic=h)
+         if (done) self%met(h)%sliding = other%omega
+      end do
    end subroutine note_frequencies
 
    !> The load that a response of the same case has.

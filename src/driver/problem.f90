@@ -199,7 +199,7 @@ contains
       end associate
       allocate (cyclic)
       call new_cyclic_structure(case%model, joint%cyclic, fourier%harmonic, range, means, cyclic, &
-                                error)
+                                error, of_mode=case%analysis == analysis_mode)
       call move_alloc(cyclic, structure)
    end subroutine new_structure
 

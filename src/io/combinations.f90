@@ -76,10 +76,7 @@ contains
       character(*), parameter :: with = " does not go with case%analysis = 'mode': "
 
       if (case%analysis /= analysis_mode) return
-      if (case%model%cyclic%is_cyclic) then
-         call fatal_error(error, 'a cyclic structure (&cyclic)'//with//'model all sectors', &
-                          status_input)
-      else if (case%harmonics%method /= method_hbm) then
+      if (case%harmonics%method /= method_hbm) then
          call fatal_error(error, 'harmonics%method'//with//"use 'hbm'", status_input)
       else if (case%harmonics%adaptive) then
          call fatal_error(error, 'harmonics%adaptive = .true.'//with//'give n_harmonics', &
@@ -114,6 +111,9 @@ contains
    pure logical function is_loaded(case)
       type(case_type), intent(in) :: case
 
+      ! Loads of matrices of every nodal diameter stand with these.
+      is_loaded = case%model%cyclic%has_nodal()
+      if (is_loaded) return
       is_loaded = any(abs(case%model%load_cosine) > 0.0_wp) .or. &
                   any(abs(case%model%load_sine) > 0.0_wp)
       if (allocated(case%model%waves%harmonic)) then

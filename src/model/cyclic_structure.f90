@@ -39,6 +39,8 @@ module fw_cyclic_structure
    !> coordinate is to motion above the harmonics as well.
    integer, parameter :: means_none = 0, means_static = 1, means_split = 2
 
+   !> A mode may stiffen up to this many times the frequency of its stuck motion.
+   real(wp), parameter :: reach_of_mode = 2.0_wp
    !> More internal modes than any nodal diameter has.
    integer, parameter :: most_modes = 1000000
 
@@ -88,7 +90,8 @@ module fw_cyclic_structure
 contains
 
    !> Condense a sector in the nodal diameters of the harmonics.
-   subroutine new_cyclic_structure(model, relative, harmonic, omega_range, means, self, error)
+   subroutine new_cyclic_structure(model, relative, harmonic, omega_range, means, self, error, &
+                                   of_mode)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       !> Harmonics in use.
@@ -99,11 +102,16 @@ contains
       integer, intent(in) :: means
       type(cyclic_structure), intent(out) :: self
       type(error_type), allocatable, intent(out) :: error
+      !> For a nonlinear mode of about the highest frequency: nothing is condensed in harmonic 1.
+      logical, intent(in), optional :: of_mode
+      logical :: keeps_first
 
+      keeps_first = .false.
+      if (present(of_mode)) keeps_first = of_mode
       call lay_out_coefficients(self, harmonic)
       self%n_relative = relative%n_coordinates
       self%n_observed = size(model%observe_matrix, 1)
-      call find_bases(model, relative, omega_range, self, error)
+      call find_bases(model, relative, omega_range, keeps_first, self, error)
       if (allocated(error)) return
       if (means >= means_static) call take_static_means(model, relative, self, error)
       if (allocated(error)) return
@@ -111,10 +119,11 @@ contains
    end subroutine new_cyclic_structure
 
    !> A basis for each nodal diameter in use, with coordinates at places that all share.
-   subroutine find_bases(model, relative, omega_range, self, error)
+   subroutine find_bases(model, relative, omega_range, keeps_first, self, error)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       real(wp), intent(in) :: omega_range(2)
+      logical, intent(in) :: keeps_first
       type(cyclic_structure), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices), allocatable :: nodal(:)
@@ -135,6 +144,13 @@ contains
             call check_free_modes(self%basis(j), nodal(j), error)
          end if
          if (allocated(error)) return
+         if (keeps_first) then
+            call self%basis(j)%keep_of_mode(any(self%harmonic == 1 .and. self%basis_of == j), &
+                                            reach_of_mode*omega_range(2)* &
+                                            maxval(self%harmonic, mask=self%basis_of == j), &
+                                            nodal(j)%has_whirl())
+            cycle
+         end if
          call self%basis(j)%keep_resonances(pack(self%harmonic, self%basis_of == j), omega_range, &
                                             nodal(j)%has_whirl())
       end do

@@ -55,6 +55,7 @@ module fw_sector_reduction
    contains
       procedure :: find_modes
       procedure :: keep_resonances
+      procedure :: keep_of_mode
       procedure :: transform
       procedure :: pushes_free_mode
       procedure :: has_whirl
@@ -162,11 +163,9 @@ contains
       !> Whether blocks couple the internal modes that are not Hermitian.
       logical, intent(in) :: whirls
       real(wp), parameter :: margin = 1.0e-2_wp
-      complex(wp), allocatable :: wider(:, :)
-      integer, allocatable :: others(:)
       logical :: keep(self%n_internal)
       real(wp) :: frequency
-      integer :: j, m
+      integer :: j
 
       keep = .false.
       do j = 1, self%n_internal
@@ -177,6 +176,32 @@ contains
          keep(j) = whirls .or. any(frequency >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
                                    frequency <= (1.0_wp + margin)*harmonic*omega_range(2))
       end do
+      call move_to_coordinates(self, keep)
+   end subroutine keep_resonances
+
+   !> Of a nonlinear mode: all of the nodal diameter of the mode itself; of others those that a
+   !> harmonic may hit, damped or not, for the self-excitation cancels damping.
+   subroutine keep_of_mode(self, is_first, highest, whirls)
+      class(sector_reduction), intent(inout) :: self
+      logical, intent(in) :: is_first
+      !> Highest frequency of the harmonics of this nodal diameter [rad/s].
+      real(wp), intent(in) :: highest
+      logical, intent(in) :: whirls
+
+      associate (vibrates => self%m_i > 0.0_wp .and. self%k_i > 0.0_wp, &
+                 is_met => whirls .or. self%k_i <= highest**2*self%m_i)
+         call move_to_coordinates(self, is_first .or. (vibrates .and. is_met))
+      end associate
+   end subroutine keep_of_mode
+
+   !> Make coordinates of internal modes.
+   subroutine move_to_coordinates(self, keep)
+      class(sector_reduction), intent(inout) :: self
+      logical, intent(in) :: keep(:)
+      complex(wp), allocatable :: wider(:, :)
+      integer, allocatable :: others(:)
+      integer :: j, m
+
       if (.not. any(keep)) return
       self%kept = pack([(j, j=1, size(keep))], keep)
       others = pack([(j, j=1, size(keep))], .not. keep)
@@ -190,8 +215,9 @@ contains
       self%t_i = self%t_i(:, others)
       self%k_i = self%k_i(others)
       self%m_i = self%m_i(others)
+      self%c_i = self%c_i(others)
       self%n_internal = size(others)
-   end subroutine keep_resonances
+   end subroutine move_to_coordinates
 
    !> Whether a static load acts on a mode that nothing holds.
    pure logical function pushes_free_mode(self, nodal) result(pushes)
