@@ -1,11 +1,16 @@
 """Resonances followed over every parameter, through folds, by both linear solvers, with two
 tangential directions and in sectors."""
+import sys
+
 import h5py
 import numpy as np
 import pytest
 from cases import merged, read, run
-from cyclic_cases import model_groups, read_reference
+from project import ROOT
 from resonance_cases import REFERENCES, slope, track, track_groups
+
+sys.path.insert(0, str(ROOT / "test" / "cyclic"))
+from cyclic_cases import model_groups, read_reference
 
 #: The same case, moved in memory or read: solutions stop at 1e-12, which the resonance amplifies.
 MOVED = 1e-9
