@@ -6,7 +6,8 @@
 !> D h^2 / (16 (h_0 + h)^2) at most (h, h_0: the new step and the one before; fourth derivatives
 !> of Hermite interpolation). Where contact opens, closes or begins to slip, the curve has a
 !> corner, and what is missed is an eighth of the step times the change of the tangent. D cannot
-!> tell one from the other: where a corner would be too much, the curve is looked at there.
+!> tell one from the other: where a corner would be too much, the curve is looked at there. Two
+!> corners that turn there and back leave D without a change of the tangent: D itself is missed.
 !>
 !> Only what lies across the tangent counts: along it, errors are those of the parameter s.
 module fw_branch_step
@@ -147,7 +148,7 @@ contains
    end function turns_between
 
    !> What the cubic of the step from `here` to `next` misses, of the size of y: of a smooth curve,
-   !> and of one that has a corner on the way. 0 where nothing is known yet.
+   !> and of one that has corners on the way. 0 where nothing is known yet.
    pure subroutine missed(metric, history, here, next, smooth, corner, place)
       type(metric_type), intent(in) :: metric
       type(step_history), intent(in) :: history
@@ -156,6 +157,9 @@ contains
       !> Where such a corner would be, as a share of the step.
       real(wp), intent(out) :: place
       real(wp), allocatable :: y(:), dy(:)
+      !> A smooth curve and a single corner have their place above; what has come away as far as this
+      !> with hardly a turn has turned twice.
+      real(wp), parameter :: of_two = 0.35_wp
       real(wp) :: p, dp, h, h_before, d, bend, weight, size
 
       smooth = 0.0_wp
@@ -174,6 +178,7 @@ contains
       smooth = d*h**2/(16.0_wp*(h_before + h)**2)/size
       corner = 0.125_wp*h*bend/size
       if (h*bend > 0.0_wp) place = 1.0_wp - min(d/(h*bend), 1.0_wp)
+      if (place < of_two) corner = max(corner, d/size)
    end subroutine missed
 
    !> A change of y across the step from `here` to `next`, with none of p, of the size of y.

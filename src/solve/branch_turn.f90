@@ -88,6 +88,9 @@ contains
          do k = first, 0
             dp = side*sign(2.0_wp**k*longest_leap*corrector%metric%p_scale, here%t_p)
             call leap_to(corrector, system, here, dp, reach /= only_ahead, 0.0_wp, next, error)
+            if (next%report%converged .and. reach == far_ahead) then
+               call draw_near(corrector, system, here, next, error)
+            end if
             if (allocated(error) .or. next%report%converged) return
             if (reach /= only_ahead .or. corrector%stands(here)) cycle
             ! From where the piece behind leads to.
@@ -96,6 +99,43 @@ contains
          end do
       end do
    end subroutine leap
+
+   !> Bring the point that a leap has come to back towards where it left, along the piece that it is
+   !> on: nothing is known of the branch between the two.
+   subroutine draw_near(corrector, system, here, next, error)
+      type(corrector_type), intent(inout) :: corrector
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(inout) :: here
+      type(branch_point), intent(inout) :: next
+      type(error_type), allocatable, intent(out) :: error
+      !> Halvings of the way, and cosine of the angle of tangents, and distance from the tangent over
+      !> the step back, up to which two points lie on one piece.
+      integer, parameter :: most = 3
+      real(wp), parameter :: along = 0.9_wp, beside = 0.25_wp
+      type(branch_point) :: nearer, predicted
+      real(wp) :: dp
+      integer :: k
+
+      do k = 1, most
+         dp = 0.5_wp*(here%p - next%p)
+         if (corrector%stands(next)) return
+         call leap_to(corrector, system, next, dp, .false., dp/next%t_p, nearer, error)
+         if (allocated(error)) return
+         if (.not. nearer%report%converged) return
+         ! It looks back where it was found.
+         if (nearer%t_p*next%t_p < 0.0_wp) call reverse(nearer)
+         call corrector%find_orientation(system, nearer, error)
+         if (allocated(error)) return
+         if (differ(nearer, next)) return
+         predicted = next
+         predicted%y = next%y + (dp/next%t_p)*next%t_y
+         predicted%p = next%p + dp
+         if (corrector%metric%inner(nearer%t_y, nearer%t_p, next%t_y, next%t_p) < along) return
+         if (corrector%metric%chord(nearer, predicted) > &
+             beside*corrector%metric%chord(next, predicted)) return
+         next = nearer
+      end do
+   end subroutine draw_near
 
    !> The point at p + dp, if the branch goes on there in the direction of dp.
    subroutine leap_to(corrector, system, here, dp, keeps_side, along, next, error)

@@ -99,6 +99,8 @@ module fw_continuation
    real(wp), parameter :: least_share = 2.0e-2_wp
    !> Share of a step at its ends where no corner is looked for.
    real(wp), parameter :: least_place = 0.25_wp
+   !> Places of single corners, and where several are looked for.
+   real(wp), parameter :: around(2) = [0.35_wp, 0.72_wp], amidst = 0.42_wp
    !> Longest step of y over its size.
    real(wp), parameter :: longest_y = 0.5_wp
    !> Step over the distance of a simple pole at which a cubic misses (0.45)^4/16 of it, 0.3 %.
@@ -531,8 +533,14 @@ contains
       call self%near_ahead%find(self%corrector, system, ahead, x_scale_at(self, ahead))
       self%knows_ahead = .true.
       if (corner_error <= allowed_error) return
+      ! The estimate of a corner may be a false alarm: one correction there tells. One that lies
+      ! where neither a smooth curve nor a single corner has it stands for several of them.
+      if (place < around(1) .or. place > around(2)) then
+         call look_between(self, system, ahead, amidst, found, error)
+         if (found > looked_at*allowed_error) shortening = amidst
+         if (allocated(error) .or. shortening < 1.0_wp .or. place < least_place) return
+      end if
       place = max(least_place, min(1.0_wp - least_place, place))
-      ! The estimate of a corner may be a false alarm: one correction there tells.
       call look_between(self, system, ahead, place, found, error)
       if (found > looked_at*allowed_error) shortening = place
    end subroutine measure
