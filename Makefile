@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint keys docs clean
-.PHONY: fuzz wheel ways sensitivities resonances calibration stops
+.PHONY: fuzz wheel ways sensitivities resonances calibration stops controls
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -160,6 +160,9 @@ sensitivities: build ## derivatives of 200 random cases against differences, in 
 resonances: build ## resonances of 60 random cases over a parameter against sweeps, in docs/robustness.md
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/resonance/resonance_family.py \
 	   -o docs/robustness.md
+
+controls: build ## 200 random responses of given amplitude against equations of another code
+	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/control_family.py -o docs/robustness.md
 
 scars: build ## steady states of wear against a march of cycles, also of a program BEFORE
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/fretting/steady_states.py \

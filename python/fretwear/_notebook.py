@@ -84,7 +84,10 @@ def result_html(result: Result) -> str:
             for name in result.observed:
                 omega, height = result.maximum(name)
                 value = f"{height:.6g} {units}".strip()
-                rows.append((f"largest {name}", f"{value} at {omega / (2.0 * np.pi):.6g} Hz"))
+                place = f"{omega / (2.0 * np.pi):.6g} Hz"
+                if "parameter" in result:
+                    place = f"{result.parameter_name} = {result.parameter[result.peak(name)]:.6g}"
+                rows.append((f"largest {name}", f"{value} at {place}"))
     if result.bifurcations:
         shown = [str(place) for place in result.bifurcations[:_MOST_REMARKS]]
         more = len(result.bifurcations) - len(shown)

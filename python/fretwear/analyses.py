@@ -10,10 +10,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING, Union, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ._native import NOT_CONVERGED, STOPPED, Session, raise_status
 from .case import Case, ModelLike
@@ -130,19 +130,27 @@ def _run(case: Case, tell: _Tell | None, is_stopped: Callable[[], object] | None
     return result
 
 
-def frf(model: ModelLike, start: float, end: float, n_points: int | None = None, *,
+def frf(model: ModelLike, start: float | None = None, end: float | None = None,
+        n_points: int | None = None, *, values: ArrayLike | None = None,
+        parameter: str | None = None, frequency: float | None = None,
         unit: Literal["rad/s", "Hz"] | None = None, file: str | Path | None = None,
         check: bool = True, progress: Progress | None = None, **groups: Unpack[Groups]) -> Result:
-    """Frequency response: periodic solutions over a range of frequencies.
+    """Frequency response: periodic solutions over a range of frequencies, or of a parameter.
 
     Parameters
     ----------
     model : Model, str or Path
         The structure, or the path of a model file.
     start, end : float
-        First and last frequency [unit]; may go down.
+        First and last frequency [unit], or values of `parameter`; may go down.
     n_points : int, optional
         Points, evenly spaced.
+    values : array_like, optional
+        Frequencies, or values of `parameter`, one by one, in place of the three.
+    parameter : str, optional
+        What is swept in place of the frequency, such as "load%harmonic_scale" or "contact%mu".
+    frequency : float, optional
+        The one frequency of such a sweep [unit].
     unit : {'rad/s', 'Hz'}, optional
         Unit of the frequencies (default: rad/s).
     file, check, progress
@@ -159,11 +167,9 @@ def frf(model: ModelLike, start: float, end: float, n_points: int | None = None,
     InputError, OutputError, ConvergenceError, RunInterrupted
         See `run`.
     """
-    sweep: Sweep = {"start": start, "end": end}
-    if n_points is not None:
-        sweep["n_points"] = n_points
-    if unit is not None:
-        sweep["unit"] = unit
+    given = {"start": start, "end": end, "n_points": n_points, "values": values,
+             "parameter": parameter, "frequency": frequency, "unit": unit}
+    sweep = cast("Sweep", {key: value for key, value in given.items() if value is not None})
     case = _case(model, {"analysis": "frf"}, sweep, groups)
     return run(case, file, check=check, progress=progress)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,9 @@ class Bifurcation:
     found_by : str
         "turn" of the branch, "multiplier" that was brought to the circle, or "bracket": it lies
         between two solutions, and no nearer ones were found.
+    parameter : float or None
+        Where it is in the parameter that the sweep goes over in place of the frequency; `error` is
+        of it then.
     """
 
     kind: str
@@ -46,6 +50,7 @@ class Bifurcation:
     coefficients: NDArray[np.float64]
     multiplier: complex
     found_by: str
+    parameter: float | None = None
 
     @property
     def frequency(self) -> float:
@@ -53,6 +58,8 @@ class Bifurcation:
         return self.omega / (2.0 * np.pi)
 
     def __str__(self) -> str:
+        if self.parameter is not None:
+            return f"{self.kind} at {self.parameter:.6g}"
         return f"{self.kind} at {self.frequency:.6g} Hz"
 
 
@@ -63,11 +70,15 @@ def read_bifurcations(result: Result) -> list[Bifurcation]:
     with result.open() as file:
         kinds, ways = (_words(file["bifurcation/" + name]) for name in ("kind", "found_by"))
     values = result["bifurcation/multiplier"]
+    errors: Iterable[float] = result["bifurcation/error"]
+    places: Iterable[float | None] = [None] * len(kinds)
+    if "bifurcation/parameter" in result:
+        errors, places = result["bifurcation/parameter_error"], result["bifurcation/parameter"]
     return [Bifurcation(kind, float(omega), float(error), amplitude, coefficients,
-                        complex(*value), way)
-            for kind, omega, error, amplitude, coefficients, value, way in zip(
-                kinds, result["bifurcation/omega"], result["bifurcation/error"],
-                result["bifurcation/amplitude"], result["bifurcation/coefficients"], values, ways)]
+                        complex(*value), way, None if place is None else float(place))
+            for kind, omega, error, amplitude, coefficients, value, way, place in zip(
+                kinds, result["bifurcation/omega"], errors, result["bifurcation/amplitude"],
+                result["bifurcation/coefficients"], values, ways, places)]
 
 
 def _words(places: h5py.Dataset) -> list[str]:

@@ -184,7 +184,7 @@ def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
             break
         rows += [(f"peak of {name}", height,
                   units_of(result, "amplitude")),
-                 (f"frequency of this peak, near point {peak + 1}", omega / (2.0 * np.pi), "Hz")]
+                 _place_of(result, peak, omega)]
         if "sensitivity/deviation/largest" in result:
             spread = result["sensitivity/deviation/largest"][peak, result.index(name)]
             rows.append((f"standard deviation of the amplitude, at point {peak + 1}",
@@ -197,6 +197,12 @@ def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
                          float(result.dissipation[peak].sum()),
                          units_of(result, "contact/dissipation")))
     return rows
+
+
+def _place_of(result: Result, peak: int, omega: float) -> tuple[str, object, str]:
+    if "parameter" in result:
+        return f"{result.parameter_name} of this peak, point {peak + 1}", result.parameter[peak], ""
+    return f"frequency of this peak, near point {peak + 1}", omega / (2.0 * np.pi), "Hz"
 
 
 def _wear_numbers(result: Result) -> list[tuple[str, object, str]]:

@@ -221,6 +221,47 @@ class Result(ResultFile):
         return self.omega / (2.0 * np.pi)
 
     @property
+    def parameter(self) -> Floats:
+        """Value of what a sweep goes over in place of the frequency (n_points).
+
+        Raises
+        ------
+        AbsentError
+            It goes over the frequency.
+        """
+        return self["parameter"]
+
+    @property
+    def parameter_name(self) -> str:
+        """What a sweep goes over: 'load%harmonic_scale' for one, or 'frequency'."""
+        if "parameter" not in self:
+            return "frequency"
+        with self.open() as file:
+            return plain_text(file["parameter"].attrs["name"])
+
+    @property
+    def load_scale(self) -> Floats:
+        """Factor of the vibratory loads, of a controlled response or a load sweep (n_points).
+
+        Raises
+        ------
+        AbsentError
+            The load of the case holds for all points.
+        """
+        return self["load/scale"]
+
+    @property
+    def control_amplitude(self) -> Floats:
+        """Amplitude for which the load of each point was found (n_points) [length].
+
+        Raises
+        ------
+        AbsentError
+            The case has no `&control`.
+        """
+        return self["control/amplitude"]
+
+    @property
     def coefficients(self) -> Floats:
         """Fourier coefficients (0, c1, s1, c2, ...) (n_points, 2H+1, n_observed)."""
         return self["coefficients"]

@@ -12,8 +12,9 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["CaseGroup", "Contact", "Cyclic", "Groups", "Harmonics", "Load", "Mode", "Output",
-           "PseudoTime", "Sensitivity", "Solver", "Spring", "Structure", "Sweep", "Time", "Wear"]
+__all__ = ["CaseGroup", "Contact", "Control", "Cyclic", "Groups", "Harmonics", "Load", "Mode",
+           "Output", "PseudoTime", "Sensitivity", "Solver", "Spring", "Structure", "Sweep", "Time",
+           "Wear"]
 
 
 class CaseGroup(TypedDict, total=False):
@@ -217,9 +218,21 @@ class Harmonics(TypedDict, total=False):
     accuracy: float
 
 
-class Sweep(TypedDict, total=False):
-    """Group &sweep: frequencies."""
+_Sweep = TypedDict("_Sweep", {
+    #: values of the parameter, or factors of those of the case; only: parameter other than
+    #: 'frequency' (default: 'value')
+    "as": Literal["value", "factor"],
+}, total=False)
 
+
+class Sweep(_Sweep, total=False):
+    """Group &sweep: frequencies, or values of a parameter."""
+
+    #: what the sweep goes over: start, end and values are of it; only: analysis = 'frf' (default:
+    #: 'frequency')
+    parameter: Literal["frequency", "load%harmonic_scale", "load%static_scale", "contact%mu",
+                       "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
+                       "contact%normal_stiffness", "spring%coefficient"]
     #: a list of frequencies in any order, in place of start, end and n_points; only: analysis =
     #: 'frf', 'time', continuation = 'natural' (default: none)
     frequencies: ArrayLike
@@ -242,6 +255,11 @@ class Sweep(TypedDict, total=False):
     #: points that are solved to find maxima become rows, in order; only: analysis = 'frf',
     #: continuation = 'natural' (default: .false.)
     refine: bool
+    #: a list of values in any order, in place of start, end and n_points; only: analysis = 'frf',
+    #: 'time', continuation = 'natural' (default: none)
+    values: ArrayLike
+    #: the one frequency of a sweep over another parameter (required with another parameter)
+    frequency: float
 
 
 class Solver(TypedDict, total=False):
@@ -371,6 +389,20 @@ class Output(TypedDict, total=False):
     observe: str | int | Sequence[str | int]
 
 
+class Control(TypedDict, total=False):
+    """Group &control: responses of given amplitudes."""
+
+    #: [L] of the response: the factor of the vibratory load is found, at each frequency, for one
+    #: after the other; only: analysis = 'frf', 'point' (default: none: the load is given)
+    amplitude: ArrayLike
+    #: what the amplitude is: of the first harmonic, or the largest of the period (default:
+    #: 'first_harmonic')
+    of: Literal["first_harmonic", "largest"]
+    #: the quantity that has it, by the name that output%observe gives it; only: amplitude (default:
+    #: the first one)
+    observed: str | int | Sequence[str | int]
+
+
 class Groups(TypedDict, total=False):
     """All groups; `model` is the one that `structure` stands for where a model is an argument."""
 
@@ -389,3 +421,4 @@ class Groups(TypedDict, total=False):
     time: Time
     mode: Mode
     output: Output
+    control: Control

@@ -9,6 +9,7 @@
 !> coordinates whose rows of A the active pairs need still (normal forces of slipping pairs).
 submodule(fw_balance_state) fw_balance_linear
    use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_open
    use fw_force_law, only: pair_stuck
@@ -209,11 +210,34 @@ contains
       step(self%active%used(:self%active%n_active), :) = solution
    end subroutine scatter
 
-   !> dR/d omega = Z' q - F', with what the forces add to it.
+   !> dR/d omega = Z' q - F', with what the forces add to it; of another parameter its own.
    module procedure parameter_derivative
 
-      call self%derivative_by(by_frequency, x, dr)
+      if (allocated(self%mover)) then
+         call self%mover%derive(self, x, dr)
+      else
+         call self%derivative_by(by_frequency, x, dr)
+      end if
    end procedure parameter_derivative
+
+   module procedure derivative_by_loads
+      complex(wp) :: change(size(self%structure_state%unit_load, 1), &
+                            size(self%structure_state%unit_load, 2))
+      real(wp) :: rest(size(dr))
+      integer :: h, m
+
+      m = self%problem%structure%n_coordinates
+      associate (fourier => self%problem%fourier)
+         do h = 1, fourier%n_retained
+            change(:, h) = -merge(static, vibratory, fourier%harmonic(h) == 0)* &
+                           self%structure_state%unit_load(:, h)
+         end do
+         call coefficients_of(fourier%harmonic, fourier%column, m, m, change, dr)
+         ! Inputs change by the balance alone, wherever the coordinates are.
+         rest = 0.0_wp
+         call derivative_with_forces(self, .false., m, fourier%n_coefficients, rest, dr)
+      end associate
+   end procedure derivative_by_loads
 
    module procedure derivative_by
 

@@ -27,7 +27,14 @@ module fw_balance_state
    implicit none (type, external)
    private
 
-   public :: balance_state, new_balance_state
+   public :: balance_state, new_balance_state, parameter_mover
+
+   !> A parameter of the problem that a path follows, in place of the frequency.
+   type, abstract :: parameter_mover
+   contains
+      procedure(apply_value), deferred :: apply
+      procedure(derive_by_value), deferred :: derive
+   end type parameter_mover
 
    !> A problem where one worker stands.
    type, extends(parameter_system) :: balance_state
@@ -43,6 +50,10 @@ module fw_balance_state
       real(wp), allocatable :: balance(:, :), load(:, :)
       !> Share of the vibratory load that acts; below 1 only on the way to a first solution.
       real(wp) :: load_share = 1.0_wp
+      !> The parameter that `set_parameter` moves, and its value; the frequency where none is given.
+      !> The problem belongs to one state then, or to several that stand at one value.
+      class(parameter_mover), allocatable :: mover
+      real(wp) :: value = 0.0_wp
       !> What a step of pseudo-time adds to the derivative, P/h, outside of the contact laws
       !> (n_coordinates, n_coordinates, n_retained); only allocated during such a step.
       complex(wp), allocatable :: shift(:, :, :)
@@ -53,12 +64,17 @@ module fw_balance_state
       type(kept_factors) :: preconditioner
       type(balance_scratch) :: scratch
    contains
-      procedure :: set_parameter => set_frequency
+      procedure :: set_parameter
       procedure :: set_frequency
+      procedure :: set_load_factors
+      procedure :: vibratory_factor
+      procedure :: parameter
+      procedure :: follow
       procedure :: set_point
       procedure :: frequency
       procedure :: parameter_derivative
       procedure :: derivative_by
+      procedure :: derivative_by_loads
       procedure :: rate_unit
       procedure :: pair_states
       procedure :: pair_shares
@@ -74,6 +90,27 @@ module fw_balance_state
       procedure :: precondition
       procedure :: assemble
    end type balance_state
+
+   abstract interface
+      !> Change the problem of a state, and the state itself; the frequency is set behind it.
+      subroutine apply_value(self, state, value)
+         import :: parameter_mover, balance_state, wp
+         implicit none (type, external)
+         class(parameter_mover), intent(in) :: self
+         class(balance_state), intent(inout) :: state
+         real(wp), intent(in) :: value
+      end subroutine apply_value
+
+      !> dR/dvalue at the last evaluated and linearized point x.
+      subroutine derive_by_value(self, state, x, dr)
+         import :: parameter_mover, balance_state, wp
+         implicit none (type, external)
+         class(parameter_mover), intent(in) :: self
+         class(balance_state), intent(inout) :: state
+         real(wp), intent(in), contiguous :: x(:)
+         real(wp), intent(out), contiguous :: dr(:)
+      end subroutine derive_by_value
+   end interface
 
    ! The linear problem of a Newton step (fw_balance_linear).
    interface
@@ -108,6 +145,14 @@ module fw_balance_state
          real(wp), intent(in), contiguous :: x(:)
          real(wp), intent(out), contiguous :: dr(:)
       end subroutine derivative_by
+
+      !> dR by the loads of the model where these change by their `static` and `vibratory` parts, at
+      !> the last evaluated and linearized point.
+      module subroutine derivative_by_loads(self, static, vibratory, dr)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(in) :: static, vibratory
+         real(wp), intent(out), contiguous :: dr(:)
+      end subroutine derivative_by_loads
 
       module subroutine apply(self, vector, product)
          class(balance_state), intent(inout) :: self
@@ -184,6 +229,64 @@ contains
       call self%preconditioner%reserve(m, problem%fourier%n_retained)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)
    end subroutine new_balance_state
+
+   !> Bring the problem to a value of the parameter that moves, at the present frequency, or to a
+   !> frequency where none does.
+   subroutine set_parameter(self, parameter, error)
+      class(balance_state), intent(inout) :: self
+      real(wp), intent(in) :: parameter
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. allocated(self%mover)) then
+         call self%set_point(parameter, 0.0_wp, error)
+         return
+      end if
+      call self%mover%apply(self, parameter)
+      self%value = parameter
+      call self%set_point(self%frequency(), 0.0_wp, error)
+   end subroutine set_parameter
+
+   !> Where `set_parameter` has brought it.
+   pure real(wp) function parameter(self)
+      class(balance_state), intent(in) :: self
+
+      parameter = self%frequency()
+      if (allocated(self%mover)) parameter = self%value
+   end function parameter
+
+   !> Go to where another state of the case stands: its frequency, and its value of the parameter.
+   subroutine follow(self, other, error)
+      class(balance_state), intent(inout) :: self
+      class(balance_state), intent(in) :: other
+      type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(self%mover) .and. allocated(other%mover)) then
+         call self%mover%apply(self, other%value)
+         self%value = other%value
+      end if
+      call self%set_frequency(other%frequency(), error)
+   end subroutine follow
+
+   !> Factors of the static and of the vibratory loads of the model.
+   subroutine set_load_factors(self, static, vibratory)
+      class(balance_state), intent(inout) :: self
+      real(wp), intent(in) :: static, vibratory
+
+      associate (stand => self%structure_state)
+         stand%load_factor = merge(static, vibratory, self%problem%fourier%harmonic == 0)
+         call stand%scale_loads()
+      end associate
+   end subroutine set_load_factors
+
+   !> What `set_load_factors` gave the vibratory loads.
+   pure real(wp) function vibratory_factor(self) result(factor)
+      class(balance_state), intent(in) :: self
+      integer :: h
+
+      factor = 1.0_wp
+      h = findloc(self%problem%fourier%harmonic > 0, .true., dim=1)
+      if (h > 0) factor = self%structure_state%load_factor(h)
+   end function vibratory_factor
 
    !> Bring matrices and loads to a frequency.
    subroutine set_frequency(self, parameter, error)

@@ -108,19 +108,26 @@ contains
    end subroutine start
 
    !> Take the motion x of a state, which has been evaluated and linearized there.
-   subroutine prepare(self, state, x)
+   subroutine prepare(self, state, x, residual_only)
       class(slope_finder), intent(inout) :: self
       type(balance_state), intent(inout) :: state
       real(wp), intent(in), contiguous :: x(:)
+      !> Slopes of the residual by pairs and springs are all that is asked for (default: no).
+      logical, intent(in), optional :: residual_only
       real(wp) :: rest(size(x))
       complex(wp), allocatable :: q(:, :)
+      logical :: wants_all
 
       self%x = x
       rest = 0.0_wp
-      call observe(state, rest, self%at_rest)
-      call find_work_at_rest(self, state)
+      wants_all = .true.
+      if (present(residual_only)) wants_all = .not. residual_only
+      if (wants_all) then
+         call observe(state, rest, self%at_rest)
+         call find_work_at_rest(self, state)
+      end if
       associate (problem => state%problem, m => state%problem%structure%n_coordinates)
-         if (problem%structure%knows_field) then
+         if (wants_all .and. problem%structure%knows_field) then
             allocate (q(m, problem%fourier%n_retained))
             call amplitudes_of(problem%fourier%harmonic, problem%fourier%column, m, x, m, q)
             call problem%structure%complete_field(state%structure_state, q, field=self%field)

@@ -38,6 +38,12 @@ module fw_point
    type :: point_type
       !> Angular frequency of the excitation [rad/s].
       real(wp) :: omega = 0.0_wp
+      !> Where on its path: omega, or the value of the parameter that a sweep goes over.
+      real(wp) :: place = 0.0_wp
+      !> Factor of the vibratory loads, as load%harmonic_scale is one.
+      real(wp) :: load_scale = 1.0_wp
+      !> Amplitude that was asked for, where the load is found for it [length].
+      real(wp) :: control = 0.0_wp
       !> Fourier coefficients (0, c1, s1, ...) of the observed quantities (2H+1, n_observed).
       real(wp), allocatable :: coefficients(:, :)
       !> Largest magnitude over the period (n_observed).
@@ -55,9 +61,9 @@ module fw_point
       real(wp) :: error_estimate = 0.0_wp
       !> The branch turns here.
       logical :: fold = .false.
-      !> Direction of the branch: changes of omega [rad/s] and of the coefficients, of any common
-      !> length; only along a branch.
-      real(wp) :: tangent_omega = 0.0_wp
+      !> Direction of the branch: changes of omega [rad/s] or of the parameter, and of the
+      !> coefficients, of any common length; only along a branch.
+      real(wp) :: tangent_omega = 0.0_wp, tangent_parameter = 0.0_wp
       real(wp), allocatable :: tangent(:, :)
       !> Floquet multipliers, only when asked for, how far each may be off, huge(1.0_wp) where that
       !> is not known (n_multipliers), and whether all lie in the unit circle.

@@ -97,6 +97,8 @@ module fw_accuracy
       logical, private :: planar = .false.
       !> What may end the work on the present point.
       class(interrupt_type), pointer, private :: interrupt => null()
+      !> What is asked of it.
+      type(point_request), private :: asked
    contains
       procedure :: start
       procedure :: solve
@@ -159,6 +161,7 @@ contains
       logical :: finer
 
       self%interrupt => request%interrupt
+      self%asked = request
       iterations = 0
       failures = 0
       at_best = [self%current, self%doublings]
@@ -230,11 +233,11 @@ contains
          bound = safety*known
          if (self%factor_time < 1.0_wp .and. &
              bound <= with_margin*self%case%harmonics%accuracy) return
-         call check(self, point%omega, self%current, self%doublings - 1, iterations, error)
+         call check(self, self%current, self%doublings - 1, iterations, error)
          if (allocated(error)) return
          bound = unknown
          associate (level => self%level(self%current, self%doublings - 1))
-            if (is_solved(level, point%omega)) bound = self%factor_time* &
+            if (is_solved(level, self%asked%place())) bound = self%factor_time* &
                relative_distance(point%coefficients, level%coefficients)
          end associate
          known = min(bound, unknown/safety)
@@ -303,9 +306,9 @@ contains
       end if
       do k = max(1, self%current - 2), self%current - 1
          if (order <= order_rigid .and. self%n_harmonics(k) < fewest_on_mass) cycle
-         call check(self, point%omega, k, self%doublings, iterations, error)
+         call check(self, k, self%doublings, iterations, error)
          if (allocated(error)) return
-         if (.not. is_solved(self%level(k, self%doublings), point%omega)) cycle
+         if (.not. is_solved(self%level(k, self%doublings), self%asked%place())) cycle
          bound = factor_harmonics(self%n_harmonics(self%current), self%n_harmonics(k), order)* &
                  relative_distance(point%coefficients, self%level(k, self%doublings)%coefficients)
          return
@@ -326,33 +329,34 @@ contains
 
    !> A coarser solution to compare with, from the present one: nothing is asked of it but its
    !> observed coefficients, and fallbacks would look too far away.
-   subroutine check(self, omega, k, doublings, iterations, error)
+   subroutine check(self, k, doublings, iterations, error)
       class(accuracy_solver), intent(inout) :: self
-      real(wp), intent(in) :: omega
       integer, intent(in) :: k, doublings
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
       type(point_type) :: point
 
-      if (is_solved(self%level(k, doublings), omega)) return
+      if (is_solved(self%level(k, doublings), self%asked%place())) return
       call need(self, k, doublings, error)
       if (allocated(error)) return
       associate (level => self%level(k, doublings))
          call level%take_over(self%level(self%current, self%doublings))
-         call level%solve(self%case, point_request(omega=omega, interrupt=self%interrupt, &
-                                              fallback=.false., &
+         call level%solve(self%case, point_request(omega=self%asked%omega, &
+                                              has_value=self%asked%has_value, &
+                                              value=self%asked%value, &
+                                              interrupt=self%interrupt, fallback=.false., &
                                               histories=self%case%output%histories), point, error)
       end associate
       if (allocated(error)) return
       iterations = iterations + point%iterations
    end subroutine check
 
-   !> A level that was solved at this very frequency last is not solved again.
-   pure logical function is_solved(level, omega)
+   !> A level that was solved at this very place last is not solved again.
+   pure logical function is_solved(level, place)
       type(level_type), intent(in) :: level
-      real(wp), intent(in) :: omega
+      real(wp), intent(in) :: place
 
-      is_solved = abs(level%omega - omega) <= 0.0_wp
+      is_solved = level%is_solved .and. abs(level%place - place) <= 0.0_wp
    end function is_solved
 
    !> What the distance of two solutions is multiplied by to bound the error of the finer.

@@ -49,6 +49,7 @@ module fw_branch
    use fw_strategy, only: note_time_limit
    use fw_remarks, only: is_undamped
    use fw_response_view, only: response_view
+   use fw_sweep, only: path_ends
    use fw_sweep, only: point_source
    implicit none (type, external)
    private
@@ -79,6 +80,8 @@ module fw_branch
       integer(int64) :: clock = 0
       real(wp), allocatable :: r(:)
       type(branch_peaks) :: peaks
+      !> Frequencies where it begins and ends, or values of the parameter that it goes along.
+      real(wp) :: ends(2) = 0.0_wp
       !> The first row, and the last point of the curve.
       type(point_type) :: first_row
       type(branch_point), private :: before
@@ -165,10 +168,11 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
 
+      self%branch%ends = path_ends(case)
       ! What the first point leaves, the whole path inherits.
       self%level%solver%method%newton%loosest = tight_forcing
       call observer%limit_point(case%solver%max_seconds)
-      call self%level%solve(case, new_request(case, case%sweep%start, observer), point, error)
+      call self%level%solve(case, new_request(case, self%branch%ends(1), observer), point, error)
       if (allocated(error)) return
       if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
       call observer%limit_point(0.0_wp)
@@ -210,8 +214,8 @@ contains
       call observer%on_message(words)
    end subroutine finish
 
-   !> Start at a converged point x of the system at sweep%start, which counts as the first of
-   !> sweep%max_points. The system has to outlive the branch.
+   !> Start at a converged point x of the system at the start of the path, which counts as the
+   !> first of sweep%max_points. The system has to outlive the branch.
    subroutine begin(self, case, system, x, error)
       class(branch_type), intent(inout), target :: self
       type(case_type), intent(in) :: case
@@ -227,12 +231,12 @@ contains
       allocate (self%r(self%system%n))
       associate (curve => self%curve)
          curve%options = case%solver
-         curve%start = case%sweep%start
-         curve%finish = case%sweep%end
+         curve%start = self%ends(1)
+         curve%finish = self%ends(2)
          curve%max_points = case%sweep%max_points
          curve%x_scale = displacement_scale(self%system)
          ! Of a structure that is taken whole, too: a pair that sticks leaves no unknowns there.
-         call find_poles(system, curve)
+         if (.not. case%over%is_wanted()) call find_poles(system, curve)
          curve%step = 1.0_wp/real(default_steps, wp)
          if (case%sweep%n_points > 1) curve%step = 1.0_wp/real(case%sweep%n_points - 1, wp)
       end associate
@@ -267,7 +271,7 @@ contains
                         forces=system%problem%forces)
       if (allocated(error)) return
       self%whole%interrupt => system%interrupt
-      call self%whole%set_frequency(case%sweep%start, error)
+      call self%whole%follow(system, error)
       if (allocated(error)) return
       self%whole%depth = system%depth
       associate (pairs => system%problem%forces%pairs)
@@ -338,11 +342,11 @@ contains
       type(point_type), intent(in) :: point
       type(error_type), allocatable, intent(out) :: error
 
-      call note_peak(self, case, found, point, error)
+      if (.not. case%over%is_wanted()) call note_peak(self, case, found, point, error)
       if (allocated(error)) return
       if (point%fold) then
          ! One just beyond a bound belongs to no point of the sweep.
-         if (is_within(case, point%omega)) call add_fold(self, found, point)
+         if (is_within(self, point%place)) call add_fold(self, found, point)
          self%has_fold = .true.
          return
       end if
@@ -393,12 +397,12 @@ contains
       self%iterations = self%iterations + point%iterations
    end subroutine solve_peak
 
-   !> Whether a frequency lies in the range of the sweep.
-   pure logical function is_within(case, omega)
-      type(case_type), intent(in) :: case
-      real(wp), intent(in) :: omega
+   !> Whether a place lies in the range of the sweep.
+   pure logical function is_within(self, place)
+      type(branch_type), intent(in) :: self
+      real(wp), intent(in) :: place
 
-      is_within = (omega - case%sweep%start)*(omega - case%sweep%end) <= 0.0_wp
+      is_within = (place - self%ends(1))*(place - self%ends(2)) <= 0.0_wp
    end function is_within
 
    !> A place that would not settle may be one of round-off: it is left open.
@@ -415,7 +419,7 @@ contains
          fold%found_by = way_bracket
          fold%error = found%unsettled
       end if
-      fold%omega = point%omega
+      fold%place = point%place
       fold%amplitude = point%amplitude
       fold%coefficients = point%coefficients
       if (allocated(point%multipliers)) then
@@ -495,7 +499,7 @@ contains
       end if
       words = 'branch: '//self%curve%ending
       if (self%curve%runs_away .and. case%contact%n_pairs > 0) then
-         words = words//': from this frequency on the contact no longer holds the structure '// &
+         words = words//': from here on the contact no longer holds the structure '// &
                  'in place: all of it slips, and no periodic response exists without a support '// &
                  'in that direction'
       else if (self%curve%runs_away .and. is_undamped(case)) then
@@ -536,7 +540,9 @@ contains
       ! A fold is located by steps of its own: the system may stand at another frequency.
       call stand_at(self, found, coefficients, error)
       if (allocated(error)) return
-      point%omega = found%p
+      point%omega = self%system%frequency()
+      point%place = found%p
+      point%load_scale = case%model%harmonic_scale*self%system%vibratory_factor()
       point%converged = found%report%converged
       if (point%converged) point%converged = is_lasting(self%system) .and. .not. &
                                              lacks_friction(self%system, coefficients)
@@ -550,7 +556,7 @@ contains
          call recover_histories(self%system, size(self%system%balance, 1), coefficients, &
                                 case%harmonics%n_harmonics, point)
       end if
-      if (point%converged .and. is_within(case, found%p)) call note_height(self, found, point)
+      if (point%converged .and. is_within(self, found%p)) call note_height(self, found, point)
       if (point%converged .and. with_stability) then
          call self%stability%find(case, self%system, coefficients, point, error)
       end if
@@ -567,7 +573,7 @@ contains
       real(wp), allocatable, intent(out) :: coefficients(:)
       type(error_type), allocatable, intent(out) :: error
 
-      call self%system%set_frequency(found%p, error)
+      call self%system%set_parameter(found%p, error)
       if (allocated(error)) return
       allocate (coefficients(size(found%x)))
       call self%formulation%to_coefficients(found%x, coefficients)
@@ -598,7 +604,8 @@ contains
       if (.not. (allocated(self%highest%x) .and. case%output%contact)) return
       call stand_at(self, self%highest, coefficients, error)
       if (allocated(error)) return
-      point%omega = self%highest%p
+      point%omega = self%system%frequency()
+      point%place = self%highest%p
       point%converged = .true.
       call recover_point(self%system, coefficients, case%harmonics%n_harmonics, .true., point)
       call recover_cycle(self%system, size(self%system%balance, 1), coefficients, point)
@@ -615,12 +622,19 @@ contains
       !> Of the tangent, and what it may change of the frequency.
       real(wp), parameter :: longest = 1.0e-4_wp, difference = 1.0e-7_wp
       real(wp), allocatable :: beside(:)
-      real(wp) :: step
+      real(wp) :: step, scale
 
-      point%tangent_omega = found%t_p
+      scale = abs(found%p)
+      if (case%over%is_wanted()) then
+         point%tangent_parameter = found%t_p
+         ! It may pass 0.
+         scale = max(scale, abs(self%ends(2) - self%ends(1)))
+      else
+         point%tangent_omega = found%t_p
+      end if
       step = longest
-      if (abs(found%t_p)*step > difference*found%p) step = difference*found%p/abs(found%t_p)
-      call self%system%set_frequency(found%p + step*found%t_p, error)
+      if (abs(found%t_p)*step > difference*scale) step = difference*scale/abs(found%t_p)
+      call self%system%set_parameter(found%p + step*found%t_p, error)
       if (allocated(error)) return
       allocate (beside(size(found%x)))
       call self%formulation%to_coefficients(found%x + step*found%t, beside)

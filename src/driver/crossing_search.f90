@@ -168,11 +168,11 @@ contains
          if (allocated(error)) return
          if (.not. is_known(middle%point)) exit
          value = test_value(middle%point%multipliers, crossing, before)
-         if (abs(high%point%omega - low%point%omega) > 0.0_wp .and. high%share - low%share > &
+         if (abs(high%point%place - low%point%place) > 0.0_wp .and. high%share - low%share > &
              1.0e3_wp*narrow) then
             slope = abs((test_value(high%point%multipliers, crossing, before) - &
                          test_value(low%point%multipliers, crossing, before))/ &
-                        (high%point%omega - low%point%omega))
+                        (high%point%place - low%point%place))
          end if
          if (value > 0.0_wp) then
             high = middle
@@ -226,7 +226,7 @@ contains
       found%found_by = way_multiplier
       if (minval(distance) > on_circle .and. high%share - low%share > narrow) then
          found%found_by = way_bracket
-         found%error = abs(high%point%omega - low%point%omega)
+         found%error = abs(high%point%place - low%point%place)
       end if
       found%kind = kind_of(low%point, high%point, crossing, distance, found%found_by, on_branch)
 
@@ -235,7 +235,7 @@ contains
       subroutine take(point)
          type(point_type), intent(in) :: point
 
-         found%omega = point%omega
+         found%place = point%place
          found%amplitude = point%amplitude
          found%coefficients = point%coefficients
          found%multiplier = critical_multiplier(point%multipliers, passed)

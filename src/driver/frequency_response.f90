@@ -8,6 +8,7 @@ module fw_frequency_response
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_time
    use fw_case, only: case_type
+   use fw_controlled_response, only: controlled_response
    use fw_error, only: error_type
    use fw_error, only: status_stopped
    use fw_kinds, only: wp
@@ -33,11 +34,11 @@ module fw_frequency_response
    use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: point_strategy
    use fw_summary, only: summary_type
-   use fw_sweep, only: frequency_source
+   use fw_sweep, only: list_source
    use fw_sweep, only: point_source
    use fw_sweep, only: run_sweep
    use fw_sweep_bifurcations, only: sweep_bifurcations
-   use fw_sweep, only: sweep_frequencies
+   use fw_sweep, only: sweep_places
    use fw_time_response, only: time_strategy
    implicit none (type, external)
    private
@@ -63,6 +64,7 @@ contains
       type(sweep_bifurcations), target :: changes
       type(cycle_keeper), target :: keeper
       type(sink_list) :: sinks
+      logical :: in_order
 
       call new_strategy(case, strategy)
       call strategy%start(case, error)
@@ -77,16 +79,24 @@ contains
       call sinks%add(to_summary)
       call sinks%add(to_observer)
       call observer%on_start(case%title, to_observer%n_points)
-      ! A branch finds its peaks itself; a single frequency has none.
+      ! A branch finds its peaks itself; a single frequency has none, nor has another parameter:
+      ! what is looked for are resonances.
       select type (source)
-      type is (frequency_source)
-         if (size(source%omega) > 1) then
-            call finder%start(case, source%omega, source, strategy, observer)
-            ! It keeps the rows that a search after them may need.
-            call sinks%add(finder)
-            call sinks%add(keeper)
-            call remark_range(case, finder%modes, summary%remarks)
-            if (case%analysis == analysis_frf .and. case%sweep%stability .and. finder%in_order) then
+      type is (list_source)
+         if (size(source%place) > 1) then
+            in_order = case%over%is_ordered()
+            if (case%control%is_wanted()) then
+               ! Its amplitude is given.
+               in_order = .false.
+            else if (.not. case%over%is_wanted()) then
+               call finder%start(case, source%place, source, strategy, observer)
+               ! It keeps the rows that a search after them may need.
+               call sinks%add(finder)
+               call sinks%add(keeper)
+               call remark_range(case, finder%modes, summary%remarks)
+               in_order = finder%in_order
+            end if
+            if (case%analysis == analysis_frf .and. case%sweep%stability .and. in_order) then
                call changes%start(source, strategy, observer)
                call sinks%add(changes)
             end if
@@ -155,7 +165,7 @@ contains
 
          call summary%describe_bifurcations(list, n_solved, iterations)
          call writer%add_bifurcations(list, case%harmonics%n_harmonics, case%model%unit_system, &
-                                      error)
+                                      error, frequency_of(case))
       end subroutine keep
 
    end subroutine keep_bifurcations
@@ -208,6 +218,7 @@ contains
       type(peak_type), allocatable :: peaks(:)
       type(point_type) :: highest
 
+      if (case%over%is_wanted() .or. case%control%is_wanted()) return
       select type (source)
       type is (branch_source)
          call source%branch%peaks%list(source%branch%first_row, peaks)
@@ -229,6 +240,14 @@ contains
                             keeper%omega, keeper%cycle, error)
    end subroutine find_peaks
 
+   !> The one frequency of a sweep over another parameter [rad/s]; 0 where there is none.
+   pure real(wp) function frequency_of(case) result(omega)
+      type(case_type), intent(in) :: case
+
+      omega = 0.0_wp
+      if (case%over%is_wanted()) omega = case%sweep%start
+   end function frequency_of
+
    !> How the case wants its points solved.
    subroutine new_strategy(case, strategy)
       type(case_type), intent(in) :: case
@@ -236,6 +255,8 @@ contains
 
       if (case%analysis == analysis_time) then
          allocate (time_strategy :: strategy)
+      else if (case%control%is_wanted()) then
+         allocate (controlled_response :: strategy)
       else if (case%harmonics%adaptive) then
          allocate (adaptive_solver :: strategy)
       else if (case%harmonics%accuracy > 0.0_wp) then
@@ -253,7 +274,7 @@ contains
       !> How many (0: not known beforehand).
       integer, intent(out) :: n_points
       type(branch_source), allocatable :: branch
-      type(frequency_source) :: list
+      type(list_source) :: list
       logical :: along_branch
 
       along_branch = .false.
@@ -273,11 +294,23 @@ contains
          n_points = 0
          call move_alloc(branch, source)
       else
-         list%omega = sweep_frequencies(case)
+         list%place = sweep_places(case)
+         if (case%control%is_wanted()) call repeat_places(case%control%amplitude, list)
          list%strategy => strategy
-         n_points = size(list%omega)
+         n_points = size(list%place)
          source = list
       end if
    end subroutine new_source
+
+   !> All frequencies for each amplitude.
+   pure subroutine repeat_places(amplitude, list)
+      real(wp), intent(in) :: amplitude(:)
+      type(list_source), intent(inout) :: list
+      integer :: k, n
+
+      n = size(list%place)
+      list%amplitude = [(spread(amplitude(k), 1, n), k=1, size(amplitude))]
+      list%place = [(list%place, k=1, size(amplitude))]
+   end subroutine repeat_places
 
 end module fw_frequency_response

@@ -88,7 +88,7 @@ contains
          if (allocated(error)) return
       end if
       if (self%n_total <= self%n_kept) return
-      call self%finer%set_frequency(system%frequency(), error)
+      call self%finer%follow(system, error)
       if (allocated(error)) return
       associate (pairs => system%problem%forces%pairs)
          self%finer%work(pairs)%x_start = system%work(pairs)%x_start

@@ -31,8 +31,9 @@ module fw_level
       !> Of the problem: levels are not copied once they are built.
       type(balance_state) :: system
       type(point_solver) :: solver
-      !> The last frequency that was solved, and the observed coefficients there.
-      real(wp) :: omega = -1.0_wp
+      !> Where on the path was solved last, if anywhere, and the observed coefficients there.
+      logical :: is_solved = .false.
+      real(wp) :: place = 0.0_wp
       real(wp), allocatable :: coefficients(:, :)
       logical, private :: is_built = .false.
    contains
@@ -121,9 +122,10 @@ contains
       call self%solver%solve(case, self%system, request, point, error)
       point%n_harmonics = self%harmonics%n_harmonics
       point%n_time = self%system%problem%fourier%n_time
-      self%omega = -1.0_wp
+      self%is_solved = .false.
       if (allocated(error) .or. .not. point%converged) return
-      self%omega = request%omega
+      self%is_solved = .true.
+      self%place = request%place()
       self%coefficients = point%coefficients
    end subroutine solve
 

@@ -64,7 +64,8 @@ module fw_point_solver
       type(solution_method) :: method
       type(stability_solver) :: stability
       type(sensitivity_solver) :: sensitivity
-      !> The present solution, and the last two converged ones with their frequencies.
+      !> The present solution, and the last two converged ones with their frequencies. (Of a sweep
+      !> over another parameter, here and below its values.)
       real(wp), allocatable :: x(:), last(:), before(:), r(:)
       !> The point to be solved, and the best that was found of it where nothing converged.
       real(wp) :: omega_wanted = -1.0_wp
@@ -116,17 +117,19 @@ contains
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
-      self%omega_wanted = request%omega
+      self%omega_wanted = request%place()
       self%best_residual = huge(1.0_wp)
       self%work_limit = most_work*max(case%solver%max_iterations, least_counted)
       self%out_of_work = .false.
       system%interrupt => request%interrupt
+      if (allocated(system%mover)) call system%set_frequency(request%omega, error)
+      if (allocated(error)) return
       call reach(self, case, system, request, report, point%iterations, error)
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return
       if (self%out_of_work .and. .not. report%converged) then
-         point%note = 'work limit: the other ways to omega = '//to_text(request%omega)// &
-                      ' rad/s were left after '//to_text(point%iterations)//' iterations'
+         point%note = 'work limit: the other ways to '//trim(request%describe())// &
+                      ' were left after '//to_text(point%iterations)//' iterations'
       end if
       self%point_failures = merge(0, self%point_failures + 1, report%converged)
       if (report%converged) point%served_by = self%served_by
@@ -137,6 +140,8 @@ contains
       ! Forces and states of this very point: the last trial may have been another.
       call system%residual(self%x, self%r)
       point%omega = request%omega
+      point%place = request%place()
+      point%load_scale = case%model%harmonic_scale*system%vibratory_factor()
       point%converged = report%converged
       point%residual = report%residual
       ! Also of a point that failed: it is written with its mark.
@@ -190,27 +195,27 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (case%solver%kind == solver_pseudo_time) then
-         call by_flow(self, case, case%pseudo_time, system, request%omega, report, iterations, &
+         call by_flow(self, case, case%pseudo_time, system, request%place(), report, iterations, &
                       error)
          return
       end if
       self%method%newton%linear%lu_left_out = .false.
-      call from_guesses(self, system, request%omega, report, iterations, error)
+      call from_guesses(self, system, request%place(), report, iterations, error)
       if (allocated(error)) return
       if (.not. request%fallback) return
       if (.not. goes_on(self, report, iterations)) return
       if (self%point_failures < max_point_failures) then
-         call by_other_ways(self, case, system, request%omega, report, iterations, error)
+         call by_other_ways(self, case, system, request%place(), report, iterations, error)
          if (allocated(error)) return
          if (.not. goes_on(self, report, iterations)) return
       end if
       if (self%method%newton%linear%lu_left_out) then
          self%method%newton%linear%lu_follows = .true.
-         call from_guesses(self, system, request%omega, report, iterations, error)
+         call from_guesses(self, system, request%place(), report, iterations, error)
          self%method%newton%linear%lu_follows = .false.
          if (allocated(error) .or. report%converged .or. report%interrupted) return
       end if
-      call from_free_guess(self, system, request%omega, report, iterations)
+      call from_free_guess(self, system, request%place(), report, iterations)
    end subroutine reach
 
    !> Ways that cost many solutions: pseudo-time, then smaller steps of the frequency or the load.
@@ -271,7 +276,7 @@ contains
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
 
-      call system%set_frequency(omega, error)
+      call system%set_parameter(omega, error)
       if (allocated(error)) return
       if (self%n_converged > 0) then
          self%x = self%last
@@ -306,13 +311,13 @@ contains
                             max(self%method%newton%options%max_iterations, least_counted))
       ! The position at rest, from which the load is raised.
       system%load_share = 0.0_wp
-      call system%set_frequency(omega, error)
+      call system%set_parameter(omega, error)
       if (allocated(error)) return
       call stuck_guess(system, self%x)
       reached = self%x
       do
          system%load_share = min(1.0_wp, share + step)
-         call system%set_frequency(omega, error)
+         call system%set_parameter(omega, error)
          if (allocated(error)) exit
          call attempt(self, system, report)
          iterations = iterations + report%iterations
@@ -334,7 +339,7 @@ contains
       if (report%converged) then
          call remember(self, omega)
       else if (.not. allocated(error)) then
-         call system%set_frequency(omega, error)
+         call system%set_parameter(omega, error)
       end if
    end subroutine raise_load
 
@@ -347,7 +352,7 @@ contains
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
 
-      call system%set_frequency(omega, error)
+      call system%set_parameter(omega, error)
       if (allocated(error)) return
       call try_guesses(self, system, omega, report, iterations)
       if (report%converged) call remember(self, omega)
@@ -382,7 +387,7 @@ contains
          end if
       end if
       ! Left at the frequency that was asked for.
-      if (.not. report%converged) call system%set_frequency(omega, error)
+      if (.not. report%converged) call system%set_parameter(omega, error)
    end subroutine approach
 
    !> Extrapolation along the sweep, the last solution, all stuck.
@@ -442,7 +447,7 @@ contains
       call self%method%solve(system, self%x, report)
       if (report%converged .or. system%load_share < 1.0_wp) return
       ! Intermediate frequencies and loads are no answer to what was asked.
-      if (abs(system%frequency() - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
+      if (abs(system%parameter() - self%omega_wanted) <= 0.0_wp) call note_best(self, report)
    end subroutine attempt
 
    !> Keep the unknowns of the smallest residual; NaN is never smaller.

@@ -36,6 +36,12 @@ module fw_problem
    use fw_joint, only: new_joint
    use fw_joint, only: turn_joint
    use fw_memory, only: require_memory
+   use fw_moved_parameter, only: moved_parameter
+   use fw_moved_parameter, only: new_moved_parameter
+   use fw_moved_parameter, only: renew_laws
+   use fw_parameter_sweep, only: as_factor
+   use fw_parameters, only: gap
+   use fw_parameters, only: harmonic_scale
    use fw_plain_structure, only: new_plain_structure
    use fw_plain_structure, only: plain_structure
    use fw_reduction, only: held_basis
@@ -78,7 +84,28 @@ contains
       call build_problem(case, problem, stand, error, keep_all, of_level, forces, held)
       if (allocated(error)) return
       call new_balance_state(problem, system, stand)
+      call let_move(case, system, error)
    end subroutine build_system
+
+   !> Give the state the parameter that the case goes over, and its first value; that of a given
+   !> amplitude is the load.
+   subroutine let_move(case, system, error)
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(inout) :: system
+      type(error_type), allocatable, intent(out) :: error
+      type(moved_parameter), allocatable :: mover
+
+      if (.not. (case%over%is_wanted() .or. case%control%is_wanted())) return
+      allocate (mover)
+      if (case%over%is_wanted()) then
+         mover = new_moved_parameter(case, case%over%number, case%over%as == as_factor)
+      else
+         mover = new_moved_parameter(case, harmonic_scale, .false.)
+      end if
+      call move_alloc(mover, system%mover)
+      call system%set_parameter(merge(case%over%start, case%model%harmonic_scale, &
+                                      case%over%is_wanted()), error)
+   end subroutine let_move
 
    !> What all workers share. The first state is made along the way: the stiffness of rigid laws
    !> is chosen by the structure at the first frequency.
@@ -105,6 +132,8 @@ contains
       ! A perturbation moves what no load moves.
       skip_idle = case%solver%skips .and. .not. case%sweep%stability .and. &
                   case%analysis /= analysis_mode
+      ! A gap that closes into an interference does so too.
+      if (case%over%number == gap) skip_idle = .false.
       call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
       ! No load moves a mode, and none has to.
@@ -147,24 +176,8 @@ contains
    subroutine renew_forces(case, problem)
       type(case_type), intent(in) :: case
       type(balance_problem), intent(inout) :: problem
-      type(force_list) :: laws
-      integer :: k
 
-      call new_forces(case%contact, case%springs, problem%joint%row, problem%joint%spring_row, &
-                      locates_events(case, case%harmonics, problem%joint), &
-                      case%harmonics%filter_harmonics, laws)
-      do k = 1, laws%n_laws
-         associate (new => laws%entry(k)%law%prediction, &
-                    old => problem%forces%entry(k)%law%prediction)
-            ! The structure gave it, and has not changed.
-            if (new%takes_balance) new%stiffness = old%stiffness
-            if (new%takes_balance .and. new%has_inertia) then
-               new%inertia = old%inertia
-               new%damping = old%damping
-            end if
-         end associate
-      end do
-      problem%forces = laws
+      call renew_laws(problem, case%contact, case%springs, case%harmonics%filter_harmonics)
    end subroutine renew_forces
 
    !> The structure of a case, condensed.

@@ -273,6 +273,12 @@ contains
          self%case%harmonics%accuracy = plain%accuracy
          self%case%harmonics%is_chosen = .false.
       end if
+      if (self%case%over%is_wanted() .or. self%case%control%is_wanted()) then
+         call fatal_error(error, 'steps go through frequencies at a given load: &sweep '// &
+                          'parameter and &control are for runs of the case as a whole', &
+                          status_usage)
+         return
+      end if
       if (all(self%case%analysis /= [analysis_frf, analysis_point]) .or. &
           self%case%sweep%continuation /= continuation_natural .or. &
           self%case%harmonics%adaptive .or. self%case%harmonics%accuracy > 0.0_wp) then

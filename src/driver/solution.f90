@@ -53,6 +53,7 @@ module fw_solution
       procedure :: start
       procedure :: solve
       procedure :: solve_by_flow
+      procedure :: refuse => refuse_unreal
    end type solution_method
 
 contains
@@ -165,7 +166,7 @@ contains
                            of_level=self%harmonics, forces=system%problem%forces)
          if (allocated(error)) return
       end if
-      call self%whole%set_frequency(system%frequency(), error)
+      call self%whole%follow(system, error)
       if (allocated(error)) return
       ! Memory and reference, too.
       self%whole%depth = system%depth

@@ -82,7 +82,7 @@ contains
 
       marched = .false.
       if (.not. allocated(self%fine)) call build(self, case, system, error)
-      if (.not. allocated(error)) call self%fine%set_frequency(system%frequency(), error)
+      if (.not. allocated(error)) call self%fine%follow(system, error)
       if (allocated(error)) return
       self%fine%interrupt => system%interrupt
       self%fine%depth = system%depth

@@ -21,6 +21,11 @@ module fw_strategy
    type :: point_request
       !> [rad/s]
       real(wp) :: omega = 0.0_wp
+      !> Value of the parameter that the sweep goes over, if it does.
+      logical :: has_value = .false.
+      real(wp) :: value = 0.0_wp
+      !> That the response is to have, where the load is found [length].
+      real(wp) :: amplitude = 0.0_wp
       !> Look for other ways where the first fails.
       logical :: fallback = .true.
       !> Floquet multipliers; contact forces, states and energies; histories over the period.
@@ -31,13 +36,16 @@ module fw_strategy
       class(interrupt_type), pointer :: interrupt => null()
       !> Derivatives by parameters.
       logical :: sensitivity = .false.
+   contains
+      procedure :: place
+      procedure :: describe => describe_request
    end type point_request
 
    !> A solution to go on from, wherever the points have gone since.
    type :: solver_memory
       !> Unknowns at the frequency; not allocated where there is no solution.
       real(wp), allocatable :: x(:)
-      !> [rad/s]
+      !> [rad/s], or the value of the parameter.
       real(wp) :: omega = 0.0_wp
       !> Harmonics and instants that it is of, where these differ from point to point.
       integer :: level(2) = 0
@@ -92,6 +100,22 @@ module fw_strategy
 
 contains
 
+   !> Where on the path: omega, or the value of the parameter.
+   pure real(wp) function place(self)
+      class(point_request), intent(in) :: self
+
+      place = merge(self%value, self%omega, self%has_value)
+   end function place
+
+   !> Where it is asked for, in words.
+   pure function describe_request(self) result(words)
+      class(point_request), intent(in) :: self
+      character(80) :: words
+
+      words = 'omega = '//to_text(self%omega)//' rad/s'
+      if (self%has_value) words = trim(words)//', '//to_text(self%value)//' of the parameter'
+   end function describe_request
+
    !> The last solution; none of a strategy that does not go on from solutions of its choice.
    subroutine remember_nothing(self, memory)
       class(point_strategy), intent(in) :: self
@@ -139,15 +163,20 @@ contains
    end subroutine note_time_limit
 
    !> What a case asks of its points.
-   function new_request(case, omega, interrupt) result(request)
+   function new_request(case, place, interrupt) result(request)
       type(case_type), intent(in) :: case
-      !> [rad/s]
-      real(wp), intent(in) :: omega
+      !> [rad/s], or the value of the parameter that the case goes over at its one frequency.
+      real(wp), intent(in) :: place
       class(interrupt_type), intent(inout), target, optional :: interrupt
       type(point_request) :: request
 
       if (present(interrupt)) request%interrupt => interrupt
-      request%omega = omega
+      request%omega = place
+      request%has_value = case%over%is_wanted()
+      if (request%has_value) then
+         request%value = place
+         request%omega = case%sweep%start
+      end if
       request%fallback = case%solver%fallback
       request%stability = case%sweep%stability
       request%contact = case%output%contact

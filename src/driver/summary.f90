@@ -11,6 +11,7 @@ module fw_summary
    use fw_balance_state, only: balance_state
    use fw_linear_step, only: linear_step_type
    use fw_mode_group, only: mode_table
+   use fw_parameters, only: parameter_words
    use fw_peak, only: found_bound
    use fw_peak, only: found_jump
    use fw_peak, only: found_unresolved
@@ -49,8 +50,13 @@ module fw_summary
       !> Points by their verdict on stability (undecided, unstable, stable).
       integer :: verdicts(verdict_undecided:verdict_stable) = 0
       type(string_type), allocatable :: name(:)
-      !> Largest amplitude of each observed quantity among converged points, and where [rad/s].
-      real(wp), allocatable :: peak(:), peak_omega(:)
+      !> Largest amplitude of each observed quantity among converged points, and where: at a
+      !> frequency [rad/s], or at a value of the parameter that is named.
+      real(wp), allocatable :: peak(:), peak_place(:)
+      character(28) :: parameter = ''
+      !> The least and the largest scale of the load at converged points, where it is a result.
+      real(wp) :: load_scale(2) = [huge(1.0_wp), -huge(1.0_wp)]
+      logical :: is_controlled = .false.
       !> What else there is to say of the peak of each; not allocated where nothing is.
       type(string_type), allocatable :: peak_note(:)
       !> What is allowed and seldom meant.
@@ -96,7 +102,9 @@ contains
       type(summary_type) :: self
 
       self%name = case%model%observe_name
-      allocate (self%peak(size(self%name)), self%peak_omega(size(self%name)), source=0.0_wp)
+      allocate (self%peak(size(self%name)), self%peak_place(size(self%name)), source=0.0_wp)
+      if (case%over%is_wanted()) self%parameter = parameter_words(case%over%number)
+      self%is_controlled = case%control%is_wanted()
       allocate (self%work(0), self%skipped(0))
    end function new_summary
 
@@ -111,6 +119,8 @@ contains
                         max(self%harmonics(2), point%n_harmonics)]
       self%instants = [min(self%instants(1), point%n_time), max(self%instants(2), point%n_time)]
       if (.not. point%converged) return
+      self%load_scale = [min(self%load_scale(1), point%load_scale), &
+                         max(self%load_scale(2), point%load_scale)]
       ! What instants leave out is a part of the estimate of an error.
       if (point%instants_wanted > 0 .and. .not. point%error_estimate > 0.0_wp) then
          self%n_coarse = self%n_coarse + 1
@@ -122,7 +132,8 @@ contains
       do i = 1, size(self%peak)
          if (point%amplitude(i) < self%peak(i)) cycle
          self%peak(i) = point%amplitude(i)
-         self%peak_omega(i) = point%omega
+         self%peak_place(i) = point%omega
+         if (len_trim(self%parameter) > 0) self%peak_place(i) = point%place
       end do
    end subroutine add
 
@@ -222,7 +233,7 @@ contains
             if (peaks(k)%found_by == found_unresolved) n_open = n_open + 1
             if (peaks(k)%amplitude < self%peak(i)) cycle
             self%peak(i) = peaks(k)%amplitude
-            self%peak_omega(i) = peaks(k)%omega
+            self%peak_place(i) = peaks(k)%omega
             self%peak_note(i)%text = trim(note_of(peaks(k)))
          end do
          if (n_inside > 1) self%peak_note(i)%text = self%peak_note(i)%text//', '// &
@@ -241,13 +252,19 @@ contains
       !> Solutions made to find them, and their iterations.
       integer, intent(in) :: n_solved, iterations
       character(14) :: text
+      character(48) :: where
       integer :: k
 
       allocate (self%bifurcation(0))
       do k = 1, min(list%n, most_places)
-         write (text, '(es13.6)') list%item(k)%omega
+         write (text, '(es13.6)') list%item(k)%place
+         if (len_trim(self%parameter) > 0) then
+            where = trim(self%parameter)//' = '//trim(adjustl(text))
+         else
+            where = trim(adjustl(text))//' rad/s'
+         end if
          call add_line(self%bifurcation, trim(merge('bifurcations', '            ', k == 1)), &
-                       trim(kind_words(list%item(k)%kind))//' at '//trim(adjustl(text))//' rad/s')
+                       trim(kind_words(list%item(k)%kind))//' at '//trim(where))
       end do
       if (list%n > most_places) then
          call add_line(self%bifurcation, '', to_text(list%n - most_places)// &
@@ -498,19 +515,29 @@ contains
             call append(table, self%mode(i)%text)
          end do
       end if
+      if (self%is_controlled .and. state%n_converged > 0) then
+         write (text, '(es13.6, a, es13.6)') self%load_scale(1), ' .. ', self%load_scale(2)
+         call add_line(table, 'load scale', trim(adjustl(text)))
+      end if
       do i = 1, merge(min(size(self%name), max_shown), 0, state%n_converged > 0 .and. &
-                      .not. allocated(self%mode))
+                      .not. (allocated(self%mode) .or. self%is_controlled))
          write (text, '(es13.6, a, es13.6, a, es13.6, a)') self%peak(i), ' at ', &
-            self%peak_omega(i), &
-            ' rad/s (', self%peak_omega(i)/(2.0_wp*pi), ' Hz)'
-         if (allocated(self%peak_note)) then
+            self%peak_place(i), &
+            ' rad/s (', self%peak_place(i)/(2.0_wp*pi), ' Hz)'
+         if (len_trim(self%parameter) > 0) then
+            ! Of the rows: no maximum between them is looked for.
+            write (text, '(es13.6, a, es13.6)') self%peak(i), ' at '//trim(self%parameter)// &
+               ' = ', self%peak_place(i)
+            call add_line(table, 'largest '//self%name(i)%text, trim(adjustl(text)))
+         else if (allocated(self%peak_note)) then
             call add_line(table, 'peak '//self%name(i)%text, trim(adjustl(text))// &
                           self%peak_note(i)%text)
          else
             call add_line(table, 'peak '//self%name(i)%text, trim(adjustl(text)))
          end if
       end do
-      if (size(self%name) > max_shown .and. .not. allocated(self%mode)) then
+      if (size(self%name) > max_shown .and. .not. (allocated(self%mode) .or. &
+                                                   self%is_controlled)) then
          call add_line(table, '...', to_text(size(self%name) - max_shown)// &
                        ' more in the result file')
       end if

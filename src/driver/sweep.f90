@@ -12,12 +12,13 @@ module fw_sweep
    use fw_sinks, only: sink_list
    use fw_solver_options, only: sweep_options
    use fw_strategy, only: new_request
+   use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
    use fw_strategy, only: solver_memory
    implicit none (type, external)
    private
 
-   public :: point_source, frequency_source, run_sweep, sweep_frequency, sweep_frequencies
+   public :: point_source, list_source, run_sweep, sweep_frequency, sweep_places, path_ends
 
    !> Where points come from: given frequencies, or a branch that chooses its own.
    type, abstract :: point_source
@@ -50,19 +51,21 @@ module fw_sweep
       end function is_covered
    end interface
 
-   !> Given frequencies, in their order.
-   type, extends(point_source) :: frequency_source
-      !> (n_points) [rad/s]
-      real(wp), allocatable :: omega(:)
+   !> Given frequencies, or values of the parameter that the sweep goes over, in their order.
+   type, extends(point_source) :: list_source
+      !> (n_points)
+      real(wp), allocatable :: place(:)
+      !> Amplitude that each is to have, where the load is found; else not allocated.
+      real(wp), allocatable :: amplitude(:)
       !> Points given so far.
       integer :: n_given = 0
       !> How each of them is solved.
       class(point_strategy), pointer :: strategy => null()
    contains
-      procedure :: next => next_frequency
+      procedure :: next => next_of_list
       procedure :: is_covered => all_given
       procedure :: remember => remember_strategy
-   end type frequency_source
+   end type list_source
 
 contains
 
@@ -113,44 +116,46 @@ contains
       end associate
    end subroutine remember
 
-   !> What the strategy knows: the frequencies themselves hold nothing.
+   !> What the strategy knows: the list itself holds nothing.
    subroutine remember_strategy(self, memory)
-      class(frequency_source), intent(in) :: self
+      class(list_source), intent(in) :: self
       type(solver_memory), intent(out) :: memory
 
       call self%strategy%remember(memory)
    end subroutine remember_strategy
 
-   !> Solve at the next frequency of the list; a point that fails is given all the same.
-   subroutine next_frequency(self, case, observer, point, more, error)
-      class(frequency_source), intent(inout) :: self
+   !> Solve at the next place of the list; a point that fails is given all the same.
+   subroutine next_of_list(self, case, observer, point, more, error)
+      class(list_source), intent(inout) :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(point_type), intent(out) :: point
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
+      type(point_request) :: request
 
-      more = self%n_given < size(self%omega)
+      more = self%n_given < size(self%place)
       if (.not. more) return
-      call self%strategy%solve_in_time(case, new_request(case, self%omega(self%n_given + 1), &
-                                                         observer), point, error)
+      request = new_request(case, self%place(self%n_given + 1), observer)
+      if (allocated(self%amplitude)) request%amplitude = self%amplitude(self%n_given + 1)
+      call self%strategy%solve_in_time(case, request, point, error)
       if (allocated(error)) return
       if (allocated(point%note)) call observer%on_message(point%note)
       if (allocated(self%strategy%note)) call observer%on_message(self%strategy%note)
       self%n_given = self%n_given + 1
-   end subroutine next_frequency
+   end subroutine next_of_list
 
    !> A run that was stopped or failed has not given all.
    pure logical function all_given(self)
-      class(frequency_source), intent(in) :: self
+      class(list_source), intent(in) :: self
 
-      all_given = self%n_given == size(self%omega)
+      all_given = self%n_given == size(self%place)
    end function all_given
 
-   !> The frequencies that a case asks for [rad/s].
-   pure function sweep_frequencies(case) result(omega)
+   !> The frequencies that a case asks for [rad/s], or the values of its parameter.
+   pure function sweep_places(case) result(places)
       type(case_type), intent(in) :: case
-      real(wp), allocatable :: omega(:)
+      real(wp), allocatable :: places(:)
       integer :: k, n_points
 
       n_points = 1
@@ -158,8 +163,21 @@ contains
       if (case%analysis == analysis_time .and. case%sweep%end > 0.0_wp) then
          n_points = case%sweep%n_points
       end if
-      omega = [(sweep_frequency(case%sweep, k, n_points), k=1, n_points)]
-   end function sweep_frequencies
+      if (case%over%is_wanted()) then
+         places = [(case%over%value(k, n_points), k=1, n_points)]
+      else
+         places = [(sweep_frequency(case%sweep, k, n_points), k=1, n_points)]
+      end if
+   end function sweep_places
+
+   !> Where a sweep begins and where it ends.
+   pure function path_ends(case) result(ends)
+      type(case_type), intent(in) :: case
+      real(wp) :: ends(2)
+
+      ends = [case%sweep%start, case%sweep%end]
+      if (case%over%is_wanted()) ends = [case%over%start, case%over%end]
+   end function path_ends
 
    !> Point k of a sweep: of the list, or evenly spaced from start to end, both exact [rad/s].
    pure real(wp) function sweep_frequency(sweep, k, n_points) result(omega)

@@ -18,6 +18,7 @@ module fw_sweep_bifurcations
    use fw_stability_crossing, only: multiplier_track
    use fw_stability_crossing, only: signature_of
    use fw_stability_verdict, only: verdict_undecided
+   use fw_strategy, only: new_request
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
    use fw_strategy, only: solver_memory
@@ -63,8 +64,8 @@ module fw_sweep_bifurcations
       type(case_type), pointer :: case => null()
       class(point_strategy), pointer :: strategy => null()
       class(interrupt_type), pointer :: interrupt => null()
-      !> Frequencies of the rows [rad/s], and where a solution starts.
-      real(wp) :: omega(2) = 0.0_wp
+      !> Places of the rows, and where a solution starts.
+      real(wp) :: place(2) = 0.0_wp
       integer :: before(3) = 0
       real(wp) :: share = 0.0_wp
       type(solver_memory) :: memory
@@ -142,7 +143,7 @@ contains
       probe%interrupt => self%interrupt
       do k = 1, size(self%changes)
          associate (change => self%changes(k))
-            probe%omega = [change%first%omega, change%second%omega]
+            probe%place = [change%first%place, change%second%place]
             probe%memory = change%memory
             probe%share = 0.0_wp
             probe%before = signature_of(change%first%multipliers)
@@ -165,8 +166,12 @@ contains
       type(point_request) :: request
 
       if (.not. allocated(self%memory%x)) return
-      request = point_request(omega=(1.0_wp - share)*self%omega(1) + share*self%omega(2), &
-                              fallback=.false., stability=.true.)
+      request = new_request(self%case, (1.0_wp - share)*self%place(1) + share*self%place(2))
+      request%fallback = .false.
+      request%stability = .true.
+      request%contact = .false.
+      request%histories = .false.
+      request%sensitivity = .false.
       request%interrupt => self%interrupt
       call self%strategy%recall(self%memory)
       call self%strategy%solve_in_time(self%case, request, point, error)

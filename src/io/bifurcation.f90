@@ -27,8 +27,9 @@ module fw_bifurcation
 
    type :: bifurcation_type
       integer :: kind = kind_undecided
-      !> [rad/s], and how far it may be off; below 0 where that is not known.
-      real(wp) :: omega = 0.0_wp, error = -1.0_wp
+      !> The frequency [rad/s], or the value of the parameter that the sweep goes over, and how far
+      !> it may be off; below 0 where that is not known.
+      real(wp) :: place = 0.0_wp, error = -1.0_wp
       !> Largest magnitude over the period (n_observed).
       real(wp), allocatable :: amplitude(:)
       !> Coefficients (0, c1, s1, ...) of the observed quantities (2H+1, n_observed).
@@ -51,7 +52,7 @@ module fw_bifurcation
    end type bifurcation_list
 
    !> Two turns are one place where frequencies and amplitudes agree to this, relative.
-   real(wp), parameter :: same_omega = 1.0e-9_wp, same_amplitude = 1.0e-6_wp
+   real(wp), parameter :: same_place = 1.0e-9_wp, same_amplitude = 1.0e-6_wp
    !> Way back of the frequency between two turns, relative, that harmonics and instants of a
    !> balance may make of a curve that does not turn.
    real(wp), parameter :: ripple = 1.0e-5_wp
@@ -100,9 +101,9 @@ contains
                n = n - 1
                cycle
             end if
-            if (abs(kept(last)%omega - self%item(k)%omega) <= ripple*self%item(k)%omega) then
-               call leave_open(kept(last), self%item(k)%omega)
-               call leave_open(self%item(k), kept(last)%omega)
+            if (abs(kept(last)%place - self%item(k)%place) <= ripple*abs(self%item(k)%place)) then
+               call leave_open(kept(last), self%item(k)%place)
+               call leave_open(self%item(k), kept(last)%place)
             end if
          end if
          n = n + 1
@@ -129,7 +130,7 @@ contains
    pure logical function is_same(a, b)
       type(bifurcation_type), intent(in) :: a, b
 
-      is_same = abs(a%omega - b%omega) <= same_omega*b%omega .and. &
+      is_same = abs(a%place - b%place) <= same_place*abs(b%place) .and. &
                 maxval(abs(a%amplitude - b%amplitude)) <= same_amplitude*maxval(b%amplitude)
    end function is_same
 
@@ -139,7 +140,7 @@ contains
       real(wp), intent(in) :: other
 
       item%kind = kind_undecided
-      item%error = abs(item%omega - other)
+      item%error = abs(item%place - other)
    end subroutine leave_open
 
    !> Whether a turn, whose multiplier should be 1 and is not, lies beside a place.
@@ -147,7 +148,7 @@ contains
       type(bifurcation_type), intent(in) :: fold, place
 
       is_beside = fold%found_by == way_turn .and. &
-                  abs(fold%omega - place%omega) <= beside*place%omega .and. &
+                  abs(fold%place - place%place) <= beside*abs(place%place) .and. &
                   abs(fold%multiplier - 1.0_wp) > off_one .and. abs(fold%multiplier) > 0.0_wp
       if (.not. is_beside) return
       is_beside = maxval(abs(fold%amplitude - place%amplitude)) <= &

@@ -21,17 +21,19 @@ module fw_bifurcation_group
 contains
 
    !> Write the group; nothing where there is none.
-   subroutine write_bifurcations(file, list, n_harmonics, unit_system, error)
+   subroutine write_bifurcations(file, list, n_harmonics, unit_system, frequency, error)
       type(hdf5_file), intent(in) :: file
       type(bifurcation_list), intent(in) :: list
       !> Of the case: those that a solution does not carry read as zero.
       integer, intent(in) :: n_harmonics
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
+      !> That of a sweep over another parameter [rad/s]; 0 where it is the frequency that changes.
+      real(wp), intent(in) :: frequency
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: coefficients(:, :, :), multiplier(:, :), amplitude(:, :), width(:)
-      ! Components of the list side by side: a write of `list%item%omega` would copy them unseen.
-      real(wp), allocatable :: omega(:)
+      ! Components of the list side by side: a write of `list%item%place` would copy them unseen.
+      real(wp), allocatable :: place(:)
       integer, allocatable :: kind(:), found_by(:)
       integer :: k, n, n_observed
 
@@ -55,10 +57,17 @@ contains
                ieee_quiet_nan)
          end associate
       end do
-      omega = list%item(:list%n)%omega
+      place = list%item(:list%n)%place
       kind = list%item(:list%n)%kind
       found_by = list%item(:list%n)%found_by
-      call write_dataset(file, '/bifurcation/omega', omega, error)
+      if (frequency > 0.0_wp) then
+         call write_place(file, place, width, unit_system, error)
+         if (allocated(error)) return
+         ! The frequency is what it is.
+         place = frequency
+         width = 0.0_wp
+      end if
+      call write_dataset(file, '/bifurcation/omega', place, error)
       if (allocated(error)) return
       call write_dataset(file, '/bifurcation/error', width, error)
       if (allocated(error)) return
@@ -74,6 +83,22 @@ contains
       if (allocated(error)) return
       call label_all(file, unit_system, error)
    end subroutine write_bifurcations
+
+   !> Values of the parameter that a sweep goes over, and how far they may be off.
+   subroutine write_place(file, place, width, unit_system, error)
+      type(hdf5_file), intent(in) :: file
+      real(wp), intent(in), contiguous :: place(:), width(:)
+      character(:), allocatable, intent(in) :: unit_system
+      type(error_type), allocatable, intent(out) :: error
+
+      call write_dataset(file, '/bifurcation/parameter', place, error)
+      if (allocated(error)) return
+      call label_dataset(file, '/bifurcation/parameter', unit_system, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/bifurcation/parameter_error', width, error)
+      if (allocated(error)) return
+      call label_dataset(file, '/bifurcation/parameter_error', unit_system, error)
+   end subroutine write_place
 
    !> Places in words, from 0.
    subroutine write_words(file, name, places, words, error)

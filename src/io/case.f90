@@ -7,9 +7,11 @@ module fw_case
    use fw_key_range, only: from_to
    use fw_kinds, only: wp
    use fw_mode_options, only: mode_options
+   use fw_parameter_sweep, only: parameter_sweep
    use fw_model_forming, only: model_origin
    use fw_model, only: model_type
    use fw_contact_data, only: contact_type, spring_type
+   use fw_control_options, only: control_options
    use fw_harmonics_options, only: harmonics_options
    use fw_resonance_options, only: resonance_options
    use fw_sensitivity_options, only: sensitivity_options
@@ -58,6 +60,10 @@ module fw_case
       type(spring_type) :: springs
       type(harmonics_options) :: harmonics
       type(sweep_options) :: sweep
+      !> What the sweep goes over where that is not the frequency.
+      type(parameter_sweep) :: over
+      !> Amplitudes that are given in place of the load.
+      type(control_options) :: control
       type(solver_options) :: solver
       type(pseudo_time_options) :: pseudo_time
       type(wear_options) :: wear

@@ -16,6 +16,8 @@ module fw_combinations
    use fw_laws, only: facts_of
    use fw_laws, only: is_viscous
    use fw_laws, only: law_words
+   use fw_path_checks, only: check_control
+   use fw_path_checks, only: check_parameter_sweep
    use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: continuation_natural
    use fw_solver_options, only: jacobian_analytic
@@ -46,6 +48,8 @@ contains
       if (.not. allocated(error)) call check_jacobian(case, error)
       if (.not. allocated(error)) call check_memory(case, error)
       if (.not. allocated(error)) call check_refine(case, error)
+      if (.not. allocated(error)) call check_parameter_sweep(case, error)
+      if (.not. allocated(error)) call check_control(case, error)
       if (.not. allocated(error)) call check_adaptive(case, error)
       if (.not. allocated(error)) call check_accuracy(case, error)
       if (.not. allocated(error)) call check_stability(case, error)

@@ -52,13 +52,13 @@ contains
 
       if (number == harmonic_scale) then
          if (.not. abs(model%harmonic_scale) > 0.0_wp) reason = 'load%harmonic_scale is 0'
-         if (model%cyclic%is_cyclic) return
+         if (model%cyclic%is_cyclic .or. allocated(reason)) return
          if (.not. (acts(model%load_cosine) .or. acts(model%load_sine))) then
             if (.not. allocated(model%load_wave)) reason = 'there is no vibratory load'
          end if
       else if (number == static_scale) then
          if (.not. abs(model%static_scale) > 0.0_wp) reason = 'load%static_scale is 0'
-         if (model%cyclic%is_cyclic) return
+         if (model%cyclic%is_cyclic .or. allocated(reason)) return
          if (.not. acts(model%load_static)) reason = 'there is no static load'
       end if
    end subroutine check_of_loads

@@ -14,6 +14,7 @@ module fw_point_quantities
    use fw_hdf5, only: growing_logical
    use fw_hdf5, only: growing_real
    use fw_kinds, only: wp
+   use fw_parameters, only: harmonic_scale
    use fw_parameters, only: is_per_pair
    use fw_parameters, only: is_per_spring
    use fw_parameters, only: n_parameter_words
@@ -50,6 +51,8 @@ module fw_point_quantities
       integer :: missing = 0
       !> Whether the integers are places, from 0, in the words for what gave a solution.
       logical :: is_served_by = .false.
+      !> Whether an attribute names the parameter that the sweep goes over.
+      logical :: names_parameter = .false.
       !> Its numbers in a point, and whether the result of a case has it at all.
       procedure(get_values), pointer, nopass :: get => null()
       procedure(is_wanted), pointer, nopass :: exists => null()
@@ -89,6 +92,13 @@ contains
 
       allocate (list(0))
       call add('omega', r, 'rad/s', 'point', 'angular frequency of the excitation', omega, always)
+      call add('parameter', r, '', 'point', 'value of the parameter that the sweep goes over', &
+               place, goes_over)
+      list(size(list))%names_parameter = .true.
+      call add('load/scale', r, '1', 'point', 'factor of the vibratory loads of the model', &
+               load_scale, scales_load)
+      call add('control/amplitude', r, '<length>', 'point', &
+               'amplitude for which the load was found', control, is_controlled)
       call add('coefficients', r, '<length>', 'point coefficient observed', &
                'Fourier coefficients 0, c1, s1, ... of observed quantities', coefficients, always)
       call add('amplitude', r, '<length>', 'point observed', &
@@ -103,7 +113,9 @@ contains
       list(size(list))%is_served_by = .true.
       call add('fold', l, '', 'point', 'whether the branch turns here', fold, follows_branch)
       call add('tangent/omega', r, 'rad/s', 'point', 'direction of the branch, frequency', &
-               tangent_omega, follows_branch)
+               tangent_omega, follows_frequency)
+      call add('tangent/parameter', r, '', 'point', 'direction of the branch, parameter', &
+               tangent_parameter, follows_parameter)
       call add('tangent/coefficients', r, '<length>', 'point coefficient observed', &
                'direction of the branch, coefficients', tangent, follows_branch)
       call add('harmonics', i, '1', 'point', 'harmonics of the balance', harmonics, has_levels)
@@ -328,6 +340,38 @@ contains
       follows_branch = case%sweep%continuation == continuation_arclength
    end function follows_branch
 
+   !> Along frequencies, or along another parameter.
+   pure logical function follows_frequency(case)
+      type(case_type), intent(in) :: case
+
+      follows_frequency = follows_branch(case) .and. .not. case%over%is_wanted()
+   end function follows_frequency
+
+   pure logical function follows_parameter(case)
+      type(case_type), intent(in) :: case
+
+      follows_parameter = follows_branch(case) .and. case%over%is_wanted()
+   end function follows_parameter
+
+   !> A sweep over another parameter than the frequency.
+   pure logical function goes_over(case)
+      type(case_type), intent(in) :: case
+
+      goes_over = case%over%is_wanted()
+   end function goes_over
+
+   pure logical function scales_load(case)
+      type(case_type), intent(in) :: case
+
+      scales_load = case%over%number == harmonic_scale .or. case%control%is_wanted()
+   end function scales_load
+
+   pure logical function is_controlled(case)
+      type(case_type), intent(in) :: case
+
+      is_controlled = case%control%is_wanted()
+   end function is_controlled
+
    !> Whether harmonics differ from point to point.
    pure logical function has_levels(case)
       type(case_type), intent(in) :: case
@@ -433,6 +477,34 @@ contains
 
       values = [point%tangent_omega]
    end subroutine tangent_omega
+
+   subroutine tangent_parameter(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%tangent_parameter]
+   end subroutine tangent_parameter
+
+   subroutine load_scale(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%load_scale]
+   end subroutine load_scale
+
+   subroutine control(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%control]
+   end subroutine control
+
+   subroutine place(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      values = [point%place]
+   end subroutine place
 
    subroutine tangent(point, values)
       type(point_type), intent(in) :: point

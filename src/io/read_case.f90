@@ -13,6 +13,7 @@ module fw_read_case
    use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
+   use fw_read_control, only: read_control
    use fw_read_cyclic, only: check_sectors, read_cyclic
    use fw_read_model, only: read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_mode, read_sweep
@@ -49,7 +50,8 @@ module fw_read_case
       logical :: tries_files = .false.
    end type case_input
 
-   !> Harmonics of a nonlinear mode or resonance where nothing is said of them: frequencies to some 1e-5.
+   !> Harmonics of a nonlinear mode, a resonance or a controlled response where nothing is said of
+   !> them: frequencies to some 1e-5.
    integer, parameter :: usual_of_mode = 7
 
 contains
@@ -138,7 +140,8 @@ contains
       if (reader%given('harmonics', 'n_harmonics')) return
       if (reader%given('harmonics', 'accuracy')) return
       if (case%sensitivity%is_wanted()) return
-      if (any(case%analysis == [analysis_mode, analysis_resonance])) then
+      if (any(case%analysis == [analysis_mode, analysis_resonance]) .or. &
+          case%control%is_wanted()) then
          case%harmonics%n_harmonics = usual_of_mode
          call reader%amend('harmonics', 'n_harmonics', to_text(usual_of_mode))
          return
@@ -192,7 +195,7 @@ contains
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)
       call read_harmonics(reader, case%harmonics)
-      call read_sweep(reader, case%analysis, case%sweep)
+      call read_sweep(reader, case%analysis, case%sweep, case%over)
       call case%solver%bind_keys(reader)
       call case%pseudo_time%bind_keys(reader)
       call case%wear%bind_keys(reader, case%analysis == analysis_wear)
@@ -201,6 +204,7 @@ contains
       case%output%file = stem_of(path)//'.h5'
       call read_output(reader, directory_of(path), case%output)
       call read_observed(reader, raw, case%model)
+      call read_control(reader, case%model, case%control)
    end subroutine read_keys
 
    !> What every key is and holds by default: the keys that an empty input is asked for.

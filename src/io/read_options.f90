@@ -9,6 +9,8 @@ module fw_read_options
                                    instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
    use fw_mode_options, only: mode_options
+   use fw_parameter_sweep, only: parameter_sweep
+   use fw_parameters, only: parameter_words
    use fw_reader, only: reader_type
    use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength
    use fw_text, only: to_text
@@ -81,12 +83,13 @@ contains
       end if
    end subroutine choose_for_accuracy
 
-   !> Group &sweep; frequencies leave in rad/s.
-   subroutine read_sweep(reader, analysis, options)
+   !> Group &sweep; frequencies leave in rad/s. A sweep over another parameter leaves its one
+   !> frequency in `options`, as start and end, and the values in `over`.
+   subroutine read_sweep(reader, analysis, options, over)
       type(reader_type), intent(inout) :: reader
       integer, intent(in) :: analysis
       type(sweep_options), intent(inout) :: options
-
+      type(parameter_sweep), intent(inout) :: over
       logical :: has_frequency
 
       has_frequency = analysis /= analysis_modes .and. analysis /= analysis_mode
@@ -94,10 +97,14 @@ contains
          call reader%require_group('sweep', &
                                    'the frequency: start (and end and n_points of a sweep)')
       end if
+      call reader%open('sweep', 'frequencies, or values of a parameter')
+      call over%bind_parameter(reader)
       call options%bind_keys(reader, any(analysis == [analysis_frf, analysis_resonance]), &
-                             has_frequency)
+                             has_frequency, reader%given('sweep', 'values'), over%is_wanted())
+      call over%bind_values(reader)
       if (analysis == analysis_mode) call refuse_sweep(reader)
       call check_ends(reader, analysis, options)
+      call take_values(reader, analysis, options, over)
       if (allocated(options%frequencies)) call take_list(reader, analysis, options)
       ! Everything inside is in rad/s; the effective input keeps the unit of the user.
       if (options%unit == unit_hertz) then
@@ -107,11 +114,64 @@ contains
       end if
    end subroutine read_sweep
 
+   !> A list of values is one of frequencies, or of what else the sweep goes over; the ends are.
+   subroutine take_values(reader, analysis, options, over)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: analysis
+      type(sweep_options), intent(inout) :: options
+      type(parameter_sweep), intent(inout) :: over
+
+      if (.not. over%is_wanted()) then
+         call refuse_of_parameter(reader)
+         if (.not. allocated(over%values)) return
+         if (allocated(options%frequencies)) then
+            call reader%refuse('sweep', 'values', 'is given beside frequencies: keep one of '// &
+                               'the two')
+         else if (any(over%values <= 0.0_wp)) then
+            call reader%refuse('sweep', 'values', 'are frequencies: must be above 0')
+         else
+            call move_alloc(over%values, options%frequencies)
+            call refuse_list(reader, analysis, options, 'values')
+         end if
+         return
+      end if
+      if (allocated(options%frequencies)) call reader%refuse('sweep', 'frequencies', &
+         'does not go with another parameter: give values, and frequency')
+      if (analysis /= analysis_frf) call reader%refuse('sweep', 'parameter', "= '"// &
+         trim(parameter_words(over%number))//"' goes with analysis = 'frf': leave it out")
+      if (allocated(over%values)) then
+         call refuse_list(reader, analysis, options, 'values')
+         options%n_points = size(over%values)
+         if (options%n_points > 0) over%start = over%values(1)
+         if (options%n_points > 0) over%end = over%values(options%n_points)
+      else
+         over%start = options%start
+         over%end = options%end
+      end if
+      options%start = over%frequency
+      options%end = over%frequency
+   end subroutine take_values
+
+   !> Keys that a sweep over frequencies has no use for.
+   subroutine refuse_of_parameter(reader)
+      type(reader_type), intent(inout) :: reader
+      character(*), parameter :: keys(*) = [character(9) :: 'frequency', 'as']
+      integer :: i
+
+      do i = 1, size(keys)
+         if (reader%given('sweep', trim(keys(i)))) call reader%refuse('sweep', trim(keys(i)), &
+            'goes with a parameter other than the frequency: name it, or leave this out')
+         ! Nor in the effective input.
+         call reader%amend('sweep', trim(keys(i)), '')
+      end do
+   end subroutine refuse_of_parameter
+
    !> The frequencies of a mode are its own.
    subroutine refuse_sweep(reader)
       type(reader_type), intent(inout) :: reader
-      character(*), parameter :: keys(*) = [character(12) :: 'frequencies', 'start', 'end', &
-                                            'unit', 'continuation', 'n_points', 'max_points', &
+      character(*), parameter :: keys(*) = [character(12) :: 'parameter', 'frequencies', &
+                                            'values', 'start', 'end', 'unit', 'continuation', &
+                                            'n_points', 'max_points', &
                                             'stability', 'refine']
       integer :: i
 
@@ -157,35 +217,47 @@ contains
       end if
    end subroutine read_mode
 
-   !> A list stands for start, end and n_points.
+   !> Frequencies one by one.
    subroutine take_list(reader, analysis, options)
       type(reader_type), intent(inout) :: reader
       integer, intent(in) :: analysis
       type(sweep_options), intent(inout) :: options
-      character(*), parameter :: others(*) = [character(8) :: 'start', 'end', 'n_points']
-      integer :: i
 
-      do i = 1, size(others)
-         if (reader%given('sweep', trim(others(i)))) then
-            call reader%refuse('sweep', trim(others(i)), 'is given beside frequencies, which '// &
-                               'says it: keep one of the two')
-         end if
-         ! None of the three shall stand in the effective input beside the list.
-         call reader%amend('sweep', trim(others(i)), '')
-      end do
-      if (all(analysis /= [analysis_frf, analysis_time])) then
-         call reader%refuse('sweep', 'frequencies', "goes with analysis = 'frf' or 'time': "// &
-                            'give start, the one frequency, instead')
-      else if (options%continuation == continuation_arclength) then
-         call reader%refuse('sweep', 'frequencies', "does not go with continuation = "// &
-                            "'arclength', whose points are its own: give start and end")
-      end if
+      if (reader%given('sweep', 'frequencies')) call refuse_list(reader, analysis, options, &
+                                                                'frequencies')
       ! Refused before: it was given, but not as it must be.
       if (size(options%frequencies) == 0) return
       options%n_points = size(options%frequencies)
       options%start = options%frequencies(1)
       options%end = options%frequencies(options%n_points)
    end subroutine take_list
+
+   !> A list stands for start, end and n_points.
+   subroutine refuse_list(reader, analysis, options, key)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: analysis
+      type(sweep_options), intent(in) :: options
+      !> That it is given by.
+      character(*), intent(in) :: key
+      character(*), parameter :: others(*) = [character(8) :: 'start', 'end', 'n_points']
+      integer :: i
+
+      do i = 1, size(others)
+         if (reader%given('sweep', trim(others(i)))) then
+            call reader%refuse('sweep', trim(others(i)), 'is given beside '//key//', which '// &
+                               'says it: keep one of the two')
+         end if
+         ! None of the three shall stand in the effective input beside the list.
+         call reader%amend('sweep', trim(others(i)), '')
+      end do
+      if (all(analysis /= [analysis_frf, analysis_time])) then
+         call reader%refuse('sweep', key, "goes with analysis = 'frf' or 'time': "// &
+                            'give start, the one frequency, instead')
+      else if (options%continuation == continuation_arclength) then
+         call reader%refuse('sweep', key, "does not go with continuation = "// &
+                            "'arclength', whose points are its own: give start and end")
+      end if
+   end subroutine refuse_list
 
    !> A branch is followed from one end to the other: it needs two.
    subroutine check_ends(reader, analysis, options)

@@ -176,7 +176,7 @@ contains
    end subroutine add_peaks
 
    !> Where the response turns or its stability changes.
-   subroutine add_bifurcations(self, list, n_harmonics, unit_system, error)
+   subroutine add_bifurcations(self, list, n_harmonics, unit_system, error, frequency)
       class(result_writer), intent(inout) :: self
       type(bifurcation_list), intent(in) :: list
       !> Of the case.
@@ -184,10 +184,12 @@ contains
       !> Of the model; not allocated where nothing is known of it.
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
+      !> That of a sweep over another parameter [rad/s]; 0 where it is the frequency that changes.
+      real(wp), intent(in) :: frequency
 
       if (self%file%id < 0) return
       !$omp critical (fretwear_io)
-      call write_bifurcations(self%file, list, n_harmonics, unit_system, error)
+      call write_bifurcations(self%file, list, n_harmonics, unit_system, frequency, error)
       !$omp end critical (fretwear_io)
    end subroutine add_bifurcations
 

@@ -44,6 +44,9 @@ module fw_result_labels
                  'contact force (t1, t2, n), as the law gives it'), &
       label_type('/peak/found_by', '', 'peak', 'how it was found, an index into names'), &
       label_type('/bifurcation/omega', 'rad/s', 'bifurcation', 'angular frequency of the place'), &
+      label_type('/bifurcation/parameter', '', 'bifurcation', 'value of the parameter'), &
+      label_type('/bifurcation/parameter_error', '', 'bifurcation', &
+                 'estimated error of the parameter'), &
       label_type('/bifurcation/error', 'rad/s', 'bifurcation', &
                  'estimated error of the frequency'), &
       label_type('/bifurcation/amplitude', '<length>', 'bifurcation observed', &

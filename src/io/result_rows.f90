@@ -15,6 +15,7 @@ module fw_result_rows
    use fw_hdf5, only: read_dataset
    use fw_hdf5, only: write_attribute
    use fw_kinds, only: wp
+   use fw_parameters, only: parameter_words
    use fw_point, only: point_type
    use fw_point, only: served_words
    use fw_point_quantities, only: point_quantities
@@ -96,6 +97,7 @@ contains
 
       ! Matrices of thousands of dofs must not be held a second time.
       sizes%harmonics = case%harmonics
+      sizes%over = case%over
       sizes%contact%n_pairs = case%contact%n_pairs
       sizes%springs%n_springs = case%springs%n_springs
       if (allocated(case%model%unit_system)) sizes%model%unit_system = case%model%unit_system
@@ -118,6 +120,7 @@ contains
          expected_rows = case%resonance%n_points
       else if (case%analysis == analysis_frf) then
          expected_rows = max(1, case%sweep%n_points)
+         if (case%control%is_wanted()) expected_rows = expected_rows*size(case%control%amplitude)
          if (case%sweep%continuation == continuation_arclength) then
             expected_rows = min(usual_rows, case%sweep%max_points)
          end if
@@ -253,6 +256,10 @@ contains
       if (allocated(error)) return
       self%dataset%waits = .true.
       call label_quantity(file, self%quantity, case%model%unit_system, error)
+      if (allocated(error)) return
+      if (self%quantity%names_parameter) then
+         call write_attribute(file, name, 'name', trim(parameter_words(case%over%number)), error)
+      end if
       if (allocated(error) .or. .not. self%quantity%is_served_by) return
       do i = 1, size(words)
          ! Places count from 0.

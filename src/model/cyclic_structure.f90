@@ -315,7 +315,7 @@ contains
       allocate (cyclic%point(nh))
       cyclic%point%harmonic = self%harmonic
       cyclic%point%conjugated = self%conjugated
-      allocate (cyclic%load(m, nh), source=(0.0_wp, 0.0_wp))
+      call cyclic%reserve_loads(m, nh)
       allocate (cyclic%used(m), source=0)
       call cyclic%formed%reserve(m, nh)
       call move_alloc(cyclic, state)
@@ -338,6 +338,7 @@ contains
          state%point%s = self%harmonic*omega
          state%point%theta = cmplx(state%point%s**2, state%point%s*self_excitation, wp)
          if (self%n_coordinates > 0) call form_all(self, state, n_failed)
+         call state%scale_loads()
          state%restricted = .false.
       end select
       if (n_failed > 0) then
@@ -362,7 +363,7 @@ contains
       !$omp if(self%n_coordinates >= coordinates_for_threads)
       do h = 1, size(self%harmonic)
          call form_sector(self%basis(self%basis_of(h)), state%point(h), &
-                          state%formed%matrix(:, :, h), state%load(:, h), failed)
+                          state%formed%matrix(:, :, h), state%unit_load(:, h), failed)
          if (failed) n_failed = n_failed + 1
       end do
       !$omp end parallel do
@@ -478,7 +479,7 @@ contains
          do h = 1, size(self%harmonic)
             call derive_sector(self%basis(self%basis_of(h)), state%point(h), &
                                slopes_of(state%point(h), state%self_excitation, parameter), &
-                               amplitude(:, h), slopes(:, h))
+                               state%load_factor(h), amplitude(:, h), slopes(:, h))
          end do
       end select
       call coefficients_of(self%harmonic, self%column, m, m, slopes, slope)
@@ -511,8 +512,8 @@ contains
       select type (state)
       type is (cyclic_state)
          do h = 1, size(self%harmonic)
-            call recover_sector(self%basis(self%basis_of(h)), state%point(h), q(:, h), &
-                                observed(:, h))
+            call recover_sector(self%basis(self%basis_of(h)), state%point(h), &
+                                state%load_factor(h), q(:, h), observed(:, h))
          end do
       end select
    end subroutine recover

@@ -149,7 +149,7 @@ contains
       plain%factors%column = self%column
       allocate (plain%factors%theta(nh), source=(0.0_wp, 0.0_wp))
       allocate (plain%factors%s(nh), source=0.0_wp)
-      allocate (plain%load(m, nh), source=(0.0_wp, 0.0_wp))
+      call plain%reserve_loads(m, nh)
       allocate (plain%used(m), source=0)
       if (self%forms_blocks) then
          call plain%formed%reserve(m, nh)
@@ -202,12 +202,13 @@ contains
          ! alone.
          if (self%n_coordinates == 0) return
          if (self%forms_blocks) then
-            call state%formed%form(self%basis, f%harmonic, f%theta, f%s, state%load, n_failed)
+            call state%formed%form(self%basis, f%harmonic, f%theta, f%s, state%unit_load, n_failed)
             state%restricted = .false.
          else
             call state%products%factor(self%basis, f, n_failed)
-            call condense_load(self, f, state%products, state%load)
+            call condense_load(self, f, state%products, state%unit_load)
          end if
+         call state%scale_loads()
       end associate
    end subroutine go_to
 
@@ -384,7 +385,8 @@ contains
              abs(state%self_excitation) <= 0.0_wp) then
             call derive_formed(self, state, q, slope)
          else
-            call derive(self, state%factors, slopes_of(state, parameter), q, slope)
+            call derive(self, state%factors, slopes_of(state, parameter), state%load_factor, q, &
+                        slope)
          end if
       end select
    end subroutine derivative
@@ -403,19 +405,19 @@ contains
       m = self%n_coordinates
       call amplitudes_of(self%harmonic, self%column, m, q, m, amplitude)
       do h = 1, size(self%harmonic)
-         call derive_harmonic(self%basis, self%harmonic(h), state%factors%s(h), amplitude(:, h), &
-                              derivative(:, h))
+         call derive_harmonic(self%basis, self%harmonic(h), state%factors%s(h), &
+                              state%load_factor(h), amplitude(:, h), derivative(:, h))
       end do
       call coefficients_of(self%harmonic, self%column, m, m, derivative, slope)
    end subroutine derive_formed
 
    !> One harmonic, with the terms named in `derivative`; without self-excitation theta = s^2 and,
    !> by omega, ' = n d/ds: Z' = n (-2 s M + i C).
-   subroutine derive_harmonic(b, harmonic, s, q, derivative)
+   subroutine derive_harmonic(b, harmonic, s, load_factor, q, derivative)
       type(reduction_type), intent(in) :: b
       integer, intent(in) :: harmonic
-      !> n omega.
-      real(wp), intent(in) :: s
+      !> n omega, and the factor of the loads.
+      real(wp), intent(in) :: s, load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: derivative(:)
       type(internal_block) :: internal
@@ -434,18 +436,20 @@ contains
                  k_iq => b%blocks(m + 1:, :, 1), m_iq => b%blocks(m + 1:, :, 2), &
                  c_iq => damping(m + 1:, :))
          derivative = n*matmul(cmplx(-2.0_wp*s*m_qq, c_qq, wp), q)
-         if (b%waves%acts()) derivative = derivative - load_slope(b%load_q, b%waves, harmonic, s, n)
+         if (b%waves%acts()) derivative = derivative - load_factor* &
+                                          load_slope(b%load_q, b%waves, harmonic, s, n)
          if (b%n_internal == 0) return
          coupling = cmplx(k_iq - s**2*m_iq, s*c_iq, wp)
          slope = n*cmplx(-2.0_wp*s*m_iq, c_iq, wp)
       end associate
       call internal%factor(b, cmplx(s**2, kind=wp), s, failed)
       ! x, recovered; then D^-1 (Z'_iq q + D' x).
-      xi(:, 1) = harmonic_load(b%load_i, b%waves, harmonic, s) - matmul(coupling, q)
+      xi(:, 1) = load_factor*harmonic_load(b%load_i, b%waves, harmonic, s) - matmul(coupling, q)
       call internal%solve(1, xi)
       derivative = derivative + matmul(xi(:, 1), slope)
       xi(:, 1) = matmul(slope, q) + n*internal_slope(b, cmplx(2.0_wp*s, kind=wp), 1.0_wp, xi(:, 1))
-      if (b%waves%acts()) xi(:, 1) = xi(:, 1) - load_slope(b%load_i, b%waves, harmonic, s, n)
+      if (b%waves%acts()) xi(:, 1) = xi(:, 1) - load_factor* &
+                                     load_slope(b%load_i, b%waves, harmonic, s, n)
       call internal%solve(1, xi)
       derivative = derivative - matmul(xi(:, 1), coupling)
    end subroutine derive_harmonic
@@ -469,9 +473,11 @@ contains
    end function slopes_of
 
    !> All harmonics at once.
-   subroutine derive(self, f, slopes, q, slope)
+   subroutine derive(self, f, slopes, load_factor, q, slope)
       class(plain_structure), intent(in) :: self
       type(harmonic_factors), intent(in) :: f, slopes
+      !> Of the loads in each harmonic.
+      real(wp), intent(in) :: load_factor(:)
       real(wp), intent(in) :: q(*)
       real(wp), intent(inout) :: slope(*)
       type(real_products) :: work
@@ -483,10 +489,10 @@ contains
       call work%reserve(self%basis, size(self%harmonic), self%n_coefficients)
       associate (b => self%basis)
          call work%factor(b, f, n_failed)
-         call recover_modes(self, f, work, q, x)
+         call recover_modes(self, f, load_factor, work, q, x)
          call work%multiply_blocks(b, slopes, q)
          call take_rows(m, n_i, self%n_coefficients, work%products, slope, work%modes)
-         if (b%waves%acts()) call subtract_load_slopes(self, f, slopes, slope)
+         if (b%waves%acts()) call subtract_load_slopes(self, f, slopes, load_factor, slope)
          if (n_i > 0) then
             ! D^-1 (Z'_iq q + D' x)
             call amplitudes_of(f%harmonic, f%column, n_i, work%modes, n_i, work%amplitudes)
@@ -494,7 +500,7 @@ contains
                work%amplitudes(:, h) = work%amplitudes(:, h) + &
                                        internal_slope(b, slopes%theta(h), slopes%s(h), x(:, h))
                if (.not. b%waves%acts()) cycle
-               work%amplitudes(:, h) = work%amplitudes(:, h) - &
+               work%amplitudes(:, h) = work%amplitudes(:, h) - load_factor(h)* &
                                        load_slope(b%load_i, b%waves, f%harmonic(h), f%s(h), &
                                                   slopes%s(h))
             end do
@@ -509,9 +515,10 @@ contains
    end subroutine derive
 
    !> dF_q/dp of loads that grow with their frequency.
-   subroutine subtract_load_slopes(self, f, slopes, slope)
+   subroutine subtract_load_slopes(self, f, slopes, load_factor, slope)
       class(plain_structure), intent(in) :: self
       type(harmonic_factors), intent(in) :: f, slopes
+      real(wp), intent(in) :: load_factor(:)
       real(wp), intent(inout) :: slope(*)
       real(wp) :: loads(self%n_coordinates*self%n_coefficients)
       complex(wp) :: amplitude(self%n_coordinates, size(self%harmonic))
@@ -519,8 +526,8 @@ contains
 
       m = self%n_coordinates
       do h = 1, size(self%harmonic)
-         amplitude(:, h) = load_slope(self%basis%load_q, self%basis%waves, f%harmonic(h), f%s(h), &
-                                      slopes%s(h))
+         amplitude(:, h) = load_factor(h)*load_slope(self%basis%load_q, self%basis%waves, &
+                                                     f%harmonic(h), f%s(h), slopes%s(h))
       end do
       call coefficients_of(f%harmonic, f%column, m, m, amplitude, loads)
       slope(:size(loads)) = slope(:size(loads)) - loads
@@ -554,9 +561,10 @@ contains
    end function internal_slope
 
    !> x = D^-1 (F_i - Z_iq q), complex amplitudes (n_internal, n_retained); D factored in `work`.
-   subroutine recover_modes(self, factors, work, q, x)
+   subroutine recover_modes(self, factors, load_factor, work, q, x)
       class(plain_structure), intent(in) :: self
       type(harmonic_factors), intent(in) :: factors
+      real(wp), intent(in) :: load_factor(:)
       type(real_products), intent(inout) :: work
       real(wp), intent(in) :: q(*)
       complex(wp), allocatable, intent(out) :: x(:, :)
@@ -571,8 +579,8 @@ contains
          call amplitudes_of(factors%harmonic, factors%column, b%n_internal, work%modes, &
                             b%n_internal, x)
          do h = 1, size(factors%harmonic)
-            x(:, h) = harmonic_load(b%load_i, b%waves, factors%harmonic(h), factors%s(h)) - &
-                      x(:, h)
+            x(:, h) = load_factor(h)*harmonic_load(b%load_i, b%waves, factors%harmonic(h), &
+                                                   factors%s(h)) - x(:, h)
             call work%internal(h)%solve(1, x(:, h:h))
          end do
       end associate
@@ -595,7 +603,7 @@ contains
       type is (plain_state)
          ! Rarely asked for (once a point): factors of its own leave those of the state alone.
          call work%factor(self%basis, state%factors, n_failed)
-         call recover_modes(self, state%factors, work, coefficients, x)
+         call recover_modes(self, state%factors, state%load_factor, work, coefficients, x)
       end select
       do h = 1, size(self%harmonic)
          ! Observed: T_q q + T_i x, with the matrix of observed quantities in both.
@@ -723,8 +731,8 @@ contains
             if (present(load)) then
                own = load(m + 1:, h)
             else
-               own = harmonic_load(self%basis%load_i, self%basis%waves, self%harmonic(h), &
-                                   state%factors%s(h))
+               own = state%load_factor(h)*harmonic_load(self%basis%load_i, self%basis%waves, &
+                                                        self%harmonic(h), state%factors%s(h))
             end if
             field(:m, h) = q(:, h)
             call complete_harmonic(self%basis, state%factors%theta(h), state%factors%s(h), &

@@ -73,10 +73,12 @@ contains
 
    !> d(Z_r q - F_r)/dp, from the derivatives of the factors:
    !> Z'_qq q + Z'_qi x - Z_qi D^-1 (Z'_iq q + D' x).
-   subroutine derive_sector(basis, point, slopes, q, derivative)
+   subroutine derive_sector(basis, point, slopes, load_factor, q, derivative)
       type(sector_reduction), intent(in) :: basis
       !> `slopes` holds the derivatives of the factors.
       type(harmonic_point), intent(in) :: point, slopes
+      !> Of the loads of the basis.
+      real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: derivative(:)
       type(internal_type) :: internal
@@ -90,20 +92,22 @@ contains
       call combine_rows(basis, slopes, 1, m, .false., block)
       call add_whirl(basis, slopes, 0, 0, block)
       derivative = matmul(block, q)
-      if (basis%waves%acts()) derivative = derivative - slope_of(basis, basis%load_q, point, slopes)
+      if (basis%waves%acts()) derivative = derivative - load_factor* &
+                                           slope_of(basis, basis%load_q, point, slopes)
       if (n == 0) return
       call factor_internal(basis, point, internal, failed)
       allocate (x(n, 1))
       deallocate (block)
       allocate (block(n, m))
-      x(:, 1) = modes_of(basis, point, internal, q)
+      x(:, 1) = modes_of(basis, point, internal, load_factor, q)
       call combine_rows(basis, slopes, m + 1, m + n, .true., block)
       call add_whirl(basis, slopes, m, 0, block, adjoint=.true.)
       derivative = derivative + matmul(x(:, 1), block)
       call combine_rows(basis, slopes, m + 1, m + n, .false., block)
       call add_whirl(basis, slopes, m, 0, block)
       x(:, 1) = matmul(block, q) + internal_slope(basis, slopes, x(:, 1))
-      if (basis%waves%acts()) x(:, 1) = x(:, 1) - slope_of(basis, basis%load_i, point, slopes)
+      if (basis%waves%acts()) x(:, 1) = x(:, 1) - load_factor* &
+                                        slope_of(basis, basis%load_i, point, slopes)
       call solve_internal(internal, 1, x)
       call combine_rows(basis, point, m + 1, m + n, .true., block)
       call add_whirl(basis, point, m, 0, block, adjoint=.true.)
@@ -111,9 +115,11 @@ contains
    end subroutine derive_sector
 
    !> Observed quantities of sector 0.
-   subroutine recover_sector(basis, point, q, observed)
+   subroutine recover_sector(basis, point, load_factor, q, observed)
       type(sector_reduction), intent(in) :: basis
       type(harmonic_point), intent(in) :: point
+      !> Of the loads of the basis.
+      real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: observed(:)
       type(internal_type) :: internal
@@ -123,7 +129,7 @@ contains
       if (basis%n_internal == 0) return
       call factor_internal(basis, point, internal, failed)
       observed = observed + matmul(turned(basis%observe_i, point), &
-                                   modes_of(basis, point, internal, q))
+                                   modes_of(basis, point, internal, load_factor, q))
    end subroutine recover_sector
 
    !> Observed quantities by the frequency at held coordinates: the internal modes follow.
@@ -195,10 +201,11 @@ contains
    end subroutine work_of_sector
 
    !> x = D^-1 (F_i - Z_iq q).
-   function modes_of(basis, point, internal, q) result(x)
+   function modes_of(basis, point, internal, load_factor, q) result(x)
       type(sector_reduction), intent(in) :: basis
       type(harmonic_point), intent(in) :: point
       type(internal_type), intent(in) :: internal
+      real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp) :: x(basis%n_internal)
       complex(wp), allocatable :: z_iq(:, :), rhs(:, :)
@@ -207,7 +214,7 @@ contains
          allocate (z_iq(n, m), rhs(n, 1))
          call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
          call add_whirl(basis, point, m, 0, z_iq)
-         rhs(:, 1) = load_of(basis, basis%load_i, point) - matmul(z_iq, q)
+         rhs(:, 1) = load_factor*load_of(basis, basis%load_i, point) - matmul(z_iq, q)
          call solve_internal(internal, 1, rhs)
          x = rhs(:, 1)
       end associate

@@ -26,12 +26,17 @@ module fw_structure_operator
       !> Angular frequency and self-excitation [rad/s]; below 0 before the first.
       real(wp) :: omega = -1.0_wp
       real(wp) :: self_excitation = 0.0_wp
-      !> F_n (n_coordinates, n_retained) [force].
-      complex(wp), allocatable :: load(:, :)
+      !> F_n (n_coordinates, n_retained) [force], and the same with the loads of the model as they
+      !> are, to which each harmonic gives a factor (n_retained).
+      complex(wp), allocatable :: load(:, :), unit_load(:, :)
+      real(wp), allocatable :: load_factor(:)
       !> Coordinates in use (first n_used entries), of which the first n_active are multiplied.
       integer :: n_active = 0
       integer :: n_used = 0
       integer, allocatable :: used(:)
+   contains
+      procedure :: reserve_loads
+      procedure :: scale_loads
    end type structure_state
 
    type, abstract :: structure_operator
@@ -262,6 +267,25 @@ contains
          self%n_coefficients = self%n_coefficients + merge(1, 2, harmonic(h) == 0)
       end do
    end subroutine lay_out_coefficients
+
+   !> Room for the loads of m coordinates; factors are 1.
+   pure subroutine reserve_loads(self, m, n_retained)
+      class(structure_state), intent(inout) :: self
+      integer, intent(in) :: m, n_retained
+
+      allocate (self%load(m, n_retained), self%unit_load(m, n_retained), source=(0.0_wp, 0.0_wp))
+      allocate (self%load_factor(n_retained), source=1.0_wp)
+   end subroutine reserve_loads
+
+   !> F_n from the loads of the model at the present frequency and the factors.
+   pure subroutine scale_loads(self)
+      class(structure_state), intent(inout) :: self
+      integer :: h
+
+      do h = 1, size(self%load_factor)
+         self%load(:, h) = self%load_factor(h)*self%unit_load(:, h)
+      end do
+   end subroutine scale_loads
 
    ! The whole field: the coordinates and what is condensed behind them, complex amplitudes
    ! (whole_size, n_retained). Structures without it leave these as they are.

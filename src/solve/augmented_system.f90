@@ -30,6 +30,9 @@ module fw_augmented_system
       !> Further unknowns, and how many of them stay in the linear problem.
       integer :: n_extra = 0
       integer :: n_linear_extra = 0
+      !> Residuals are compared to `reference` as it is, not to that of the inner system, which may
+      !> change with the further unknowns.
+      logical :: holds_reference = .false.
       !> Unknowns of the inner system in the linear problem.
       integer :: n_linear_inner = 0
       !> Preconditioner: M^-1 R_z (n_linear_inner, n_linear_extra), factors of the complement.
@@ -217,7 +220,7 @@ contains
       end if
       call self%inner%residual(x(:n), r(:n))
       call self%conditions(x(:n), x(n + 1:), r(n + 1:))
-      self%reference = self%inner%reference
+      if (.not. self%holds_reference) self%reference = self%inner%reference
    end subroutine residual
 
    subroutine linearize(self, n_linear)

@@ -7,6 +7,7 @@ module fw_solver_options
    use fw_key_range, only: at_least
    use fw_key_range, only: below
    use fw_key_range, only: operator(.and.)
+   use fw_key_range, only: range_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -151,13 +152,17 @@ contains
    end subroutine bind_pseudo_time_keys
 
    !> The keys of group &sweep.
-   subroutine bind_sweep_keys(self, keys, is_sweep, needs_start)
+   subroutine bind_sweep_keys(self, keys, is_sweep, needs_start, is_listed, is_other)
       class(sweep_options), intent(inout) :: self
       class(key_visitor), intent(inout) :: keys
       !> Whether the analysis is one of a range.
       logical, intent(in) :: is_sweep
       !> Whether it has a frequency at all (default: yes).
       logical, intent(in), optional :: needs_start
+      !> Whether a list is given under another key, and whether the ends are those of another
+      !> parameter, which may be any number (default: no).
+      logical, intent(in), optional :: is_listed, is_other
+      type(range_type) :: first, last
       logical :: is_range, needs
 
       call keys%open('sweep', 'frequencies')
@@ -168,11 +173,21 @@ contains
       is_range = is_sweep .and. .not. allocated(self%frequencies)
       needs = .not. allocated(self%frequencies)
       if (present(needs_start)) needs = needs .and. needs_start
-      call keys%bind(key('start', 'first frequency, or the only one', above(0.0_wp), &
+      if (present(is_listed)) needs = needs .and. .not. is_listed
+      if (present(is_listed)) is_range = is_range .and. .not. is_listed
+      first = above(0.0_wp)
+      last = at_least(0.0_wp)
+      if (present(is_other)) then
+         if (is_other) then
+            first = range_type()
+            last = range_type()
+         end if
+      end if
+      call keys%bind(key('start', 'first frequency, or the only one', first, &
                          unit='unit', absent='required'), self%start, &
                      needed=needs)
       call keys%bind(key('end', 'last frequency; below start the sweep goes down', &
-                         at_least(0.0_wp), unit='unit', absent='required for frf'), self%end, &
+                         last, unit='unit', absent='required for frf'), self%end, &
                      needed=is_range)
       call keys%bind_word(key('unit', 'of frequencies, start and end; results are in rad/s'), &
                           self%unit, unit_words)

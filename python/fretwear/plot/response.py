@@ -46,7 +46,7 @@ class Response:
     name : str
         Observed quantity.
     frequency : (n_points,)
-        [Hz]
+        [Hz], or what the sweep goes over in place of it.
     amplitude : (n_points,)
         Largest absolute value over the period, in the units of the model.
     converged : (n_points,) bool
@@ -65,6 +65,8 @@ class Response:
         Standard deviation of the amplitude to first order, of runs with `sensitivity%deviation`.
     bifurcations : tuple of (str, float, float)
         Kind, frequency [Hz] and amplitude of every place where it turns or its stability changes.
+    parameter : str
+        What the sweep goes over in place of the frequency; "" where it is the frequency.
     """
 
     name: str
@@ -78,6 +80,12 @@ class Response:
     maximum: tuple[float, float] | None = None
     bifurcations: tuple[tuple[str, float, float], ...] = ()
     deviation: Floats | None = None
+    parameter: str = ""
+
+    @property
+    def axis(self) -> str:
+        """What stands along the axis."""
+        return self.parameter or "frequency [Hz]"
 
     @property
     def is_branch(self) -> bool:
@@ -112,14 +120,19 @@ def read_response(source: Source, observe: str | None = None) -> Response:
     column = result.index(observe)
     fraction = result.fraction if "contact/fraction" in result else None
     loss = result.dissipation if "contact/dissipation" in result else None
+    # Rows of a resonance over a parameter have frequencies of their own.
+    over = "" if "parameter" not in result or "resonance/phase" in result else (
+        result.parameter_name)
     return Response(
-        result.observed[column], result.frequency, result.amplitude[:, column], result.converged,
+        result.observed[column], result.parameter if over else result.frequency,
+        result.amplitude[:, column], result.converged,
         None if fraction is None else fraction.mean(axis=1),
         None if loss is None else loss.sum(axis=1),
         result.stable if "floquet/stable" in result else None, units_of(result, "amplitude"),
-        _maximum(result, column),
-        tuple((b.kind, b.frequency, float(b.amplitude[column])) for b in result.bifurcations),
-        _deviation(result, column))
+        None if over else _maximum(result, column),
+        tuple((b.kind, b.frequency if b.parameter is None else b.parameter,
+               float(b.amplitude[column])) for b in result.bifurcations),
+        _deviation(result, column), over)
 
 
 def _deviation(result: Result, column: int) -> Floats | None:
@@ -198,7 +211,7 @@ def friction_damping(response: Response, linear: Response | None = None, *,
 
 def plot_response(source: Source, observe: str | None = None, *, linear: Source | None = None,
                   modal_mass: float | None = None) -> Figure:
-    """Amplitude, and below it the contact states, against frequency.
+    """Amplitude, and below it the contact states, against frequency or a parameter.
 
     The peak is annotated with its shift from the stuck peak and the equivalent damping ratio of
     friction as ``friction_damping`` defines it (the half-power width of the peak where that cannot
@@ -234,7 +247,7 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
     if response.converged.any():
         _annotate_peak(upper, response, stuck, modal_mass, largest)
     if not has_states or response.is_branch:
-        upper.set_xlabel("frequency [Hz]")
+        upper.set_xlabel(response.axis)
     return figure
 
 
@@ -316,14 +329,19 @@ def _annotate_peak(axes: Axes, response: Response, stuck: Response | None,
     f, a = response.maximum or (response.frequency[peak], response.amplitude[peak])
     factor, units = scale(largest, response.units)
     height = f"{factor * a:.4g} {units}".strip()
-    lines = [f"peak {height} at {f:.{_digits(response.frequency)}f} Hz"]
-    if stuck is not None:
+    if response.parameter:
+        lines = [f"largest {height} at {f:.{_digits(response.frequency)}f}"]
+    else:
+        lines = [f"peak {height} at {f:.{_digits(response.frequency)}f} Hz"]
+    if stuck is not None and not response.parameter:
         shift = 100.0 * (f / stuck.frequency[stuck.peak] - 1.0)
         lines.append(f"shift {shift:+.3f} %")
-    damping = friction_damping(response, stuck, modal_mass=modal_mass)
+    damping = (None if response.parameter
+               else friction_damping(response, stuck, modal_mass=modal_mass))
     if damping is not None:
         lines.append(f"friction damping {100.0 * damping:.4f} %")
-    elif not response.is_branch and np.isfinite(width := half_power_damping(response)):
+    elif not (response.is_branch or response.parameter) and np.isfinite(
+            width := half_power_damping(response)):
         # Of a peak that friction bends to one side it is a width, and no damping.
         lines.append(f"half-power width {200.0 * width:.4f} % of the frequency")
     axes.plot(f, a, "o", color=CURVE, markersize=6)
@@ -346,7 +364,7 @@ def _draw_states(axes: Axes, response: Response) -> None:
     else:
         keep = keep[np.argsort(response.frequency[keep], kind="stable")]
         abscissa = response.frequency[keep]
-        axes.set_xlabel("frequency [Hz]")
+        axes.set_xlabel(response.axis)
     axes.stackplot(abscissa, response.fraction[keep].T, labels=STATES, colors=STATE_COLOURS,
                    alpha=0.9)
     axes.set(ylim=(0.0, 1.0), ylabel="share of pairs\nand period")

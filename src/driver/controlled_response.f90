@@ -1,0 +1,508 @@
+!> Points of given amplitude (group &control): the load is found with the motion.
+!>
+!> Started from the points before, from the linear solution scaled to the amplitude, and where these
+!> fail along a path: from the last solution by halves of the way, or from a small amplitude up.
+module fw_controlled_response
+   use, intrinsic :: iso_fortran_env, only: int64
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
+   use fw_case, only: case_type
+   use fw_control_options, only: of_first_harmonic
+   use fw_control_system, only: control_system
+   use fw_control_system, only: new_control_system
+   use fw_error, only: error_type
+   use fw_guess, only: free_guess
+   use fw_guess, only: stuck_guess
+   use fw_interrupt, only: stop_run
+   use fw_kinds, only: wp
+   use fw_newton, only: solver_report
+   use fw_point, only: point_type
+   use fw_point, only: served_by_free_guess
+   use fw_point, only: served_by_newton
+   use fw_point, only: served_by_none
+   use fw_point, only: served_by_other_guess
+   use fw_point, only: served_by_raised_load
+   use fw_point, only: served_by_smaller_steps
+   use fw_problem, only: build_system
+   use fw_recovery, only: recover_histories
+   use fw_recovery, only: recover_point
+   use fw_run_state, only: run_state
+   use fw_solution, only: solution_method
+   use fw_stability_solver, only: stability_solver
+   use fw_strategy, only: point_request
+   use fw_strategy, only: point_strategy
+   use fw_summary, only: summary_type
+   use fw_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: controlled_response
+
+   !> A solution to go on from.
+   type :: known_point
+      logical :: is_known = .false.
+      real(wp) :: omega = 0.0_wp, amplitude = 0.0_wp
+      !> Unknowns of the balance, then the scale of the load.
+      real(wp), allocatable :: y(:)
+   end type known_point
+
+   type, extends(point_strategy) :: controlled_response
+      type(balance_problem) :: problem
+      type(balance_state) :: system
+      type(control_system) :: control
+      type(solution_method) :: method
+      type(stability_solver) :: stability
+      !> load%harmonic_scale of the case.
+      real(wp) :: base = 1.0_wp
+      !> Whether loads change their sign half a period later.
+      logical :: can_turn = .true.
+      !> The last two solutions, and the first of an amplitude.
+      type(known_point) :: last, before, head
+      integer :: iterations = 0, served_by = served_by_none
+      !> The present point cannot be: what is observed rests where the load acts.
+      logical :: is_node = .false.
+      !> What of the amplitude stands still in the linear solution, under static loads.
+      real(wp) :: rest = 0.0_wp
+      real(wp), allocatable :: y(:), r(:)
+   contains
+      procedure :: start
+      procedure :: solve
+      procedure :: describe
+   end type controlled_response
+
+   !> Halvings of the way from the last point; smallest amplitude that one is raised from, and the
+   !> smallest step up, over the amplitude.
+   integer, parameter :: max_halvings = 6
+   real(wp), parameter :: smallest_start = 1.0e-3_wp, smallest_step = 1.0_wp/512.0_wp
+   !> An observed quantity below this part of all others rests.
+   real(wp), parameter :: at_rest = 1.0e-10_wp
+   !> Rounds in which the norm that residuals are compared to follows the load.
+   integer, parameter :: most_rounds = 4
+
+contains
+
+   subroutine start(self, case, error)
+      class(controlled_response), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      call build_system(case, self%problem, self%system, error)
+      if (allocated(error)) return
+      call self%method%start(case, case%harmonics)
+      call new_control_system(self%system, case%control%observed, case%control%of, self%control)
+      self%base = case%model%harmonic_scale
+      self%can_turn = .true.
+      if (allocated(case%model%waves%harmonic)) then
+         self%can_turn = all(modulo(case%model%waves%harmonic, 2) == 1)
+      end if
+      allocate (self%y(self%control%n), self%r(self%control%n), source=0.0_wp)
+   end subroutine start
+
+   !> The load and the motion at a frequency and an amplitude.
+   subroutine solve(self, case, request, point, error)
+      class(controlled_response), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
+      type(point_type), intent(out) :: point
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      integer(int64) :: clock, clock_end, rate
+      integer :: n
+
+      call system_clock(clock, rate)
+      if (allocated(self%note)) deallocate (self%note)
+      self%system%interrupt => request%interrupt
+      self%control%interrupt => request%interrupt
+      self%iterations = 0
+      self%is_node = .false.
+      call reach(self, request%omega, request%amplitude, request%fallback, report, error)
+      if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
+      if (allocated(error)) return
+      n = self%system%n
+      call self%control%residual(self%y, self%r)
+      point%omega = request%omega
+      point%place = request%place()
+      point%load_scale = self%y(n + 1)
+      point%control = request%amplitude
+      point%converged = report%converged
+      point%residual = report%residual
+      point%iterations = self%iterations
+      if (report%converged) point%served_by = self%served_by
+      call recover_point(self%system, self%y(:n), case%harmonics%n_harmonics, request%contact, &
+                         point)
+      point%n_harmonics = case%harmonics%n_harmonics
+      point%n_time = self%problem%fourier%n_time
+      if (request%histories) then
+         call recover_histories(self%system, size(self%system%balance, 1), self%y(:n), &
+                                case%harmonics%n_harmonics, point)
+      end if
+      if (report%converged .and. request%stability) then
+         call self%stability%find(case, self%system, self%y(:n), point, error)
+         if (allocated(error)) return
+      end if
+      if (.not. report%converged .and. self%rest >= request%amplitude) then
+         point%note = 'control: at omega = '//to_text(request%omega)//' rad/s static loads '// &
+                      'alone move '//case%model%observe_name(case%control%observed)%text//' by '// &
+                      to_text(self%rest)//', more than the amplitude '// &
+                      to_text(request%amplitude)//'; give a larger one, or control%of = '// &
+                      "'first_harmonic'"
+      else if (self%is_node) then
+         point%note = 'control: at omega = '//to_text(request%omega)//' rad/s '// &
+                      case%model%observe_name(case%control%observed)%text//' rests under the '// &
+                      'load (a node): no load gives it an amplitude; observe another place'
+      end if
+      call system_clock(clock_end)
+      point%seconds = real(clock_end - clock, wp)/real(rate, wp)
+   end subroutine solve
+
+   !> From what is known of the points before, then from linear solutions, then along a path.
+   subroutine reach(self, omega, amplitude, tries_all, report, error)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: omega, amplitude
+      logical, intent(in) :: tries_all
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+
+      self%method%newton%linear%lu_left_out = .false.
+      call from_guesses(self, omega, amplitude, report, error)
+      if (allocated(error) .or. ends(report)) return
+      if (.not. tries_all .or. self%is_node) return
+      if (self%last%is_known) then
+         call approach(self, omega, amplitude, 1, report, error)
+         self%served_by = served_by_smaller_steps
+         if (allocated(error) .or. ends(report)) return
+      end if
+      call raise_amplitude(self, omega, amplitude, report, error)
+      self%served_by = served_by_raised_load
+      if (allocated(error) .or. ends(report)) return
+      if (self%control%of /= of_first_harmonic) then
+         call by_first_harmonic(self, omega, amplitude, report, error)
+         self%served_by = served_by_smaller_steps
+         if (allocated(error) .or. ends(report)) return
+      end if
+      if (.not. self%method%newton%linear%lu_left_out) return
+      self%method%newton%linear%lu_follows = .true.
+      call from_guesses(self, omega, amplitude, report, error)
+      self%method%newton%linear%lu_follows = .false.
+   end subroutine reach
+
+   !> Nothing more is to be tried.
+   pure logical function ends(report)
+      type(solver_report), intent(in) :: report
+
+      ends = report%converged .or. report%interrupted
+   end function ends
+
+   !> Extrapolated, the nearest solution scaled, all stuck, all free.
+   subroutine from_guesses(self, omega, amplitude, report, error)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: omega, amplitude
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      integer :: guess
+      logical :: is_there
+
+      call self%control%stand(omega, error)
+      if (allocated(error)) return
+      self%control%amplitude = amplitude
+      do guess = 1, 4
+         call make_guess(self, guess, omega, amplitude, is_there, error)
+         if (allocated(error)) return
+         if (.not. is_there) cycle
+         call attempt(self, report, error)
+         if (allocated(error)) return
+         if (ends(report)) exit
+      end do
+      if (.not. report%converged) return
+      call remember(self, omega, amplitude)
+      self%served_by = served_by_newton
+      if (guess == 3 .and. self%before%is_known) self%served_by = served_by_other_guess
+      if (guess == 4) self%served_by = served_by_free_guess
+   end subroutine from_guesses
+
+   subroutine make_guess(self, guess, omega, amplitude, is_there, error)
+      class(controlled_response), intent(inout) :: self
+      integer, intent(in) :: guess
+      real(wp), intent(in) :: omega, amplitude
+      logical, intent(out) :: is_there
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: step
+
+      is_there = .true.
+      select case (guess)
+      case (1)
+         is_there = self%before%is_known .and. is_near(self%last, omega, amplitude)
+         if (is_there) is_there = is_near(self%before, omega, amplitude) .and. &
+                                  abs(self%last%omega - self%before%omega) > 0.0_wp
+         if (.not. is_there) return
+         step = (omega - self%last%omega)/(self%last%omega - self%before%omega)
+         ! Further than the points are apart, an extrapolation says nothing.
+         is_there = abs(step) <= 2.0_wp
+         self%y = self%last%y + step*(self%last%y - self%before%y)
+      case (2)
+         is_there = self%last%is_known
+         if (.not. is_there) return
+         if (self%head%is_known .and. &
+             abs(self%head%omega - omega) < abs(self%last%omega - omega)) then
+            call scale(self, self%head, amplitude)
+         else
+            call scale(self, self%last, amplitude)
+         end if
+      case default
+         call self%system%set_parameter(self%base, error)
+         if (allocated(error)) return
+         if (guess == 3) call stuck_guess(self%system, self%y(:self%system%n))
+         if (guess == 4) call free_guess(self%system, self%y(:self%system%n))
+         call scale_linear(self, amplitude, is_there)
+      end select
+   end subroutine make_guess
+
+   !> Whether a point is one of the same amplitude.
+   pure logical function is_near(point, omega, amplitude)
+      type(known_point), intent(in) :: point
+      real(wp), intent(in) :: omega, amplitude
+
+      is_near = point%is_known .and. abs(point%amplitude - amplitude) <= 0.0_wp .and. &
+                abs(point%omega - omega) > 0.0_wp
+   end function is_near
+
+   !> Another amplitude of a solution: its vibration and its load in proportion.
+   subroutine scale(self, point, amplitude)
+      class(controlled_response), intent(inout) :: self
+      type(known_point), intent(in) :: point
+      real(wp), intent(in) :: amplitude
+
+      self%y = point%y
+      call multiply_vibration(self, amplitude/point%amplitude)
+   end subroutine scale
+
+   !> Unknowns above harmonic 0, and the load.
+   subroutine multiply_vibration(self, factor)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: factor
+      integer :: first
+
+      first = 1
+      ! Harmonic 0 is the first of those retained.
+      if (self%problem%fourier%has_constant()) first = self%problem%structure%n_coordinates + 1
+      self%y(first:) = factor*self%y(first:)
+   end subroutine multiply_vibration
+
+   !> The linear solution under the load of the case, scaled to the amplitude.
+   subroutine scale_linear(self, amplitude, is_there)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: amplitude
+      !> False where what is observed rests.
+      logical, intent(out) :: is_there
+      complex(wp), allocatable :: at_rest_motion(:)
+      real(wp) :: vibration, others, static
+      integer :: n
+
+      n = self%system%n
+      self%y(n + 1) = self%base
+      call self%control%move(self%y(:n), self%base)
+      at_rest_motion = self%control%motion
+      static = 0.0_wp
+      if (self%problem%fourier%has_constant()) then
+         static = real(at_rest_motion(1), wp)
+         self%control%motion(1) = (0.0_wp, 0.0_wp)
+      end if
+      vibration = self%control%size_of_motion()
+      others = norm2(self%y(:n))
+      is_there = vibration > at_rest*others .and. vibration > 0.0_wp
+      self%is_node = .not. is_there
+      if (.not. is_there) return
+      ! The largest of the period has the static part on top.
+      self%rest = merge(0.0_wp, abs(static), self%control%of == of_first_harmonic)
+      if (self%rest < amplitude) vibration = vibration*amplitude/(amplitude - self%rest)
+      call multiply_vibration(self, amplitude/vibration)
+   end subroutine scale_linear
+
+   !> Newton's method from the guess in y. The norm that residuals are compared to is that of the
+   !> load in the end; while it is solved for, that of a guess.
+   subroutine attempt(self, report, error)
+      class(controlled_response), intent(inout) :: self
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n, round
+
+      n = self%system%n
+      do round = 1, most_rounds
+         call self%system%set_parameter(self%y(n + 1), error)
+         if (allocated(error)) return
+         self%control%reference = self%system%reference
+         call self%method%newton%solve(self%control, self%y, report)
+         self%iterations = self%iterations + report%iterations
+         if (report%interrupted) return
+         call self%control%residual(self%y, self%r)
+         ! Where residuals belong: the state has just been brought to the load.
+         report%residual = norm2(self%r)/self%system%reference
+         if (report%residual <= self%method%newton%options%tolerance) then
+            report%converged = self%y(n + 1) >= 0.0_wp
+            if (report%converged .or. .not. self%can_turn) exit
+            call turn(self)
+         else if (.not. report%converged) then
+            exit
+         end if
+         report%converged = .false.
+      end do
+      if (report%converged) call self%method%refuse(self%system, self%y(:n), report)
+   end subroutine attempt
+
+   !> A load with the other sign is one half a period later: U_n (-1)^n. Paths that start at rest
+   !> may depend on where the period starts: what is turned is solved again.
+   subroutine turn(self)
+      class(controlled_response), intent(inout) :: self
+      integer :: first, h, last, m, n
+
+      n = self%system%n
+      m = self%problem%structure%n_coordinates
+      associate (fourier => self%problem%fourier)
+         do h = 1, fourier%n_retained
+            if (modulo(fourier%harmonic(h), 2) == 0) cycle
+            first = (fourier%column(h) - 1)*m + 1
+            last = first + 2*m - 1
+            self%y(first:last) = -self%y(first:last)
+         end do
+      end associate
+      self%y(n + 1) = -self%y(n + 1)
+   end subroutine turn
+
+   !> First half of the way from the last point, which may take halves of its own, then the rest.
+   recursive subroutine approach(self, omega, amplitude, depth, report, error)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: omega, amplitude
+      integer, intent(in) :: depth
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: middle(2)
+
+      ! Amplitudes by their ratio.
+      middle = [0.5_wp*(self%last%omega + omega), sqrt(self%last%amplitude*amplitude)]
+      call from_guesses(self, middle(1), middle(2), report, error)
+      if (allocated(error) .or. report%interrupted) return
+      if (.not. report%converged .and. depth < max_halvings) then
+         call approach(self, middle(1), middle(2), depth + 1, report, error)
+         if (allocated(error) .or. report%interrupted) return
+      end if
+      if (.not. report%converged) return
+      call from_guesses(self, omega, amplitude, report, error)
+      if (allocated(error) .or. ends(report) .or. depth >= max_halvings) return
+      call approach(self, omega, amplitude, depth + 1, report, error)
+   end subroutine approach
+
+   !> From a small amplitude up, by steps that adapt.
+   subroutine raise_amplitude(self, omega, amplitude, report, error)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: omega, amplitude
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      type(known_point) :: last
+      real(wp) :: share, step
+
+      if (self%rest >= amplitude) return
+      ! What is known of other frequencies is no guess here, and comes back where this fails.
+      last = self%last
+      self%last%is_known = .false.
+      self%before%is_known = .false.
+      share = 0.0_wp
+      step = smallest_start
+      do
+         call from_guesses(self, omega, self%rest + min(1.0_wp, share + step)* &
+                           (amplitude - self%rest), report, error)
+         if (allocated(error) .or. report%interrupted) exit
+         if (report%converged) then
+            share = min(1.0_wp, share + step)
+            if (share >= 1.0_wp) exit
+            step = merge(2.0_wp, 1.5_wp, share < 0.1_wp)*step
+         else
+            step = 0.5_wp*step
+            if (share <= 0.0_wp .or. step < smallest_step*min(1.0_wp, 10.0_wp*share)) exit
+         end if
+      end do
+      if (.not. report%converged) self%last = last
+   end subroutine raise_amplitude
+
+   !> The largest of a period has corners where another instant takes over, which the first harmonic
+   !> has not: to where the one has the amplitude along the other, by secants.
+   subroutine by_first_harmonic(self, omega, amplitude, report, error)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: omega, amplitude
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: most_secants = 20
+      type(known_point) :: kept(3)
+      real(wp) :: first(2), largest(2), next
+      integer :: k, of
+      logical :: is_there
+
+      is_there = .false.
+      kept = [self%last, self%before, self%head]
+      self%last%is_known = .false.
+      self%before%is_known = .false.
+      of = self%control%of
+      next = max(amplitude - self%rest, smallest_start*amplitude)
+      first = 0.0_wp
+      largest = 0.0_wp
+      do k = 1, most_secants
+         self%control%of = of_first_harmonic
+         call from_guesses(self, omega, next, report, error)
+         self%control%of = of
+         if (allocated(error) .or. .not. report%converged) exit
+         first = [first(2), next]
+         largest = [largest(2), self%control%size_of_motion()]
+         is_there = abs(largest(2) - amplitude) <= self%method%newton%options%tolerance*amplitude
+         if (is_there) exit
+         next = first(2)*amplitude/largest(2)
+         if (k == 1 .or. .not. abs(largest(2) - largest(1)) > 0.0_wp) cycle
+         next = first(2) + (amplitude - largest(2))*(first(2) - first(1))/(largest(2) - largest(1))
+         next = min(max(next, 0.3_wp*first(2)), 3.0_wp*first(2))
+      end do
+      self%last = kept(1)
+      self%before = kept(2)
+      self%head = kept(3)
+      if (allocated(error) .or. .not. report%converged) return
+      self%control%amplitude = amplitude
+      if (.not. is_there) call attempt(self, report, error)
+      if (allocated(error)) return
+      if (report%converged) call remember(self, omega, amplitude)
+   end subroutine by_first_harmonic
+
+   !> A solution for the guesses of the next points.
+   subroutine remember(self, omega, amplitude)
+      class(controlled_response), intent(inout) :: self
+      real(wp), intent(in) :: omega, amplitude
+
+      if (self%last%is_known) then
+         if (abs(self%last%amplitude - amplitude) > 0.0_wp) then
+            ! The next amplitude begins where this one did.
+            self%head%is_known = .false.
+         end if
+      end if
+      self%before = self%last
+      self%last%is_known = .true.
+      self%last%omega = omega
+      self%last%amplitude = amplitude
+      self%last%y = self%y
+      if (.not. self%head%is_known) self%head = self%last
+   end subroutine remember
+
+   !> The work done, and why points failed.
+   subroutine describe(self, case, state, summary, message)
+      class(controlled_response), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(run_state), intent(in) :: state
+      type(summary_type), intent(inout) :: summary
+      character(:), allocatable, intent(out) :: message
+
+      message = ''
+      call summary%describe_work(self%system, self%method%newton%linear, case%solver%kind, &
+                                 state%all_converged())
+      if (state%was_stopped .or. state%all_converged()) return
+      message = 'not converged: try smaller steps of frequency or amplitude, or more '// &
+                'harmonics%n_harmonics, for the points above'
+      if (self%method%rippled) message = message//'; some were solved with friction that is '// &
+         "ripple, not slip: take contact%law = 'rigid' where friction acts on mass"
+   end subroutine describe
+
+end module fw_controlled_response
