@@ -158,7 +158,8 @@ contains
       logical :: failed
 
       call factor_internal(basis, point, internal, failed)
-      x = modes_of(basis, point, internal, q)
+      ! Resonances, which ask for this, scale the loads of the structure itself.
+      x = modes_of(basis, point, internal, 1.0_wp, q)
       associate (m => basis%n_coordinates, n => basis%n_internal)
          call combine_rows(basis, slopes, m + 1, m + n, .false., block)
          call add_whirl(basis, slopes, m, 0, block)
