@@ -37,6 +37,7 @@ COMMANDS = """## Measure
 | `make bench-limit` | limit, skips |
 | `make bench-peers` | peers |
 | `python -m bench.speed.sectors` | sectors |
+| `python -m bench.speed.sector_modes` | modes |
 | `make bench-full` | all others |
 | `make compare OTHER=fw_run TIMES=9` | two builds side by side, on the screen |"""
 

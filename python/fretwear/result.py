@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -539,8 +540,8 @@ class Result(ResultFile):
         InputError
             No mesh belongs to the model, or PyVista is not installed.
         """
-        from .export import export_mesh
-
+        # Meshes stand above results: loaded when one is asked for.
+        export_mesh = importlib.import_module("fretwear.export").export_mesh
         try:
             import pyvista
         except ImportError:

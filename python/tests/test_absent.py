@@ -22,7 +22,7 @@ METHODS: dict[str, tuple[Any, ...]] = {
     "sector": (1,),
     "declared": ("omega",), "units": ("omega",), "to_xarray": ()}
 #: Neither is asked for data.
-OTHERS = {"open", "save", "from_bytes"}
+OTHERS = {"open", "save", "from_bytes", "to_pyvista"}
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A command replaces its own section of docs/robustness.md and nothing else."""
+"""A command replaces its own section of a document and nothing else."""
 import re
 import sys
 from pathlib import Path
@@ -17,10 +17,15 @@ NAMES = [*sorted({name for path in (ROOT / "test").rglob("*.py")
                   for call in CALL.findall(path.read_text()) for name in call if name}), *PARTS]
 
 
+#: The counts, and the page whose trials stand beside what they are about.
+PAGES = [DOCUMENT, ROOT / "docs" / "design.md"]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_section_replaces_itself_and_nothing_else(tmp_path, name):
     page = tmp_path / "page.md"
-    before = DOCUMENT.read_text(encoding="utf-8")
+    before = next(text for text in (one.read_text(encoding="utf-8") for one in PAGES)
+                  if f"<!-- {name}: begin -->" in text)
     page.write_text(before, encoding="utf-8")
     write_section(name, ["new", "lines"], page)
     after = page.read_text(encoding="utf-8")
@@ -30,5 +35,6 @@ def test_a_section_replaces_itself_and_nothing_else(tmp_path, name):
 
 
 def test_every_section_has_its_command():
-    marks = re.findall(r"<!-- (.*): begin -->", DOCUMENT.read_text(encoding="utf-8"))
+    marks = [mark for page in PAGES
+             for mark in re.findall(r"<!-- (.*): begin -->", page.read_text(encoding="utf-8"))]
     assert sorted(marks) == sorted(NAMES)
