@@ -3,8 +3,8 @@
     python test/robustness/stops.py [--pairs 16 48 384] [--tries 6] [-o docs/robustness.md]
 
 A sweep of the sector that no tolerance ends is stopped by a signal after a random time within the
-points, and one from another thread of Python. What counts is the processor time that the run still
-takes, which other work on the machine does not lengthen; the clock stands beside.
+points, and one from another thread of Python, and of C. What counts is the processor time that the
+run still takes, which other work on the machine does not lengthen; the clock stands beside.
 """
 import argparse
 import os
@@ -23,9 +23,9 @@ from sections import write_section
 #: Seconds of processor time of points before the stop, at most.
 BEFORE = 6.0
 TICKS = os.sysconf("SC_CLK_TCK")
-WAYS = ("signal", "Python thread")
+WAYS = ("signal", "Python thread", "C thread")
 #: Status of a run that was stopped.
-STATUS = dict(zip(WAYS, (6, 0)))
+STATUS = dict(zip(WAYS, (6, 0, 0)))
 PYTHON = """
 import sys, threading
 import fretwear as fw
@@ -51,6 +51,25 @@ def model(pairs, folder):
     return path
 
 
+def c_program(folder):
+    """The run of C, compiled with the library of the build."""
+    path = folder / "stop_run"
+    if not path.exists():
+        subprocess.run(["cc", "-O1", Path(__file__).with_name("stop_run.c"), "-o", path,
+                        f"-I{ROOT / 'include'}", f"-L{PROGRAM.parent}",
+                        f"-Wl,-rpath,{PROGRAM.parent}", "-lfretwear", "-lpthread"], check=True)
+    return path
+
+
+def command_of(way, namelist):
+    """What runs it."""
+    if way == "signal":
+        return [PROGRAM, namelist]
+    if way == "C thread":
+        return [c_program(namelist.parent), namelist]
+    return [sys.executable, "-c", PYTHON, namelist]
+
+
 def spent(process):
     """Processor time of a process so far [s]."""
     fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
@@ -59,11 +78,10 @@ def spent(process):
 
 def stopped(way, namelist, wait):
     """Processor time and seconds from the stop to the end of a run."""
-    command = [PROGRAM, namelist] if way == WAYS[0] else [sys.executable, "-c", PYTHON, namelist]
     # An output that nobody reads fills no pipe: the run says next to nothing.
-    process = subprocess.Popen(command, cwd=namelist.parent, text=True, stdin=subprocess.PIPE,
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                               env={**PATIENT, "OMP_NUM_THREADS": "1",
+    process = subprocess.Popen(command_of(way, namelist), cwd=namelist.parent, text=True,
+                               stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL, env={**PATIENT, "OMP_NUM_THREADS": "1",
                                     "PYTHONPATH": f"{ROOT / 'python'}:{PROGRAM.parent / 'python'}"})
     while spent(process) < wait:
         time.sleep(0.02)
@@ -87,7 +105,7 @@ def stopped(way, namelist, wait):
     return last - before, time.monotonic() - begun
 
 
-def measure(pairs, tries, folder):
+def measure(pairs, tries, ways, folder):
     """Rows of the table of a size."""
     random.seed(pairs)
     # Its result is beside it under its name, and must not be the model.
@@ -98,7 +116,7 @@ def measure(pairs, tries, folder):
               "&solver tolerance = 1e-30 /",
               "&sweep start = 995 end = 1029 unit = 'Hz' n_points = 400 /", ""]
     namelist.write_text("\n".join(groups))
-    for way in WAYS:
+    for way in ways:
         found = [stopped(way, namelist, random.uniform(0.5, BEFORE)) for _ in range(tries)]
         yield (f"| {pairs} | {way} | {tries} | {max(cpu for cpu, _ in found):.2f} "
                f"| {sorted(cpu for cpu, _ in found)[tries // 2]:.2f} "
@@ -109,13 +127,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pairs", type=int, nargs="+", default=[16, 48, 384])
     parser.add_argument("--tries", type=int, default=6)
+    parser.add_argument("--ways", nargs="+", choices=WAYS, default=WAYS)
     parser.add_argument("-o", "--output", type=Path, help="document with the section `stops`")
     options = parser.parse_args()
     lines = ["", "| pairs | stopped by | tries | longest [s of processor time] | middle "
              "| longest by the clock [s] |", "|---" * 6 + "|"]
     with tempfile.TemporaryDirectory() as name:
         for pairs in options.pairs:
-            for row in measure(pairs, options.tries, Path(name)):
+            for row in measure(pairs, options.tries, options.ways, Path(name)):
                 print(row, flush=True)
                 lines.append(row)
     if options.output:
