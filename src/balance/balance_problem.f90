@@ -34,6 +34,9 @@ module fw_balance_problem
       logical :: reduced = .true.
       !> Unknowns are the values at the instants, not the coefficients (hdhb).
       logical :: solves_values = .false.
+      !> Norm of the vibratory load on the structure [force], below whose round-off no load of the
+      !> joint is one; 0 where it is not known.
+      real(wp) :: load_size = 0.0_wp
    contains
       procedure :: coordinate_of
       procedure :: scale_forces

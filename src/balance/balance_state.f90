@@ -356,6 +356,9 @@ contains
    real(wp) function load_norm(self)
       type(balance_state), intent(in) :: self
       real(wp), parameter :: static_share = 1.0e-5_wp
+      !> Of the load on the structure: what does not reach the joint but as round-off, amplified by
+      !> a resonance, and what such round-off is compared to.
+      real(wp), parameter :: round_off = 1.0e-13_wp, idle_share = 1.0e-5_wp
       real(wp) :: static
 
       static = 0.0_wp
@@ -366,6 +369,9 @@ contains
          static = norm2(self%load(:, 1)) + press_of(self)
       end if
       load_norm = max(load_norm, static_share*static)
+      if (load_norm <= round_off*self%problem%load_size) then
+         load_norm = idle_share*self%problem%load_size
+      end if
       ! Where nothing loads the joint: what its pairs are pressed by, or pressed together by.
       if (load_norm <= 0.0_wp) then
          associate (p => self%problem%forces%entry(self%problem%forces%pairs)%law%prediction)

@@ -166,6 +166,7 @@ contains
       call structure%at(stand, case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
       call new_balance_problem(joint, structure, fourier, laws, case%contact%depth, problem)
+      problem%load_size = norm2([case%model%load_cosine, case%model%load_sine])
       problem%reduced = case%solver%skips
       problem%solves_values = harmonics%method == method_hdhb
       if (.not. present(forces)) call problem%scale_forces(stand, range(2))
