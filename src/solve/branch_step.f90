@@ -157,8 +157,8 @@ contains
       !> Where such a corner would be, as a share of the step.
       real(wp), intent(out) :: place
       real(wp), allocatable :: y(:), dy(:)
-      !> A smooth curve and a single corner have their place above; what has come away as far as this
-      !> with hardly a turn has turned twice.
+      !> A smooth curve and a single corner have their place above; what has come away with hardly a
+      !> turn has turned twice.
       real(wp), parameter :: of_two = 0.35_wp
       real(wp) :: p, dp, h, h_before, d, bend, weight, size
 
