@@ -108,8 +108,8 @@ contains
       type(branch_point), intent(inout) :: here
       type(branch_point), intent(inout) :: next
       type(error_type), allocatable, intent(out) :: error
-      !> Halvings of the way; cosine of the angle of tangents, and distance from the tangent over the
-      !> step back, up to which two points lie on one piece.
+      !> Halvings of the way; cosine of the angle of tangents, and distance from the tangent over
+      !> the step back, up to which two points lie on one piece.
       integer, parameter :: most = 3
       real(wp), parameter :: along = 0.9_wp, beside = 0.25_wp
       type(branch_point) :: nearer, predicted
