@@ -175,6 +175,19 @@ def test_what_is_refused() -> None:
         ModeData([1.0], [1.0], [0.1], frequency_deviation=0.1)
 
 
+def test_example(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The command of example/calibration gives the numbers of its README."""
+    example = Path(__file__).resolve().parents[2] / "example" / "calibration"
+    assert main(["calibrate", str(example / "mode.nml"), "--data", str(example / "measured.csv"),
+                 "--over", OVER[0], "--bounds", "0.1", "3", "--over", OVER[1], "--bounds", "0.2",
+                 "5", "-q", "--picture", str(tmp_path / "fit.svg")]) == 0
+    text, readme = capsys.readouterr().out, (example / "README.md").read_text()
+    for name in OVER:
+        value, _, error = text.split(name)[1].split()[:3]
+        assert f"**{float(value):.4f}**" in readme and f"{float(error):.4f}" in readme
+    assert (tmp_path / "fit.svg").stat().st_size > 5000
+
+
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     namelist = tmp_path / "case.nml"
     namelist.write_text("""&case analysis = 'mode' /

@@ -78,6 +78,35 @@ def test_several_parameters() -> None:
         assert evaluate(found.values * step).value > found.value
 
 
+def test_two_peaks_of_one_height() -> None:
+    """An absorber: its best stiffness makes both peaks equal, where the slope jumps."""
+    contact = fw.ContactPairs([[1, 0, 0]], [[2, 0, 0]], mu=1.0, normal_load=1e6,
+                              tangential_stiffness=0.09)
+    model = fw.Model([[1.0, 0.0], [0.0, 0.1]], [[0.05, -0.03], [-0.03, 0.03]],
+                     [[1.0, 0.0], [0.0, 0.0]], cosine=[1.0, 0.0], contact=contact)
+    case = fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 1},
+                   sweep={"start": 0.6, "end": 1.4, "n_points": 81})
+    found = fw.optimise(case, minimise="max_amplitude[u1]", over="contact%tangential_stiffness",
+                        bounds=(0.02, 0.5))
+    assert found.converged and found.word.startswith("optimum at a corner")
+    assert found.n_evaluations <= 20
+    first, second = sorted((peak for peak in fw.run(found.case).peaks if peak.observed == "u1"),
+                           key=lambda peak: peak.omega)
+    assert first.amplitude == pytest.approx(second.amplitude, rel=1e-3)
+
+    def height(stiffness: float) -> float:
+        """The linear structure."""
+        omega = np.linspace(0.6, 1.4, 400001)
+        z11 = 1.0 + stiffness - omega**2 + 0.05j * omega
+        z12 = -stiffness - 0.03j * omega
+        z22 = stiffness - 0.1 * omega**2 + 0.03j * omega
+        return float(np.abs(z22 / (z11 * z22 - z12**2)).max())
+
+    best = found.values[0]
+    assert found.value == pytest.approx(height(best), rel=1e-8)
+    assert height(best) < min(height(best * 1.0001), height(best / 1.0001))
+
+
 def test_optimum_at_a_bound() -> None:
     found = fw.optimise(jenkins(), minimise="max_amplitude", over="contact%normal_load",
                         bounds=(0.5, 2.0))
@@ -204,6 +233,22 @@ def test_a_jump_is_no_peak() -> None:
                    sweep={"start": 0.5, "end": 3.5, "n_points": 121})
     with pytest.raises(ConvergenceError, match="the first run failed"):
         fw.optimise(case, minimise="max_amplitude", over="spring%coefficient", bounds=(0.1, 1.0))
+
+
+def test_example(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The command of example/damper gives the numbers of its README."""
+    example = Path(__file__).resolve().parents[2] / "example" / "damper"
+    assert main(["optimise", str(example / "damper.nml"), "--minimise", "max_amplitude", "--over",
+                 "contact%normal_load", "--bounds", "0.05", "5", "-q", "--picture",
+                 str(tmp_path / "best.png")]) == 0
+    text, readme = capsys.readouterr().out, (example / "README.md").read_text()
+    found = float(text.split("contact%normal_load")[1].split()[0])
+    height = float(text.split("max_amplitude")[1].split()[0])
+    assert f"**{found:.7f}**" in readme and f"**{height:.7f}**" in readme
+    assert (tmp_path / "best.png").stat().st_size > 5000
+    assert main(["optimise", str(example / "damper.nml"), "--minimise", "max_amplitude", "--over",
+                 "contact%normal_load", "--bounds", "0.05", "5", "--picture",
+                 str(tmp_path / "none" / "best.png")]) == 5
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from .._native import namelist_values
 from ..case import Case
 from ..errors import InputError, OutputError
+from ..plot.found import plot_calibration
 from .calibration import calibrate
 from .measured import Measured, ModeData, ResponseData
-from .optimise_command import add_parameters, read_case, write_case
+from .optimise_command import add_parameters, read_case, write_case, write_picture
 
 __all__ = ["add_arguments", "main", "read_table"]
 
@@ -52,6 +53,7 @@ def main(options: argparse.Namespace) -> int:
                       max_evaluations=options.max_evaluations, progress=not options.quiet)
     print(found)
     write_case(found.case, options.output)
+    write_picture(lambda: plot_calibration(found, data), options.picture)
     return 0 if found.converged else _NOT_CONVERGED
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 __all__ = ["descend"]
 
+#: Steps that leave most of the slope, until the minimum is taken for a corner.
+_PATIENCE = 3
 #: Nearer points are joined by their slopes alone: their heights differ by round-off.
 _NEAR = 1e-3
-#: Part of a bracket that a new point keeps from its ends.
-_MARGIN = 1e-3
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,10 @@ class _Place:
 
 
 def descend(at: Callable[[float], tuple[float, float]], start: float, low: float, high: float,
-            first_step: float) -> None:
+            first_step: float, width: float) -> None:
     """Go down from `start` until `at` raises, which it does where it is satisfied.
+
+    Returns where the minimum is a corner: known within `width`, with slopes that do not vanish.
 
     Parameters
     ----------
@@ -34,6 +36,8 @@ def descend(at: Callable[[float], tuple[float, float]], start: float, low: float
         Where to begin, and the bounds.
     first_step : float
         Doubled until the slope turns.
+    width : float
+        Of the bracket about a corner.
     """
     a = _Place(start, *at(start))
     limit, step = (high, first_step) if a.slope < 0.0 else (low, -first_step)
@@ -43,21 +47,45 @@ def descend(at: Callable[[float], tuple[float, float]], start: float, low: float
         if b.slope * step >= 0.0 or b.height >= a.height:
             break
         a, step = b, 2.0 * step
-    before, last = a, b
-    while True:
-        width = b.x - a.x
-        if abs(width) < 1e-14 * max(abs(a.x), abs(b.x), 1.0):
-            return
+    before, last, slow = a, b, 0
+    while abs(b.x - a.x) > width:
+        span = b.x - a.x
         x = _lowest(before, last)
-        if not _MARGIN < (x - a.x) / width < 1.0 - _MARGIN:
-            # Outside of what is known to hold the minimum, or at its very end.
+        if slow >= _PATIENCE:
+            x = _beyond(a, b, width)
+        elif not 0.0 < (x - a.x) / span < 1.0:
+            # Outside of what is known to hold the minimum.
             x = _lowest(a, b)
-            x = a.x + width * float(np.clip((x - a.x) / width if np.isfinite(x) else 0.5, 0.1, 0.9))
+            share = (x - a.x) / span if np.isfinite(x) else 0.5
+            x = a.x + span * float(np.clip(share, 0.1, 0.9))
         before, last = last, _Place(x, *at(x))
-        if last.slope * width < 0.0 and last.height <= a.height:
+        if last.slope * span < 0.0 and last.height <= a.height:
             a = last
         else:
             b = last
+        slow = slow + 1 if abs(last.slope) > 0.5 * abs(before.slope) else 0
+
+
+def _beyond(a: _Place, b: _Place, width: float) -> float:
+    """A place beyond a corner, which is near where the tangents of both ends of a bracket meet:
+    twice as far from the nearer end, so that both ends close in.
+    """
+    span = b.x - a.x
+    share = (_meeting(a, b) - a.x) / span
+    if not 0.0 <= share <= 1.0:
+        return a.x + 0.5 * span
+    least = min(0.45 * width / abs(span), 0.5)
+    if share < 0.5:
+        return a.x + span * float(np.clip(2.0 * share, least, 0.5))
+    return a.x + span * float(np.clip(2.0 * share - 1.0, 0.5, 1.0 - least))
+
+
+def _meeting(one: _Place, other: _Place) -> float:
+    """Where the tangents of two places meet; NaN where they do not."""
+    change = one.slope - other.slope
+    if change == 0.0:
+        return np.nan
+    return (other.height - one.height + one.slope * one.x - other.slope * other.x) / change
 
 
 def _lowest(one: _Place, other: _Place) -> float:

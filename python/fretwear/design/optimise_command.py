@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from ..case import Case
 from ..errors import InputError, OutputError
+from ..plot.found import plot_optimum
 from .objectives import OBJECTIVES
 from .optimum import optimise
 
-__all__ = ["add_arguments", "add_parameters", "main", "read_case", "write_case"]
+__all__ = ["add_arguments", "add_parameters", "main", "read_case", "write_case", "write_picture"]
 
 _NOT_CONVERGED = 4
 
@@ -46,6 +50,8 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
                         help="set a key of the case, as fw_run does")
     parser.add_argument("-o", "--output", metavar="FILE.nml",
                         help="write the case with what was found")
+    parser.add_argument("--picture", metavar="FILE",
+                        help="draw what was found, its suffix is the format (png, svg, pdf)")
     parser.add_argument("-q", "--quiet", action="store_true", help="the answer only")
 
 
@@ -58,8 +64,9 @@ def read_case(options: argparse.Namespace) -> Case:
     if len(options.over) != len(options.bounds):
         raise InputError(f"--over stands {len(options.over)} times and --bounds "
                          f"{len(options.bounds)} times: each parameter needs its bounds")
-    if options.output and not Path(options.output).absolute().parent.is_dir():
-        raise OutputError(f"{options.output}: there is no such folder")
+    for path in (options.output, options.picture):
+        if path and not Path(path).absolute().parent.is_dir():
+            raise OutputError(f"{path}: there is no folder {Path(path).absolute().parent}")
     return Case.from_file(options.case).overridden(options.set)
 
 
@@ -68,6 +75,17 @@ def write_case(case: Case, output: str | None) -> None:
     if output:
         Path(output).write_text(case.namelist())
         print(output)
+
+
+def write_picture(draw: Callable[[], Figure], path: str | None) -> None:
+    """Draw, where that was asked for."""
+    if not path:
+        return
+    try:
+        draw().savefig(path)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None  # such as a format not known
+    print(path)
 
 
 def main(options: argparse.Namespace) -> int:
@@ -84,4 +102,5 @@ def main(options: argparse.Namespace) -> int:
                      max_evaluations=options.max_evaluations, progress=not options.quiet)
     print(found)
     write_case(found.case, options.output)
+    write_picture(lambda: plot_optimum(found), options.picture)
     return 0 if found.converged else _NOT_CONVERGED

@@ -35,6 +35,8 @@ class Optimum:
 
     Attributes
     ----------
+    objective : str
+        What was made small or large.
     names : list of str
         Parameters.
     values : (n,)
@@ -63,6 +65,7 @@ class Optimum:
         The case at the optimum.
     """
 
+    objective: str
     names: list[str]
     values: Floats
     value: float
@@ -79,7 +82,7 @@ class Optimum:
 
     def __str__(self) -> str:
         lines = [f"{name:46}{value:.9g}" for name, value in zip(self.names, self.values)]
-        lines.append(f"{'value':46}{self.value:.9g}")
+        lines.append(f"{self.objective:46}{self.value:.9g}")
         if np.isfinite(self.omega):
             lines.append(f"{'at':46}{self.omega:.9g} rad/s, {self.omega / (2 * np.pi):.9g} Hz")
         lines += [f"{'derivative by ' + name:46}{slope:.3e}"
@@ -146,6 +149,7 @@ def optimise(case: Case | str, *, minimise: Objective | None = None,
         progress = _Lines(unknowns.names)
     search = _Search(unknowns, new_objective(what, unknowns, case), maximise is not None,
                      tolerance, max_evaluations, progress or None)
+    search.name = what if isinstance(what, str) else "objective"
     first = None if start is None else np.atleast_1d(np.array(start, dtype=float)).tolist()
     return search.run(unknowns.start(first))
 
@@ -180,6 +184,7 @@ class _Search:
                  tell: Callable[[Evaluation], object] | None) -> None:
         self._unknowns, self._evaluate, self._most = unknowns, evaluate, most
         self._sign, self._tolerance, self._tell = -1.0 if upwards else 1.0, tolerance, tell
+        self.name = "objective"
         self._steps: list[_Step] = []
         self._failures: list[str] = []
         self._places: list[Floats] = []
@@ -245,8 +250,9 @@ class _Search:
         if len(scaled) == 1:
             span = float(self._high[0] - self._low[0])
             descend(self._asked_one, float(scaled[0]), float(self._low[0]), float(self._high[0]),
-                    min(_FIRST_STEP, 0.25 * span))
-            return "no optimum: the slope jumps from one sign to the other"
+                    min(_FIRST_STEP, 0.25 * span), self._tolerance)
+            return ("optimum at a corner: the slope jumps from one sign to the other, as where "
+                    "another peak becomes the highest")
         # scipy's own tests are left to the last: they stop on the value, or wait for its noise.
         minimize = import_module("scipy.optimize").minimize  # where needed: it takes time
         found = minimize(
@@ -337,7 +343,8 @@ class _Search:
                 f"{name} at its {'upper' if side > 0 else 'lower'} one"
                 for name, side in zip(unknowns.names, sides) if side)
         return Optimum(
-            unknowns.names, values, best.found.value, best.found.gradient, best.found.omega,
+            self.name, unknowns.names, values, best.found.value, best.found.gradient,
+            best.found.omega,
             word.startswith("optimum"), word, [one.found for one in self._steps], self._failures,
             len(self._steps) + len(self._failures), sum(one.found.solved for one in self._steps),
             best.found.remarks, unknowns.case_at(values))

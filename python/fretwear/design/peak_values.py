@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..analyses import run_in_memory
 from ..case import Case
 from ..errors import ConvergenceError
+from ..peaks import Peak
 from ..result import Result
 from ..steps import Steps
 from .parameters import differentiated, has_parts
@@ -31,6 +32,8 @@ _NODES = -np.cos(np.pi * np.arange(7) / 6.0)
 #: Half widths of the first window and of the last, over the width of the peak. In the last, six
 #: orders above and below a Lorentzian leave 1e-9 of the slope, and round-off of the solver less.
 _FIRST_WIDTH, _LAST_WIDTH = 0.05, 0.02
+#: Peaks within this of the highest one are all located: a sweep knows heights to some 1e-4.
+_TIED = 1e-3
 #: Windows until a peak counts as not located.
 _MOST_WINDOWS = 12
 #: Rows from which the peak is come back to, and how near they have to be to the sweep's own.
@@ -88,19 +91,21 @@ def peak_values(case: Case, keys: Sequence[str], quantity: str, others: Sequence
     """
     swept = run_in_memory(case)
     column = swept.index(observe)
-    start, width = _first_guess(swept, quantity, column)
+    guesses = _first_guesses(swept, quantity, column)
     tight: Case = case.replace(solver={"tolerance": min(_TOLERANCE, _tolerance(case))},
                                sweep={"continuation": "natural"})
     quantities = [quantity, *(other for other in others if other != "omega")]
     with Steps(differentiated(tight, keys, quantities)) as steps:
         solver = _Solver(steps, keys, quantities, column)
-        _approach(solver, swept, quantity, column, start)
         remarks = [*swept.remarks]
-        if width == 0.0:
+        windows = []
+        for start, width in guesses:
+            _approach(solver, swept, quantity, column, start)
+            windows.append(_located(solver, start, width, _ends(steps), quantity, swept.name)
+                           if width > 0.0 else _Window(start, 0.0, [solver.solve(start)]))
+        window = max(windows, key=lambda one: one.height(quantity))
+        if window.half == 0.0:
             remarks.append("the largest amplitude is at an end of the sweep, not at a peak")
-            window = _Window(start, 0.0, [solver.solve(start)])
-        else:
-            window = _located(solver, start, width, _ends(steps), quantity, swept.name)
     value, derivative = window.at_peak(quantity, keys, quantities)
     return PeakValues(value["omega"], value, derivative, swept.n_points + solver.solved,
                       tuple(remarks))
@@ -111,8 +116,8 @@ def _tolerance(case: Case) -> float:
         return float(session.part("solver_tolerance")[0])
 
 
-def _first_guess(swept: Result, quantity: str, column: int) -> tuple[float, float]:
-    """Frequency of the highest maximum and its width; no width where it ends the sweep."""
+def _first_guesses(swept: Result, quantity: str, column: int) -> list[tuple[float, float]]:
+    """Frequencies and widths of the maxima that may be the highest; no width at an end."""
     if not swept.converged.any():
         raise ConvergenceError(f"{swept.name}: no point has converged")
     step = float(np.abs(np.diff(swept.omega)).max(initial=0.0)) if swept.n_points > 1 else 0.0
@@ -120,18 +125,29 @@ def _first_guess(swept: Result, quantity: str, column: int) -> tuple[float, floa
     peaks = [peak for peak in swept.peaks if peak.observed == name]
     if not peaks or swept.n_points == 1:
         point = swept.peak(column)
-        return float(swept.omega[point]), 0.0
-    top = max(peaks, key=lambda peak: peak.amplitude)
-    if quantity == "first_harmonic":
-        top = max(peaks, key=lambda peak: float(np.hypot(*peak.coefficients[1:3])))
-    if top.found_by == "end of the sweep":
-        return top.omega, 0.0
-    if top.found_by in ("jump", "not resolved"):
-        why = ("jumps at its highest point, which has no derivative there: follow it with "
-               "sweep%continuation = 'arclength'" if top.found_by == "jump" else
-               "has a highest peak that was not resolved: take more points")
-        raise ConvergenceError(f"the response of {name} {why} (near {top.omega:.6g} rad/s)")
-    return top.omega, top.bandwidth if np.isfinite(top.bandwidth) else step
+        return [(float(swept.omega[point]), 0.0)]
+
+    def height(peak: Peak) -> float:
+        return (peak.amplitude if quantity == "largest"
+                else float(np.hypot(*peak.coefficients[1:3])))
+
+    top = max(height(peak) for peak in peaks)
+    found = []
+    for peak in peaks:
+        # As near to each other as the search of the sweep is to their heights.
+        if height(peak) < (1.0 - _TIED) * top:
+            continue
+        if peak.found_by == "jump":
+            raise ConvergenceError(
+                f"the response of {name} jumps at its highest point, which has no derivative "
+                "there: follow it with sweep%continuation = 'arclength' (near "
+                f"{peak.omega:.6g} rad/s)")
+        if peak.found_by == "not resolved":
+            raise ConvergenceError(f"the highest peak of {name}, near {peak.omega:.6g} rad/s, was "
+                                   "not resolved: take more points")
+        width = peak.bandwidth if np.isfinite(peak.bandwidth) else step
+        found.append((peak.omega, 0.0 if peak.found_by == "end of the sweep" else width))
+    return found
 
 
 def _ends(steps: Steps) -> tuple[float, float]:
@@ -205,6 +221,11 @@ class _Window:
         inside = found.real[(np.abs(found.imag) < 1e-6) & (np.abs(found.real) <= 1.0)]
         places = np.concatenate((inside, [-1.0, 1.0]))
         return float(places[np.argmax(chebyshev.chebval(places, series))])
+
+    def height(self, quantity: str) -> float:
+        """The largest value of the quantity."""
+        x = self.top(quantity) if self.half > 0.0 else 0.0
+        return float(self._slope(quantity, x, 0)[0])
 
     def at_peak(self, quantity: str, keys: Sequence[str], quantities: Sequence[str]
                 ) -> tuple[dict[str, float], dict[str, dict[str, Floats]]]:

@@ -13,6 +13,7 @@ from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
 from .disks import plot_nodal_diameters, plot_safe, plot_wave
 from .flanks import plot_flanks
+from .found import plot_calibration, plot_optimum
 from .kinds import KINDS, Choices, Kind, fitting
 from .mode import plot_mode
 from .resonance import plot_resonance
@@ -29,9 +30,9 @@ from .together import plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
-           "half_power_damping", "main", "plot_backbone", "plot_campbell", "plot_convergence",
-           "plot_cycle", "plot_damping", "plot_flanks", "plot_harmonics", "plot_hysteresis",
-           "plot_mode", "plot_nodal_diameters", "plot_resonance", "plot_response",
-           "plot_responses", "plot_safe", "plot_sensitivity", "plot_table", "plot_wave",
-           "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps", "read_damping",
-           "read_response"]
+           "half_power_damping", "main", "plot_backbone", "plot_calibration", "plot_campbell",
+           "plot_convergence", "plot_cycle", "plot_damping", "plot_flanks", "plot_harmonics",
+           "plot_hysteresis", "plot_mode", "plot_nodal_diameters", "plot_optimum",
+           "plot_resonance", "plot_response", "plot_responses", "plot_safe", "plot_sensitivity",
+           "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",
+           "read_damping", "read_response"]
