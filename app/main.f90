@@ -1,7 +1,7 @@
 !> fw_run: read a case, run it, report. The only place that ends the program.
 program fw_run_program
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
-   use fw_blas, only: describe_blas, slow_kernel
+   use fw_blas, only: describe_blas, slow_kernel, text_length
    use fw_case, only: case_type
    use fw_cli, only: cli_options, get_arguments, parse_arguments
    use fw_error, only: error_type, status_ok
@@ -32,7 +32,7 @@ contains
       type(string_type), allocatable :: arguments(:)
       type(cli_options) :: options
       type(error_type), allocatable :: error
-      character(80) :: blas
+      character(text_length) :: blas
 
       call get_arguments(arguments)
       call parse_arguments(arguments, options, error)
@@ -113,7 +113,7 @@ contains
    !> The BLAS where it is asked for, and its remedy where it is slow.
    subroutine report_blas(verbose)
       logical, intent(in) :: verbose
-      character(80) :: text, kernel, better
+      character(text_length) :: text, kernel, better
       logical :: is_slow
 
       call describe_blas(text)

@@ -11,7 +11,10 @@ module fw_blas
    implicit none (type, external)
    private
 
-   public :: describe_blas, slow_kernel, vector_level_of
+   public :: describe_blas, slow_kernel, vector_level_of, text_length
+
+   !> Of names and versions.
+   integer, parameter :: text_length = 128
 
    !> Vectors of kernels and processors.
    integer, parameter :: unknown = -1, none = 0, avx = 1, avx2 = 2, avx512 = 3
@@ -49,8 +52,8 @@ contains
 
    !> Name, version and kernel, as 'OpenBLAS 0.3.21, kernel Haswell'.
    subroutine describe_blas(text)
-      character(*), intent(out) :: text
-      character(128) :: config, kernel
+      character(text_length), intent(out) :: text
+      character(text_length) :: config, kernel
       integer :: first, second
 
       call take(blas_config(), config)
@@ -69,7 +72,7 @@ contains
    !> Whether the kernel in use lacks vectors that the processor has, and the kernel to ask for.
    subroutine slow_kernel(is_slow, kernel, better)
       logical, intent(out) :: is_slow
-      character(*), intent(out) :: kernel, better
+      character(text_length), intent(out) :: kernel, better
       integer :: level, possible
 
       call take(blas_kernel(), kernel)
@@ -94,7 +97,7 @@ contains
    !> A text of C, cut where it is longer.
    subroutine take(address, text)
       type(c_ptr), intent(in) :: address
-      character(*), intent(out) :: text
+      character(text_length), intent(out) :: text
       character(kind=c_char), pointer :: letters(:)
       integer :: i, n
 
