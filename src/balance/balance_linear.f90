@@ -22,6 +22,8 @@ submodule(fw_balance_state) fw_balance_linear
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
    !> Part of a residual whose effect on a step is far below the tolerance of linear solutions.
    real(wp), parameter :: negligible = 1.0e-9_wp
+   !> Relative residual of a linear solution from which the product of low rank serves.
+   real(wp), parameter :: near_enough = 5.0e-5_wp
 
 contains
 
@@ -367,8 +369,13 @@ contains
       integer :: k, na
 
       na = self%active%n_active
-      call self%problem%structure%multiply_active(self%structure_state, vector, &
-                                                  self%scratch%active_out)
+      if (self%preconditioner%may_split .and. self%asked >= near_enough) then
+         call self%problem%structure%multiply_nearly(self%structure_state, vector, &
+                                                     self%scratch%active_out)
+      else
+         call self%problem%structure%multiply_active(self%structure_state, vector, &
+                                                     self%scratch%active_out)
+      end if
       call add_forces(self, self%active%place, na, vector)
       if (allocated(self%shift)) call add_shift(self, na, vector)
       do k = 1, self%problem%fourier%n_coefficients

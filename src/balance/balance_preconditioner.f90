@@ -10,13 +10,29 @@ submodule(fw_balance_state) fw_balance_preconditioner
    !> Share of the active coordinates that may have joined or left since a preconditioner was built.
    real(wp), parameter :: most_changed = 0.05_wp
 
+   ! Two matrices for all harmonics (fw_balance_split).
+   interface
+      module subroutine build_split(self)
+         type(balance_state), intent(inout) :: self
+      end subroutine build_split
+
+      !> complex_in in place, of the active coordinates.
+      module subroutine solve_split(self)
+         type(balance_state), intent(inout) :: self
+      end subroutine solve_split
+   end interface
+
 contains
 
    !> Per harmonic, the matrix with each G replaced by its mean over cosine and sine.
    module procedure build_preconditioner
       integer :: h
 
-      if (self%problem%structure%n_coordinates < coordinates_for_threads) then
+      self%preconditioner%is_split = self%preconditioner%may_split .and. &
+                                     .not. allocated(self%shift)
+      if (self%preconditioner%is_split) then
+         call build_split(self)
+      else if (self%problem%structure%n_coordinates < coordinates_for_threads) then
          do h = 1, self%problem%fourier%n_retained
             call build_harmonic(self, h)
          end do
@@ -220,7 +236,9 @@ contains
 
       na = self%active%n_active
       call active_to_complex(self, na, vector)
-      if (self%problem%structure%n_coordinates < coordinates_for_threads) then
+      if (self%preconditioner%is_split) then
+         call solve_split(self)
+      else if (self%problem%structure%n_coordinates < coordinates_for_threads) then
          do h = 1, self%problem%fourier%n_retained
             if (h /= self%preconditioner%left_out) call solve_kept(self, h)
          end do

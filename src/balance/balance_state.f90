@@ -227,6 +227,8 @@ contains
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       call self%active%reserve(m)
       call self%preconditioner%reserve(m, problem%fourier%n_retained)
+      self%preconditioner%may_split = problem%structure%split_rank() > 0 .and. &
+                                      all_are_static(problem)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)
    end subroutine new_balance_state
 
@@ -287,6 +289,19 @@ contains
       h = findloc(self%problem%fourier%harmonic > 0, .true., dim=1)
       if (h > 0) factor = self%structure_state%load_factor(h)
    end function vibratory_factor
+
+   !> Whether the derivatives of all laws are alike in all harmonics: functions of displacements.
+   pure logical function all_are_static(problem)
+      type(balance_problem), intent(in) :: problem
+      integer :: k
+
+      all_are_static = .true.
+      do k = 1, problem%forces%n_laws
+         associate (p => problem%forces%entry(k)%law%prediction)
+            all_are_static = all_are_static .and. all(p%order == 0) .and. .not. p%has_inertia
+         end associate
+      end do
+   end function all_are_static
 
    !> Bring matrices and loads to a frequency.
    subroutine set_frequency(self, parameter, error)

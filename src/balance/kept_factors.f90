@@ -3,6 +3,7 @@
 module fw_kept_factors
    use fw_kinds, only: wp
    use fw_preconditioner_lu, only: preconditioner_lu_type
+   use fw_split_factors, only: split_factors
    implicit none (type, external)
    private
 
@@ -10,6 +11,11 @@ module fw_kept_factors
 
    type :: kept_factors
       type(preconditioner_lu_type), allocatable :: harmonic(:)
+      !> In place of them: two matrices for all harmonics. Whether the problem has that form, and
+      !> whether the factors in use are these.
+      type(split_factors) :: split
+      logical :: may_split = .false.
+      logical :: is_split = .false.
       !> Coordinates for which they were built (first n entries).
       integer :: n = 0
       integer, allocatable :: coordinate(:)

@@ -184,6 +184,10 @@ contains
                     to_text(linear%preconditioners)//' preconditioners'// &
                     trim(merge(repeat(' ', 32), ', where Newton''s method was used', &
                                kind == solver_newton)))
+      if (system%preconditioner%may_split .and. linear%krylov_iterations > 0) then
+         call add_line(self%work, 'linear products', 'static stiffness and '// &
+                       to_text(system%problem%structure%split_rank())//' patterns of motion')
+      end if
       if (.not. system%problem%fourier%has_constant()) then
          call skip(self, 'even harmonics (half-wave symmetry)')
       end if

@@ -19,6 +19,9 @@ module fw_krylov
    type, abstract :: linear_operator
       !> What may end work with it early; null where nothing does.
       class(interrupt_type), pointer :: interrupt => null()
+      !> Relative residual that the solution at work is asked for; 0 outside of solutions, where
+      !> products are exact. An operator that has a cheaper product of such a precision may take it.
+      real(wp) :: asked = 0.0_wp
    contains
       procedure :: is_interrupted
       procedure(apply_operator), deferred :: apply
@@ -115,6 +118,7 @@ contains
       norm = norm2(b)
       target = tolerance*norm
       converged = norm <= 0.0_wp
+      operator%asked = tolerance
       self%basis(:, 1) = b
       do while (.not. converged .and. self%iterations < self%max_iterations)
          if (operator%is_interrupted()) exit
@@ -139,6 +143,7 @@ contains
          end where
          exit
       end do
+      operator%asked = 0.0_wp
    end subroutine solve
 
    !> Arnoldi's process with Givens rotations, until the target or the restart length.

@@ -10,7 +10,7 @@ module fw_lapack
    private
 
    public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
-   public :: dgeev, dpotrf, ztrsv, cgetrf, claswp, ctrsv, zhegvd, zpotrf, zpotrs
+   public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
    public :: zggev
 
    interface
@@ -109,6 +109,24 @@ module fw_lapack
          integer, intent(in) :: n, lda, k1, k2, ipiv(*), incx
          complex(sp), intent(inout) :: a(lda, *)
       end subroutine claswp
+
+      !> As zgemm in single precision.
+      subroutine cgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+         import :: sp
+         character, intent(in) :: transa, transb
+         integer, intent(in) :: m, n, k, lda, ldb, ldc
+         complex(sp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
+         complex(sp), intent(inout) :: c(ldc, *)
+      end subroutine cgemm
+
+      !> B = alpha op(A)^-1 B or alpha B op(A)^-1 with a triangular A (side 'L', 'R').
+      subroutine ctrsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+         import :: sp
+         character, intent(in) :: side, uplo, transa, diag
+         integer, intent(in) :: m, n, lda, ldb
+         complex(sp), intent(in) :: alpha, a(lda, *)
+         complex(sp), intent(inout) :: b(ldb, *)
+      end subroutine ctrsm
 
       !> As ztrsv in single precision.
       subroutine ctrsv(uplo, trans, diag, n, a, lda, x, incx)

@@ -6,6 +6,7 @@ module fw_preconditioner_lu
    use fw_kinds, only: wp
    use fw_lapack, only: cgetrf
    use fw_lapack, only: claswp
+   use fw_lapack, only: ctrsm
    use fw_lapack, only: ctrsv
    implicit none (type, external)
    private
@@ -29,6 +30,7 @@ module fw_preconditioner_lu
       procedure :: reserve
       procedure :: factor
       procedure :: solve
+      procedure :: solve_scaled
       procedure :: solve_transposed
    end type preconditioner_lu_type
 
@@ -81,6 +83,20 @@ contains
       ! x = A^-1 b = scale largest (scale A)^-1 (b/largest).
       b = self%scale*largest*cmplx(self%rhs(:self%n), kind=wp)
    end subroutine solve
+
+   !> (scale A)^-1 b for many right-hand sides of the order of one, in place (n, n_columns).
+   subroutine solve_scaled(self, n_columns, b)
+      class(preconditioner_lu_type), intent(in) :: self
+      integer, intent(in) :: n_columns
+      complex(sp), intent(inout), contiguous :: b(:, :)
+      complex(sp), parameter :: one = (1.0_sp, 0.0_sp)
+      integer :: ld
+
+      ld = size(self%matrix, 1)
+      call claswp(n_columns, b, size(b, 1), 1, self%n, self%pivot, 1)
+      call ctrsm('L', 'L', 'N', 'U', self%n, n_columns, one, self%matrix, ld, b, size(b, 1))
+      call ctrsm('L', 'U', 'N', 'N', self%n, n_columns, one, self%matrix, ld, b, size(b, 1))
+   end subroutine solve_scaled
 
    !> As `solve`, with the transposed matrix.
    subroutine solve_transposed(self, b)

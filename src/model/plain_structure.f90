@@ -27,6 +27,8 @@ module fw_plain_structure
    use fw_field_slopes, only: work_of_load
    use fw_formed_stiffness, only: harmonic_load
    use fw_formed_stiffness, only: load_slope
+   use fw_dynamic_part, only: dynamic_part
+   use fw_dynamic_part, only: find_dynamic_part
    use fw_internal_block, only: internal_block
    use fw_model, only: model_type
    use fw_real_products, only: harmonic_factors
@@ -37,6 +39,7 @@ module fw_plain_structure
    use fw_reduction, only: new_reduction
    use fw_relative, only: relative_type
    use fw_split, only: split_coordinate
+   use fw_split_product, only: split_product
    use fw_structure_operator, only: by_frequency
    use fw_structure_operator, only: lay_out_coefficients
    use fw_structure_operator, only: structure_operator
@@ -55,6 +58,8 @@ module fw_plain_structure
       logical :: forms_blocks = .true.
       !> All rows and columns for real products, where it is not.
       type(packed_blocks) :: packed
+      !> What vibration adds to the static stiffness; of rank 0 where Z_r is formed.
+      type(dynamic_part) :: dynamic
    contains
       procedure :: new_state
       procedure :: at
@@ -82,6 +87,10 @@ module fw_plain_structure
       procedure :: observe_back
       procedure :: change_field
       procedure :: field_work
+      procedure :: split_rank
+      procedure :: multiply_nearly
+      procedure :: static_block
+      procedure :: dynamic_block
    end type plain_structure
 
    type, extends(structure_state) :: plain_state
@@ -89,6 +98,7 @@ module fw_plain_structure
       !> The one or the other.
       type(formed_stiffness) :: formed
       type(real_products) :: products
+      type(split_product) :: split
       !> Whether rows in use are those of the present frequency.
       logical :: restricted = .false.
    end type plain_state
@@ -131,8 +141,12 @@ contains
       self%forms_blocks = real(self%n_coordinates, wp)**2*size(harmonic) < most_entries .or. &
                           self%basis%n_internal > most_internal*self%n_coordinates
       if (present(forms_blocks)) self%forms_blocks = forms_blocks
-      if (.not. self%forms_blocks) call self%packed%pack_blocks(self%basis, self%n_coordinates, &
-                                           self%n_coordinates, [(j, j=1, self%n_coordinates)])
+      if (self%forms_blocks) return
+      call self%packed%pack_blocks(self%basis, self%n_coordinates, self%n_coordinates, &
+                                   [(j, j=1, self%n_coordinates)])
+      ! Kept modes have no stiffness of their own to trust.
+      if (size(self%kept) == 0) call find_dynamic_part(self%basis, &
+                                     maxval(harmonic)*omega_range(2), self%dynamic)
    end subroutine new_plain_structure
 
    !> Room for one thread: formed matrices, or what real products need.
@@ -207,10 +221,27 @@ contains
          else
             call state%products%factor(self%basis, f, n_failed)
             call condense_load(self, f, state%products, state%unit_load)
+            if (self%dynamic%rank > 0) call find_dynamic(self, f, state)
          end if
          call state%scale_loads()
       end associate
    end subroutine go_to
+
+   !> S_n of all harmonics.
+   subroutine find_dynamic(self, factors, state)
+      type(plain_structure), intent(in) :: self
+      type(harmonic_factors), intent(in) :: factors
+      type(plain_state), intent(inout) :: state
+      integer :: h
+
+      associate (rank => self%dynamic%rank, s => state%split)
+         if (.not. allocated(s%dynamic)) allocate (s%dynamic(rank, rank, size(factors%harmonic)))
+         do h = 1, size(factors%harmonic)
+            call self%dynamic%at_harmonic(state%products%internal(h), factors%theta(h), &
+                                          factors%s(h), s%dynamic(:, :, h))
+         end do
+      end associate
+   end subroutine find_dynamic
 
    !> F_q - Z_qi D^-1 F_i of all harmonics.
    subroutine condense_load(self, factors, products, load)
@@ -276,6 +307,8 @@ contains
          if (self%forms_blocks) then
             call state%formed%gather(n_active, n_used, used)
          else
+            if (self%dynamic%rank > 0) call state%split%pack_rows(self%basis, self%dynamic, &
+                                            self%n_coefficients, n_active, n_used, used)
             ! `packed` has all rows already.
             if (n_active == self%n_coordinates) return
             call state%products%active%pack_blocks(self%basis, n_active, n_used, used)
@@ -303,6 +336,56 @@ contains
          end select
       end associate
    end subroutine multiply_active
+
+   pure integer function split_rank(self) result(rank)
+      class(plain_structure), intent(in) :: self
+
+      rank = self%dynamic%rank
+   end function split_rank
+
+   subroutine multiply_nearly(self, state, v, product)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: v(*)
+      real(wp), intent(inout) :: product(*)
+
+      select type (state)
+      type is (plain_state)
+         call state%split%multiply(self%dynamic%rank, state%factors, v, self%n_coefficients, &
+                                   self%n_coordinates, product)
+      end select
+   end subroutine multiply_nearly
+
+   subroutine static_block(self, state, matrix)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      real(wp), intent(out), contiguous :: matrix(:, :)
+      integer :: j
+
+      associate (used => state%used(:state%n_used))
+         do j = 1, state%n_active
+            matrix(:, j) = self%basis%blocks(used, state%used(j), 1)
+         end do
+         do j = 1, self%dynamic%rank
+            matrix(:, state%n_active + j) = self%dynamic%v(used, j)
+         end do
+      end associate
+   end subroutine static_block
+
+   subroutine dynamic_block(self, state, h, matrix)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+
+      matrix = (0.0_wp, 0.0_wp)
+      select type (state)
+      type is (plain_state)
+         matrix = state%split%dynamic(:, :, h)
+      end select
+      associate (unused => self)
+      end associate
+   end subroutine dynamic_block
 
    !> Z_r of a harmonic: as it is formed, or from K, M, C and the factors of D for this one call.
    subroutine block_of_all(self, state, h, matrix)

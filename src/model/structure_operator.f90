@@ -78,6 +78,10 @@ module fw_structure_operator
       procedure :: observe_back
       procedure :: change_field
       procedure :: field_work
+      procedure :: split_rank
+      procedure :: multiply_nearly
+      procedure :: static_block
+      procedure :: dynamic_block
    end type structure_operator
 
    abstract interface
@@ -371,5 +375,51 @@ contains
       associate (unused => self, unused_state => state, unused_field => field)
       end associate
    end function field_work
+
+   ! Z_n ~ K + V S_n V^T with K and V real, the same for all harmonics and frequencies: near enough
+   ! for steps of iterative solvers and their preconditioners. A structure of rank 0 has no such
+   ! form; of it nothing below is asked.
+
+   !> Columns of V.
+   pure integer function split_rank(self) result(rank)
+      class(structure_operator), intent(in) :: self
+
+      rank = 0
+      associate (unused => self)
+      end associate
+   end function split_rank
+
+   !> As `multiply_active`, nearly.
+   subroutine multiply_nearly(self, state, v, product)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: v(*)
+      real(wp), intent(inout) :: product(*)
+
+      call self%multiply_active(state, v, product)
+   end subroutine multiply_nearly
+
+   !> [K V] of the rows in use: active columns of K, then all of V (n_used, n_active + rank).
+   subroutine static_block(self, state, matrix)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      real(wp), intent(out), contiguous :: matrix(:, :)
+
+      matrix = 0.0_wp
+      associate (unused => self, unused_state => state)
+      end associate
+   end subroutine static_block
+
+   !> S_n of the h-th harmonic (rank, rank).
+   subroutine dynamic_block(self, state, h, matrix)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+
+      matrix = (0.0_wp, 0.0_wp)
+      associate (unused => self, unused_state => state, unused_number => h)
+      end associate
+   end subroutine dynamic_block
 
 end module fw_structure_operator

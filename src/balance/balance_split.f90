@@ -1,0 +1,201 @@
+!> The preconditioner of a structure whose stiffness is that of rest and a low rank: two matrices
+!> for all harmonics (fw_split_factors). With g_0 the mean derivative of the forces in harmonic 0
+!> and g_1 that of all others,
+!>
+!>   P_j = (1 - g_j) K + g_j k d,   X_j = (1 - g_j) V.
+submodule(fw_balance_state:fw_balance_preconditioner) fw_balance_split
+   implicit none (type, external)
+
+   !> Terms g of the rows: m(row, :) = m(row, :) - g static(source, :).
+   type :: row_terms
+      integer :: n = 0
+      integer, allocatable :: row(:), source(:)
+      complex(wp), allocatable :: factor(:)
+   end type row_terms
+
+contains
+
+   module procedure build_split
+      real(wp), allocatable :: static(:, :)
+      complex(wp), allocatable :: dynamic(:, :, :)
+      type(row_terms) :: terms
+      real(wp) :: largest
+      integer :: h, j, k, na, nh, rank
+
+      na = self%active%n_active
+      nh = self%problem%fourier%n_retained
+      rank = self%problem%structure%split_rank()
+      allocate (static(self%active%n_used, na + rank), dynamic(rank, rank, nh))
+      call self%problem%structure%static_block(self%structure_state, static)
+      largest = 0.0_wp
+      do k = 1, na
+         largest = max(largest, abs(static(k, k)))
+      end do
+      do h = 1, nh
+         call self%problem%structure%dynamic_block(self%structure_state, h, dynamic(:, :, h))
+      end do
+      call reserve_terms(self, terms)
+      associate (split => self%preconditioner%split)
+         call split%reserve(na, rank, nh, largest)
+         split%v = cmplx(static(:na, na + 1:), kind=sp)
+         do j = 0, 1
+            associate (m => split%static(j)%matrix, scale => split%static(j)%scale)
+               m(:na, :na) = cmplx(scale*static(:na, :na), kind=sp)
+               split%u(:, :, j) = cmplx(scale*static(:na, na + 1:), kind=sp)
+               terms%n = 0
+               do k = 1, self%problem%forces%n_laws
+                  call add_law(self, self%problem%forces%entry(k), self%work(k), j, scale, m, terms)
+               end do
+               call subtract_terms(terms, na, static, m, split%u(:, :, j))
+            end associate
+         end do
+         call split%factor(first_moving(self), dynamic)
+      end associate
+   end procedure build_split
+
+   !> Number of the first harmonic that is not 0.
+   pure integer function first_moving(self) result(first)
+      type(balance_state), intent(in) :: self
+
+      first = merge(2, 1, self%problem%fourier%has_constant())
+   end function first_moving
+
+   !> Room for all terms of a derivative.
+   pure subroutine reserve_terms(self, terms)
+      type(balance_state), intent(in) :: self
+      type(row_terms), intent(inout) :: terms
+      integer :: k, n
+
+      n = 0
+      do k = 1, self%problem%forces%n_laws
+         n = n + size(self%problem%forces%entry(k)%row)*size(self%problem%forces%entry(k)%row, 1)
+      end do
+      allocate (terms%row(n), terms%source(n), terms%factor(n))
+   end subroutine reserve_terms
+
+   !> k d of a law into the matrix, and what it takes of the rows of K and V into the terms.
+   subroutine add_law(self, entry, work, j, scale, m, terms)
+      type(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
+      !> 0 for harmonic 0, 1 for all others.
+      integer, intent(in) :: j
+      real(wp), intent(in) :: scale
+      complex(sp), intent(inout) :: m(:, :)
+      type(row_terms), intent(inout) :: terms
+      integer :: i, c_out, c_in
+      complex(wp) :: mean
+
+      do i = 1, size(entry%row, 2)
+         if (work%linear_state(i) == pair_open) cycle
+         do c_out = 1, size(entry%row, 1)
+            if (entry%row(c_out, i) == 0) cycle
+            do c_in = 1, size(entry%row, 1)
+               if (entry%row(c_in, i) == 0) cycle
+               if (work%linear_state(i) /= pair_mixed .and. c_in /= c_out) cycle
+               mean = one
+               if (work%linear_state(i) == pair_mixed) mean = mean_of(self, work, i, c_in, c_out, j)
+               call add_term(self, entry, i, c_out, c_in, scale*mean, m, terms)
+            end do
+         end do
+      end do
+   end subroutine add_law
+
+   !> Mean block of the derivative of an element over harmonic 0, or over all others.
+   pure complex(wp) function mean_of(self, work, element, c_in, c_out, j) result(mean)
+      type(balance_state), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: element, c_in, c_out, j
+      integer :: h, k, n, nc
+
+      nc = self%problem%fourier%n_coefficients
+      mean = zero
+      n = 0
+      do h = 1, self%problem%fourier%n_retained
+         if ((self%problem%fourier%harmonic(h) == 0) .neqv. j == 0) cycle
+         k = self%problem%fourier%column(h)
+         mean = mean + mean_block(work%jacobian(:, :, element), self%problem%fourier%harmonic(h), &
+                                  (c_in - 1)*nc + k, (c_out - 1)*nc + k)
+         n = n + 1
+      end do
+      if (n > 0) mean = mean/n
+   end function mean_of
+
+   !> mean (k d - A) of one input in the row of one output.
+   subroutine add_term(self, entry, element, c_out, c_in, mean, m, terms)
+      type(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      integer, intent(in) :: element, c_out, c_in
+      complex(wp), intent(in) :: mean
+      complex(sp), intent(inout) :: m(:, :)
+      type(row_terms), intent(inout) :: terms
+      integer :: p_out, p_in
+
+      associate (p => entry%law%prediction, row => entry%row(:, element), &
+                 na => self%active%n_active)
+         if (p%takes_balance) then
+            p_out = self%active%place(self%problem%incidence%coordinate_of(row(c_out)))
+            p_in = self%active%place(self%problem%incidence%coordinate_of(row(c_in)))
+            if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then
+               terms%n = terms%n + 1
+               terms%row(terms%n) = p_out
+               terms%source(terms%n) = p_in
+               terms%factor(terms%n) = mean
+            end if
+         end if
+         ! Of any harmonic: weights do not turn here.
+         call self%problem%incidence%add_mapped_block(row(c_out), row(c_in), 1, &
+                                                      self%active%place, na, &
+                                                      p%stiffness(element, c_in)*mean, m)
+      end associate
+   end subroutine add_term
+
+   !> Column by column, as the matrices lie in memory.
+   subroutine subtract_terms(terms, na, static, m, x)
+      type(row_terms), intent(in) :: terms
+      integer, intent(in) :: na
+      !> [K V].
+      real(wp), intent(in) :: static(:, :)
+      complex(sp), intent(inout) :: m(:, :), x(:, :)
+      integer :: e, k
+
+      do k = 1, na
+         do e = 1, terms%n
+            m(terms%row(e), k) = m(terms%row(e), k) - &
+                                 cmplx(terms%factor(e)*static(terms%source(e), k), kind=sp)
+         end do
+      end do
+      do k = 1, size(x, 2)
+         do e = 1, terms%n
+            x(terms%row(e), k) = x(terms%row(e), k) - &
+                                 cmplx(terms%factor(e)*static(terms%source(e), na + k), kind=sp)
+         end do
+      end do
+   end subroutine subtract_terms
+
+   !> Coordinates that the factors do not know are taken as stuck, as `solve_kept` does.
+   module procedure solve_split
+      integer :: h, k
+
+      associate (in => self%scratch%complex_in, z => self%scratch%complex_out, &
+                 kept => self%preconditioner)
+         z(:kept%n, :) = zero
+         do h = 1, self%problem%fourier%n_retained
+            do k = 1, self%active%n_active
+               if (kept%place(k) > 0) then
+                  z(kept%place(k), h) = in(k, h)
+               else
+                  in(k, h) = in(k, h)/kept%unknown_stiffness(k)
+               end if
+            end do
+         end do
+         call kept%split%solve(first_moving(self), z)
+         do h = 1, self%problem%fourier%n_retained
+            do k = 1, self%active%n_active
+               if (kept%place(k) > 0) in(k, h) = z(kept%place(k), h)
+            end do
+         end do
+      end associate
+   end procedure solve_split
+
+end submodule fw_balance_split
