@@ -1,6 +1,7 @@
 !> Group &control: amplitudes that are given in place of the load.
 module fw_read_control
    use fw_control_options, only: control_options
+   use fw_control_options, only: of_first_harmonic
    use fw_key, only: key
    use fw_model, only: model_type
    use fw_reader, only: reader_type
@@ -21,7 +22,8 @@ contains
       type(control_options), intent(inout) :: options
       type(string_type), allocatable :: chosen(:)
       logical, allocatable :: is_text(:)
-      character(*), parameter :: others(*) = [character(8) :: 'of', 'observed']
+      character(*), parameter :: without = &
+         'is given without amplitude: give it, or leave this out'
       integer :: i
 
       call options%bind_keys(reader)
@@ -30,12 +32,9 @@ contains
                                 only='amplitude'), 'an observed quantity', 1, chosen, is_text)
       if (reader%failed()) return
       if (.not. options%is_wanted()) then
-         do i = 1, size(others)
-            if (reader%given('control', trim(others(i)))) then
-               call reader%refuse('control', trim(others(i)), 'is given without amplitude: '// &
-                                  'give it, or leave this out')
-            end if
-         end do
+         ! The default of `of` stands in every case that is written out.
+         if (options%of /= of_first_harmonic) call reader%refuse('control', 'of', without)
+         if (reader%given('control', 'observed')) call reader%refuse('control', 'observed', without)
          return
       end if
       if (size(chosen) == 0 .or. .not. allocated(model%observe_name)) return
