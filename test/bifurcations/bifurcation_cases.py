@@ -8,9 +8,12 @@ from orbit_judge import Branch, Oscillator
 
 # A cubic spring that folds; a strong one, whose symmetric vibrations lose their symmetry; a static
 # load beside a cubic spring, which doubles periods; a stop; two equal masses in phase, whose
-# vibration modulates the stiffness against each other.
-FAMILIES = ("folds", "symmetry", "doubling", "stop", "parametric")
-HARMONICS = {"folds": 15, "symmetry": 31, "doubling": 31, "stop": 21, "parametric": 15}
+# vibration modulates the stiffness against each other; two masses, one of twice the frequency of
+# the other, with a square spring between them: where the slower one is driven, both exchange energy
+# in a rhythm of their own (Nayfeh, Mook 1979, Nonlinear oscillations, section 6.5).
+FAMILIES = ("folds", "symmetry", "doubling", "stop", "parametric", "torus")
+HARMONICS = {"folds": 15, "symmetry": 31, "doubling": 31, "stop": 21, "parametric": 15,
+             "torus": 15}
 
 
 @dataclass
@@ -89,6 +92,12 @@ def random_sample(family, seed):
         return Sample(family, seed, Oscillator(one, damping * one, one, np.array([load]), zero,
                                                stops=[(0, side, gap, uniform(1.0, 8.0))]),
                       2.6, 0.75)
+    if family == "torus":
+        ratio = np.diag([1.0, rounded(4.0 * (1.0 + rng.uniform(-0.03, 0.05)))])
+        return Sample(family, seed, Oscillator(
+            np.eye(2), uniform(0.015, 0.03) * np.eye(2), ratio,
+            np.array([uniform(0.05, 0.12), 0.0]), np.zeros(2), [(0, 1, uniform(0.2, 0.35), 2)]),
+                      1.4, 0.85)
     c, cubic = uniform(0.02, 0.08), uniform(0.3, 1.0)
     square = uniform(0.0, 0.5) if rng.random() < 0.5 else 0.0
     coupling = uniform(0.02, 0.3)

@@ -8,8 +8,8 @@ import pytest
 import stop_judge
 from bifurcation_cases import FAMILIES, random_sample
 
-# Branches at a stop take the judge longer.
-SEEDS = {family: range(1 if family == "stop" else 2) for family in FAMILIES}
+# Branches at a stop take the judge longer, and those of two masses.
+SEEDS = {family: range(1 if family in ("stop", "torus") else 2) for family in FAMILIES}
 
 
 @pytest.mark.parametrize(("family", "seed"), [(f, seed) for f in FAMILIES for seed in SEEDS[f]])
@@ -21,6 +21,8 @@ def test_kinds_and_places(family, seed):
     assert status == 0
     verdict = bifurcations.compare(family, true, found)
     assert not (verdict.missed or verdict.wrong), verdict
+    if family == "torus":
+        assert [kind for kind, *_ in true].count(orbit_judge.TORUS) >= 2 and not verdict.undecided
 
 
 def test_the_comparison_sees_what_is_wrong():
