@@ -253,7 +253,7 @@ contains
          if (allocated(error)) return
          if (guess == 3) call stuck_guess(self%system, self%y(:self%system%n))
          if (guess == 4) call free_guess(self%system, self%y(:self%system%n))
-         call scale_linear(self, amplitude, is_there)
+         call scale_linear(self, amplitude, guess == 3, is_there)
       end select
    end subroutine make_guess
 
@@ -289,9 +289,11 @@ contains
    end subroutine multiply_vibration
 
    !> The linear solution under the load of the case, scaled to the amplitude.
-   subroutine scale_linear(self, amplitude, is_there)
+   subroutine scale_linear(self, amplitude, notes_rest, is_there)
       class(controlled_response), intent(inout) :: self
       real(wp), intent(in) :: amplitude
+      !> Keep its static part as that of the response.
+      logical, intent(in) :: notes_rest
       !> False where what is observed rests.
       logical, intent(out) :: is_there
       complex(wp), allocatable :: at_rest_motion(:)
@@ -313,8 +315,10 @@ contains
       self%is_node = .not. is_there
       if (.not. is_there) return
       ! The largest of the period has the static part on top.
-      self%rest = merge(0.0_wp, abs(static), self%control%of == of_first_harmonic)
-      if (self%rest < amplitude) vibration = vibration*amplitude/(amplitude - self%rest)
+      if (self%control%of /= of_first_harmonic) then
+         if (notes_rest) self%rest = abs(static)
+         if (abs(static) < amplitude) vibration = vibration*amplitude/(amplitude - abs(static))
+      end if
       call multiply_vibration(self, amplitude/vibration)
    end subroutine scale_linear
 
