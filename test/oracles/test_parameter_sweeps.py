@@ -7,6 +7,7 @@ from cases import merged, read, run
 from sensitivity_family import random_case
 
 import fretwear as fw
+from fretwear.plot import plot_response
 
 #: Solutions of the same equations to residuals of 1e-12.
 SAME = 1e-9
@@ -176,7 +177,7 @@ def test_python(tmp_path):
     fold = branch.bifurcations[0]
     assert fold.kind == "fold"
     assert fold.parameter == pytest.approx(branch.parameter[branch["fold"].astype(bool)][0])
-    figure = fw.plot.plot_response(branch)
+    figure = plot_response(branch)
     assert figure.axes[0].get_xlabel() == "load%harmonic_scale"
     plain = fw.frf(model, 0.5, 0.9, 3, **settings)
     assert plain.parameter_name == "frequency"
