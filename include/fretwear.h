@@ -163,6 +163,8 @@ int fw_count(fw_handle handle, const char *what, int *n);
    "floquet/multipliers", "floquet/stable": where the case asks for them.
    "sensitivity/QUANTITY/PARAMETER" ([n_observed][, n_pairs]), "sensitivity/deviation/QUANTITY":
    derivatives, with group &sensitivity.
+   "mode/damping_ratio", "mode/self_excitation", "mode/modal_amplitude" (1) and
+   "mode/first_harmonic" (n_observed): of the points of a nonlinear mode.
    "wear/cycles" (1), "wear/depth", "wear/rate" and "wear/energy" (n_pairs), "wear/volume"
    (n_patches): of the steps of a wear run. */
 int fw_size(fw_handle handle, const char *name, int point, size_t *n);

@@ -42,7 +42,7 @@ __path__ = extend_path(__path__, __name__)
 
 __version__: str = "0.1.0"
 
-from .analyses import frf, mode, run, wear
+from .analyses import frf, mode, resonance, run, wear
 from .bifurcation import Bifurcation
 from .case import Case
 from .design import calibrate, optimise
@@ -62,7 +62,7 @@ from .steps import Point, Steps
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
            "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "calibrate",
-           "frf", "mode", "optimise", "run", "wear"]
+           "frf", "mode", "optimise", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Union, cast
+from typing import TYPE_CHECKING, Any, Union, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     else:
         from typing_extensions import Unpack
 
-__all__ = ["frf", "mode", "run", "run_in_memory", "wear"]
+__all__ = ["frf", "mode", "resonance", "run", "run_in_memory", "wear"]
 
 #: Called with the number of points done and of points to come (0: not known); True for a line on
 #: the standard error.
@@ -225,7 +225,7 @@ def wear(model: ModelLike, frequency: float, coefficient: float,
 
 
 def mode(model: ModelLike, start: float, end: float, n_points: int | None = None, *,
-         number: int | None = None, control: Literal["observed", "modal"] | None = None,
+         number: int | None = None,
          continuation: Literal["natural", "arclength"] | None = None,
          file: str | Path | None = None, check: bool = True, progress: Progress | None = None,
          **groups: Unpack[Groups]) -> Result:
@@ -236,14 +236,13 @@ def mode(model: ModelLike, start: float, end: float, n_points: int | None = None
     model : Model, str or Path
         The structure, or the path of a model file.
     start, end : float
-        Lowest and highest amplitude, as `control` has it.
+        Lowest and highest amplitude: of the first harmonic of the first observed quantity, or
+        modal with ``mode={"control": "modal"}``.
     n_points : int, optional
         Points, evenly spaced in the logarithm of the amplitude; of a branch it sets its longest
         step.
     number : int, optional
         Of the elastic modes of the structure with its closed pairs stuck, from 1.
-    control : {'observed', 'modal'}, optional
-        Amplitude of the first harmonic of the first observed quantity (default), or modal.
     continuation : {'natural', 'arclength'}, optional
         Points at given amplitudes, or a branch through folds (default).
     file, check, progress
@@ -266,12 +265,66 @@ def mode(model: ModelLike, start: float, end: float, n_points: int | None = None
         settings["n_points"] = n_points
     if number is not None:
         settings["number"] = number
-    if control is not None:
-        settings["control"] = control
     if continuation is not None:
         settings["continuation"] = continuation
     _refuse_twice("mode", settings, groups.get("mode", {}))
     case = _case(model, {"analysis": "mode"}, {}, groups).replace(mode=settings)
+    return run(case, file, check=check, progress=progress)
+
+
+def resonance(model: ModelLike, parameter: str, start: float, end: float,
+              n_points: int | None = None, *, between: tuple[float, float],
+              n_sweep: int = 41, unit: Literal["rad/s", "Hz"] | None = None,
+              by_factor: bool = False, file: str | Path | None = None, check: bool = True,
+              progress: Progress | None = None, **groups: Unpack[Groups]) -> Result:
+    """A resonance as a function of a parameter: its amplitude and its frequency.
+
+    Parameters
+    ----------
+    model : Model, str or Path
+        The structure, or the path of a model file.
+    parameter : str
+        Such as 'contact%normal_load' (`resonance%parameter`).
+    start, end : float
+        First and last value, or factor.
+    n_points : int, optional
+        Values.
+    between : (float, float)
+        Frequencies [unit] between which the first resonance is looked for.
+    n_sweep : int
+        Points of the sweep that looks for it.
+    unit : {'rad/s', 'Hz'}, optional
+        Unit of these frequencies (default: rad/s).
+    by_factor : bool
+        Whether the values are factors of those of the case, all pairs (springs) together.
+    file, check, progress
+        See `run`.
+    **groups
+        Further settings by group, see `Case`; such as ``resonance={"condition": "phase"}``.
+
+    Returns
+    -------
+    Result
+        With `resonance`, a `ResonanceTrack`.
+
+    Raises
+    ------
+    InputError, OutputError, ConvergenceError, RunInterrupted
+        See `run`.
+    """
+    sweep: Sweep = {"start": between[0], "end": between[1], "n_points": n_sweep}
+    if unit is not None:
+        sweep["unit"] = unit
+    settings: dict[str, object] = {"parameter": parameter, "start": start, "end": end}
+    if n_points is not None:
+        settings["n_points"] = n_points
+    if by_factor:
+        settings["as"] = "factor"
+    given: Any = groups
+    _refuse_twice("resonance", settings, given.get("resonance", {}))
+    analysis: Any = {"analysis": "resonance"}
+    change: Any = {"resonance": settings}
+    case = _case(model, analysis, sweep, groups).replace(**change)
     return run(case, file, check=check, progress=progress)
 
 

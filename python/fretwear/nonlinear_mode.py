@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._native import namelist_values
+from .errors import AbsentError
 from .result_file import ResultFile
 
 __all__ = ["LimitCycle", "NonlinearMode", "read_mode"]
@@ -83,6 +84,9 @@ def read_mode(result: ResultFile) -> NonlinearMode:
                  else result["mode/first_harmonic"][:, 0])
     with result.open() as file:
         facts = dict(file["mode"].attrs)
+    if "number" not in facts:
+        raise AbsentError(f"{result.name}: holds no point of the mode: the run has not come to its "
+                          "end, or failed at the start")
     cycles = []
     if "mode/limit_cycle/amplitude" in result:
         cycles = [LimitCycle(float(a), float(omega), bool(stable)) for a, omega, stable in zip(

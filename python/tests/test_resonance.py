@@ -49,6 +49,22 @@ def test_track(damper: fw.Result) -> None:
     assert (track.curvature < 0.0).all()
 
 
+def test_by_the_function(damper: fw.Result) -> None:
+    contact = fw.ContactPairs([[1, 0, 0]], mu=1.0, normal_load=0.35, tangential_stiffness=1.0)
+    model = fw.Model([[1.0]], [[0.05]], [[1.0]], cosine=[0.3], contact=contact)
+    shared: Any = {"contact": {"law": "penalty"}, "harmonics": {"n_harmonics": 1}}
+    again = fw.resonance(model, "contact%normal_load", 0.35, 0.47, 7, between=(0.5, 2.0),
+                         n_sweep=60, **shared).resonance
+    np.testing.assert_allclose(again.amplitude, damper.resonance.amplitude, rtol=SAME)
+    factors = fw.resonance(model, "contact%normal_load", 1.0, 1.2, 2, between=(0.5, 2.0),
+                           by_factor=True, **shared).resonance
+    assert factors.by_factor and factors.amplitude[0] == pytest.approx(again.amplitude[0], rel=SAME)
+
+
+def test_it_prints_as_a_table(damper: fw.Result) -> None:
+    assert "resonance_omega" in repr(damper.sensitivities)
+
+
 def test_optimum(damper: fw.Result) -> None:
     best = damper.resonance.optimum()
     assert best is not None

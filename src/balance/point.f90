@@ -81,6 +81,10 @@ module fw_point
       real(wp), allocatable :: fraction(:, :)
       !> Friction energy per cycle (n_pairs) [force * length].
       real(wp), allocatable :: dissipation(:)
+      !> Of a nonlinear mode: self-excitation [1/s], modal amplitude [length mass**(1/2)], and the
+      !> amplitude of the first harmonic of what is observed, not allocated elsewhere (n_observed).
+      real(wp) :: self_excitation = 0.0_wp, modal_amplitude = 0.0_wp
+      real(wp), allocatable :: first_harmonic(:)
       !> Of a step of wear: cycles so far, depth [length] and depth per cycle (n_pairs).
       real(wp) :: cycles = 0.0_wp
       real(wp), allocatable :: depth(:), wear_rate(:)

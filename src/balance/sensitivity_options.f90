@@ -18,6 +18,8 @@ module fw_sensitivity_options
       integer, allocatable :: further(:)
       !> Standard deviation of each parameter over its value; not allocated where none was given.
       real(wp), allocatable :: deviation(:)
+      !> Whether the number of harmonics is given, without which derivatives are of nothing.
+      logical :: has_harmonics = .false.
    contains
       procedure :: is_wanted
       procedure :: has

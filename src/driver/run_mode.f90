@@ -408,6 +408,9 @@ contains
          row%converged = report%converged
          row%modal_amplitude = system%modal_amplitude(y)*system%amplitude
          row%first = point%coefficients(2:3, :)
+         point%self_excitation = row%self_excitation
+         point%modal_amplitude = row%modal_amplitude
+         point%first_harmonic = hypot(row%first(1, :), row%first(2, :))
          row%force = modal_force(curve%start, y)*system%amplitude/row%modal_amplitude
       end associate
       call system_clock(now, rate)

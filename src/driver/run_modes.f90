@@ -34,7 +34,7 @@ contains
       type(string_type), allocatable, intent(out) :: table(:)
       type(error_type), allocatable, intent(out) :: error
       type(natural_modes) :: modes
-      character(:), allocatable :: text
+      character(:), allocatable :: text, name
       integer :: j
 
       call find_natural_modes(case, min(case%model%cyclic%n_modes, most_of(case)), modes, error)
@@ -44,14 +44,17 @@ contains
                             modes%closed_damping)
       if (allocated(error)) return
       allocate (table(0))
-      call append(table, 'natural frequencies ['//trim(unit_words(case%sweep%unit))// &
-                  '] of each nodal diameter')
+      text = 'natural frequencies ['//trim(unit_words(case%sweep%unit))//']'
+      if (case%model%cyclic%is_cyclic) text = text//' of each nodal diameter'
+      call append(table, text)
       do j = 1, size(modes%nodal_diameter)
+         name = ''
+         if (case%model%cyclic%is_cyclic) name = to_text(modes%nodal_diameter(j))//' '
          call line_of(case, modes%open(:, j), -1.0_wp, huge(1.0_wp), text)
-         call append(table, to_text(modes%nodal_diameter(j))//' open'//text)
+         call append(table, name//'open'//text)
          if (case%contact%n_pairs == 0) cycle
          call line_of(case, modes%closed(:, j), -1.0_wp, huge(1.0_wp), text)
-         call append(table, to_text(modes%nodal_diameter(j))//' closed'//text)
+         call append(table, name//'closed'//text)
       end do
    end subroutine run_modes
 

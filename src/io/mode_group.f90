@@ -113,42 +113,20 @@ contains
       type(mode_table), intent(in) :: table
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: first(:, :), shape_of(:, :, :)
-      real(wp) :: column(table%n, 4)
+      real(wp), allocatable :: shape_of(:, :, :)
       integer :: k
 
       ! Shapes are those of h5py reversed.
-      allocate (first(size(table%row(1)%first, 2), table%n))
-      allocate (shape_of(2, size(first, 1), table%n))
+      allocate (shape_of(2, size(table%row(1)%first, 2), table%n))
       do k = 1, table%n
-         associate (row => table%row(k))
-            first(:, k) = hypot(row%first(1, :), row%first(2, :))
-            shape_of(:, :, k) = row%first/row%modal_amplitude
-            column(k, :) = [damping_ratio(row), row%self_excitation, row%modal_amplitude, &
-                            resonant_scale(row)]
-         end associate
+         shape_of(:, :, k) = table%row(k)%first/table%row(k)%modal_amplitude
       end do
-      call write_one(file, '/mode/damping_ratio', column(:, 1), unit_system, error)
-      if (allocated(error)) return
-      call write_one(file, '/mode/self_excitation', column(:, 2), unit_system, error)
-      if (allocated(error)) return
-      call write_one(file, '/mode/modal_amplitude', column(:, 3), unit_system, error)
-      if (allocated(error)) return
-      call write_dataset(file, '/mode/first_harmonic', first, error)
-      if (.not. allocated(error)) call label_dataset(file, '/mode/first_harmonic', unit_system, &
-                                                     error)
-      if (allocated(error)) return
       call write_dataset(file, '/mode/shape', shape_of, error)
       if (.not. allocated(error)) call label_dataset(file, '/mode/shape', unit_system, error)
       if (allocated(error) .or. .not. any(table%row(:table%n)%force > 0.0_wp)) return
-      call write_one(file, '/mode/resonant_scale', column(:, 4), unit_system, error)
+      call write_one(file, '/mode/resonant_scale', &
+                     [(resonant_scale(table%row(k)), k=1, table%n)], unit_system, error)
    end subroutine write_points
-
-   pure real(wp) function damping_ratio(row)
-      type(mode_row), intent(in) :: row
-
-      damping_ratio = 0.5_wp*row%self_excitation/row%omega
-   end function damping_ratio
 
    !> The factor of the load with which a point is a resonance: its work balances the damping.
    pure real(wp) function resonant_scale(row) result(scale)

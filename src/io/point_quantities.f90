@@ -7,6 +7,7 @@ module fw_point_quantities
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
    use, intrinsic :: ieee_arithmetic, only: ieee_value
    use fw_case, only: analysis_frf
+   use fw_case, only: analysis_mode
    use fw_case, only: analysis_point
    use fw_case, only: analysis_wear
    use fw_case, only: case_type
@@ -141,6 +142,14 @@ contains
                'contact forces t1, t2, n over one period', force_history, always)
       call add('history/relative_displacement', r, '<length>', 'point instant pair direction', &
                'relative displacement t1, t2, n over one period', slip_history, always)
+      call add('mode/damping_ratio', r, '1', 'point', 'damping ratio of the mode, xi/(2 omega)', &
+               damping_ratio, is_mode)
+      call add('mode/self_excitation', r, '1/s', 'point', &
+               'self-excitation xi in proportion to mass', self_excitation, is_mode)
+      call add('mode/modal_amplitude', r, '', 'point', &
+               'modal amplitude sqrt(U^H M U) of the first harmonic', modal_amplitude, is_mode)
+      call add('mode/first_harmonic', r, '<length>', 'point observed', &
+               'amplitude of the first harmonic', first_harmonic, is_mode)
       call add('wear/cycles', r, '1', 'step', 'cycles of vibration', cycles, wears)
       call add('wear/depth', r, '<length>', 'step pair', 'wear depth', depth, wears)
       call add('wear/rate', r, '<length>', 'step pair', 'wear depth per cycle', wear_rate, wears)
@@ -332,6 +341,12 @@ contains
 
       is_response = case%analysis == analysis_frf .or. case%analysis == analysis_point
    end function is_response
+
+   pure logical function is_mode(case)
+      type(case_type), intent(in) :: case
+
+      is_mode = case%analysis == analysis_mode
+   end function is_mode
 
    !> Only a branch turns back.
    pure logical function follows_branch(case)
@@ -617,6 +632,34 @@ contains
          values = reshape(point%slip_history, [size(point%slip_history)])
       end if
    end subroutine slip_history
+
+   subroutine damping_ratio(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%first_harmonic)) values = [0.5_wp*point%self_excitation/point%omega]
+   end subroutine damping_ratio
+
+   subroutine self_excitation(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%first_harmonic)) values = [point%self_excitation]
+   end subroutine self_excitation
+
+   subroutine modal_amplitude(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%first_harmonic)) values = [point%modal_amplitude]
+   end subroutine modal_amplitude
+
+   subroutine first_harmonic(point, values)
+      type(point_type), intent(in) :: point
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(point%first_harmonic)) values = point%first_harmonic
+   end subroutine first_harmonic
 
    !> A point with depths is a step of wear; any other has no row in these quantities.
    subroutine cycles(point, values)

@@ -107,12 +107,7 @@ contains
 
       associate (options => case%sensitivity)
          if (.not. options%is_wanted()) return
-         ! An accuracy would choose other harmonics from point to point, and with them another
-         ! function.
-         if (.not. reader%given('harmonics', 'n_harmonics')) then
-            call reader%refuse('harmonics', 'n_harmonics', 'is missing: derivatives '// &
-                               '(&sensitivity) are those of a balance of given harmonics')
-         end if
+         options%has_harmonics = reader%given('harmonics', 'n_harmonics')
          if (case%analysis == analysis_resonance) options%further = [resonance_omega]
          if (size(options%quantities) > 0) return
          options%quantities = [first_harmonic, largest]
@@ -157,6 +152,11 @@ contains
          if (allocated(error)) return
       end do
       call check_quantities(case, error)
+      if (allocated(error) .or. case%sensitivity%has_harmonics) return
+      ! Last, since the rest may say that there are to be no derivatives. An accuracy would choose
+      ! other harmonics from point to point, and with them another function.
+      call fatal_error(error, '&harmonics n_harmonics is missing: derivatives (&sensitivity) '// &
+                       'are those of a balance of given harmonics', status_input)
    end subroutine check_sensitivity
 
    !> Friction begins at mu = 0 and at a load of 0: derivatives there are one-sided.

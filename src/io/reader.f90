@@ -11,7 +11,7 @@ module fw_reader
    use fw_kinds, only: wp
    use fw_namelist_data, only: value_type, value_count, multiply_out
    use fw_records, only: record_type, record_list
-   use fw_reader_text, only: near, did_you_mean, shown, to_strings, words_text
+   use fw_reader_text, only: near, near_part, did_you_mean, shown, to_strings, words_text
    use fw_text, only: string_type, lower_case, to_text
    use fw_text_list, only: append
    use fw_values, only: range_text, read_logical, read_number, quoted_text
@@ -380,7 +380,7 @@ contains
                                                     near(entry%group, self%records%groups))
             else if (.not. self%records%has(entry%group, entry%key)) then
                call self%blame(i, '&'//entry%group//' has no key '//entry%key// &
-                               near(entry%key, self%records%keys(entry%group)))
+                               hint_for(self, entry%group, entry%key))
             end if
          end associate
       end do
@@ -388,5 +388,23 @@ contains
          call append(self%problems, others(i)%text)
       end do
    end subroutine find_unknown
+
+   !> Where a key that a group does not have may belong: in another group that has it, or among the
+   !> longer names of this one.
+   function hint_for(self, group, name) result(hint)
+      class(reader_type), intent(in) :: self
+      character(*), intent(in) :: group, name
+      character(:), allocatable :: hint
+      integer :: i
+
+      hint = ''
+      do i = 1, size(self%records%groups)
+         if (.not. self%records%has(self%records%groups(i)%text, name)) cycle
+         if (len(hint) > 0) hint = hint//', &'//self%records%groups(i)%text
+         if (len(hint) == 0) hint = '; it is a key of &'//self%records%groups(i)%text
+      end do
+      if (len(hint) == 0) hint = near_part(name, self%records%keys(group))
+      if (len(hint) == 0) hint = near(name, self%records%keys(group))
+   end function hint_for
 
 end module fw_reader

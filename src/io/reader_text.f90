@@ -7,8 +7,8 @@ module fw_reader_text
    implicit none (type, external)
    private
 
-   public :: near, did_you_mean, shown, to_strings, words_text, element_text, dims_text, number_list
-   public :: repeat_hint, printable
+   public :: near, near_part, did_you_mean, shown, to_strings, words_text, element_text, dims_text
+   public :: number_list, repeat_hint, printable
 
 contains
 
@@ -26,6 +26,23 @@ contains
          hint = '; known are '//join(words, ', ')
       end if
    end function near
+
+   !> `; did you mean ... or ...?` where a name is a whole part of some of the list, as harmonic is
+   !> of term_harmonic, or nothing.
+   pure function near_part(word, words) result(hint)
+      character(*), intent(in) :: word
+      type(string_type), intent(in) :: words(:)
+      character(:), allocatable :: hint
+      integer :: i
+
+      hint = ''
+      do i = 1, size(words)
+         if (index('_'//words(i)%text//'_', '_'//lower_case(word)//'_') == 0) cycle
+         if (len(hint) > 0) hint = hint//' or '//words(i)%text
+         if (len(hint) == 0) hint = '; did you mean '//words(i)%text
+      end do
+      if (len(hint) > 0) hint = hint//'?'
+   end function near_part
 
    !> `; did you mean '...'?` where a text value of the list is near, or nothing. Short words are
    !> near to any other: they have to share a letter.

@@ -70,14 +70,6 @@ module fw_result_labels
                  'damping of them, over the critical one'), &
       label_type('/modes/closed_damping', '1', 'diameter mode', &
                  'damping of them, over the critical one'), &
-      label_type('/mode/damping_ratio', '1', 'point', &
-                 'damping ratio of the mode, xi/(2 omega)'), &
-      label_type('/mode/self_excitation', '1/s', 'point', &
-                 'self-excitation xi in proportion to mass'), &
-      label_type('/mode/modal_amplitude', '', 'point', &
-                 'modal amplitude sqrt(U^H M U) of the first harmonic'), &
-      label_type('/mode/first_harmonic', '<length>', 'point observed', &
-                 'amplitude of the first harmonic'), &
       label_type('/mode/shape', '', 'point observed part', &
                  'first harmonic, cosine and sine, over the modal amplitude'), &
       label_type('/mode/resonant_scale', '1', 'point', &

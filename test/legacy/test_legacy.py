@@ -114,6 +114,36 @@ def test_abort_keeps_what_is_done(programs, language, model, reference, tmp_path
     assert np.array_equal(found, reference[:4])
 
 
+@pytest.fixture(scope="module")
+def mode_and_response(prefix, tmp_path_factory):
+    """The two tables that the programs write, from result files."""
+    folder, tables = tmp_path_factory.mktemp("modes"), []
+    for name, columns in (
+            ("nonlinear_mode/mode", ("mode/first_harmonic", "omega", "mode/damping_ratio")),
+            ("sensitivity/sensitivity", ("omega", "amplitude", "sensitivity/largest/contact_mu"))):
+        path = folder / f"{Path(name).name}.h5"
+        run(prefix / "bin" / "fw_run", "-q", "-o", path, ROOT / "example" / f"{name}.nml")
+        with h5py.File(path) as result:
+            tables.append(np.column_stack([result[column][()].ravel() for column in columns]))
+    return np.concatenate(tables)
+
+
+@pytest.mark.parametrize("language", ["f77", "c", "f90"])
+def test_modes_and_derivatives(programs, language, mode_and_response, tmp_path):
+    cases = [str(ROOT / "example" / name) for name in (
+        "nonlinear_mode/mode.nml", "sensitivity/sensitivity.nml")]
+    if language == "f77":
+        # Names are short in old codes.
+        for short, case in zip(("mode.nml", "response.nml"), cases, strict=True):
+            shutil.copy(case, tmp_path / short)
+        run(programs / "modes_f77", cwd=tmp_path, text="mode.nml\nresponse.nml\nout.txt\n")
+    else:
+        run(programs / f"modes_{language}", *cases, "out.txt", cwd=tmp_path)
+    found = np.loadtxt(tmp_path / "out.txt")
+    assert np.array_equal(found, mode_and_response)
+    assert f"{found[:81, 2].max():.7f}" in (EXAMPLE / "README.md").read_text()
+
+
 @pytest.mark.parametrize("package", ["fretwear", "fretwear-static"])
 def test_fortran_facade(prefix, package, reference, tmp_path):
     flags = run("pkg-config", "--cflags", "--libs", package,
