@@ -100,8 +100,8 @@ contains
       if (.not. allocated(values)) allocate (values(0))
    end subroutine case_part
 
-   !> Stiffness of the air in harmonics 1 .. H (H, a, a, 2), real and imaginary part; NaN where it is
-   !> not known.
+   !> Stiffness of the air in harmonics 1 .. H (H, a, a, 2), real and imaginary part; NaN where it
+   !> is not known.
    pure function air_stiffness(case) result(values)
       type(case_type), intent(in) :: case
       real(wp), allocatable :: values(:)

@@ -9,6 +9,7 @@ module fw_one_level
    use fw_level, only: level_type
    use fw_other_starts, only: start_elsewhere
    use fw_point, only: point_type
+   use fw_point_solver, only: looks_again
    use fw_remarks, only: is_undamped
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
@@ -20,8 +21,6 @@ module fw_one_level
 
    public :: one_level
 
-   !> Points without a solution in a row after which no other balance is looked at.
-   integer, parameter :: most_failures = 2
    !> Stick-slip that no balance of few harmonics follows is no trouble to an integration in time.
    character(*), parameter :: in_time = &
       '; analysis = ''time'' integrates what no balance converges to, such as slow stick-slip'
@@ -29,6 +28,9 @@ module fw_one_level
    !> The strategy of a given number of harmonics: one system and one solver serve all points.
    type, extends(point_strategy) :: one_level
       type(level_type) :: level
+      !> The last one with fewer harmonics that a point was started from: it goes along with the
+      !> sweep where points fail.
+      type(level_type), pointer, private :: below => null()
       !> Points that other balances of the case led to, and what did so last.
       integer :: n_elsewhere = 0
       character(:), allocatable :: way
@@ -38,6 +40,7 @@ module fw_one_level
       procedure :: describe
       procedure :: remember
       procedure :: recall
+      final :: forget
    end type one_level
 
 contains
@@ -64,7 +67,8 @@ contains
       call self%level%solve(case, request, point, error)
       if (allocated(error)) return
       if (.not. point%converged .and. goes_on(self, case, request)) then
-         call start_elsewhere(case, self%level, request, point, error)
+         call start_elsewhere(case, self%level, self%below, request, &
+                              looks_again(self%level%solver%point_failures), point, error)
          if (allocated(error)) return
          if (point%converged) then
             self%level%solver%point_failures = 0
@@ -81,14 +85,13 @@ contains
    end subroutine solve
 
    !> Whether other balances of the case are worth their solutions: nothing ended the work on the
-   !> point, and it is not one of many in a row that have no solution.
+   !> point.
    logical function goes_on(self, case, request)
       class(one_level), intent(in) :: self
       type(case_type), intent(in) :: case
       type(point_request), intent(in) :: request
 
-      goes_on = request%fallback .and. self%level%solver%point_failures <= most_failures &
-                .and. .not. self%level%solver%method%unbounded &
+      goes_on = request%fallback .and. .not. self%level%solver%method%unbounded &
                 .and. case%contact%n_pairs + case%springs%n_springs > 0 &
                 .and. case%contact%memory /= memory_carried
       if (goes_on .and. associated(request%interrupt)) goes_on = .not. request%interrupt%is_due()
@@ -135,6 +138,12 @@ contains
          end associate
       end associate
    end subroutine describe
+
+   impure elemental subroutine forget(self)
+      type(one_level), intent(inout) :: self
+
+      if (associated(self%below)) deallocate (self%below)
+   end subroutine forget
 
    !> The last converged solution, so that points of a search start from it.
    subroutine remember(self, memory)

@@ -2,7 +2,8 @@
 !> the same case. In the order that pays:
 !>
 !> * with fewer harmonics, lifted from level to level: slow stick-slip, whose many harmonics of a
-!>   square wave let Newton's method wander, has a smooth beginning;
+!>   square wave let Newton's method wander, has a smooth beginning. The level that led there goes
+!>   along with the sweep, so that the next points that fail have a start at the price of its own;
 !> * with softer elastic pairs, or another eps of rigid ones, at the harmonics of the case.
 module fw_other_starts
    use fw_case, only: case_type
@@ -30,10 +31,14 @@ contains
 
    !> Solve a point of a level that its own solver did not reach; `point` stays where this fails
    !> too.
-   subroutine start_elsewhere(case, level, request, point, error)
+   subroutine start_elsewhere(case, level, below, request, everywhere, point, error)
       type(case_type), intent(in) :: case
       type(level_type), intent(inout), target :: level
+      !> With fewer harmonics, of an earlier point that failed; not associated without one.
+      type(level_type), pointer, intent(inout) :: below
       type(point_request), intent(in) :: request
+      !> Whether the point is worth more than a step of that one.
+      logical, intent(in) :: everywhere
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
       integer :: work, harmonics, spent
@@ -41,11 +46,19 @@ contains
 
       work = 0
       spent = point%iterations
-      call by_fewer_harmonics(case, level, request, point, work, done, harmonics, error)
-      if (allocated(error)) return
+      done = .false.
+      if (associated(below)) then
+         harmonics = below%harmonics%n_harmonics
+         call from_below(case, below, level, request, point, work, done, error)
+         if (allocated(error)) return
+      end if
+      if (.not. done .and. everywhere) then
+         call by_fewer_harmonics(case, level, below, request, point, work, done, harmonics, error)
+         if (allocated(error)) return
+      end if
       if (done) then
          point%note = 'started from '//to_text(harmonics)//' harmonics'
-      else if (case%contact%n_pairs > 0 .and. work < most_work) then
+      else if (everywhere .and. case%contact%n_pairs > 0 .and. work < most_work) then
          call by_stiffness(case, level, request, point, work, done, error)
          if (allocated(error)) return
          if (done) point%note = 'started from another stiffness of its pairs'
@@ -54,11 +67,45 @@ contains
       if (done) point%served_by = served_by_other_balance
    end subroutine start_elsewhere
 
+   !> A step of the level with fewer harmonics, and from there.
+   subroutine from_below(case, below, level, request, point, work, done, error)
+      type(case_type), intent(in) :: case
+      type(level_type), pointer, intent(in) :: below
+      type(level_type), intent(inout), target :: level
+      type(point_request), intent(in) :: request
+      type(point_type), intent(inout) :: point
+      integer, intent(inout) :: work
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      type(point_type) :: step
+
+      call below%solve(case, bare_request(request, fallback=.false.), step, error)
+      if (allocated(error)) return
+      work = work + step%iterations
+      done = step%converged
+      if (done) call arrive(case, below, level, request, point, work, done, error, deep=.false.)
+   end subroutine from_below
+
+   !> What a balance on the way is asked for.
+   function bare_request(request, fallback) result(bare)
+      type(point_request), intent(in) :: request
+      logical, intent(in) :: fallback
+      type(point_request) :: bare
+
+      bare = request
+      bare%stability = .false.
+      bare%contact = .false.
+      bare%histories = .false.
+      bare%fallback = fallback
+   end function bare_request
+
    !> Up the ladder of harmonics; steps between the last that has a solution and the wanted one are
    !> halved.
-   subroutine by_fewer_harmonics(case, level, request, point, work, done, lower, error)
+   subroutine by_fewer_harmonics(case, level, below, request, point, work, done, lower, error)
       type(case_type), intent(in) :: case
       type(level_type), intent(inout), target :: level
+      !> The last level with a solution takes its place.
+      type(level_type), pointer, intent(inout) :: below
       type(point_request), intent(in) :: request
       type(point_type), intent(inout) :: point
       integer, intent(inout) :: work
@@ -103,7 +150,9 @@ contains
          lower = upper
          upper = most
       end do
-      if (associated(last)) deallocate (last)
+      if (.not. associated(last)) return
+      if (associated(below)) deallocate (below)
+      below => last
    end subroutine by_fewer_harmonics
 
    !> With other stiffnesses of the pairs.
@@ -157,19 +206,13 @@ contains
       integer, intent(inout) :: work
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
-      type(point_request) :: bare
       type(point_type) :: point
 
       done = .false.
-      bare = request
-      bare%stability = .false.
-      bare%contact = .false.
-      bare%histories = .false.
-      bare%fallback = .true.
       call next%build(easier, n_harmonics, error)
       if (.not. allocated(error)) then
          if (associated(last)) call next%take_over(last)
-         call next%solve(easier, bare, point, error)
+         call next%solve(easier, bare_request(request, fallback=.true.), point, error)
       end if
       if (.not. allocated(error)) then
          work = work + point%iterations
@@ -185,7 +228,7 @@ contains
    end subroutine climb
 
    !> From the solution of another balance to the wanted one.
-   subroutine arrive(case, last, level, request, point, work, done, error)
+   subroutine arrive(case, last, level, request, point, work, done, error, deep)
       type(case_type), intent(in) :: case
       type(level_type), intent(in) :: last
       type(level_type), intent(inout), target :: level
@@ -194,7 +237,10 @@ contains
       integer, intent(inout) :: work
       logical, intent(out) :: done
       type(error_type), allocatable, intent(out) :: error
+      !> Whether every way of its own balance is gone from there (default).
+      logical, intent(in), optional :: deep
       type(point_request) :: plain
+      logical :: goes_deep
       type(point_type) :: trial
       real(wp), allocatable :: x(:), before(:)
       real(wp) :: omega, omega_before
@@ -215,7 +261,9 @@ contains
          call level%solve(case, plain, trial, error)
          if (allocated(error)) return
          work = work + trial%iterations
-         if (.not. trial%converged .and. work < most_work) then
+         goes_deep = work < most_work
+         if (present(deep)) goes_deep = goes_deep .and. deep
+         if (.not. trial%converged .and. goes_deep) then
             ! Pseudo-time flows on from here, where Newton's method has gone astray.
             plain%fallback = .true.
             solver%flow_failures = 0

@@ -38,7 +38,7 @@ module fw_point_solver
    implicit none (type, external)
    private
 
-   public :: point_solver
+   public :: looks_again, point_solver
 
    !> Halvings of a frequency step that fails.
    ! A 64th of a step of the sweep.
@@ -47,8 +47,9 @@ module fw_point_solver
    !> joint that cannot carry its load has no solution to flow to.
    integer, parameter :: fallback_steps = 60, max_flow_failures = 2
    !> Points that fail in a row after which a sweep spends less on a point: it has gone where no
-   !> solution exists, or where none is found in this way.
-   integer, parameter :: max_point_failures = 2
+   !> solution exists, or where none is found in this way. After 4, 8, 16, .. of them it looks
+   !> again: a sweep that begins where nothing is found comes to where something is.
+   integer, parameter :: most_point_failures = 2
    !> Iterations spent on a point after which no other way to it is begun, over max_iterations, of
    !> which at least as many count. (Where a sector loses its hold, points take 470 at most, and
    !> none of those with a solution took more than 25.)
@@ -204,7 +205,7 @@ contains
       if (allocated(error)) return
       if (.not. request%fallback) return
       if (.not. goes_on(self, report, iterations)) return
-      if (self%point_failures < max_point_failures) then
+      if (looks_again(self%point_failures + 1)) then
          call by_other_ways(self, case, system, request%place(), report, iterations, error)
          if (allocated(error)) return
          if (.not. goes_on(self, report, iterations)) return
@@ -470,6 +471,13 @@ contains
       ! No second point: an extrapolation over two numbers of harmonics would mix them.
       self%n_converged = 1
    end subroutine know
+
+   !> Whether a point is worth every way to it, with it the number of points in a row that failed.
+   pure logical function looks_again(n_failed)
+      integer, intent(in) :: n_failed
+
+      looks_again = n_failed <= most_point_failures .or. popcnt(n_failed) == 1
+   end function looks_again
 
    !> A solution for the guesses of the next points.
    subroutine remember(self, omega)

@@ -34,8 +34,6 @@ def test_response(tmp_path, name, sampling):
     if not points:
         pytest.skip("the reference has none")
     n_time = points[0][sampling].get("n_time", 0)
-    # Down: the first frequency of one case is reached from the resonance, or in pseudo-time only.
-    points = points[::-1]
     found = run_at(tmp_path, case, [point["omega"] for point in points], sampling=sampling,
                    n_time=n_time)
     assert found["converged"].all()
