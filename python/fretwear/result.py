@@ -19,7 +19,7 @@ from .errors import AbsentError, InputError, OutputError
 from .natural_modes import NaturalModes, read_natural_modes
 from .nonlinear_mode import NonlinearMode, read_mode
 from .peaks import Peak, read_peaks
-from .resonance import ResonanceTrack, read_resonance
+from .resonance_track import ResonanceTrack, read_resonance
 from .result_file import Quantity, ResultFile, plain_text
 from .sensitivity import Sensitivities, read_sensitivities
 

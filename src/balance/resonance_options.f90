@@ -81,8 +81,8 @@ contains
                               'the case (all pairs or springs together)'), self%as, as_words)
       call keys%bind_word(key('condition', 'the response is largest, or the load does no '// &
                               'reactive work'), self%condition, condition_words)
-      call keys%bind_word(key('quantity', 'of the first observed quantity, what is largest: the '// &
-                              'amplitude of its first harmonic, or its largest value'), &
+      call keys%bind_word(key('quantity', 'of the first observed quantity, what is largest: '// &
+                              'the amplitude of its first harmonic, or its largest value'), &
                           self%quantity, resonance_words)
       call keys%bind_word(key('continuation', "points at given values, or a branch through "// &
                               "folds (condition = 'phase')"), self%continuation, &

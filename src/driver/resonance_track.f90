@@ -59,7 +59,7 @@ module fw_resonance_track
       procedure :: sweep
       procedure :: reach
       procedure :: bring
-      procedure :: renew_system
+      procedure :: restore
    end type resonance_track
 
    !> Shortest step of what steps are even in, over the whole, and how steps grow.
@@ -184,6 +184,7 @@ contains
       if (allocated(error)) return
       call self%curve%state%set_frequency(guess(size(guess)), error)
       if (allocated(error)) return
+      self%phase%interrupt => self%curve%state%interrupt
       call self%phase%scale(guess)
       call self%phase%pack_point(guess, y)
       call self%newton%solve(self%phase, y, report)
@@ -286,11 +287,18 @@ contains
       self%kept = min(3, self%kept + 1)
    end subroutine remember
 
-   !> The state of the sweeps follows where another state has moved the problem.
-   subroutine renew_system(self)
+   !> All states stand at a value again, after one of them has moved the problem by itself.
+   subroutine restore(self, value, error)
       class(resonance_track), intent(inout), target :: self
+      real(wp), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
 
-      call renew_state(self%strategy%level%problem, self%strategy%level%system)
-   end subroutine renew_system
+      associate (level => self%strategy%level)
+         call self%mover%bring(value, level%problem, level%system, error)
+         if (allocated(error)) return
+         call renew_state(level%problem, level%system)
+         call self%curve%renew(level%system)
+      end associate
+   end subroutine restore
 
 end module fw_resonance_track

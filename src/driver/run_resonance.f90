@@ -117,22 +117,33 @@ contains
       call run%track%find_first(observer, error)
       if (allocated(error)) return
       if (run%track%outcome%kind /= outcome_found) then
-         call observer%on_message('no resonance to follow at '//place(case, run%track%mover%value) &
-                                  //': '//trim(outcome_words(run%track%outcome%kind))//'; give '// &
-                                  '&sweep a range with a maximum inside, or more points')
+         call tell('no resonance', 'no resonance to follow at '// &
+                   place(case, run%track%mover%value)//': '// &
+                   trim(outcome_words(run%track%outcome%kind))//'; give &sweep a range with a '// &
+                   'maximum inside, or more points', observer, summary)
          state%is_incomplete = .true.
          call add_row(case, run, .false., served_by_newton, state, error)
          return
       end if
       if (case%resonance%continuation == continuation_arclength) then
-         call along_branch(case, run, observer, state, error)
+         call along_branch(case, run, observer, summary, state, error)
       else
-         call along_values(case, run, observer, state, error)
+         call along_values(case, run, observer, summary, state, error)
       end if
       if (.not. allocated(error)) call remark_resonance(case, run%track, run%table, &
                                                         run%n_corners, observer, &
                                                         summary%remarks, error)
    end subroutine follow
+
+   !> What ended the track, at once and beside the result.
+   subroutine tell(name, text, observer, summary)
+      character(*), intent(in) :: name, text
+      class(observer_type), intent(inout) :: observer
+      type(summary_type), intent(inout) :: summary
+
+      call observer%on_message(text)
+      call summary%remarks%add(name, text)
+   end subroutine tell
 
    !> Name and value of the parameter.
    function place(case, value) result(text)
@@ -144,10 +155,11 @@ contains
    end function place
 
    !> Points at given values.
-   subroutine along_values(case, run, observer, state, error)
+   subroutine along_values(case, run, observer, summary, state, error)
       type(case_type), intent(in) :: case
       type(resonance_run), intent(inout), target :: run
       class(observer_type), intent(inout), target :: observer
+      type(summary_type), intent(inout) :: summary
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: reached
@@ -159,7 +171,7 @@ contains
          call run%track%reach(case%resonance%value_of(k), reached, error)
          if (allocated(error)) return
          if (run%track%outcome%kind /= outcome_found) then
-            call end_early(case, observer, state, reached, &
+            call end_early(case, observer, summary, state, reached, &
                            trim(outcome_words(run%track%outcome%kind)))
             ! States are those of the last value that was reached.
             call run%track%bring(reached, error)
@@ -170,9 +182,10 @@ contains
    end subroutine along_values
 
    !> Say where the resonance was lost short of its last value, and why it may have.
-   subroutine end_early(case, observer, state, value, reason)
+   subroutine end_early(case, observer, summary, state, value, reason)
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout) :: observer
+      type(summary_type), intent(inout) :: summary
       type(run_state), intent(inout) :: state
       real(wp), intent(in) :: value
       character(*), intent(in) :: reason
@@ -183,15 +196,16 @@ contains
       if (case%resonance%continuation /= continuation_arclength) why = '; the resonance may '// &
          "fold over the parameter, which condition = 'phase' with continuation = 'arclength' "// &
          'follows, or leave the range of &sweep, from which it may go half its width'
-      call observer%on_message('the resonance was lost beyond '//place(case, value)//' of '// &
-                               to_text(case%resonance%end)//': '//reason//why)
+      call tell('lost resonance', 'the resonance was lost beyond '//place(case, value)//' of '// &
+                to_text(case%resonance%end)//': '//reason//why, observer, summary)
    end subroutine end_early
 
    !> Points of the branch in the order in which it has them.
-   subroutine along_branch(case, run, observer, state, error)
+   subroutine along_branch(case, run, observer, summary, state, error)
       type(case_type), intent(in) :: case
       type(resonance_run), intent(inout), target :: run
       class(observer_type), intent(inout), target :: observer
+      type(summary_type), intent(inout) :: summary
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
       type(arclength_type) :: branch
@@ -221,8 +235,13 @@ contains
             call add_branch_row(case, run, found, state, error)
          end do
          call track%newton%linear%add_work(branch%corrector%linear)
-         if (allocated(error) .or. branch%complete) return
-         call end_early(case, observer, state, track%mover%value, branch%ending)
+         if (allocated(error)) return
+         ! The last attempt may have been elsewhere.
+         associate (last => run%table%row(run%table%n)%parameter)
+            call track%restore(last, error)
+            if (allocated(error) .or. branch%complete) return
+            call end_early(case, observer, summary, state, last, branch%ending)
+         end associate
       end associate
    end subroutine along_branch
 
@@ -236,8 +255,8 @@ contains
       logical :: done
 
       associate (track => run%track)
-         call track%curve%renew(track%strategy%level%system)
-         call track%renew_system()
+         call track%restore(track%mover%value, error)
+         if (allocated(error)) return
          track%curve%x = track%x
          call track%curve%look(done, error)
          if (allocated(error)) return

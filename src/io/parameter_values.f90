@@ -70,7 +70,7 @@ contains
       !> Modes of the damping that cannot be found.
       type(error_type), allocatable, intent(out) :: error
 
-      associate (c => case%contact)
+      associate (c => case%contact, m => case%model)
          select case (number)
          case (friction_coefficient); c%mu = values
          case (normal_load); c%normal_load = values
@@ -78,12 +78,12 @@ contains
          case (tangential_stiffness); c%tangential_stiffness = values
          case (normal_stiffness); c%normal_stiffness = values
          case (harmonic_scale)
-            call scale_vibration(values(1)/case%model%harmonic_scale, case%model)
-            case%model%harmonic_scale = values(1)
+            call scale_vibration(values(1)/m%harmonic_scale, m)
+            m%harmonic_scale = values(1)
             if (allocated(case%origin)) case%origin%options%harmonic_scale = values(1)
          case (static_scale)
-            call scale_static(values(1)/case%model%static_scale, case%model)
-            case%model%static_scale = values(1)
+            call scale_static(values(1)/m%static_scale, m)
+            m%static_scale = values(1)
             if (allocated(case%origin)) case%origin%options%static_scale = values(1)
          case default
             if (is_per_spring(number)) case%springs%coefficient = values
