@@ -41,6 +41,8 @@ module fw_resonance_track
       real(wp) :: range(2) = 0.0_wp
       !> Whether residuals have second derivatives, piece by piece.
       logical :: is_smooth = .true.
+      !> Whether events are located.
+      logical :: is_located = .false.
       !> Unknowns (q, omega) of the present resonance.
       real(wp), allocatable :: x(:)
       type(search_outcome) :: outcome
@@ -87,6 +89,7 @@ contains
             self%curve%kind = r%quantity
             allocate (self%x(level%system%n + 1), self%y(level%system%n + 1, 3), source=0.0_wp)
             associate (law => level%problem%forces%entry(level%problem%forces%pairs)%law)
+               self%is_located = law%facts%follows_events
                self%is_smooth = law%facts%follows_events .or. .not. law%facts%has_events
             end associate
             if (r%condition == condition_phase) then

@@ -113,6 +113,7 @@ contains
       type(summary_type), intent(inout) :: summary
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: instants = ", or harmonics%sampling = 'uniform'"
 
       call run%track%find_first(observer, error)
       if (allocated(error)) return
@@ -120,7 +121,8 @@ contains
          call tell('no resonance', 'no resonance to follow at '// &
                    place(case, run%track%mover%value)//': '// &
                    trim(outcome_words(run%track%outcome%kind))//'; give &sweep a range with a '// &
-                   'maximum inside, or more points', observer, summary)
+                   'maximum inside, or more points'//trim(merge(instants, repeat(' ', &
+                   len(instants)), run%track%is_located)), observer, summary)
          state%is_incomplete = .true.
          call add_row(case, run, .false., served_by_newton, state, error)
          return

@@ -124,7 +124,8 @@ def peaks(folder, groups, omega):
     """The highest peak of an ordinary sweep about a frequency."""
     case = merged(groups, {"case": {"analysis": "frf"}, "solver": {"tolerance": 1e-12},
                            "sweep": {"start": 0.9 * omega, "end": 1.1 * omega, "n_points": 81}})
-    run(folder, case, name="sweep")
+    # Elsewhere in the range points may fail.
+    run(folder, case, name="sweep", status=(0, 4))
     with h5py.File(folder / "sweep.h5") as file:
         mine = file["peak/observed"][()] == 0
         k = np.argmax(np.where(mine, file["peak/amplitude"][()], 0.0))
@@ -140,13 +141,13 @@ def test_two_tangential_directions(tmp_path):
               "load": {"cosine": [0.0, 0.3, 0.5, 0.0], "sine": [0.2, 0.0, 0.0, 0.3]},
               "contact": {"n_pairs": 1, "side_1": [1, 2, 0], "law": "penalty", "mu": [0.4],
                           "tangential_stiffness": [2.0], "normal_load": [1.0]},
-              "harmonics": {"n_harmonics": 3}, "output": {"observe": [3]},
+              "harmonics": {"n_harmonics": 3, "sampling": "events"}, "output": {"observe": [3]},
               "sweep": {"start": 1.0, "end": 3.0, "n_points": 120}}
     found = track(tmp_path, groups, "contact%normal_load", 1.0, 1.2, quantity="largest")
     amplitude, omega = peaks(tmp_path, merged(groups, {"contact": {"normal_load": [1.2]}}),
                              found["omega"][-1])
-    assert found["resonance/value"][-1] == pytest.approx(amplitude, rel=1e-4)
-    assert found["omega"][-1] == pytest.approx(omega, rel=1e-3)
+    assert found["resonance/value"][-1] == pytest.approx(amplitude, rel=PEAK)
+    assert found["omega"][-1] == pytest.approx(omega, rel=1e-4)
 
 
 @pytest.mark.parametrize(("name", "planar"), [
@@ -158,12 +159,14 @@ def test_sectors(tmp_path, name, planar):
     groups = merged(model_groups(case), {
         "harmonics": {"n_harmonics": 3}, "output": {"observe": [4]},
         "sweep": {"start": 0.7 * middle, "end": 1.5 * middle, "n_points": 150}})
+    if planar:
+        # With separation in few harmonics the quadrature over slip does not settle here.
+        groups["harmonics"]["sampling"] = "uniform"
     found = track(tmp_path, groups, "load%harmonic_scale", 1.0, 1.3, quantity="largest")
     amplitude, omega = peaks(tmp_path, merged(groups, {"load": {"harmonic_scale": 1.3}}),
                              found["omega"][-1])
-    # Instants of the sweep against events, in two tangential directions.
-    assert found["resonance/value"][-1] == pytest.approx(amplitude, rel=1e-4 if planar else PEAK)
-    assert found["omega"][-1] == pytest.approx(omega, rel=1e-3 if planar else 1e-4)
+    assert found["resonance/value"][-1] == pytest.approx(amplitude, rel=PEAK)
+    assert found["omega"][-1] == pytest.approx(omega, rel=1e-4)
 
 
 def test_phase_in_sectors(tmp_path):
@@ -178,6 +181,39 @@ def test_phase_in_sectors(tmp_path):
     assert found[1]["parameter"][-1] == pytest.approx(1.3)
     for key in ("omega", "resonance/value"):
         assert found[1][key][-1] == pytest.approx(found[0][key][-1], rel=MOVED)
+
+
+def test_without_contact(tmp_path):
+    """A linear structure: the closed form of its resonance, by both conditions."""
+    groups = {"model": {"n_dof": 1, "mass": [1.0], "stiffness": [4.0], "modal_damping": 0.05},
+              "load": {"cosine": [1.0]}, "sweep": {"start": 1.0, "end": 3.0, "n_points": 40},
+              "harmonics": {"n_harmonics": 1}}
+    zeta = np.linspace(0.05, 0.3, 6)
+    found = track(tmp_path, groups, "model%modal_damping", zeta[0], zeta[-1], n_points=6)
+    assert found["omega"] == pytest.approx(2.0 * np.sqrt(1.0 - 2.0 * zeta**2), rel=EXACT)
+    assert found["resonance/value"] == pytest.approx(
+        0.125 / (zeta * np.sqrt(1.0 - zeta**2)), rel=EXACT)
+    found = track(tmp_path, groups, "model%modal_damping", zeta[0], zeta[-1], condition="phase")
+    assert found["omega"] == pytest.approx([2.0, 2.0], rel=EXACT)
+
+
+def test_rotation(tmp_path):
+    """Stiffness and static load that grow with the square of the speed."""
+    path = tmp_path / "model.h5"
+    with h5py.File(path, "w") as file:
+        file["mass"], file["stiffness"], file["damping"] = ([[1.0]], [[4.0]], [[0.2]])
+        file["stiffness_rotation"] = [[0.5]]
+        file["load/cosine"] = [1.0]
+        file.attrs["format"], file.attrs["version"] = "fretwear-model", 1
+    speed = np.linspace(1.0, 2.0, 3)
+    groups = {"model": {"source": "hdf5", "file": path.name, "rotation_speed": 1.0},
+              "sweep": {"start": 1.0, "end": 3.5, "n_points": 60}, "harmonics": {"n_harmonics": 1}}
+    found = track(tmp_path, groups, "model%rotation_speed", 1.0, 2.0, n_points=3,
+                  slopes=["model%rotation_speed"])
+    square = 4.0 + 0.5 * speed**2
+    assert found["omega"]**2 == pytest.approx(square - 0.02, rel=EXACT)
+    assert slope(found, "resonance_omega", "model%rotation_speed") == pytest.approx(
+        0.5 / found["omega"][0], rel=1e-7)
 
 
 def test_harmonics_left_out(tmp_path):
