@@ -47,6 +47,8 @@ module fw_resonance_search
    integer, parameter :: most_looks = 60, most_halvings = 8
    !> Looks after which a bracket is halved.
    integer, parameter :: most_free = 8
+   !> A step that leads so many times across a bracket leaves it.
+   real(wp), parameter :: beyond = 2.0_wp
    !> Q may fall by this part, as round-off does.
    real(wp), parameter :: round_off = 1.0e-10_wp
 
@@ -81,7 +83,9 @@ contains
          ds = step_of(curve)
          if (abs(ds) <= arrived .or. (abs(ds) <= near .and. abs(ds) > 0.3_wp*last)) exit
          last = abs(ds)
-         outcome%is_corner = bracket%width(curve) <= near
+         ! Between slopes of both signs a rounded maximum has its zero; at a corner the step would
+         ! lead far beyond.
+         outcome%is_corner = bracket%width(curve) <= min(near, abs(ds)/beyond)
          if (outcome%is_corner) exit
          if (bracket%is_closed() .and. (k > most_free .or. .not. is_smooth)) then
             call solve_at(curve, bracket%middle(), .false., report, outcome, error)
@@ -122,12 +126,16 @@ contains
       end associate
    end function is_closed
 
+   !> Length along the curve between the two.
    pure real(wp) function width(self, curve)
       class(bracket_type), intent(in) :: self
       type(response_curve), intent(in) :: curve
 
       width = huge(1.0_wp)
-      if (self%is_closed()) width = curve%size_of(self%high - self%low)
+      if (.not. self%is_closed()) return
+      associate (n => size(self%low))
+         if (abs(curve%t(n)) > 0.0_wp) width = (self%high(n) - self%low(n))/abs(curve%t(n))
+      end associate
    end function width
 
    pure function middle(self) result(x)

@@ -204,7 +204,7 @@ def test_rotation(tmp_path):
         file["mass"], file["stiffness"], file["damping"] = ([[1.0]], [[4.0]], [[0.2]])
         file["stiffness_rotation"] = [[0.5]]
         file["load/cosine"] = [1.0]
-        file.attrs["format"], file.attrs["version"] = "fretwear-model", 1
+        file.attrs["format"], file.attrs["format_version"] = "fretwear-model", 1
     speed = np.linspace(1.0, 2.0, 3)
     groups = {"model": {"source": "hdf5", "file": path.name, "rotation_speed": 1.0},
               "sweep": {"start": 1.0, "end": 3.5, "n_points": 60}, "harmonics": {"n_harmonics": 1}}
