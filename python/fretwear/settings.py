@@ -13,8 +13,8 @@ from typing import Literal, TypedDict
 from numpy.typing import ArrayLike
 
 __all__ = ["CaseGroup", "Contact", "Control", "Cyclic", "Groups", "Harmonics", "Load", "Mode",
-           "Output", "PseudoTime", "Sensitivity", "Solver", "Spring", "Structure", "Sweep", "Time",
-           "Wear"]
+           "Output", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Structure",
+           "Sweep", "Time", "Wear"]
 
 
 class CaseGroup(TypedDict, total=False):
@@ -22,9 +22,9 @@ class CaseGroup(TypedDict, total=False):
 
     #: stands in the result file (default: title of the model file, or name of the namelist)
     title: str
-    #: a sweep, one frequency, wear at one frequency, integration in time, natural frequencies, or a
-    #: nonlinear mode (default: 'frf')
-    analysis: Literal["frf", "point", "wear", "time", "modes", "mode"]
+    #: a sweep, one frequency, wear at one frequency, integration in time, natural frequencies, a
+    #: nonlinear mode, or a resonance over a parameter (default: 'frf')
+    analysis: Literal["frf", "point", "wear", "time", "modes", "mode", "resonance"]
     #: OpenMP threads; 0: as many as OpenMP gives (default: 0)
     threads: int
     #: [s] time after which the run ends with the points that are done; 0: none (default: 0)
@@ -35,7 +35,7 @@ class Sensitivity(TypedDict, total=False):
     """Group &sensitivity: derivatives of the response by parameters of the case."""
 
     #: what the response is differentiated by: 'contact%mu', 'load%harmonic_scale', ...; only:
-    #: analysis = 'frf', 'point' (default: none: no derivatives)
+    #: analysis = 'frf', 'point', 'resonance' (default: none: no derivatives)
     parameters: str | int | Sequence[str | int]
     #: what is differentiated: first_harmonic, largest, dissipation, wear_volume; only: parameters
     #: (default: all that the case has)
@@ -43,6 +43,41 @@ class Sensitivity(TypedDict, total=False):
     #: standard deviation of each parameter over its value, for that of the quantities; only:
     #: parameters (default: none)
     deviation: ArrayLike
+
+
+_Resonance = TypedDict("_Resonance", {
+    #: what start and end are: values, or factors of those of the case (all pairs or springs
+    #: together) (default: 'value')
+    "as": Literal["value", "factor"],
+}, total=False)
+
+
+class Resonance(_Resonance, total=False):
+    """Group &resonance: a resonance over a parameter of the case."""
+
+    #: what changes from point to point; only: analysis = 'resonance' (required, else
+    #: 'load%harmonic_scale')
+    parameter: Literal["load%harmonic_scale", "load%static_scale", "contact%mu",
+                       "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
+                       "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
+                       "model%rotation_speed"]
+    #: first value, or factor; only: analysis = 'resonance' (required, else 0)
+    start: float
+    #: last value, or factor; only: analysis = 'resonance' (required, else 0)
+    end: float
+    #: values; of a branch: sets its longest step (default: 20)
+    n_points: int
+    #: even steps, or even in the logarithm (default: 'linear')
+    spacing: Literal["linear", "log"]
+    #: the response is largest, or the load does no reactive work (default: 'amplitude')
+    condition: Literal["amplitude", "phase"]
+    #: of the first observed quantity, what is largest: the amplitude of its first harmonic, or its
+    #: largest value (default: 'first_harmonic')
+    quantity: Literal["first_harmonic", "largest"]
+    #: points at given values, or a branch through folds (condition = 'phase') (default: 'natural')
+    continuation: Literal["natural", "arclength"]
+    #: points of a branch at most; only: continuation = 'arclength' (default: 1000)
+    max_points: int
 
 
 class Structure(TypedDict, total=False):
@@ -408,6 +443,7 @@ class Groups(TypedDict, total=False):
 
     case: CaseGroup
     sensitivity: Sensitivity
+    resonance: Resonance
     structure: Structure
     cyclic: Cyclic
     contact: Contact
