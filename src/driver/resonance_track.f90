@@ -90,7 +90,8 @@ contains
             allocate (self%x(level%system%n + 1), self%y(level%system%n + 1, 3), source=0.0_wp)
             associate (law => level%problem%forces%entry(level%problem%forces%pairs)%law)
                self%is_located = law%facts%follows_events
-               self%is_smooth = law%facts%follows_events .or. .not. law%facts%has_events
+               self%is_smooth = case%contact%n_pairs == 0 .or. law%facts%follows_events .or. &
+                                .not. law%facts%has_events
             end associate
             if (r%condition == condition_phase) then
                call self%phase%build(self%mover, level%problem, self%curve%state, r)
