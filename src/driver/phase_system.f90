@@ -82,7 +82,9 @@ contains
       integer :: n
 
       n = size(x) - 1
-      self%omega_unit = x(n + 1)/max(norm2(x(:n)), tiny(1.0_wp))
+      self%omega_unit = x(n + 1)
+      ! Of the size of the others, where these are not all at rest.
+      if (norm2(x(:n)) > 0.0_wp) self%omega_unit = x(n + 1)/norm2(x(:n))
       call work_at(self, x(:n), work, slope, row)
       self%work_unit = 1.0_wp
       if (abs(work) > 0.0_wp) self%work_unit = self%state%reference/abs(work)
