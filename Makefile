@@ -176,10 +176,13 @@ bifurcations: build ## bifurcations of 200 random branches against shooting, in 
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/bifurcations/bifurcations.py -o
 
 # Goes on where it was stopped; a changed program starts anew.
-sectors: build ## 300 random sectors against whole annuli, written to docs/robustness.md
+sectors: build ## 300 random sectors against whole annuli, 45 mistuned ones, in docs/robustness.md
 	@if [ $(BUILD)/fw_run -nt build/sectors.jsonl ]; then rm -f build/sectors.jsonl; fi
+	@if [ $(BUILD)/fw_run -nt build/mistuned.jsonl ]; then rm -f build/mistuned.jsonl; fi
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/cyclic/family.py --count 300 \
 	   --state build/sectors.jsonl -o docs/robustness.md
+	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/cyclic/mistuned_family.py --count 45 \
+	   --state build/mistuned.jsonl -o docs/robustness.md
 
 stops: build ## how long a stop takes at 16, 48 and 384 pairs, written to docs/robustness.md
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/robustness/stops.py -o docs/robustness.md

@@ -1,5 +1,6 @@
 """Cost of a point of a cyclic structure: of one sector of a disk of 36, against a plain structure
-with the same dofs, and against annuli of the same sectors as one structure.
+with the same dofs, against annuli of the same sectors as one structure, and against all sectors
+with contact that differs from one to the next.
 
     python -m bench.speed.sectors [--program build/release/fw_run] [--most 9] [--disk disk.h5]
 
@@ -37,12 +38,14 @@ N_TIME = 144
 REPEATS = 3
 #: Condensation of an annulus is not measured, but has to be done.
 POINTS_OF_ANNULUS = 5
+#: Of all sectors with contact that differs by up to such a part of friction and interference.
+POINTS_OF_ALL, SPREADS = 21, (0.0, 0.1, 0.5)
 
 
 @dataclass(frozen=True)
 class Cost:
     """Of a structure: dofs, unknowns, processor time of a point [ms], Newton steps of a point,
-    largest memory [MB]."""
+    largest memory [MB], sectors that are solved for."""
 
     name: str
     dofs: int
@@ -50,6 +53,7 @@ class Cost:
     milliseconds: float
     steps: float
     memory: float
+    sectors: int = 1
 
 
 def read_disk(path: Path) -> dict[str, Any]:
@@ -128,6 +132,16 @@ def groups(model: Path, n_harmonics: int, observed: int) -> dict[str, dict[str, 
         "output": {"observe": [observed], "contact": False}}
 
 
+def mistuned(case: dict[str, dict[str, Any]], pairs: int, spread: float) -> dict[str, Any]:
+    """The case of one sector for all sectors, contact data at random about their mean."""
+    rng = np.random.default_rng(36)
+    contact = dict(case["contact"])
+    for key in ("mu", "gap"):
+        factors = 1.0 + spread * rng.uniform(-1.0, 1.0, N_SECTORS * pairs)
+        contact[key] = (contact[key] * factors).tolist()
+    return case | {"contact": contact, "cyclic": case["cyclic"] | {"mistuned": True}}
+
+
 def run(program: Path, folder: Path, case: dict[str, dict[str, Any]],
         points: int, start: float) -> tuple[float, float]:
     """Processor time of a sweep [s] and its largest memory [MB]."""
@@ -158,7 +172,8 @@ def memory_of(process: int) -> float:
 
 
 def measure(program: Path, name: str, case: dict[str, dict[str, Any]], dofs: int, pairs: int,
-            points: int, repeats: int, start: float = START) -> tuple[Cost, np.ndarray]:
+            points: int, repeats: int, start: float = START,
+            sectors: int = 1) -> tuple[Cost, np.ndarray]:
     """The cost of a point, and the response."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
@@ -172,7 +187,7 @@ def measure(program: Path, name: str, case: dict[str, dict[str, Any]], dofs: int
             response = file["coefficients"][:points, :, 0]
             assert file["converged"][:points].all()
     unknowns = 3 * pairs * (2 * case["harmonics"]["n_harmonics"] + 1)
-    return Cost(name, dofs, unknowns, 1e3 * min(times), steps, memory), response
+    return Cost(name, dofs, unknowns, 1e3 * min(times), steps, memory, sectors), response
 
 
 def measure_all(program: Path, disk: Path, n_harmonics: int, most: int) -> list[Cost]:
@@ -198,24 +213,32 @@ def measure_all(program: Path, disk: Path, n_harmonics: int, most: int) -> list[
         cost, _ = measure(program, f"sector of {N_SECTORS}", case, ring.width, pairs, N_POINTS,
                              REPEATS)
         costs.append(cost)
+        for spread in SPREADS:
+            cost, _ = measure(program, f"all {N_SECTORS}, contact +-{100.0 * spread:.0f} %",
+                              mistuned(case, pairs, spread), N_SECTORS * ring.width,
+                              N_SECTORS * pairs, POINTS_OF_ALL, 1, sectors=N_SECTORS)
+            costs.append(cost)
         for n in (9, 18, 36):
             if n > most:
                 continue
             case, ring = ring_of(n)
             cost, _ = measure(program, f"annulus of {n}", case, n * ring.width, n * pairs,
-                                  POINTS_OF_ANNULUS, 1)
+                                  POINTS_OF_ANNULUS, 1, sectors=n)
             costs.append(cost)
     return costs
 
 
 def table(costs: dict[int, list[Cost]]) -> str:
     lines = ["| harmonics | structure | dofs | unknowns | Newton steps | ms a point "
-             "| to the plain one | memory [MB] |", "|---|---|---|---|---|---|---|---|"]
+             "| to the plain one | a sector, to the wave | memory [MB] |",
+             "|---|---|---|---|---|---|---|---|---|"]
     for n_harmonics, rows in costs.items():
         for row in rows:
             lines.append(f"| {n_harmonics} | {row.name} | {row.dofs} | {row.unknowns} | "
                          f"{row.steps:.1f} | {row.milliseconds:.2f} | "
-                         f"{row.milliseconds / rows[0].milliseconds:.2f} | {row.memory:.0f} |")
+                         f"{row.milliseconds / rows[0].milliseconds:.2f} | "
+                         f"{row.milliseconds / row.sectors / rows[1].milliseconds:.2f} | "
+                         f"{row.memory:.0f} |")
     return "\n".join(lines)
 
 

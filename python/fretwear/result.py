@@ -268,7 +268,8 @@ class Result(ResultFile):
         return self["coefficients"]
 
     def sector(self, j: int, name: str = "coefficients") -> Floats:
-        """Fourier coefficients of sector j of a cyclic structure: those of sector 0, delayed.
+        """Fourier coefficients of sector j of a cyclic structure: those of sector 0, delayed, or,
+        where sectors differ (`&cyclic mistuned`), its own.
 
         Parameters
         ----------
@@ -293,6 +294,11 @@ class Result(ResultFile):
             raise InputError(f"name = {name!r}: must be 'coefficients' or 'contact/force'")
         values = np.array(self[name])
         n_sectors = int(self.attributes["n_sectors"])
+        if self.is_mistuned:
+            # Sector after sector: observed quantities, or pairs.
+            n = values.shape[2] // n_sectors
+            first = j % n_sectors * n
+            return values[:, :, first:first + n]
         turn = j * int(self.attributes["engine_order"]) % n_sectors / n_sectors
         for n in range(1, (values.shape[1] + 1) // 2):
             # U_n = c_n - i s_n of sector j is that of sector 0 times exp(-i n j phi).
@@ -301,6 +307,24 @@ class Result(ResultFile):
             values[:, 2 * n - 1] = c * cosine - s * sine
             values[:, 2 * n] = s * cosine + c * sine
         return values
+
+    @property
+    def is_mistuned(self) -> bool:
+        """Whether all sectors of a cyclic structure were solved for."""
+        return bool(self.attributes.get("mistuned", 0))
+
+    @property
+    def sector_amplitude(self) -> Floats:
+        """Amplitudes of every sector of a cyclic structure (n_points, n_sectors, n_observed): where
+        contact differs from sector to sector, the largest over that of the wave is the
+        amplification factor."""
+        if "engine_order" not in self.attributes:
+            raise AbsentError(f"{self.name}: has no sectors: give the case &cyclic n_sectors and "
+                              "engine_order")
+        n_sectors = int(self.attributes["n_sectors"])
+        if self.is_mistuned:
+            return self.amplitude.reshape(len(self.amplitude), n_sectors, -1)
+        return np.repeat(self.amplitude[:, None, :], n_sectors, axis=1)
 
     @property
     def amplitude(self) -> Floats:

@@ -114,6 +114,9 @@ class Cyclic(TypedDict, total=False):
     #: each sector moves as the one before it, this part of n_sectors periods later; negative: the
     #: other way; only: cyclic, all but analysis = 'modes' (required with sectors)
     engine_order: int
+    #: solve for all sectors, whose pairs may differ: &contact takes values of n_pairs, all sectors
+    #: alike, or of n_sectors times as many (default: .false.)
+    mistuned: bool
     #: natural frequencies of each nodal diameter; only: analysis = 'modes' (default: 10)
     n_modes: int
     #: dofs of an interface; 0: only contact joins the sectors (default: of the file, else 0)

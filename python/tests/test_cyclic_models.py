@@ -83,3 +83,25 @@ def test_results_without_sectors():
     result = fw.run(fw.Case(structure, case={"analysis": "point"}, sweep={"start": 2.0}))
     with pytest.raises(fw.AbsentError, match="engine_order"):
         result.sector(1)
+
+
+def test_sectors_that_differ():
+    """Each has its own motion, tied to that of its neighbours."""
+    case = reference()
+    n, left, right = case["n_sectors"], case["model"]["left"], case["model"]["right"]
+    pairs = len(case["contact"]["side_1"])
+    mu = np.tile(case["contact"]["mu"], n) * np.linspace(0.5, 1.5, n * pairs)
+    result = fw.run(fw.Case(model(case), case={"analysis": "point"},
+                            sweep={"start": case["points"][3]["omega"]},
+                            cyclic={"engine_order": case["engine_order"], "mistuned": True},
+                            harmonics={"n_harmonics": 7, "sampling": "events"},
+                            contact={"law": "penalty", "mu": mu.tolist()},
+                            solver={"tolerance": 1e-12}))
+    n_dof = len(case["model"]["mass"])
+    assert result.is_mistuned and result.observed[0] == "u1@0"
+    assert result.sector_amplitude.shape == (1, n, n_dof)
+    assert np.ptp(result.sector_amplitude, axis=1).max() > 1e-3 * result.amplitude.max()
+    for j in range(n):
+        here, following = result.sector(j), result.sector(j + 1)
+        assert np.allclose(here[:, :, np.array(right) - 1], following[:, :, np.array(left) - 1])
+    assert result.sector(1, "contact/force").shape[2] == pairs

@@ -9,6 +9,9 @@ submodule(fw_balance_state) fw_balance_preconditioner
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
    !> Share of the active coordinates that may have joined or left since a preconditioner was built.
    real(wp), parameter :: most_changed = 0.05_wp
+   !> Coordinates of all sectors up to which their matrices are factored where waves do not serve:
+   !> each takes a second or so.
+   integer, parameter :: most_whole = 1500
 
    ! Two matrices for all harmonics (fw_balance_split).
    interface
@@ -30,7 +33,9 @@ contains
 
       self%preconditioner%is_split = self%preconditioner%may_split .and. &
                                      .not. allocated(self%shift)
-      if (self%preconditioner%is_split) then
+      if (by_waves(self)) then
+         call build_waves(self)
+      else if (self%preconditioner%is_split) then
          call build_split(self)
       else if (self%problem%structure%n_coordinates < coordinates_for_threads) then
          do h = 1, self%problem%fourier%n_retained
@@ -50,6 +55,21 @@ contains
       self%preconditioner%place(:self%active%n_active) = [(h, h=1, self%active%n_active)]
       self%preconditioner%shifted = allocated(self%shift)
    end procedure build_preconditioner
+
+   pure logical function by_waves(self)
+      class(balance_state), intent(in) :: self
+
+      by_waves = self%problem%structure%n_alike > 1 .and. .not. self%preconditioner%is_whole
+   end function by_waves
+
+   module procedure take_whole
+
+      is_stronger = by_waves(self) .and. self%problem%structure%n_coordinates <= most_whole
+      if (.not. is_stronger) return
+      self%preconditioner%is_whole = .true.
+      ! What was built does not serve any more.
+      self%preconditioner%n = 0
+   end procedure take_whole
 
    !> Factors of one harmonic, but for the one that an augmented system builds with its borders.
    subroutine build_harmonic(self, h)
@@ -137,11 +157,7 @@ contains
    !> A factor r + i s of uc - i us is the block [r s; -s r] of (uc, us). Of all factors the nearest
    !> to a block (sum of squares) is r = (G_cc + G_ss)/2, s = (G_cs - G_sc)/2, G_cs being what the
    !> sine of the input does to the cosine of the output.
-   pure complex(wp) function mean_block(block, harmonic, input, output) result(mean)
-      real(wp), intent(in) :: block(:, :)
-      integer, intent(in) :: harmonic
-      !> Columns of the cosine coefficient in the input and the output.
-      integer, intent(in) :: input, output
+   module procedure mean_block
 
       if (harmonic == 0) then
          mean = cmplx(block(input, output), kind=wp)
@@ -149,7 +165,7 @@ contains
          mean = 0.5_wp*cmplx(block(input, output) + block(input + 1, output + 1), &
                              block(input + 1, output) - block(input, output + 1), wp)
       end if
-   end function mean_block
+   end procedure mean_block
 
    !> Add scale B^T G_mean (eps B d - B A) of the elements of a law, in one harmonic.
    subroutine add_mean_forces(self, entry, work, h, scale, stiffness, m)
@@ -240,12 +256,12 @@ contains
          call solve_split(self)
       else if (self%problem%structure%n_coordinates < coordinates_for_threads) then
          do h = 1, self%problem%fourier%n_retained
-            if (h /= self%preconditioner%left_out) call solve_kept(self, h)
+            if (h /= self%preconditioner%left_out) call solve_harmonic(self, h)
          end do
       else
          !$omp parallel do default(none) shared(self) private(h)
          do h = 1, self%problem%fourier%n_retained
-            if (h /= self%preconditioner%left_out) call solve_kept(self, h)
+            if (h /= self%preconditioner%left_out) call solve_harmonic(self, h)
          end do
          !$omp end parallel do
       end if
@@ -256,6 +272,17 @@ contains
             = -aimag(self%scratch%complex_in(:na, h))
       end do
    end procedure precondition
+
+   subroutine solve_harmonic(self, h)
+      type(balance_state), intent(inout) :: self
+      integer, intent(in) :: h
+
+      if (by_waves(self)) then
+         call solve_waves(self, h)
+      else
+         call solve_kept(self, h)
+      end if
+   end subroutine solve_harmonic
 
    !> With the factors of one harmonic; coordinates that they do not know are taken as stuck.
    !> Of these the row of a stuck pair would read eps v = r: the right scale, which is all that a

@@ -88,6 +88,7 @@ module fw_balance_state
       procedure :: fill_harmonic
       procedure :: preconditioner_fits
       procedure :: precondition
+      procedure :: strengthen_preconditioner => take_whole
       procedure :: assemble
    end type balance_state
 
@@ -173,8 +174,29 @@ module fw_balance_state
       end subroutine active_to_complex
    end interface
 
-   ! Its preconditioner (fw_balance_preconditioner).
+   ! Its preconditioner (fw_balance_preconditioner), by waves where equal sectors are told apart
+   ! (fw_balance_waves).
    interface
+      !> Factors for each harmonic and nodal diameter.
+      module subroutine build_waves(self)
+         class(balance_state), intent(inout) :: self
+      end subroutine build_waves
+
+      !> Solve with them, in scratch%complex_in of the active coordinates.
+      module subroutine solve_waves(self, h)
+         type(balance_state), intent(inout) :: self
+         integer, intent(in) :: h
+      end subroutine solve_waves
+
+      !> Mean over cosine and sine of a block of a transposed derivative, as a complex factor.
+      pure module function mean_block(block, harmonic, input, output) result(mean)
+         real(wp), intent(in) :: block(:, :)
+         integer, intent(in) :: harmonic
+         !> Columns of the cosine coefficient in the input and the output.
+         integer, intent(in) :: input, output
+         complex(wp) :: mean
+      end function mean_block
+
       module subroutine build_preconditioner(self)
          class(balance_state), intent(inout) :: self
       end subroutine build_preconditioner
@@ -190,6 +212,12 @@ module fw_balance_state
       module subroutine place_kept(self)
          type(balance_state), intent(inout) :: self
       end subroutine place_kept
+
+      !> From waves to matrices of all sectors, where these are not too large.
+      module subroutine take_whole(self, is_stronger)
+         class(balance_state), intent(inout) :: self
+         logical, intent(out) :: is_stronger
+      end subroutine take_whole
 
       pure module logical function preconditioner_fits(self)
          class(balance_state), intent(in) :: self
@@ -229,6 +257,8 @@ contains
       call self%preconditioner%reserve(m, problem%fourier%n_retained)
       self%preconditioner%may_split = problem%structure%split_rank() > 0 .and. &
                                       all_are_static(problem)
+      if (problem%structure%n_alike > 1) call self%preconditioner%reserve_waves( &
+         problem%structure%n_slots, problem%structure%n_alike, problem%fourier%n_retained)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)
    end subroutine new_balance_state
 

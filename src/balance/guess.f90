@@ -11,9 +11,27 @@ module fw_guess
    private
 
    public :: stuck_guess, free_guess, held_without_contact, held_without_friction
+   ! For the submodule alone, which gfortran lets reach no private procedures.
+   public :: mean_slope, elastic_slope, solve_free, find_tension
 
    !> Rounds of opening pairs under tension; each opens at least one pair or is the last.
    integer, parameter :: max_rounds = 20
+
+   ! The same where equal sectors are told apart (fw_wave_guess).
+   interface
+      !> Whether static loads are held: with pairs open, or closed but free of friction.
+      module logical function waves_are_held(system, closed)
+         type(balance_state), intent(in) :: system
+         logical, intent(in) :: closed
+      end function waves_are_held
+
+      module subroutine solve_sectors(system, closed, x, tension)
+         type(balance_state), intent(in) :: system
+         logical, intent(in) :: closed(:)
+         real(wp), intent(out), contiguous :: x(:)
+         real(wp), intent(out) :: tension(:)
+      end subroutine solve_sectors
+   end interface
 
 contains
 
@@ -54,6 +72,10 @@ contains
 
       held = .true.
       if (.not. system%problem%fourier%has_constant()) return
+      if (system%problem%structure%n_alike > 1) then
+         held = waves_are_held(system, .false.)
+         return
+      end if
       allocate (stiffness(system%problem%structure%n_coordinates, &
                           system%problem%structure%n_coordinates))
       ! Harmonic 0 is the first of those retained.
@@ -71,23 +93,32 @@ contains
       integer, intent(in) :: k
       !> Of harmonic 0 (n_coordinates, n_coordinates).
       complex(wp), intent(inout) :: stiffness(:, :)
-      real(wp) :: slope, at_rest
       integer :: i, row
 
-      associate (law => system%problem%forces%entry(k)%law, work => system%work(k))
+      associate (law => system%problem%forces%entry(k)%law)
          if (law%n_components > 1 .or. law%prediction%order(1) > 0) return
          do i = 1, law%n_elements
             row = system%problem%forces%entry(k)%row(1, i)
             if (row == 0) cycle
-            at_rest = law%slope_at(i, 0.0_wp)
-            slope = sum(law%slope_at(i, work%prediction_time(i, 1, :)))/ &
-                    size(work%prediction_time, 3)
-            slope = at_rest + max(0.0_wp, slope - at_rest)
             call system%problem%incidence%add_block( &
-               row, 1, cmplx(slope*law%prediction%stiffness(i, 1), kind=wp), stiffness)
+               row, 1, cmplx(mean_slope(system, k, i)*law%prediction%stiffness(i, 1), kind=wp), &
+               stiffness)
          end do
       end associate
    end subroutine add_law
+
+   real(wp) function mean_slope(system, k, element) result(slope)
+      type(balance_state), intent(in) :: system
+      integer, intent(in) :: k, element
+      real(wp) :: at_rest
+
+      associate (law => system%problem%forces%entry(k)%law, work => system%work(k))
+         at_rest = law%slope_at(element, 0.0_wp)
+         slope = sum(law%slope_at(element, work%prediction_time(element, 1, :)))/ &
+                 size(work%prediction_time, 3)
+         slope = at_rest + max(0.0_wp, slope - at_rest)
+      end associate
+   end function mean_slope
 
    !> Whether the structure holds a static load with its pairs closed but free of friction.
    logical function held_without_friction(system) result(held)
@@ -99,6 +130,10 @@ contains
 
       held = .true.
       if (.not. system%problem%fourier%has_constant()) return
+      if (system%problem%structure%n_alike > 1) then
+         held = waves_are_held(system, .true.)
+         return
+      end if
       free = .true.
       allocate (stiffness(size(free), size(free)))
       call system%problem%structure%block(system%structure_state, 1, stiffness)
@@ -130,8 +165,12 @@ contains
       complex(wp), allocatable :: q(:, :), force(:)
       complex(wp), allocatable :: stiffness(:, :)
       logical :: held(system%problem%structure%n_coordinates)
-      integer :: h, m
+      integer :: h, j, m
 
+      if (system%problem%structure%n_alike > 1) then
+         call solve_sectors(system, closed, x, tension)
+         return
+      end if
       m = system%problem%structure%n_coordinates
       allocate (q(m, system%problem%fourier%n_retained), source=(0.0_wp, 0.0_wp))
       allocate (stiffness(m, m))
@@ -147,7 +186,8 @@ contains
          call close_pairs(system, closed, h, stiffness, force, held, q(:, h))
          call solve_free(stiffness, force, held, q(:, h))
          if (system%problem%fourier%harmonic(h) == 0) then
-            call mean_tension(system, stiffness, q(:, h), tension)
+            call find_tension(system, [(real(sum(stiffness(j, :)*q(:, h)), wp), &
+                                        j=1, m)], q(:, h), tension)
          end if
       end do
       call to_real_vector(system, q, x)
@@ -234,10 +274,10 @@ contains
    end subroutine solve_free
 
    !> Mean normal force of every pair at a static position.
-   subroutine mean_tension(system, stiffness, q, tension)
+   subroutine find_tension(system, product, q, tension)
       type(balance_state), intent(in) :: system
-      !> Of the structure, where the pairs take the balance.
-      complex(wp), intent(in) :: stiffness(:, :)
+      !> Z_0 q, where the pairs take the balance (n_coordinates).
+      real(wp), intent(in) :: product(:)
       !> Coordinates at rest (n_coordinates).
       complex(wp), intent(in) :: q(:)
       real(wp), intent(out) :: tension(:)
@@ -254,14 +294,13 @@ contains
             if (p%takes_balance) then
                j = system%problem%incidence%coordinate_of(row)
                ! What is left of the balance of a held row is the force that holds it.
-               tension(i) = system%load(j, 1) - &
-                            real(sum(stiffness(j, :)*q), wp)
+               tension(i) = system%load(j, 1) - product(j)
             else
                tension(i) = p%stiffness(i, 3)*(opening(i) + p%gap(i) + system%depth(i))
             end if
          end do
       end associate
-   end subroutine mean_tension
+   end subroutine find_tension
 
    !> Complex amplitudes as the unknowns of the balance; a shape for what comes as a vector.
    subroutine to_real_vector(system, q, x)

@@ -33,8 +33,12 @@ module fw_joint
       integer :: n_idle = 0
       !> Whether the solution has odd harmonics only (u(t + T/2) = -u(t)).
       logical :: half_wave_symmetric = .false.
-      !> Of a cyclic structure: the coordinates of every nodal diameter.
+      !> Of a cyclic structure: the coordinates of every nodal diameter, and, where all sectors are
+      !> solved for, which row of which sector each is (from 0), see `lay_out_all`.
       type(cyclic_relative) :: cyclic
+      integer, allocatable :: row_in_sector(:), sector(:)
+   contains
+      procedure :: wave_weights
    end type joint_type
 
 contains
@@ -49,15 +53,18 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: side_1(:), side_2(:), sector_2(:)
       logical, allocatable :: moving(:)
-      integer :: i, c, n_rows
+      integer :: i, c, n_pairs, n_rows, n_springs
 
       ! Before the rows are numbered: what never moves needs none.
       call find_moving_dofs(model, contact, springs, moving)
       allocate (self%row(3, contact%n_pairs), source=0)
       allocate (self%idle(3, contact%n_pairs), source=.false.)
+      ! Pairs and springs of all sectors are those of the first.
+      n_pairs = contact%n_pairs/model%cyclic%n_solved()
+      n_springs = springs%n_springs/model%cyclic%n_solved()
       allocate (side_1(0), side_2(0), sector_2(0))
       n_rows = 0
-      do i = 1, contact%n_pairs
+      do i = 1, n_pairs
          do c = 1, 3
             ! Ground against ground: the component is absent.
             if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
@@ -74,12 +81,13 @@ contains
             sector_2 = [sector_2, sector_of(contact%sector_2, i)]
          end do
       end do
-      self%spring_row = [(n_rows + i, i=1, springs%n_springs)]
-      if (springs%n_springs > 0) then
-         side_1 = [side_1, springs%side_1]
-         side_2 = [side_2, springs%side_2]
-         sector_2 = [sector_2, (sector_of(springs%sector_2, i), i=1, springs%n_springs)]
+      self%spring_row = [(n_rows + i, i=1, n_springs)]
+      if (n_springs > 0) then
+         side_1 = [side_1, springs%side_1(:n_springs)]
+         side_2 = [side_2, springs%side_2(:n_springs)]
+         sector_2 = [sector_2, (sector_of(springs%sector_2, i), i=1, n_springs)]
       end if
+      if (model%cyclic%is_mistuned) call repeat_rows(model%cyclic%n_sectors, n_pairs, n_rows, self)
       self%half_wave_symmetric = symmetric(model, contact, springs, self)
       if (model%cyclic%is_cyclic) then
          call new_cyclic_relative(model, side_1, side_2, sector_2, self%cyclic)
@@ -88,6 +96,43 @@ contains
       call new_relative(model%n_dof, side_1, side_2, self%relative)
       call check_independent(contact, self, error)
    end subroutine new_joint
+
+   !> Rows of the pairs of all sectors, sector after sector, then those of the springs.
+   pure subroutine repeat_rows(n_sectors, n_pairs, n_rows, self)
+      integer, intent(in) :: n_sectors
+      !> Pairs of a sector, and their rows.
+      integer, intent(in) :: n_pairs, n_rows
+      type(joint_type), intent(inout) :: self
+      integer, allocatable :: first(:, :), springs(:)
+      integer :: i, j, n
+
+      first = self%row(:, :n_pairs)
+      springs = self%spring_row
+      n = size(springs)
+      deallocate (self%spring_row)
+      allocate (self%spring_row(n*n_sectors))
+      allocate (self%row_in_sector((n_rows + n)*n_sectors), self%sector((n_rows + n)*n_sectors))
+      do j = 0, n_sectors - 1
+         self%row(:, j*n_pairs + 1:(j + 1)*n_pairs) = merge(first + j*n_rows, 0, first > 0)
+         self%idle(:, j*n_pairs + 1:(j + 1)*n_pairs) = self%idle(:, :n_pairs)
+         self%spring_row(j*n + 1:(j + 1)*n) = [(n_sectors*n_rows + j*n + i, i=1, n)]
+         self%row_in_sector(j*n_rows + 1:(j + 1)*n_rows) = [(i, i=1, n_rows)]
+         self%row_in_sector(self%spring_row(j*n + 1:(j + 1)*n)) = springs
+         self%sector(j*n_rows + 1:(j + 1)*n_rows) = j
+         self%sector(self%spring_row(j*n + 1:(j + 1)*n)) = j
+      end do
+      self%n_idle = n_sectors*self%n_idle
+   end subroutine repeat_rows
+
+   !> A row of a sector in a nodal diameter k = 0 .. n_sectors - 1, as a combination of the
+   !> coordinates of a sector.
+   pure function wave_weights(self, n_sectors, k, row) result(weight)
+      class(joint_type), intent(in) :: self
+      integer, intent(in) :: n_sectors, k, row
+      complex(wp), allocatable :: weight(:)
+
+      weight = self%cyclic%weights(merge(k - n_sectors, k, 2*k > n_sectors), row)
+   end function wave_weights
 
    !> The sector that side 2 of an element lies in, counted from its own; 0 where none is given.
    pure integer function sector_of(sector_2, element) result(sector)
@@ -107,16 +152,26 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(*), parameter :: component(*) = [character(2) :: 't1', 't2', 'n']
       type(law_facts) :: facts
-      integer :: h, i, k, row
+      integer, allocatable :: diameter(:)
+      integer :: h, i, k, n, row
       integer :: place(2)
 
       if (.not. model%cyclic%is_cyclic) return
-      call self%cyclic%lay_out(model%cyclic, harmonic, self%relative)
+      if (model%cyclic%is_mistuned) then
+         call self%cyclic%lay_out_all(model%cyclic, self%row_in_sector, self%sector, self%relative)
+         ! Waves of all nodal diameters run around sectors that differ.
+         diameter = [(k, k=0, model%cyclic%n_sectors/2)]
+      else
+         call self%cyclic%lay_out(model%cyclic, harmonic, self%relative)
+         diameter = model%cyclic%nodal_diameter(harmonic)
+      end if
       facts = facts_of(contact%law)
       if (.not. facts%needs_independent .or. contact%n_pairs == 0) return
-      do h = 1, size(harmonic)
-         k = model%cyclic%nodal_diameter(harmonic(h))
-         row = self%cyclic%first_dependent(k, [(any(self%row == i), i=1, self%cyclic%n_rows)])
+      n = contact%n_pairs/model%cyclic%n_solved()
+      do h = 1, size(diameter)
+         k = diameter(h)
+         row = self%cyclic%first_dependent(k, [(any(self%row(:, :n) == i), &
+                                                i=1, self%cyclic%n_rows)])
          if (row == 0) cycle
          place = findloc(self%row, row)
          call fatal_error(error, '&contact pair '//to_text(place(2))//', '// &

@@ -16,6 +16,12 @@ module fw_kept_factors
       type(split_factors) :: split
       logical :: may_split = .false.
       logical :: is_split = .false.
+      !> Whether these are used although there are those of waves.
+      logical :: is_whole = .false.
+      !> Of waves around equal sectors in their place (n_sectors, n_retained), with scratch (slots
+      !> of a sector, n_sectors, n_retained).
+      type(preconditioner_lu_type), allocatable :: wave(:, :)
+      complex(wp), allocatable :: sectors(:, :, :), waves(:, :, :)
       !> Coordinates for which they were built (first n entries).
       integer :: n = 0
       integer, allocatable :: coordinate(:)
@@ -29,6 +35,7 @@ module fw_kept_factors
       real(wp), allocatable :: unknown_stiffness(:)
    contains
       procedure :: reserve
+      procedure :: reserve_waves
    end type kept_factors
 
 contains
@@ -41,5 +48,15 @@ contains
       allocate (self%coordinate(n_coordinates), self%place(n_coordinates), source=0)
       allocate (self%unknown_stiffness(n_coordinates), source=0.0_wp)
    end subroutine reserve
+
+   !> Of equal sectors, beside the rest.
+   pure subroutine reserve_waves(self, n_slots, n_sectors, n_harmonics)
+      class(kept_factors), intent(inout) :: self
+      integer, intent(in) :: n_slots, n_sectors, n_harmonics
+
+      allocate (self%wave(n_sectors, n_harmonics))
+      allocate (self%sectors(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
+      allocate (self%waves(n_slots, n_sectors, n_harmonics), source=(0.0_wp, 0.0_wp))
+   end subroutine reserve_waves
 
 end module fw_kept_factors

@@ -78,7 +78,7 @@ contains
       type(joint_mode_type), allocatable, intent(inout) :: modes(:)
       type(mode_type), allocatable :: found(:)
       complex(wp) :: load(case%model%n_dof)
-      integer :: i
+      integer :: i, j
 
       if (case%model%cyclic%is_cyclic) then
          call find_sector_modes(case, n, first_held(state), real(n, wp)*range, found)
@@ -92,6 +92,7 @@ contains
       do i = 1, size(found)
          found(i)%omega = found(i)%omega/n
          found(i)%width = found(i)%width/n
+         found(i)%amplitude = [(found(i)%amplitude, j=1, case%model%cyclic%n_solved())]
       end do
       call join(found, state, modes)
    end subroutine add_modes_of

@@ -11,9 +11,9 @@ module fw_problem
    use fw_case, only: analysis_point
    use fw_case, only: analysis_resonance
    use fw_case, only: analysis_wear
+   use fw_all_sectors, only: all_sectors
+   use fw_all_sectors, only: new_all_sectors
    use fw_cyclic_structure, only: cyclic_structure
-   use fw_cyclic_structure, only: means_none
-   use fw_cyclic_structure, only: means_split
    use fw_cyclic_structure, only: new_cyclic_structure
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -45,6 +45,8 @@ module fw_problem
    use fw_plain_structure, only: new_plain_structure
    use fw_plain_structure, only: plain_structure
    use fw_reduction, only: held_basis
+   use fw_sector_means, only: means_none
+   use fw_sector_means, only: means_split
    use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_powell
    use fw_structure_operator, only: structure_operator
@@ -197,6 +199,7 @@ contains
       type(held_basis), intent(inout), optional :: held
       type(plain_structure), allocatable :: plain
       type(cyclic_structure), allocatable :: cyclic
+      type(all_sectors), allocatable :: all
       integer :: means
 
       if (.not. case%model%cyclic%is_cyclic) then
@@ -211,6 +214,12 @@ contains
          ! Also what mass a pair has: friction that is ripple on it is no solution.
          if (p%takes_balance) means = means_split
       end associate
+      if (case%model%cyclic%is_mistuned) then
+         allocate (all)
+         call new_all_sectors(case%model, joint%cyclic, fourier%harmonic, range, means, all, error)
+         call move_alloc(all, structure)
+         return
+      end if
       allocate (cyclic)
       call new_cyclic_structure(case%model, joint%cyclic, fourier%harmonic, range, means, cyclic, &
                                 error, of_mode=case%analysis == analysis_mode)

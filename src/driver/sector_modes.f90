@@ -155,7 +155,7 @@ contains
 
       associate (springs => case%springs, contact => case%contact)
          call sector_rows(case%model, k, springs%side_1, springs%side_2, springs%sector_2, rows)
-         do i = 1, springs%n_springs
+         do i = 1, springs%n_springs/case%model%cyclic%n_solved()
             if (springs%power(i) == 1) call add_sector_spring(rows(i, :), springs%coefficient(i), &
                                                               stiffness)
          end do
@@ -165,7 +165,8 @@ contains
          do c = first_component, 3
             call sector_rows(case%model, k, contact%side_1(c, :), contact%side_2(c, :), &
                              contact%sector_2, rows)
-            do i = 1, contact%n_pairs
+            ! Of all sectors, those of the first.
+            do i = 1, contact%n_pairs/contact%n_alike
                spring = rigid
                if (.not. law%prediction%takes_balance .and. law%prediction%order(c) == 0) then
                   spring = law%prediction%stiffness(i, c)

@@ -19,6 +19,8 @@ module fw_contact_data
    !> Contact pairs (group &contact, /contact of a model file).
    type :: contact_type
       integer :: n_pairs = 0
+      !> Sectors whose pairs these are, sector after sector.
+      integer :: n_alike = 1
       !> Which law, a number in `law_words` (fw_laws).
       integer :: law = 1
       !> Signed dof numbers of (t1, t2, n), 0 where there is none (3, n_pairs).

@@ -19,7 +19,7 @@ module fw_array_entries
 contains
 
    !> Add one assignment to the sources of an array. On failure `message` says why.
-   subroutine spread_entry(input, i_entry, dims, repeats, source, message)
+   subroutine spread_entry(input, i_entry, dims, repeats, source, message, tile)
       type(namelist_type), intent(in) :: input
       !> Number of the assignment in it.
       integer, intent(in) :: i_entry
@@ -30,17 +30,24 @@ contains
       !> Of all elements (product(dims)), with 0 where none is given yet.
       type(source_type), intent(inout) :: source
       character(:), allocatable, intent(out) :: message
+      !> So many values hold over and over, where the array is assigned as a whole; 0 for none.
+      integer, intent(in), optional :: tile
       integer, allocatable :: elements(:)
-      integer :: n_values, i
+      integer :: n_tile, n_values, i
 
+      n_tile = 0
+      if (present(tile)) n_tile = tile
       associate (entry => input%entries(i_entry))
          call list_elements(entry%sections, dims, elements, message)
          if (allocated(message)) return
          n_values = value_count(entry)
          ! One value stands for all elements where the key allows it, whatever the subscripts name.
-         if (n_values /= size(elements) .and. .not. (repeats .and. n_values == 1)) then
+         if (size(entry%sections) > 0) n_tile = 0
+         if (n_values /= size(elements) .and. .not. (repeats .and. n_values == 1) .and. &
+             .not. (n_values == n_tile .and. n_tile > 0)) then
             message = 'has '//to_text(n_values)//plural(' value', n_values)//': must be '// &
                       to_text(size(elements))//count_text(dims, size(entry%sections) > 0)
+            if (n_tile > 0) message = message//', '//to_text(n_tile)//' for all sectors alike'
             if (repeats) message = message//', or one value for all'
             message = message//stray_word(entry)
             return
@@ -55,6 +62,11 @@ contains
          end do
          source%entry(elements) = i_entry
          call number_values(entry, elements, n_values == 1, source%value)
+         if (n_values == n_tile .and. n_values < size(elements)) then
+            do i = n_values + 1, size(elements)
+               source%value(elements(i)) = source%value(elements(i - n_values))
+            end do
+         end if
       end associate
    end subroutine spread_entry
 

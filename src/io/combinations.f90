@@ -18,6 +18,7 @@ module fw_combinations
    use fw_laws, only: law_words
    use fw_path_checks, only: check_control
    use fw_path_checks, only: check_parameter_sweep
+   use fw_memory, only: require_memory
    use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: continuation_natural
    use fw_solver_options, only: jacobian_analytic
@@ -132,6 +133,8 @@ contains
       character(*), parameter :: with = ' does not go with a cyclic structure (&cyclic): '
 
       if (.not. case%model%cyclic%is_cyclic) return
+      if (case%model%cyclic%is_mistuned) call check_mistuned(case, error)
+      if (allocated(error)) return
       if (case%analysis == analysis_time) then
          call fatal_error(error, "case%analysis = 'time'"//with//"use 'frf' or 'point', or "// &
                           'model all sectors', status_input)
@@ -145,6 +148,54 @@ contains
          call fatal_error(error, 'output%tail'//with//'take more n_harmonics', status_input)
       end if
    end subroutine check_cyclic
+
+   !> What the motion of all sectors is not solved with.
+   subroutine check_mistuned(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: with = ' does not go with cyclic%mistuned = .true.: '
+
+      if (all(case%analysis /= [analysis_frf, analysis_point, analysis_wear])) then
+         call fatal_error(error, "case%analysis"//with//"use 'frf', 'point' or 'wear', or leave "// &
+                          'mistuned out', status_input)
+      else if (case%harmonics%method /= method_hbm) then
+         call fatal_error(error, 'harmonics%method'//with//"use 'hbm'", status_input)
+      else if (case%harmonics%adaptive) then
+         call fatal_error(error, 'harmonics%adaptive = .true.'//with//'give n_harmonics', &
+                          status_input)
+      else if (case%harmonics%accuracy > 0.0_wp) then
+         call fatal_error(error, 'harmonics%accuracy (also by leaving n_harmonics out)'//with// &
+                          'give n_harmonics, as many as a run of the tuned wave with accuracy '// &
+                          'reports', status_input)
+      else if (case%sensitivity%is_wanted()) then
+         call fatal_error(error, 'group &sensitivity'//with//'leave it out', status_input)
+      else if (case%over%is_wanted()) then
+         call fatal_error(error, 'sweep%parameter'//with//'sweep over the frequency', status_input)
+      else if (case%control%is_wanted()) then
+         call fatal_error(error, 'group &control'//with//'give the load', status_input)
+      else
+         call require_sectors(case, error)
+      end if
+   end subroutine check_mistuned
+
+   !> Room for the blocks of all nodal diameters, complex ones and factors of the preconditioner in
+   !> single precision: asked for before any of them is begun.
+   subroutine require_sectors(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: n_slots, blocks
+
+      associate (n => case%model%cyclic%n_sectors)
+         ! Relative coordinates of a sector at most; few modes are kept beside.
+         n_slots = (3.0_wp*case%contact%n_pairs + case%springs%n_springs)/n
+         blocks = 3.0_wp*n_slots**2*n*(case%harmonics%n_harmonics + 1.0_wp)
+         call require_memory(blocks, '&cyclic mistuned = .true. with n_sectors = '// &
+                             to_text(n)//', '//to_text(case%contact%n_pairs/n)//' pairs in '// &
+                             'each and &harmonics n_harmonics = '// &
+                             to_text(case%harmonics%n_harmonics), 'take fewer harmonics or '// &
+                             'pairs, or the tuned wave (mistuned = .false.)', error)
+      end associate
+   end subroutine require_sectors
 
    !> What the law of the pairs cannot do.
    subroutine check_law(case, error)

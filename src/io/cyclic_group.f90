@@ -28,6 +28,9 @@ contains
          call write_attribute(file, '/', 'n_sectors', cyclic%n_sectors, error)
          if (allocated(error) .or. case%analysis == analysis_modes) return
          call write_attribute(file, '/', 'engine_order', cyclic%engine_order, error)
+         if (.not. allocated(error) .and. cyclic%is_mistuned) then
+            call write_attribute(file, '/', 'mistuned', 1, error)
+         end if
          if (allocated(error)) return
          call write_dataset(file, '/cyclic/nodal_diameter', &
                             [(cyclic%nodal_diameter(h), h=0, case%harmonics%n_harmonics)], error)

@@ -168,13 +168,16 @@ contains
 
    !> The value of each element of an array; `source%entry` stays unallocated where nothing is
    !> given or a problem was found.
-   subroutine find_elements(self, group, key, accepts, dims, repeats, has_default, source)
+   subroutine find_elements(self, group, key, accepts, dims, repeats, has_default, source, &
+                            tile)
       class(input_type), intent(inout) :: self
       character(*), intent(in) :: group, key, accepts
       integer, intent(in) :: dims(:)
       !> Whether one value holds for all elements; whether elements may be left out.
       logical, intent(in) :: repeats, has_default
       type(source_type), intent(out) :: source
+      !> So many values hold over and over; 0 for none.
+      integer, intent(in) :: tile
       character(:), allocatable :: message
       integer :: i
 
@@ -189,7 +192,7 @@ contains
       allocate (source%entry(product(dims)), source%value(product(dims)), source=0)
       do i = 1, self%namelist%n_entries
          if (.not. is_entry(self%namelist%entries(i), group, key)) cycle
-         call spread_entry(self%namelist, i, dims, repeats, source, message)
+         call spread_entry(self%namelist, i, dims, repeats, source, message, tile)
          if (allocated(message)) call self%blame(i, '&'//group//' '//key//' '//message)
       end do
       i = findloc(source%entry, 0, 1)

@@ -101,7 +101,12 @@ contains
       call get_shape(file, name, dims, error)
       if (allocated(error)) return
       ! The rank decides before anything is read.
-      if (size(dims) > 0) then
+      if (size(dims) == 1) then
+         ! Values of all sectors are as many times those of one.
+         call read_vector(file, name, merge(int(dims(1)), n, is_multiple(dims(1), n)), values, &
+                          error)
+         return
+      else if (size(dims) > 0) then
          call read_vector(file, name, n, values, error)
          return
       end if
@@ -110,6 +115,15 @@ contains
       call check_finite(file, name, [integer ::], [single], error)
       if (.not. allocated(error)) allocate (values(n), source=single)
    end subroutine read_pair_values
+
+   !> Whether there are n values, or n for each of some sectors.
+   pure logical function is_multiple(extent, n)
+      integer(hsize_t), intent(in) :: extent
+      integer, intent(in) :: n
+
+      is_multiple = n > 0 .and. extent > 0
+      if (is_multiple) is_multiple = modulo(extent, int(n, hsize_t)) == 0
+   end function is_multiple
 
    !> Coordinates of the pairs (3, n).
    subroutine read_positions(file, name, n, position, error)

@@ -247,8 +247,7 @@ contains
 
       select case (dimension)
       case ('observed')
-         n = 0
-         if (allocated(case%model%observe_matrix)) n = size(case%model%observe_matrix, 1)
+         n = case%model%n_observed()
       case ('coefficient')
          n = 2*max(case%harmonics%n_harmonics, case%output%tail) + 1
       case ('pair')

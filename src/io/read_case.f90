@@ -256,14 +256,15 @@ contains
       if (allocated(error)) return
       call read_cyclic(reader, raw%cyclic, n_dof, case%analysis /= analysis_modes, &
                        case%model%cyclic)
-      call read_contact(reader, raw, case%analysis == analysis_wear, case%contact)
+      call read_contact(reader, raw, case%analysis == analysis_wear, &
+                        case%model%cyclic%n_solved(), case%contact)
       call read_worn(reader, directory_of(path), case%contact, worn, error)
       if (allocated(error)) return
       if (allocated(worn)) then
          allocate (case%inputs(0))
          call append(case%inputs, worn)
       end if
-      call read_springs(reader, case%springs)
+      call read_springs(reader, case%model%cyclic%n_solved(), case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
       call read_loads(reader, options, raw, terms)
       wanted = case%sensitivity%parameters

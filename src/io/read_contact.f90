@@ -11,6 +11,7 @@ module fw_read_contact
    use fw_model_file, only: file_model_type
    use fw_reader, only: reader_type
    use fw_text, only: to_text
+   use fw_text_list, only: name_sectors
    implicit none (type, external)
    private
 
@@ -21,19 +22,22 @@ module fw_read_contact
 contains
 
    !> Group &contact. Every array but area, position and patch leaves allocated.
-   subroutine read_contact(reader, file_model, needs_area, contact)
+   subroutine read_contact(reader, file_model, needs_area, n_sectors, contact)
       type(reader_type), intent(inout) :: reader
       !> What the model file holds; overridden here.
       type(file_model_type), intent(in) :: file_model
       !> Whether the analysis is one of wear.
       logical, intent(in) :: needs_area
+      !> Sectors whose pairs may differ.
+      integer, intent(in) :: n_sectors
       type(contact_type), intent(inout) :: contact
       real(wp) :: scale
 
       ! The order matters: see fw_contact_keys.
-      call read_n_pairs(reader, file_model, contact)
+      call read_n_pairs(reader, file_model, n_sectors, contact)
       call bind_law(reader, contact)
       call read_sides(reader, contact)
+      if (n_sectors > 1) call repeat_pairs(reader, n_sectors, contact)
       call read_constants(reader, needs_area, contact)
       call read_law(reader, contact)
       call bind_march(reader, contact)
@@ -46,10 +50,12 @@ contains
    end subroutine read_contact
 
    !> The number of pairs, and what the file says of them where it is about the same pairs.
-   subroutine read_n_pairs(reader, file_model, contact)
+   subroutine read_n_pairs(reader, file_model, n_sectors, contact)
       type(reader_type), intent(inout) :: reader
       type(file_model_type), intent(in) :: file_model
+      integer, intent(in) :: n_sectors
       type(contact_type), intent(inout) :: contact
+      real(wp), allocatable :: values(:)
       integer :: n_file
 
       n_file = 0
@@ -61,12 +67,14 @@ contains
          contact%side_1 = file_model%side_1
          contact%side_2 = file_model%side_2
          if (allocated(file_model%cyclic%sector_2)) contact%sector_2 = file_model%cyclic%sector_2
-         if (allocated(file_model%mu)) contact%mu = file_model%mu
-         if (allocated(file_model%gap)) contact%gap = file_model%gap
-         if (allocated(file_model%area)) contact%area = file_model%area
-         if (allocated(file_model%normal_load)) contact%normal_load = file_model%normal_load
-         call contact%constants%offer('tangential_stiffness', file_model%tangential_stiffness)
-         call contact%constants%offer('normal_stiffness', file_model%normal_stiffness)
+         call repeat_values(file_model%mu, n_file, n_sectors, contact%mu)
+         call repeat_values(file_model%gap, n_file, n_sectors, contact%gap)
+         call repeat_values(file_model%area, n_file, n_sectors, contact%area)
+         call repeat_values(file_model%normal_load, n_file, n_sectors, contact%normal_load)
+         call repeat_values(file_model%tangential_stiffness, n_file, n_sectors, values)
+         call contact%constants%offer('tangential_stiffness', values)
+         call repeat_values(file_model%normal_stiffness, n_file, n_sectors, values)
+         call contact%constants%offer('normal_stiffness', values)
          if (allocated(file_model%position)) contact%position = file_model%position
          if (allocated(file_model%patch)) contact%patch = file_model%patch
       else if (n_file > 0 .and. contact%n_pairs > 0 &
@@ -79,6 +87,51 @@ contains
          call reader%refuse('contact', 'n_pairs', 'is missing: must be the number of pairs')
       end if
    end subroutine read_n_pairs
+
+   !> Values of the pairs of a file, of one sector for all or of every sector.
+   pure subroutine repeat_values(given, n_pairs, n_sectors, values)
+      real(wp), allocatable, intent(in) :: given(:)
+      integer, intent(in) :: n_pairs, n_sectors
+      real(wp), allocatable, intent(inout) :: values(:)
+      integer :: j
+
+      if (allocated(values)) deallocate (values)
+      if (.not. allocated(given)) return
+      values = given
+      if (size(given) == n_pairs) values = [(given, j=1, n_sectors)]
+   end subroutine repeat_values
+
+   !> From the pairs of a sector to those of all, sector after sector.
+   subroutine repeat_pairs(reader, n_sectors, contact)
+      type(reader_type), intent(inout) :: reader
+      integer, intent(in) :: n_sectors
+      type(contact_type), intent(inout) :: contact
+      !> More than any joint has that is solved for.
+      integer, parameter :: most = 1000000
+      real(wp), allocatable :: position(:, :)
+      integer :: j, n
+
+      n = contact%n_pairs
+      if (n > most/n_sectors) then
+         call reader%refuse('cyclic', 'mistuned', '= .true.: '//to_text(n)//' pairs in each of '// &
+                            to_text(n_sectors)//' sectors are too many: must be at most '// &
+                            to_text(most)//' in all')
+         return
+      end if
+      contact%n_alike = n_sectors
+      contact%n_pairs = n*n_sectors
+      contact%side_1 = reshape([(contact%side_1, j=1, n_sectors)], [3, contact%n_pairs])
+      contact%side_2 = reshape([(contact%side_2, j=1, n_sectors)], [3, contact%n_pairs])
+      contact%sector_2 = [(contact%sector_2, j=1, n_sectors)]
+      if (allocated(contact%position)) then
+         ! Of the sector itself: where the others stand is not known here.
+         position = contact%position
+         contact%position = reshape([(position, j=1, n_sectors)], [3, contact%n_pairs])
+      end if
+      if (allocated(contact%patch)) call name_sectors(n_sectors, contact%patch)
+      call reader%set_size('n_pairs', contact%n_pairs)
+      call reader%set_tile('n_pairs', n)
+   end subroutine repeat_pairs
 
    !> The dofs of both sides.
    subroutine read_sides(reader, contact)
@@ -203,13 +256,12 @@ contains
    subroutine check_zeros(reader, contact)
       type(reader_type), intent(inout) :: reader
       type(contact_type), intent(in) :: contact
-      logical :: is_idle(contact%n_pairs)
+      logical :: slides(contact%n_pairs)
       integer :: i
 
+      slides = has_tangent(contact)
       do i = 1, contact%n_pairs
-         is_idle = .false.
-         is_idle(i) = contact%tangential_stiffness(i) <= 0.0_wp
-         if (.not. any(is_idle .and. has_tangent(contact))) cycle
+         if (contact%tangential_stiffness(i) > 0.0_wp .or. .not. slides(i)) cycle
          if (any(contact%tangential_stiffness > 0.0_wp .and. is_parallel(contact, i))) cycle
          call reader%refuse('contact', 'tangential_stiffness', '= 0 for pair '//to_text(i)// &
                             ': must be above 0, unless the pair has no tangential dof, or '// &
@@ -223,12 +275,14 @@ contains
       type(contact_type), intent(in) :: contact
       integer, intent(in) :: i
       logical :: is(contact%n_pairs)
-      integer :: k
+      integer :: k, n_sector
 
+      n_sector = contact%n_pairs/contact%n_alike
       associate (a => contact%side_1(t1:t2, :), b => contact%side_2(t1:t2, :))
          do k = 1, contact%n_pairs
             ! Turned round, the pair is the same.
-            if (contact%sector_2(k) /= contact%sector_2(i)) then
+            if (contact%sector_2(k) /= contact%sector_2(i) .or. &
+                (k - 1)/n_sector /= (i - 1)/n_sector) then
                is(k) = .false.
                cycle
             end if
@@ -255,10 +309,12 @@ contains
    end function has_normal
 
    !> Group &spring.
-   subroutine read_springs(reader, springs)
+   subroutine read_springs(reader, n_sectors, springs)
       type(reader_type), intent(inout) :: reader
+      !> Sectors whose motion is solved for.
+      integer, intent(in) :: n_sectors
       type(spring_type), intent(inout) :: springs
-      integer :: m, i
+      integer :: m, i, j
 
       if (reader%given('spring', 'coefficient') .and. &
           .not. reader%given('spring', 'n_springs')) then
@@ -276,6 +332,13 @@ contains
          call reader%refuse('spring', 'side_1', 'and side_2: spring '//to_text(i)//' has dof '// &
                             to_text(springs%side_1(i))//' on both sides: they must differ')
       end do
+      if (n_sectors == 1 .or. m == 0) return
+      springs%n_springs = m*n_sectors
+      springs%side_1 = [(springs%side_1, j=1, n_sectors)]
+      springs%side_2 = [(springs%side_2, j=1, n_sectors)]
+      springs%sector_2 = [(springs%sector_2, j=1, n_sectors)]
+      springs%coefficient = [(springs%coefficient, j=1, n_sectors)]
+      springs%power = [(springs%power, j=1, n_sectors)]
    end subroutine read_springs
 
 end module fw_read_contact

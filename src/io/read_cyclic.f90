@@ -38,6 +38,11 @@ contains
                             ': the model has '//to_text(parts%n_sectors)//'; remove n_sectors')
       end if
       if (cyclic%engine_order == no_order) cyclic%engine_order = 0
+      if (cyclic%is_mistuned .and. .not. cyclic%is_cyclic) then
+         call reader%refuse('cyclic', 'mistuned', '= .true.: goes with a cyclic structure; '// &
+                            'give n_sectors and engine_order, or .false.')
+         cyclic%is_mistuned = .false.
+      end if
       n_file = 0
       if (allocated(parts%left)) n_file = size(parts%left)
       n_interface = n_file
@@ -111,10 +116,11 @@ contains
       integer :: i
 
       if (reader%failed()) return
-      do i = 1, contact%n_pairs
+      ! Those of all sectors are those of the first.
+      do i = 1, contact%n_pairs/contact%n_alike
          call check_element('contact', i, contact%sector_2(i), any(contact%side_2(:, i) /= 0))
       end do
-      do i = 1, springs%n_springs
+      do i = 1, springs%n_springs/cyclic%n_solved()
          call check_element('spring', i, springs%sector_2(i), springs%side_2(i) /= 0)
       end do
       if (.not. reader%failed()) call check_mirrored(reader, cyclic, contact)
@@ -150,12 +156,13 @@ contains
       type(contact_type), intent(in) :: contact
       type(law_facts) :: facts
       logical :: repeats, mirrors
-      integer :: i, k, n
+      integer :: i, k, n, n_pairs
 
-      if (.not. cyclic%is_cyclic .or. contact%n_pairs < 2) return
+      n_pairs = contact%n_pairs/contact%n_alike
+      if (.not. cyclic%is_cyclic .or. n_pairs < 2) return
       facts = facts_of(contact%law)
       n = cyclic%n_sectors
-      do i = 2, contact%n_pairs
+      do i = 2, n_pairs
          do k = 1, i - 1
             associate (a => contact%side_1, b => contact%side_2, s => contact%sector_2)
                repeats = all(a(:, i) == a(:, k)) .and. all(b(:, i) == b(:, k)) .and. &

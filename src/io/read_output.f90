@@ -11,6 +11,7 @@ module fw_read_output
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
    use fw_text, only: string_type, to_text
+   use fw_text_list, only: name_sectors
    use fw_values, only: read_integer, quoted_text
    implicit none (type, external)
    private
@@ -69,6 +70,7 @@ contains
       end if
       model%observe_matrix = chosen_rows(:, :model%n_dof)
       call observe_nodal(raw, chosen_rows(:, model%n_dof + 1:), model)
+      if (model%cyclic%is_mistuned) call name_sectors(model%cyclic%n_sectors, model%observe_name)
    end subroutine read_observed
 
    !> The key of what is observed: numbers and names as they are given.

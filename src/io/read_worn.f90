@@ -44,7 +44,7 @@ contains
       !> status_io where the file cannot be read at all; anything else is refused by the reader.
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: depth(:, :)
-      integer :: step
+      integer :: i, step
 
       step = 0
       call bind_worn(reader, path, step)
@@ -58,10 +58,12 @@ contains
       call reader%amend('contact', 'worn', quoted_text(path))
       call read_depths(reader, path, depth, error)
       if (allocated(error) .or. reader%failed()) return
-      call check_depths(reader, path, step, depth, contact%n_pairs)
+      call check_depths(reader, path, step, depth, contact)
       if (reader%failed()) return
       if (step == 0) step = size(depth, 2)
       contact%depth = depth(:, step)
+      ! Of a wave: all sectors are worn alike.
+      if (size(depth, 1) < contact%n_pairs) contact%depth = [(depth(:, step), i=1, contact%n_alike)]
    end subroutine read_worn
 
    !> Every row of /wear/depth (n_pairs, n_steps).
@@ -121,19 +123,20 @@ contains
    end subroutine read_in_trial
 
    !> Refuse depths of another joint, and rows that are not there or not complete.
-   subroutine check_depths(reader, path, step, depth, n_pairs)
+   subroutine check_depths(reader, path, step, depth, contact)
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path
       integer, intent(in) :: step
       real(wp), intent(in) :: depth(:, :)
-      integer, intent(in) :: n_pairs
+      type(contact_type), intent(in) :: contact
       integer :: last
 
       last = size(depth, 2)
-      if (size(depth, 1) /= n_pairs) then
+      if (size(depth, 1) /= contact%n_pairs .and. &
+          size(depth, 1)*contact%n_alike /= contact%n_pairs) then
          call reader%refuse('contact', 'worn', path//': holds the depths of '// &
                             to_text(size(depth, 1))//' pairs: this case has '// &
-                            to_text(n_pairs)//'; name the result of the same joint')
+                            to_text(contact%n_pairs)//'; name the result of the same joint')
       else if (last == 0) then
          call reader%refuse('contact', 'worn', path//': holds no step yet')
       else if (step > last) then

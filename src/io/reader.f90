@@ -30,6 +30,8 @@ module fw_reader
       character(12) :: name
       !> Number of elements along it.
       integer :: extent
+      !> Values that may be given for as many elements after the other; 0 where only all may.
+      integer :: tile = 0
    end type size_type
 
    type, extends(input_type) :: reader_type
@@ -52,6 +54,7 @@ module fw_reader
       procedure :: bind_integers
       procedure :: extents
       procedure :: set_size
+      procedure :: set_tile
       procedure :: amend
       procedure :: finish
       procedure :: effective
@@ -302,8 +305,17 @@ contains
       integer, intent(in) :: extent
 
       ! A size told anew replaces the old one.
-      self%sizes = [pack(self%sizes, self%sizes%name /= name), size_type(name, extent)]
+      self%sizes = [pack(self%sizes, self%sizes%name /= name), size_type(name, extent, 0)]
    end subroutine set_size
+
+   !> So many values hold for all of an extent that was told, over and over.
+   subroutine set_tile(self, name, tile)
+      class(reader_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: tile
+
+      where (self%sizes%name == name) self%sizes%tile = tile
+   end subroutine set_tile
 
    !> A size that was not told is 0.
    !> Numbers of a shape such as '3 x n_pairs', in Fortran order.

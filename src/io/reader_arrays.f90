@@ -62,7 +62,8 @@ contains
       else
          ! Elements may be left out where they have a value already.
          call self%find_elements(self%group, trim(key%name), accepts, dims, key%repeats, &
-                                 allocated(numbers), source)
+                                 allocated(numbers), source, sum(pack(self%sizes%tile, &
+                                                                     self%sizes%name == key%shape)))
       end if
       if (.not. allocated(source%entry)) return
       if (.not. allocated(numbers)) allocate (numbers(size(source%entry)), source=0.0_wp)

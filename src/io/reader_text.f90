@@ -204,7 +204,8 @@ contains
       integer, intent(in) :: dims(:)
       logical, intent(in) :: repeats
       character(:), allocatable :: text
-      integer :: i, per_line
+      character(:), allocatable :: longer
+      integer :: i, last, per_line
 
       text = ''
       if (size(numbers) == 0) return
@@ -215,12 +216,33 @@ contains
       end if
       ! A column of a matrix in a line, else six numbers.
       per_line = merge(dims(1), 6, size(dims) > 1)
+      text = repeat(' ', 16)
+      last = 0
       do i = 1, size(numbers)
-         text = text//kind_text(numbers(i), kind)
+         call put(kind_text(numbers(i), kind))
          if (i == size(numbers)) exit
-         text = text//','//merge(new_line('a'), ' ', mod(i, per_line) == 0)
-         if (mod(i, per_line) == 0) text = text//repeat(' ', 6)
+         if (mod(i, per_line) == 0) then
+            call put(','//new_line('a')//repeat(' ', 6))
+         else
+            call put(', ')
+         end if
       end do
+      text = text(:last)
+
+   contains
+
+      !> Room is doubled: a text that grows number by number is copied as often.
+      subroutine put(part)
+         character(*), intent(in) :: part
+
+         if (last + len(part) > len(text)) then
+            longer = text//repeat(' ', len(text) + len(part))
+            call move_alloc(longer, text)
+         end if
+         text(last + 1:last + len(part)) = part
+         last = last + len(part)
+      end subroutine put
+
    end function number_list
 
 end module fw_reader_text

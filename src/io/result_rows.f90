@@ -102,7 +102,7 @@ contains
       sizes%springs%n_springs = case%springs%n_springs
       if (allocated(case%model%unit_system)) sizes%model%unit_system = case%model%unit_system
       if (allocated(case%model%observe_matrix)) then
-         allocate (sizes%model%observe_matrix(size(case%model%observe_matrix, 1), 0))
+         allocate (sizes%model%observe_matrix(case%model%n_observed(), 0))
       end if
    end subroutine take_sizes
 

@@ -1,10 +1,11 @@
 !> Growing lists of texts.
 module fw_text_list
    use fw_text, only: string_type
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: append, words_of
+   public :: append, words_of, name_sectors
 
 contains
 
@@ -45,5 +46,22 @@ contains
          first = first + last
       end do
    end function words_of
+
+   !> What a sector has, for each of all: name@0, .., name@1, ..
+   subroutine name_sectors(n_sectors, names)
+      integer, intent(in) :: n_sectors
+      type(string_type), allocatable, intent(inout) :: names(:)
+      type(string_type), allocatable :: all(:)
+      integer :: i, j, n
+
+      n = size(names)
+      allocate (all(n*n_sectors))
+      do j = 0, n_sectors - 1
+         do i = 1, n
+            all(j*n + i)%text = names(i)%text//'@'//to_text(j)
+         end do
+      end do
+      call move_alloc(all, names)
+   end subroutine name_sectors
 
 end module fw_text_list

@@ -51,6 +51,8 @@ module fw_cyclic_data
       logical :: is_cyclic = .false.
       integer :: n_sectors = 1
       integer :: engine_order = 0
+      !> Whether contact differs from sector to sector, and the motion of all of them is looked for.
+      logical :: is_mistuned = .false.
       !> Dofs of the interfaces: the right one of a sector is the left one of the next; a negative
       !> number on the right with its sign turned (n_interface).
       integer, allocatable :: left(:), right(:)
@@ -73,6 +75,7 @@ module fw_cyclic_data
       procedure :: holds
       procedure :: air_stiffness
       procedure :: splits_waves
+      procedure :: n_solved
    end type cyclic_type
 
 contains
@@ -114,6 +117,13 @@ contains
       angle = -2.0_wp*pi*real(min(steps, n - steps), wp)/real(n, wp)
       z = cmplx(cos(angle), merge(sin(angle), -sin(angle), 2*steps < n), wp)
    end function factor
+
+   !> Sectors whose motion is solved for.
+   elemental integer function n_solved(self) result(n)
+      class(cyclic_type), intent(in) :: self
+
+      n = merge(max(1, self%n_sectors), 1, self%is_mistuned)
+   end function n_solved
 
    !> Whether the model holds matrices of nodal diameters, not of a sector.
    pure logical function has_nodal(self)

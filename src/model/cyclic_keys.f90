@@ -32,6 +32,9 @@ contains
                          from_to(-most_order, most_order), absent='required with sectors', &
                          only="cyclic, all but analysis = 'modes'"), &
                      cyclic%engine_order, needs_order)
+      call keys%bind(key('mistuned', 'solve for all sectors, whose pairs may differ: &contact '// &
+                         'takes values of n_pairs, all sectors alike, or of n_sectors times as '// &
+                         'many'), cyclic%is_mistuned)
       call keys%bind(key('n_modes', 'natural frequencies of each nodal diameter', &
                          from_to(1, most_dofs), only="analysis = 'modes'"), cyclic%n_modes)
    end subroutine bind_sectors

@@ -26,8 +26,17 @@ module fw_cyclic_relative
    contains
       procedure :: slots
       procedure :: lay_out
+      procedure :: lay_out_all
+      procedure :: weights
       procedure :: first_dependent
    end type cyclic_relative
+
+   !> A row as a combination of coordinates: their numbers in a sector, how many sectors behind that
+   !> of the row these are, and the weights.
+   type :: ring_row
+      integer, allocatable :: coordinate(:), behind(:)
+      real(wp), allocatable :: weight(:)
+   end type ring_row
 
 contains
 
@@ -50,6 +59,7 @@ contains
          ! The wave has the multiples of gcd(N, EO), whatever its harmonics: numbers of coordinates
          ! do not depend on these.
          step = common_divisor(n, modulo(model%cyclic%engine_order, n))
+         if (model%cyclic%is_mistuned) step = 1
          is_coordinate = .false.
          do k = 0, n/2, step
             is_coordinate(self%at(k + 1)%row) = .true.
@@ -96,7 +106,7 @@ contains
       relative%row_start(1) = 1
       do r = 1, self%n_rows
          do h = 1, size(harmonic)
-            weight(:, h) = row_of(self, cyclic%nodal_diameter(harmonic(h)), r)
+            weight(:, h) = self%weights(cyclic%nodal_diameter(harmonic(h)), r)
          end do
          do j = 1, self%n_coordinates
             ! A row that is a coordinate begins with that.
@@ -117,6 +127,88 @@ contains
       call move_alloc(turned, relative%turned)
    end subroutine lay_out
 
+   !> Rows of all sectors as combinations of the coordinates of all, which stand sector after
+   !> sector: a row that is a coordinate in every nodal diameter is that of its sector, any other
+   !> takes part of those of other sectors too,
+   !>
+   !>   w(j - l) = 1/N sum_k W_k z_k**(j - l).
+   subroutine lay_out_all(self, cyclic, row, sector, relative)
+      class(cyclic_relative), intent(in) :: self
+      type(cyclic_type), intent(in) :: cyclic
+      !> Which row of which sector each is, from 1 and from 0 (rows of all sectors).
+      integer, intent(in) :: row(:), sector(:)
+      type(relative_type), intent(inout) :: relative
+      type(ring_row) :: entries(self%n_rows)
+      integer :: first, last, r
+
+      do r = 1, self%n_rows
+         call spread_row(self, cyclic, r, entries(r))
+      end do
+      relative%n_rows = size(row)
+      relative%n_coordinates = cyclic%n_sectors*self%n_coordinates
+      relative%independent = self%coordinate(row) > 0
+      if (allocated(relative%row_start)) deallocate (relative%row_start, relative%row_coordinate, &
+                                                     relative%row_weight)
+      allocate (relative%row_start(size(row) + 1))
+      relative%row_start(1) = 1
+      do r = 1, size(row)
+         relative%row_start(r + 1) = relative%row_start(r) + size(entries(row(r))%weight)
+      end do
+      last = relative%row_start(size(row) + 1) - 1
+      allocate (relative%row_coordinate(last), relative%row_weight(last))
+      do r = 1, size(row)
+         first = relative%row_start(r)
+         last = relative%row_start(r + 1) - 1
+         associate (e => entries(row(r)))
+            relative%row_weight(first:last) = e%weight
+            relative%row_coordinate(first:last) = e%coordinate + self%n_coordinates* &
+                                                  modulo(sector(r) - e%behind, cyclic%n_sectors)
+         end associate
+      end do
+   end subroutine lay_out_all
+
+   !> One row between the sectors; that of its own coordinate comes first.
+   subroutine spread_row(self, cyclic, row, entries)
+      type(cyclic_relative), intent(in) :: self
+      type(cyclic_type), intent(in) :: cyclic
+      integer, intent(in) :: row
+      type(ring_row), intent(out) :: entries
+      real(wp), parameter :: negligible = 1.0e-12_wp
+      real(wp) :: weight(self%n_coordinates, 0:cyclic%n_sectors - 1)
+      logical :: is_there(self%n_coordinates, 0:cyclic%n_sectors - 1)
+      integer :: d, j, k
+
+      weight = 0.0_wp
+      associate (n => cyclic%n_sectors)
+         do d = 0, n - 1
+            do k = 0, n - 1
+               weight(:, d) = weight(:, d) + real(cyclic%factor(k, d)* &
+                                                  self%weights(merge(k - n, k, 2*k > n), row), wp)/n
+            end do
+         end do
+         is_there = abs(weight) > negligible
+         allocate (entries%coordinate(0), entries%behind(0), entries%weight(0))
+         if (self%coordinate(row) > 0) call append(self%coordinate(row), 0)
+         do d = 0, n - 1
+            do j = 1, self%n_coordinates
+               if (is_there(j, d)) call append(j, d)
+            end do
+         end do
+      end associate
+
+   contains
+
+      subroutine append(j, d)
+         integer, intent(in) :: j, d
+
+         entries%coordinate = [entries%coordinate, j]
+         entries%behind = [entries%behind, d]
+         entries%weight = [entries%weight, weight(j, d)]
+         is_there(j, d) = .false.
+      end subroutine append
+
+   end subroutine spread_row
+
    !> Bring the entry of a coordinate to the front of its row.
    pure subroutine put_first(relative, turned, row, coordinate)
       type(relative_type), intent(inout) :: relative
@@ -133,8 +225,8 @@ contains
    end subroutine put_first
 
    !> Weights of a row in a signed nodal diameter, among the coordinates of all.
-   pure function row_of(self, k, row) result(weight)
-      type(cyclic_relative), intent(in) :: self
+   pure function weights(self, k, row) result(weight)
+      class(cyclic_relative), intent(in) :: self
       integer, intent(in) :: k, row
       complex(wp) :: weight(self%n_coordinates)
       integer :: j
@@ -147,7 +239,7 @@ contains
          end do
       end associate
       if (k < 0) weight = conjg(weight)
-   end function row_of
+   end function weights
 
    !> The first of some rows that depends on earlier ones in a nodal diameter; 0 for none.
    pure integer function first_dependent(self, k, is_asked) result(row)

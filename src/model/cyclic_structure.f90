@@ -14,14 +14,14 @@ module fw_cyclic_structure
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_sector, only: sector_at
+   use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
-   use fw_sector_reduction, only: static_diagonal
-   use fw_sector_split, only: split_sector
    use fw_sector_stiffness, only: derive_sector
    use fw_sector_stiffness, only: form_sector
    use fw_sector_stiffness, only: harmonic_point
    use fw_sector_stiffness, only: observed_sector_slope
    use fw_sector_stiffness, only: recover_sector
+   use fw_sector_stiffness, only: slopes_of
    use fw_sector_stiffness, only: work_of_sector
    use fw_structure_operator, only: by_frequency
    use fw_structure_operator, only: lay_out_coefficients
@@ -33,11 +33,6 @@ module fw_cyclic_structure
    private
 
    public :: cyclic_structure, new_cyclic_structure
-   public :: means_none, means_static, means_split
-
-   !> What laws ask of the mean over all nodal diameters: nothing, the static stiffness, or what a
-   !> coordinate is to motion above the harmonics as well.
-   integer, parameter :: means_none = 0, means_static = 1, means_split = 2
 
    !> A mode may stiffen up to this many times the frequency of its stuck motion.
    real(wp), parameter :: reach_of_mode = 2.0_wp
@@ -50,14 +45,8 @@ module fw_cyclic_structure
       type(sector_reduction), allocatable :: basis(:)
       integer, allocatable :: basis_of(:)
       logical, allocatable :: conjugated(:)
-      !> Mean of the static stiffness over all nodal diameters, which is the diagonal of all sectors
-      !> together (n_relative) [force/length].
-      real(wp), allocatable :: static(:)
-      !> Bases of all nodal diameters without kept modes, their weights among all of them, and the
-      !> place of each coordinate there; only where the split is asked for.
-      type(sector_reduction), allocatable :: all(:)
-      real(wp), allocatable :: share(:)
-      integer, allocatable :: place(:, :)
+      !> Over all nodal diameters.
+      type(sector_means) :: means
    contains
       procedure :: new_state
       procedure :: at
@@ -113,9 +102,7 @@ contains
       self%n_observed = size(model%observe_matrix, 1)
       call find_bases(model, relative, omega_range, keeps_first, self, error)
       if (allocated(error)) return
-      if (means >= means_static) call take_static_means(model, relative, self, error)
-      if (allocated(error)) return
-      if (means == means_split) call take_all(model, relative, self, error)
+      call self%means%take(model, relative, means, error)
    end subroutine new_cyclic_structure
 
    !> A basis for each nodal diameter in use, with coordinates at places that all share.
@@ -233,75 +220,6 @@ contains
       call fatal_error(error, '&load static pushes a part of the sectors that neither '// &
                        'stiffness nor contact holds; hold it or remove the load', status_input)
    end subroutine check_free_modes
-
-   !> The diagonal of the static stiffness of all sectors together.
-   subroutine take_static_means(model, relative, self, error)
-      type(model_type), intent(in) :: model
-      type(cyclic_relative), intent(in) :: relative
-      type(cyclic_structure), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
-      type(nodal_matrices) :: nodal
-      real(wp), allocatable :: diagonal(:)
-      real(wp) :: weight(self%n_relative), share
-      integer, allocatable :: slot(:)
-      integer :: j, k
-
-      allocate (self%static(self%n_relative), source=0.0_wp)
-      weight = 0.0_wp
-      do k = 0, model%cyclic%n_sectors/2
-         if (.not. model%cyclic%holds(k)) cycle
-         call sector_at(model, k, nodal, error)
-         if (.not. allocated(error)) call static_diagonal(k, nodal, relative%at(k + 1), diagonal, &
-                                                          error)
-         if (allocated(error)) return
-         share = share_of(model, k)
-         slot = relative%slots(k)
-         do j = 1, size(slot)
-            if (slot(j) == 0) cycle
-            self%static(slot(j)) = self%static(slot(j)) + share*diagonal(j)
-            weight(slot(j)) = weight(slot(j)) + share
-         end do
-      end do
-      where (weight > 0.0_wp) self%static = self%static/weight
-   end subroutine take_static_means
-
-   !> Waves in both directions count, but those that stand.
-   pure real(wp) function share_of(model, k) result(share)
-      type(model_type), intent(in) :: model
-      integer, intent(in) :: k
-
-      share = merge(1.0_wp, 2.0_wp, k == 0 .or. 2*k == model%cyclic%n_sectors)
-   end function share_of
-
-   !> Bases of all nodal diameters.
-   subroutine take_all(model, relative, self, error)
-      type(model_type), intent(in) :: model
-      type(cyclic_relative), intent(in) :: relative
-      type(cyclic_structure), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
-      type(nodal_matrices) :: nodal
-      integer, allocatable :: slot(:)
-      integer :: j, k, n
-
-      n = model%cyclic%n_sectors/2 + 1
-      allocate (self%all(n), self%share(n), self%place(self%n_relative, n))
-      self%share = 0.0_wp
-      self%place = 0
-      do k = 0, n - 1
-         if (.not. model%cyclic%holds(k)) cycle
-         call sector_at(model, k, nodal, error)
-         if (.not. allocated(error)) then
-            call self%all(k + 1)%find_modes(k, nodal, relative%at(k + 1), error)
-         end if
-         if (allocated(error)) return
-         slot = relative%slots(k)
-         call self%all(k + 1)%transform(nodal, [(j, j=1, size(slot))], size(slot))
-         self%share(k + 1) = share_of(model, k)
-         do j = 1, size(slot)
-            if (slot(j) > 0) self%place(slot(j), k + 1) = j
-         end do
-      end do
-   end subroutine take_all
 
    subroutine new_state(self, state)
       class(cyclic_structure), intent(in) :: self
@@ -485,23 +403,6 @@ contains
       call coefficients_of(self%harmonic, self%column, m, m, slopes, slope)
    end subroutine derivative
 
-   !> d/dp of the factors of K, M and C.
-   pure type(harmonic_point) function slopes_of(point, self_excitation, parameter) result(slopes)
-      type(harmonic_point), intent(in) :: point
-      real(wp), intent(in) :: self_excitation
-      integer, intent(in) :: parameter
-
-      slopes = point
-      slopes%k = 0.0_wp
-      if (parameter == by_frequency) then
-         slopes%theta = point%harmonic*cmplx(2.0_wp*point%s, self_excitation, wp)
-         slopes%s = real(point%harmonic, wp)
-      else
-         slopes%theta = cmplx(0.0_wp, point%s, wp)
-         slopes%s = 0.0_wp
-      end if
-   end function slopes_of
-
    subroutine recover(self, state, q, observed)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(inout) :: state
@@ -522,37 +423,16 @@ contains
       class(cyclic_structure), intent(in) :: self
       integer, intent(in) :: coordinate
 
-      static_stiffness = 0.0_wp
-      if (.not. allocated(self%static)) return
-      if (coordinate <= size(self%static)) static_stiffness = self%static(coordinate)
+      static_stiffness = self%means%static_stiffness(coordinate)
    end function static_stiffness
 
-   !> The mean over all nodal diameters, as of the static stiffness.
    pure subroutine split(self, coordinate, limit, m, c, k)
       class(cyclic_structure), intent(in) :: self
       integer, intent(in) :: coordinate
       real(wp), intent(in) :: limit
       real(wp), intent(out) :: m, c, k
-      real(wp) :: part(3), total
-      integer :: j
 
-      m = 0.0_wp
-      c = 0.0_wp
-      k = 0.0_wp
-      if (.not. allocated(self%all) .or. coordinate > self%n_relative) return
-      total = 0.0_wp
-      do j = 1, size(self%all)
-         if (self%place(coordinate, j) == 0) cycle
-         call split_sector(self%all(j), self%place(coordinate, j), limit, part(1), part(2), part(3))
-         m = m + self%share(j)*part(1)
-         c = c + self%share(j)*part(2)
-         k = k + self%share(j)*part(3)
-         total = total + self%share(j)
-      end do
-      if (total <= 0.0_wp) return
-      m = max(m/total, 0.0_wp)
-      c = max(c/total, 0.0_wp)
-      k = k/total
+      call self%means%split(coordinate, limit, m, c, k)
    end subroutine split
 
    !> Of the nodal diameter of the first harmonic, the real part: what flows in pseudo-time would

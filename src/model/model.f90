@@ -46,6 +46,7 @@ module fw_model
       real(wp) :: harmonic_scale = 1.0_wp, static_scale = 1.0_wp
    contains
       procedure :: load_columns
+      procedure :: n_observed
    end type model_type
 
 contains
@@ -58,5 +59,14 @@ contains
       columns = self%waves%with_columns(self%load_static, self%load_cosine, self%load_sine, &
                                         self%load_wave)
    end function load_columns
+
+   !> Observed quantities of all sectors that are solved for.
+   pure integer function n_observed(self)
+      class(model_type), intent(in) :: self
+
+      n_observed = 0
+      if (.not. allocated(self%observe_matrix)) return
+      n_observed = self%cyclic%n_solved()*size(self%observe_matrix, 1)
+   end function n_observed
 
 end module fw_model

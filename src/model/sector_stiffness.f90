@@ -9,10 +9,11 @@ module fw_sector_stiffness
    use fw_lapack, only: zgemm
    use fw_linalg, only: complex_lu_type
    use fw_sector_reduction, only: sector_reduction
+   use fw_structure_operator, only: by_frequency
    implicit none (type, external)
    private
 
-   public :: harmonic_point, form_sector, derive_sector, recover_sector
+   public :: harmonic_point, slopes_of, form_sector, derive_sector, recover_sector
    public :: observed_sector_slope, work_of_sector
 
    !> Where a harmonic stands: factors of K, M and C in Z = k K - theta M + i s C.
@@ -24,6 +25,8 @@ module fw_sector_stiffness
       real(wp) :: s = 0.0_wp
       !> 1, or 0 in a derivative.
       real(wp) :: k = 1.0_wp
+      !> Whether the load is a wave of this nodal diameter.
+      logical :: is_loaded = .true.
    end type harmonic_point
 
    !> D, factored where damping couples the modes.
@@ -36,6 +39,23 @@ module fw_sector_stiffness
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp)
 
 contains
+
+   !> d/dp of the factors of K, M and C.
+   pure type(harmonic_point) function slopes_of(point, self_excitation, parameter) result(slopes)
+      type(harmonic_point), intent(in) :: point
+      real(wp), intent(in) :: self_excitation
+      integer, intent(in) :: parameter
+
+      slopes = point
+      slopes%k = 0.0_wp
+      if (parameter == by_frequency) then
+         slopes%theta = point%harmonic*cmplx(2.0_wp*point%s, self_excitation, wp)
+         slopes%s = real(point%harmonic, wp)
+      else
+         slopes%theta = cmplx(0.0_wp, point%s, wp)
+         slopes%s = 0.0_wp
+      end if
+   end function slopes_of
 
    !> Z_r and F_r; fails where a mode resonates without damping.
    subroutine form_sector(basis, point, matrix, load, failed)
@@ -369,6 +389,8 @@ contains
       complex(wp) :: load(size(parts, 1))
       integer :: w
 
+      load = (0.0_wp, 0.0_wp)
+      if (.not. point%is_loaded) return
       select case (point%harmonic)
       case (0)
          load = cmplx(real(parts(:, 1), wp), kind=wp)
@@ -393,6 +415,7 @@ contains
       integer :: w
 
       slope = (0.0_wp, 0.0_wp)
+      if (.not. point%is_loaded) return
       do w = 1, basis%waves%n_waves()
          slope = slope + basis%waves%slope(w, point%harmonic, point%s, slopes%s)* &
                  joined(parts(:, 2*w + 2:2*w + 3), point)

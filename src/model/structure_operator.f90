@@ -45,6 +45,11 @@ module fw_structure_operator
       integer :: n_relative = 0
       integer, allocatable :: kept(:)
       integer :: n_observed = 0
+      !> Equal sectors that the coordinates are of; 1 where none are told apart. Coordinates of each
+      !> (n_slots, n_alike), and back which of which sector each is (n_coordinates).
+      integer :: n_alike = 1
+      integer :: n_slots = 0
+      integer, allocatable :: coordinate(:, :), slot(:), sector(:)
       !> Harmonics in use and the columns of their coefficients (n_retained).
       integer, allocatable :: harmonic(:), column(:)
       integer :: n_coefficients = 0
@@ -82,6 +87,9 @@ module fw_structure_operator
       procedure :: multiply_nearly
       procedure :: static_block
       procedure :: dynamic_block
+      procedure :: wave_block
+      procedure :: find_waves
+      procedure :: add_waves
    end type structure_operator
 
    abstract interface
@@ -421,5 +429,40 @@ contains
       associate (unused => self, unused_state => state, unused_number => h)
       end associate
    end subroutine dynamic_block
+
+   ! Equal sectors: waves of nodal diameters k = 0 .. n_alike - 1, which the structure does not
+   ! couple. Structures that tell no sectors apart leave these as they are.
+
+   !> Z_n of the h-th harmonic in a nodal diameter (n_slots, n_slots).
+   subroutine wave_block(self, state, h, k, matrix)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h, k
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+
+      associate (unused => k)
+      end associate
+      call self%block(state, h, matrix)
+   end subroutine wave_block
+
+   !> Amplitudes of waves from those of the sectors (n_slots, n_alike), see fw_ring_fft.
+   subroutine find_waves(self, sectors, waves)
+      class(structure_operator), intent(in) :: self
+      complex(wp), intent(inout), contiguous :: sectors(:, :), waves(:, :)
+
+      waves = sectors
+      associate (unused => self)
+      end associate
+   end subroutine find_waves
+
+   !> And back.
+   subroutine add_waves(self, waves, sectors)
+      class(structure_operator), intent(in) :: self
+      complex(wp), intent(inout), contiguous :: waves(:, :), sectors(:, :)
+
+      sectors = waves
+      associate (unused => self)
+      end associate
+   end subroutine add_waves
 
 end module fw_structure_operator

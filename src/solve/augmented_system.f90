@@ -63,6 +63,7 @@ module fw_augmented_system
       procedure :: expand
       procedure :: apply
       procedure :: build_preconditioner
+      procedure :: strengthen_preconditioner => strengthen_inner
       procedure :: preconditioner_fits
       procedure :: precondition
       procedure :: assemble
@@ -293,6 +294,13 @@ contains
       call self%rows(vector(:k), vector(k + 1:), product(k + 1:))
       call self%add_columns(vector(k + 1:), product(:k))
    end subroutine apply
+
+   subroutine strengthen_inner(self, is_stronger)
+      class(augmented_system), intent(inout) :: self
+      logical, intent(out) :: is_stronger
+
+      call self%inner%strengthen_preconditioner(is_stronger)
+   end subroutine strengthen_inner
 
    !> M, its solutions M^-1 R_z, one for each further unknown, and the complement.
    subroutine build_preconditioner(self)

@@ -26,6 +26,9 @@ module fw_linear_step
    real(wp), parameter :: kept_factor = 1.3_wp
    integer, parameter :: kept_excess = 4
 
+   !> Iterations from which on a stronger preconditioner is taken, where the system has one.
+   integer, parameter :: too_many = 100
+
    type :: linear_step_type
       !> linear_auto, linear_lu or linear_krylov.
       integer :: kind = linear_auto
@@ -139,6 +142,7 @@ contains
       logical, intent(out) :: done
       real(wp) :: decades
       integer :: limit, most
+      logical :: is_stronger
 
       ! Iterations grow with the digits asked for: only their rate compares.
       decades = -log10(tolerance)
@@ -156,6 +160,15 @@ contains
       end if
       call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
       self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+      if (self%gmres%iterations > too_many .and. .not. system%is_interrupted()) then
+         call system%strengthen_preconditioner(is_stronger)
+         if (is_stronger .and. .not. done) then
+            call build(self, system)
+            self%solution = 0.0_wp
+            call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
+            self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+         end if
+      end if
       self%fresh_rate = real(self%gmres%iterations, wp)/decades
       self%worth_keeping = done
    end subroutine iterate

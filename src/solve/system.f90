@@ -27,6 +27,7 @@ module fw_system
       procedure(expand_step), deferred :: expand
       procedure(build), deferred :: build_preconditioner
       procedure :: preconditioner_fits
+      procedure :: strengthen_preconditioner
       procedure(assemble_matrix), deferred :: assemble
    end type nonlinear_system
 
@@ -86,5 +87,15 @@ contains
       ! A system that says nothing keeps nothing.
       preconditioner_fits = self%n < 0
    end function preconditioner_fits
+
+   !> Take a preconditioner that costs more and serves better, from the next build on, if there is
+   !> one.
+   subroutine strengthen_preconditioner(self, is_stronger)
+      class(nonlinear_system), intent(inout) :: self
+      logical, intent(out) :: is_stronger
+
+      ! A system that says nothing has one only.
+      is_stronger = self%n < 0
+   end subroutine strengthen_preconditioner
 
 end module fw_system

@@ -72,6 +72,16 @@ def random_case(rng, *, law="penalty", planar=False, engine_order=None, n_sector
         "contact": contact, "load": {key: values.tolist() for key, values in load.items()}}
 
 
+def mistuned(rng, case, spread=0.3):
+    """The case with contact data that differ from sector to sector by up to a part of them."""
+    contact = dict(case["contact"])
+    n = case["n_sectors"] * len(contact["side_1"])
+    for key in set(contact) - {"side_1", "side_2", "sector_2"}:
+        factors = 1.0 + spread * rng.uniform(-1.0, 1.0, n)
+        contact[key] = (np.tile(contact[key], case["n_sectors"]) * factors).tolist()
+    return {**case, "mistuned": True, "contact": contact}
+
+
 class Annulus:
     """All sectors of a case as one structure: its dofs are those of the sectors but the right
     interfaces, sector by sector."""
@@ -122,7 +132,9 @@ class Annulus:
                        for j, t in enumerate(self.maps))
                 for h, f in case["waves"].items()}
         pairs = case["contact"]
-        contact = {key: values * n for key, values in pairs.items()
+        # Values of all sectors, or of one for all.
+        contact = {key: values * (n * len(pairs["side_1"]) // len(values))
+                   for key, values in pairs.items()
                    if key not in ("side_1", "side_2", "sector_2")}
         contact["side_1"] = [[self.dof(j, d) for d in side]
                              for j in range(n) for side in pairs["side_1"]]

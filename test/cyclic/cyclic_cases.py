@@ -39,6 +39,8 @@ def model_groups(case):
         "load": case["load"] | (term_keys(case["waves"]) if "waves" in case else {})}
     if case.get("n_sectors"):
         groups["cyclic"] = {"n_sectors": case["n_sectors"], "engine_order": case["engine_order"]}
+        if case.get("mistuned"):
+            groups["cyclic"]["mistuned"] = True
         if model.get("left"):
             groups["cyclic"] |= {"n_interface": len(model["left"]), "left": model["left"],
                                  "right": model["right"]}

@@ -146,6 +146,9 @@ def read_wave(result: Result, n_pairs: int) -> Wave | None:
     """
     if "engine_order" not in result.attributes:
         return None
+    if result.is_mistuned:
+        raise InputError(f"{result.name}: its sectors differ (&cyclic mistuned), which are not "
+                         "exported yet; result.sector(j) has the motion of each")
     values = namelist_values(result.namelist)
     parts: dict[str, Ints] = {}
     with h5py.File(result.model_file, "r") as file:

@@ -126,9 +126,10 @@ def plot_wave(source: Source, point: int | None = None, observe: str | None = No
                           "engine_order")
     point = choose_point(result, None) if point is None else point
     column, n = result.index(observe), _sectors(result)
+    width = len(result.observed) // (n if result.is_mistuned else 1)
     sectors = np.arange(n + 1)
     tau = 2.0 * np.pi * np.arange(256) / 256
-    waves = np.array([result.sector(j)[point, :, column] for j in range(n + 1)])
+    waves = np.array([result.sector(j)[point, :, column % width] for j in range(n + 1)])
     history = waves @ synthesis(waves.shape[1], tau)
     figure = new_figure(8.6, 4.6)
     axes = figure.subplots()

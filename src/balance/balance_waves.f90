@@ -1,0 +1,242 @@
+!> The preconditioner where equal sectors are told apart: what the forces add is replaced by its
+!> mean over the sectors, so that waves of nodal diameters do not couple,
+!>
+!>   M_k = Z_n,k + B_k^H mean(G k) (B_k d) - B_k^H mean(G) Z_n,k,
+!>
+!> a block of the size of one sector for each harmonic and nodal diameter. The mean is over the
+!> sectors where a coordinate is active. Where others are solved at once they act as zeros in the
+!> right-hand side, and their part of the solution is dropped.
+submodule(fw_balance_state) fw_balance_waves
+   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: pair_open
+   implicit none (type, external)
+
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+
+   !> Means of an element over the sectors: of G (output, input), and of G times the stiffness of
+   !> the input and what its derivative makes of a coefficient.
+   type :: mean_type
+      complex(wp) :: force(3, 3) = zero, slope(3, 3) = zero
+   end type mean_type
+
+   !> Of the elements of a law in a sector.
+   type :: law_means
+      type(mean_type), allocatable :: element(:)
+   end type law_means
+
+contains
+
+   module procedure build_waves
+      integer :: h
+
+      !$omp parallel do default(none) shared(self) private(h) schedule(dynamic) &
+      !$omp if(self%problem%structure%n_coordinates >= coordinates_for_threads)
+      do h = 1, self%problem%fourier%n_retained
+         call build_harmonic(self, h)
+      end do
+      !$omp end parallel do
+   end procedure build_waves
+
+   subroutine build_harmonic(self, h)
+      class(balance_state), intent(inout) :: self
+      integer, intent(in) :: h
+      complex(wp), allocatable :: stiffness(:, :), matrix(:, :)
+      !> Sectors where a coordinate is active, and the stiffness of its row where it is not.
+      integer :: n_active(self%problem%structure%n_slots)
+      real(wp) :: held(self%problem%structure%n_slots)
+      type(law_means) :: mean(self%problem%forces%n_laws)
+      integer :: i, j, k, m
+
+      m = self%problem%structure%n_slots
+      allocate (stiffness(m, m), matrix(m, m))
+      call count_active(self, n_active, held)
+      do j = 1, self%problem%forces%n_laws
+         call find_means(self, self%problem%forces%entry(j), self%work(j), h, n_active, &
+                         mean(j)%element)
+      end do
+      do k = 0, self%problem%structure%n_alike - 1
+         call self%problem%structure%wave_block(self%structure_state, h, k, stiffness)
+         matrix = stiffness
+         do j = 1, self%problem%forces%n_laws
+            do i = 1, size(mean(j)%element)
+               call add_mean(self, self%problem%forces%entry(j), i, k, mean(j)%element(i), &
+                             stiffness, matrix)
+            end do
+         end do
+         do j = 1, m
+            if (n_active(j) > 0) cycle
+            matrix(j, :) = zero
+            matrix(:, j) = zero
+            matrix(j, j) = held(j)
+         end do
+         associate (factors => self%preconditioner%wave(k + 1, h))
+            call factors%reserve(m, maxval([(abs(stiffness(j, j)), j=1, m)]))
+            factors%matrix(:m, :m) = cmplx(factors%scale*matrix, kind=kind(factors%matrix))
+            call factors%factor()
+         end associate
+      end do
+   end subroutine build_harmonic
+
+   subroutine count_active(self, n_active, held)
+      class(balance_state), intent(in) :: self
+      integer, intent(out) :: n_active(:)
+      real(wp), intent(out) :: held(:)
+      integer :: c, i, j, k
+
+      n_active = 0
+      held = 1.0_wp
+      associate (structure => self%problem%structure)
+         do j = 1, self%active%n_active
+            associate (slot => structure%slot(self%active%used(j)))
+               n_active(slot) = n_active(slot) + 1
+            end associate
+         end do
+         do k = 1, self%problem%forces%n_laws
+            associate (row => self%problem%forces%entry(k)%row, &
+                       p => self%problem%forces%entry(k)%law%prediction)
+               if (.not. p%takes_balance) cycle
+               do i = 1, size(row, 2)
+                  do c = 1, size(row, 1)
+                     if (row(c, i) == 0) cycle
+                     held(structure%slot(self%problem%incidence%coordinate_of(row(c, i)))) = &
+                        p%stiffness(i, c)
+                  end do
+               end do
+            end associate
+         end do
+      end associate
+   end subroutine count_active
+
+   !> Means of the elements of a sector (elements of a sector).
+   subroutine find_means(self, entry, work, h, n_active, mean)
+      class(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: h
+      integer, intent(in) :: n_active(:)
+      type(mean_type), allocatable, intent(out) :: mean(:)
+      complex(wp) :: force
+      integer :: c_in, c_out, e, i, place
+      real(wp) :: share
+
+      allocate (mean(size(entry%row, 2)/self%problem%structure%n_alike))
+      if (size(mean) == 0) return
+      do e = 1, size(entry%row, 2)
+         i = modulo(e - 1, size(mean)) + 1
+         if (work%linear_state(e) == pair_open) cycle
+         do c_out = 1, size(entry%row, 1)
+            if (entry%row(c_out, e) == 0) cycle
+            associate (j => self%problem%incidence%coordinate_of(entry%row(c_out, e)))
+               place = self%active%place(j)
+               if (place == 0 .or. place > self%active%n_active) cycle
+               share = 1.0_wp/n_active(self%problem%structure%slot(j))
+            end associate
+            do c_in = 1, size(entry%row, 1)
+               if (entry%row(c_in, e) == 0) cycle
+               force = share*force_mean(self, work, h, e, c_out, c_in)
+               mean(i)%force(c_out, c_in) = mean(i)%force(c_out, c_in) + force
+               mean(i)%slope(c_out, c_in) = mean(i)%slope(c_out, c_in) + &
+                                            force*input_slope(self, entry, work, h, e, c_in)
+            end do
+         end do
+      end do
+   end subroutine find_means
+
+   !> G of an element in a harmonic.
+   complex(wp) function force_mean(self, work, h, element, c_out, c_in) result(mean)
+      class(balance_state), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: h, element, c_out, c_in
+
+      associate (f => self%problem%fourier)
+         if (work%linear_state(element) == pair_mixed) then
+            mean = mean_block(work%jacobian(:, :, element), f%harmonic(h), &
+                              (c_in - 1)*f%n_coefficients + f%column(h), &
+                              (c_out - 1)*f%n_coefficients + f%column(h))
+         else
+            ! Stuck: each direction transmits what is predicted for it, and nothing else.
+            mean = merge(one, zero, c_in == c_out)
+         end if
+      end associate
+   end function force_mean
+
+   !> The input of an element by its displacement.
+   complex(wp) function input_slope(self, entry, work, h, element, component) result(slope)
+      class(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: h, element, component
+      integer :: n
+
+      associate (p => entry%law%prediction)
+         n = self%problem%fourier%harmonic(h)
+         slope = cmplx(p%stiffness(element, component), kind=wp)
+         if (p%order(component) > 0 .and. .not. (n == 0 .and. work%linear_rests(element))) then
+            slope = slope*cmplx(0.0_wp, self%rate_unit(p)*n, wp)
+         end if
+         if (p%has_inertia) slope = slope*p%impedance_ratio(element, component, n, self%frequency())
+      end associate
+   end function input_slope
+
+   !> Add what an element adds to a wave.
+   subroutine add_mean(self, entry, element, k, mean, stiffness, matrix)
+      class(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      !> Of the first sector.
+      integer, intent(in) :: element
+      integer, intent(in) :: k
+      type(mean_type), intent(in) :: mean
+      complex(wp), intent(in) :: stiffness(:, :)
+      complex(wp), intent(inout) :: matrix(:, :)
+      complex(wp), allocatable :: input(:), output(:)
+      integer :: c_in, c_out, i, j, n, n_sectors, row_of(3)
+
+      n_sectors = self%problem%structure%n_alike
+      row_of = 0
+      where (entry%row(:, element) > 0)
+         row_of(:size(entry%row, 1)) = self%problem%joint%row_in_sector(max(1, &
+                                                                            entry%row(:, element)))
+      end where
+      do c_out = 1, size(entry%row, 1)
+         if (entry%row(c_out, element) == 0) cycle
+         output = conjg(self%problem%joint%wave_weights(n_sectors, k, row_of(c_out)))
+         i = self%problem%structure%slot(self%problem%incidence%coordinate_of( &
+                                         entry%row(c_out, element)))
+         do c_in = 1, size(entry%row, 1)
+            if (entry%row(c_in, element) == 0) cycle
+            input = self%problem%joint%wave_weights(n_sectors, k, row_of(c_in))
+            n = size(input)
+            do j = 1, n
+               matrix(:n, j) = matrix(:n, j) + output*mean%slope(c_out, c_in)*input(j)
+            end do
+            if (.not. entry%law%prediction%takes_balance) cycle
+            j = self%problem%structure%slot(self%problem%incidence%coordinate_of( &
+                                            entry%row(c_in, element)))
+            matrix(i, :) = matrix(i, :) - mean%force(c_out, c_in)*stiffness(j, :)
+         end do
+      end do
+   end subroutine add_mean
+
+   module procedure solve_waves
+      integer :: j
+
+      associate (in => self%scratch%complex_in(:, h), factors => self%preconditioner, &
+                 structure => self%problem%structure)
+         factors%sectors(:, :, h) = zero
+         do j = 1, self%active%n_active
+            factors%sectors(structure%slot(self%active%used(j)), &
+                            structure%sector(self%active%used(j)), h) = in(j)
+         end do
+         call structure%find_waves(factors%sectors(:, :, h), factors%waves(:, :, h))
+         do j = 1, structure%n_alike
+            call factors%wave(j, h)%solve(factors%waves(:, j, h))
+         end do
+         call structure%add_waves(factors%waves(:, :, h), factors%sectors(:, :, h))
+         do j = 1, self%active%n_active
+            in(j) = factors%sectors(structure%slot(self%active%used(j)), &
+                                    structure%sector(self%active%used(j)), h)
+         end do
+      end associate
+   end procedure solve_waves
+
+end submodule fw_balance_waves

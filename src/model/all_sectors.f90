@@ -1,0 +1,758 @@
+!> All sectors of a tuned cyclic structure at once, for contact that differs from sector to sector.
+!> Coordinates are those of one sector, sector after sector (kept modes of all sectors behind): the
+!> structure is the same in all of them, so that Z_n is block circulant, a matrix Z_n,k for each
+!> nodal diameter k = 0 .. N - 1,
+!>
+!>   Z_n q = sum_k z_k**j Z_n,k Q_k,   Q_k = 1/N sum_j z_k**-j q_j,   z_k = exp(-2 pi i k/N),
+!>
+!> condensed as those of a wave are. k and N - k differ in every harmonic above 0, where the
+!> amplitudes of the sectors are complex. The load is a wave.
+module fw_all_sectors
+   use fw_complex_form, only: amplitudes_of
+   use fw_complex_form, only: coefficients_of
+   use fw_cyclic_data, only: cyclic_type
+   use fw_cyclic_data, only: nodal_matrices
+   use fw_cyclic_relative, only: cyclic_relative
+   use fw_error, only: error_type
+   use fw_error, only: fatal_error
+   use fw_error, only: status_input
+   use fw_kinds, only: wp
+   use fw_lapack, only: zgemv
+   use fw_model, only: model_type
+   use fw_ring_fft, only: ring_fft
+   use fw_sector, only: sector_at
+   use fw_sector_means, only: sector_means
+   use fw_sector_reduction, only: sector_reduction
+   use fw_sector_stiffness, only: derive_sector
+   use fw_sector_stiffness, only: form_sector
+   use fw_sector_stiffness, only: harmonic_point
+   use fw_sector_stiffness, only: observed_sector_slope
+   use fw_sector_stiffness, only: recover_sector
+   use fw_sector_stiffness, only: slopes_of
+   use fw_sector_stiffness, only: work_of_sector
+   use fw_structure_operator, only: by_frequency
+   use fw_structure_operator, only: lay_out_coefficients
+   use fw_structure_operator, only: structure_operator
+   use fw_structure_operator, only: structure_state
+   use fw_text, only: to_text
+   use fw_threads, only: coordinates_for_threads
+   implicit none (type, external)
+   private
+
+   public :: all_sectors, new_all_sectors
+
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+
+   type, extends(structure_operator) :: all_sectors
+      type(cyclic_type), private :: cyclic
+      !> Bases of k = 0 .. N/2; those of N - k are their conjugates.
+      type(sector_reduction), allocatable, private :: basis(:)
+      type(sector_means), private :: means
+      !> Over the sectors, of the coordinates and of what is observed.
+      type(ring_fft), private :: ring, observed_ring
+   contains
+      procedure :: new_state
+      procedure :: at
+      procedure :: multiply
+      procedure :: restrict
+      procedure :: multiply_active
+      procedure :: block => block_of_all
+      procedure :: active_block => block_in_use
+      procedure :: diagonal
+      procedure :: derivative
+      procedure :: recover
+      procedure :: static_stiffness
+      procedure :: split
+      procedure :: mass
+      procedure :: parts
+      procedure :: held_modes
+      procedure :: magnitudes
+      procedure :: scale_loads
+      procedure :: observed_slope
+      procedure :: load_work
+      procedure :: wave_block
+      procedure :: find_waves
+      procedure :: add_waves
+   end type all_sectors
+
+   type, extends(structure_state) :: all_sectors_state
+      type(harmonic_point), allocatable, private :: point(:, :)
+      !> Z_n,k (n_slots, n_slots, n_sectors, n_retained) [force/length].
+      complex(wp), allocatable, private :: wave(:, :, :, :)
+      !> Scratch of products: coordinates (n_coordinates, n_retained), and those of the sectors and
+      !> of the waves (n_slots, n_sectors, n_retained).
+      complex(wp), allocatable, private :: amplitude(:, :), in(:, :, :), out(:, :, :)
+   end type all_sectors_state
+
+contains
+
+   subroutine new_all_sectors(model, relative, harmonic, omega_range, means, self, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_relative), intent(in) :: relative
+      !> Harmonics in use.
+      integer, intent(in) :: harmonic(:)
+      !> Lowest and highest frequency that will be asked for [rad/s].
+      real(wp), intent(in) :: omega_range(2)
+      !> Of fw_sector_means.
+      integer, intent(in) :: means
+      type(all_sectors), intent(out) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call lay_out_coefficients(self, harmonic)
+      self%cyclic%n_sectors = model%cyclic%n_sectors
+      self%cyclic%engine_order = model%cyclic%engine_order
+      self%n_alike = self%cyclic%n_sectors
+      self%n_relative = self%n_alike*relative%n_coordinates
+      self%n_observed = self%n_alike*size(model%observe_matrix, 1)
+      call find_bases(model, relative, omega_range, self, error)
+      if (allocated(error)) return
+      call self%means%take(model, relative, means, error)
+      if (allocated(error)) return
+      call self%ring%plan(self%n_slots, self%n_alike)
+      call self%observed_ring%plan(size(model%observe_matrix, 1), self%n_alike)
+   end subroutine new_all_sectors
+
+   !> A basis for each nodal diameter, with coordinates at places that all share.
+   subroutine find_bases(model, relative, omega_range, self, error)
+      type(model_type), intent(in) :: model
+      type(cyclic_relative), intent(in) :: relative
+      real(wp), intent(in) :: omega_range(2)
+      type(all_sectors), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(nodal_matrices), allocatable :: nodal(:)
+      integer :: i, k, n, n_kept
+
+      n = self%n_alike/2
+      allocate (self%basis(n + 1), nodal(n + 1))
+      n_kept = 0
+      do k = 0, n
+         call require_diameter(model, k, error)
+         if (.not. allocated(error)) call sector_at(model, k, nodal(k + 1), error)
+         if (.not. allocated(error)) then
+            call self%basis(k + 1)%find_modes(k, nodal(k + 1), relative%at(k + 1), error)
+         end if
+         if (.not. allocated(error) .and. k == 0) then
+            if (self%basis(1)%pushes_free_mode(nodal(1))) call fatal_error(error, &
+               '&load static pushes a part of the sectors that neither stiffness nor contact '// &
+               'holds; hold it or remove the load', status_input)
+         end if
+         if (allocated(error)) return
+         call self%basis(k + 1)%keep_resonances(self%harmonic, omega_range, &
+                                                nodal(k + 1)%has_whirl())
+         n_kept = max(n_kept, size(self%basis(k + 1)%kept))
+      end do
+      call number_coordinates(relative%n_coordinates, n_kept, self)
+      do k = 0, n
+         call self%basis(k + 1)%transform( &
+            nodal(k + 1), [relative%slots(k), (relative%n_coordinates + i, &
+                                               i=1, size(self%basis(k + 1)%kept))], self%n_slots)
+      end do
+   end subroutine find_bases
+
+   !> Refuse what the model does not hold of a nodal diameter: all of them take part.
+   subroutine require_diameter(model, k, error)
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: k
+      type(error_type), allocatable, intent(out) :: error
+      complex(wp), allocatable :: forward(:, :), backward(:, :)
+
+      if (.not. model%cyclic%holds(k)) then
+         call fatal_error(error, '&cyclic mistuned = .true.: every nodal diameter takes part, '// &
+                          'and the model holds no matrices of '//to_text(k)//': must have '// &
+                          '/nodal_diameter/'//to_text(k), status_input)
+         return
+      end if
+      if (.not. allocated(model%cyclic%air)) return
+      call model%cyclic%air_stiffness(k, forward)
+      call model%cyclic%air_stiffness(-k, backward)
+      if (allocated(forward) .and. allocated(backward)) return
+      call fatal_error(error, '&cyclic mistuned = .true.: every nodal diameter takes part, and '// &
+                       'the model holds no forces of the air of '// &
+                       to_text(merge(-k, k, allocated(forward)))//': must have '// &
+                       '/aero/nodal_diameter of all', status_input)
+   end subroutine require_diameter
+
+   !> Relative coordinates of all sectors stand before all kept modes.
+   subroutine number_coordinates(n_relative, n_kept, self)
+      integer, intent(in) :: n_relative, n_kept
+      type(all_sectors), intent(inout) :: self
+      !> More than a choice of modes that is told from another needs.
+      integer, parameter :: many = 997
+      integer :: c, j, k, label
+
+      self%n_slots = n_relative + n_kept
+      self%n_coordinates = self%n_alike*self%n_slots
+      allocate (self%coordinate(self%n_slots, self%n_alike))
+      allocate (self%slot(self%n_coordinates), self%sector(self%n_coordinates))
+      do j = 1, self%n_alike
+         self%coordinate(:n_relative, j) = [((j - 1)*n_relative + c, c=1, n_relative)]
+         self%coordinate(n_relative + 1:, j) = [(self%n_relative + (j - 1)*n_kept + c, c=1, n_kept)]
+         self%slot(self%coordinate(:, j)) = [(c, c=1, self%n_slots)]
+         self%sector(self%coordinate(:, j)) = j
+      end do
+      ! A place stands for other modes where other modes are kept.
+      label = 0
+      do k = 1, size(self%basis)
+         do c = 1, size(self%basis(k)%kept)
+            label = modulo(31*label + k*self%basis(k)%kept(c) + c, many)
+         end do
+      end do
+      self%kept = [(label*self%n_alike*n_kept + c, c=1, self%n_alike*n_kept)]
+   end subroutine number_coordinates
+
+   subroutine new_state(self, state)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), allocatable, intent(out) :: state
+      type(all_sectors_state), allocatable :: all
+      integer :: h, k, m, n, nh
+
+      m = self%n_slots
+      n = self%n_alike
+      nh = size(self%harmonic)
+      allocate (all)
+      allocate (all%point(n, nh))
+      do h = 1, nh
+         all%point(:, h)%harmonic = self%harmonic(h)
+         all%point(:, h)%conjugated = [(2*k > n, k=0, n - 1)]
+         all%point(:, h)%is_loaded = [(modulo(self%cyclic%nodal_diameter(self%harmonic(h)) - k, n) &
+                                       == 0, k=0, n - 1)]
+      end do
+      allocate (all%wave(m, m, n, nh), all%in(m, n, nh), all%out(m, n, nh), source=zero)
+      allocate (all%amplitude(self%n_coordinates, nh), source=zero)
+      call all%reserve_loads(self%n_coordinates, nh)
+      allocate (all%used(self%n_coordinates), source=0)
+      call move_alloc(all, state)
+   end subroutine new_state
+
+   subroutine at(self, state, omega, self_excitation, error)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: omega, self_excitation
+      type(error_type), allocatable, intent(out) :: error
+      integer :: h, n_failed
+
+      if (abs(omega - state%omega) <= 0.0_wp .and. &
+          abs(self_excitation - state%self_excitation) <= 0.0_wp) return
+      n_failed = 0
+      ! Nowhere until it has come there, as a wave.
+      state%omega = -1.0_wp
+      select type (state)
+      type is (all_sectors_state)
+         do h = 1, size(self%harmonic)
+            state%point(:, h)%s = self%harmonic(h)*omega
+            state%point(:, h)%theta = cmplx((self%harmonic(h)*omega)**2, &
+                                            self%harmonic(h)*omega*self_excitation, wp)
+         end do
+         if (self%n_coordinates > 0) call form_all(self, state, n_failed)
+         call state%scale_loads()
+      end select
+      if (n_failed > 0) then
+         call fatal_error(error, 'the structure resonates without damping at omega = '// &
+                          to_text(omega)//' rad/s in a mode that no contact pair touches; '// &
+                          'give it damping or shift the frequency', status_input)
+         return
+      end if
+      state%omega = omega
+      state%self_excitation = self_excitation
+   end subroutine at
+
+   subroutine form_all(self, state, n_failed)
+      class(all_sectors), intent(in) :: self
+      type(all_sectors_state), intent(inout) :: state
+      integer, intent(inout) :: n_failed
+      complex(wp), allocatable :: load(:), loads(:, :)
+      integer :: h, k, task
+      logical :: failed
+
+      allocate (load(self%n_slots), loads(self%n_slots, size(self%harmonic)))
+      !$omp parallel do default(none) shared(self, state, loads) private(h, k, task, failed) &
+      !$omp firstprivate(load) reduction(+:n_failed) schedule(dynamic) &
+      !$omp if(self%n_coordinates >= coordinates_for_threads)
+      do task = 0, size(self%harmonic)*self%n_alike - 1
+         h = task/self%n_alike + 1
+         k = modulo(task, self%n_alike)
+         if (is_mirrored(self, k, state%point(k + 1, h))) cycle
+         call form_sector(self%basis(basis_of(self, k)), state%point(k + 1, h), &
+                          state%wave(:, :, k + 1, h), load, failed)
+         if (failed) n_failed = n_failed + 1
+         if (state%point(k + 1, h)%is_loaded) loads(:, h) = load
+      end do
+      !$omp end parallel do
+      do h = 1, size(self%harmonic)
+         do k = 0, self%n_alike - 1
+            ! K, M and C of N - k are the conjugates of Hermitian matrices, their transposes.
+            if (is_mirrored(self, k, state%point(k + 1, h))) state%wave(:, :, k + 1, h) = &
+               transpose(state%wave(:, :, self%n_alike - k + 1, h))
+         end do
+         ! The load is delayed from sector to sector.
+         k = self%cyclic%nodal_diameter(self%harmonic(h))
+         do task = 1, self%n_alike
+            state%unit_load(self%coordinate(:, task), h) = self%cyclic%factor(k, task - 1)*loads(:, h)
+         end do
+      end do
+   end subroutine form_all
+
+   !> Whether the matrix is the transpose of the one of the wave the other way.
+   pure logical function is_mirrored(self, k, point)
+      class(all_sectors), intent(in) :: self
+      integer, intent(in) :: k
+      type(harmonic_point), intent(in) :: point
+
+      is_mirrored = 2*k > self%n_alike .and. .not. point%is_loaded .and. &
+                    .not. self%basis(basis_of(self, k))%has_whirl()
+   end function is_mirrored
+
+   !> The basis of nodal diameter k = 0 .. N - 1.
+   pure integer function basis_of(self, k) result(basis)
+      class(all_sectors), intent(in) :: self
+      integer, intent(in) :: k
+
+      basis = min(k, self%n_alike - k) + 1
+   end function basis_of
+
+   !> Waves of the coordinates of one harmonic, of amplitudes in `in` to those in `out`.
+   subroutine multiply_waves(self, state)
+      class(all_sectors), intent(in) :: self
+      type(all_sectors_state), intent(inout) :: state
+      integer :: h, k, m
+
+      m = self%n_slots
+      !$omp parallel do default(none) shared(self, state, m) private(h, k) &
+      !$omp if(self%n_coordinates >= coordinates_for_threads)
+      do h = 1, size(self%harmonic)
+         call self%ring%find_waves(state%in(:, :, h), state%out(:, :, h))
+         do k = 1, self%n_alike
+            call zgemv('N', m, m, one, state%wave(1, 1, k, h), m, state%out(1, k, h), 1, zero, &
+                       state%in(1, k, h), 1)
+         end do
+         call self%ring%add_waves(state%in(:, :, h), state%out(:, :, h))
+      end do
+      !$omp end parallel do
+   end subroutine multiply_waves
+
+   subroutine find_waves(self, sectors, waves)
+      class(all_sectors), intent(in) :: self
+      complex(wp), intent(inout), contiguous :: sectors(:, :), waves(:, :)
+
+      call self%ring%find_waves(sectors, waves)
+   end subroutine find_waves
+
+   subroutine add_waves(self, waves, sectors)
+      class(all_sectors), intent(in) :: self
+      complex(wp), intent(inout), contiguous :: waves(:, :), sectors(:, :)
+
+      call self%ring%add_waves(waves, sectors)
+   end subroutine add_waves
+
+   !> Waves of a harmonic from its amplitudes (n_coordinates).
+   subroutine waves_of(self, amplitude, waves)
+      class(all_sectors), intent(in) :: self
+      complex(wp), intent(in) :: amplitude(:)
+      complex(wp), intent(inout), contiguous :: waves(:, :)
+      complex(wp), allocatable :: sectors(:, :)
+      integer :: j
+
+      allocate (sectors(self%n_slots, self%n_alike))
+      do j = 1, self%n_alike
+         sectors(:, j) = amplitude(self%coordinate(:, j))
+      end do
+      call self%ring%find_waves(sectors, waves)
+   end subroutine waves_of
+
+   subroutine multiply(self, state, q, product)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: product(*)
+      integer :: j, m
+
+      m = self%n_coordinates
+      select type (state)
+      type is (all_sectors_state)
+         call amplitudes_of(self%harmonic, self%column, m, q, m, state%amplitude)
+         do j = 1, self%n_alike
+            state%in(:, j, :) = state%amplitude(self%coordinate(:, j), :)
+         end do
+         call multiply_waves(self, state)
+         do j = 1, self%n_alike
+            state%amplitude(self%coordinate(:, j), :) = state%out(:, j, :)
+         end do
+         call coefficients_of(self%harmonic, self%column, m, m, state%amplitude, product)
+      end select
+   end subroutine multiply
+
+   subroutine restrict(self, state, n_active, n_used, used)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      integer, intent(in) :: n_active, n_used
+      integer, intent(in) :: used(:)
+
+      associate (unused => self)
+      end associate
+      state%n_active = n_active
+      state%n_used = n_used
+      state%used(:n_used) = used(:n_used)
+   end subroutine restrict
+
+   !> Of all coordinates: the product does not become less with fewer of them.
+   subroutine multiply_active(self, state, v, product)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: v(*)
+      real(wp), intent(inout) :: product(*)
+      integer :: j, m
+
+      m = self%n_coordinates
+      select type (state)
+      type is (all_sectors_state)
+         call amplitudes_of(self%harmonic, self%column, state%n_active, v, m, state%amplitude)
+         state%in = zero
+         do j = 1, state%n_active
+            state%in(self%slot(state%used(j)), self%sector(state%used(j)), :) = &
+               state%amplitude(j, :)
+         end do
+         call multiply_waves(self, state)
+         do j = 1, state%n_used
+            state%amplitude(j, :) = state%out(self%slot(state%used(j)), &
+                                              self%sector(state%used(j)), :)
+         end do
+         call coefficients_of(self%harmonic, self%column, state%n_used, m, state%amplitude, product)
+      end select
+   end subroutine multiply_active
+
+   !> What matrices of the nodal diameters k = 0 .. N - 1 are between sectors: the motion of one to
+   !> the force on the one so many further, from 0 (n_slots, n_slots, n_sectors).
+   pure subroutine between_sectors(self, wave, between)
+      class(all_sectors), intent(in) :: self
+      complex(wp), intent(in) :: wave(:, :, :)
+      complex(wp), intent(out) :: between(:, :, :)
+      integer :: j, k
+
+      between = zero
+      do j = 0, self%n_alike - 1
+         do k = 0, self%n_alike - 1
+            between(:, :, j + 1) = between(:, :, j + 1) + &
+                                   self%cyclic%factor(k, j)/self%n_alike*wave(:, :, k + 1)
+         end do
+      end do
+   end subroutine between_sectors
+
+   subroutine wave_block(self, state, h, k, matrix)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h, k
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+
+      associate (unused => self)
+      end associate
+      select type (state)
+      type is (all_sectors_state)
+         matrix = state%wave(:, :, k + 1, h)
+      end select
+   end subroutine wave_block
+
+   subroutine block_of_all(self, state, h, matrix)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+      integer :: j
+
+      select type (state)
+      type is (all_sectors_state)
+         call fill_block(self, state%wave(:, :, :, h), [(j, j=1, self%n_coordinates)], &
+                         self%n_coordinates, matrix)
+      end select
+   end subroutine block_of_all
+
+   subroutine block_in_use(self, state, h, matrix)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(out), contiguous :: matrix(:, :)
+
+      select type (state)
+      type is (all_sectors_state)
+         call fill_block(self, state%wave(:, :, :, h), state%used(:state%n_used), &
+                         state%n_active, matrix)
+      end select
+   end subroutine block_in_use
+
+   !> A block circulant matrix: rows `used`, the first n_active of them as columns.
+   pure subroutine fill_block(self, wave, used, n_active, matrix)
+      class(all_sectors), intent(in) :: self
+      complex(wp), intent(in) :: wave(:, :, :)
+      integer, intent(in) :: used(:)
+      integer, intent(in) :: n_active
+      complex(wp), intent(inout) :: matrix(:, :)
+      complex(wp), allocatable :: between(:, :, :)
+      integer :: i, j
+
+      allocate (between(self%n_slots, self%n_slots, self%n_alike))
+      call between_sectors(self, wave, between)
+      do j = 1, n_active
+         do i = 1, size(used)
+            matrix(i, j) = between(self%slot(used(i)), self%slot(used(j)), &
+                                   modulo(self%sector(used(i)) - self%sector(used(j)), &
+                                          self%n_alike) + 1)
+         end do
+      end do
+   end subroutine fill_block
+
+   complex(wp) function diagonal(self, state, h, coordinate)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h, coordinate
+
+      diagonal = zero
+      select type (state)
+      type is (all_sectors_state)
+         diagonal = sum(state%wave(self%slot(coordinate), self%slot(coordinate), :, h))/self%n_alike
+      end select
+   end function diagonal
+
+   subroutine derivative(self, state, parameter, q, slope)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      integer, intent(in) :: parameter
+      real(wp), intent(in) :: q(*)
+      real(wp), intent(inout) :: slope(*)
+      complex(wp), allocatable :: amplitude(:, :), waves(:, :), slopes(:, :)
+      integer :: h, k, m
+
+      m = self%n_coordinates
+      allocate (amplitude(m, size(self%harmonic)))
+      allocate (waves(self%n_slots, self%n_alike), slopes(self%n_slots, self%n_alike))
+      call amplitudes_of(self%harmonic, self%column, m, q, m, amplitude)
+      select type (state)
+      type is (all_sectors_state)
+         do h = 1, size(self%harmonic)
+            call waves_of(self, amplitude(:, h), waves)
+            do k = 0, self%n_alike - 1
+               associate (point => state%point(k + 1, h))
+                  call derive_sector(self%basis(basis_of(self, k)), point, &
+                                     slopes_of(point, state%self_excitation, parameter), &
+                                     state%load_factor(h), waves(:, k + 1), slopes(:, k + 1))
+               end associate
+            end do
+            call self%ring%add_waves(slopes, waves)
+            do k = 1, self%n_alike
+               amplitude(self%coordinate(:, k), h) = waves(:, k)
+            end do
+         end do
+      end select
+      call coefficients_of(self%harmonic, self%column, m, m, amplitude, slope)
+   end subroutine derivative
+
+   !> Observed quantities of a sector, sector after sector.
+   subroutine recover(self, state, q, observed)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      complex(wp), intent(in), contiguous :: q(:, :)
+      complex(wp), intent(out), contiguous :: observed(:, :)
+      complex(wp), allocatable :: waves(:, :), found(:, :), sectors(:, :)
+      integer :: h, k, n
+
+      n = self%n_observed/self%n_alike
+      allocate (waves(self%n_slots, self%n_alike))
+      allocate (found(n, self%n_alike), sectors(n, self%n_alike))
+      select type (state)
+      type is (all_sectors_state)
+         do h = 1, size(self%harmonic)
+            call waves_of(self, q(:, h), waves)
+            do k = 0, self%n_alike - 1
+               call recover_sector(self%basis(basis_of(self, k)), state%point(k + 1, h), &
+                                   state%load_factor(h), waves(:, k + 1), found(:, k + 1))
+            end do
+            call self%observed_ring%add_waves(found, sectors)
+            observed(:, h) = reshape(sectors, [self%n_observed])
+         end do
+      end select
+   end subroutine recover
+
+   pure real(wp) function static_stiffness(self, coordinate)
+      class(all_sectors), intent(in) :: self
+      integer, intent(in) :: coordinate
+
+      static_stiffness = self%means%static_stiffness(self%slot(coordinate))
+   end function static_stiffness
+
+   pure subroutine split(self, coordinate, limit, m, c, k)
+      class(all_sectors), intent(in) :: self
+      integer, intent(in) :: coordinate
+      real(wp), intent(in) :: limit
+      real(wp), intent(out) :: m, c, k
+
+      call self%means%split(self%slot(coordinate), limit, m, c, k)
+   end subroutine split
+
+   !> What flows in pseudo-time would take, which cyclic structures do not have.
+   pure subroutine mass(self, matrix)
+      class(all_sectors), intent(in) :: self
+      real(wp), intent(out) :: matrix(:, :)
+      integer :: j, k
+
+      matrix = 0.0_wp
+      do k = 0, self%n_alike - 1
+         do j = 1, self%n_alike
+            matrix(self%coordinate(:, j), self%coordinate(:, j)) = &
+               matrix(self%coordinate(:, j), self%coordinate(:, j)) + &
+               real(self%basis(basis_of(self, k))%blocks(:self%n_slots, :, 2), wp)/self%n_alike
+         end do
+      end do
+   end subroutine mass
+
+   !> Coriolis with the damping, the air with the stiffness, as of a wave.
+   pure subroutine parts(self, h, stiffness, mass, damping, observe)
+      class(all_sectors), intent(in) :: self
+      integer, intent(in) :: h
+      complex(wp), intent(out) :: stiffness(:, :), mass(:, :), damping(:, :), observe(:, :)
+      complex(wp), allocatable :: wave(:, :, :, :), rows(:, :, :), between(:, :, :)
+      integer :: every(self%n_coordinates), j, k, m, n, n_rows
+
+      m = self%n_slots
+      n = self%n_alike
+      n_rows = self%n_observed/n
+      allocate (wave(m, m, n, 3), rows(n_rows, m, n), between(n_rows, m, n), source=zero)
+      do k = 0, n - 1
+         associate (b => self%basis(basis_of(self, k)))
+            wave(:, :, k + 1, :b%n_blocks) = b%blocks(:m, :, :)
+            if (allocated(b%coriolis)) wave(:, :, k + 1, 3) = wave(:, :, k + 1, 3) + &
+                                                              b%coriolis(:m, :m)
+            rows(:, :, k + 1) = b%observe_q
+            if (2*k > n) then
+               wave(:, :, k + 1, :) = conjg(wave(:, :, k + 1, :))
+               rows(:, :, k + 1) = conjg(rows(:, :, k + 1))
+            end if
+            if (allocated(b%aero) .and. self%harmonic(h) > 0) then
+               wave(:, :, k + 1, 1) = wave(:, :, k + 1, 1) + &
+                                      b%aero(:m, :m, merge(2, 1, 2*k > n))
+            end if
+         end associate
+      end do
+      every = [(j, j=1, self%n_coordinates)]
+      call fill_block(self, wave(:, :, :, 1), every, self%n_coordinates, stiffness)
+      call fill_block(self, wave(:, :, :, 2), every, self%n_coordinates, mass)
+      call fill_block(self, wave(:, :, :, 3), every, self%n_coordinates, damping)
+      call between_sectors(self, rows, between)
+      do j = 1, self%n_coordinates
+         do k = 1, n
+            observe((k - 1)*n_rows + 1:k*n_rows, j) = between(:, self%slot(j), &
+                                                              modulo(k - self%sector(j), n) + 1)
+         end do
+      end do
+   end subroutine parts
+
+   !> In the nodal diameter of the first harmonic.
+   pure subroutine held_modes(self, frequency, half_width)
+      class(all_sectors), intent(in) :: self
+      real(wp), allocatable, intent(out) :: frequency(:), half_width(:)
+      logical, allocatable :: vibrates(:)
+
+      associate (b => self%basis(abs(self%cyclic%nodal_diameter(1)) + 1))
+         vibrates = b%k_i > 0.0_wp .and. b%m_i > 0.0_wp
+         frequency = sqrt(pack(b%k_i, vibrates)/pack(b%m_i, vibrates))
+         half_width = 0.5_wp*pack(b%c_i, vibrates)/pack(b%m_i, vibrates)
+      end associate
+   end subroutine held_modes
+
+   !> Of the wave with the largest entries: the sectors are not told apart.
+   pure subroutine magnitudes(self, state, h, amplitude, sums)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      real(wp), intent(in) :: amplitude(:)
+      real(wp), intent(out) :: sums(:)
+      real(wp) :: largest(self%n_slots, self%n_slots), theta
+      integer :: j, k, m
+
+      m = self%n_slots
+      theta = self%harmonic(h)*abs(cmplx(self%harmonic(h)*state%omega**2, &
+                                         state%omega*state%self_excitation, wp))
+      largest = 0.0_wp
+      do k = 1, size(self%basis)
+         associate (b => self%basis(k)%blocks)
+            largest = max(largest, abs(b(:m, :, 1)) + theta*abs(b(:m, :, 2)))
+         end associate
+      end do
+      do j = 1, self%n_alike
+         sums(self%coordinate(:, j)) = matmul(largest, amplitude(self%coordinate(:, j)))
+      end do
+   end subroutine magnitudes
+
+   pure subroutine scale_loads(self, static, vibration)
+      class(all_sectors), intent(inout) :: self
+      real(wp), intent(in) :: static, vibration
+      integer :: k
+
+      do k = 1, size(self%basis)
+         associate (b => self%basis(k))
+            b%load_q(:, 1) = static*b%load_q(:, 1)
+            b%load_i(:, 1) = static*b%load_i(:, 1)
+            b%load_q(:, 2:) = vibration*b%load_q(:, 2:)
+            b%load_i(:, 2:) = vibration*b%load_i(:, 2:)
+         end associate
+      end do
+   end subroutine scale_loads
+
+   subroutine observed_slope(self, state, q, slope)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      complex(wp), intent(in) :: q(:, :)
+      complex(wp), intent(out) :: slope(:, :)
+      complex(wp), allocatable :: waves(:, :), found(:, :), sectors(:, :)
+      integer :: h, k, n
+
+      n = self%n_observed/self%n_alike
+      allocate (waves(self%n_slots, self%n_alike))
+      allocate (found(n, self%n_alike), sectors(n, self%n_alike))
+      slope = zero
+      select type (state)
+      type is (all_sectors_state)
+         do h = 1, size(self%harmonic)
+            if (self%harmonic(h) == 0) cycle
+            call waves_of(self, q(:, h), waves)
+            do k = 0, self%n_alike - 1
+               associate (point => state%point(k + 1, h))
+                  call observed_sector_slope(self%basis(basis_of(self, k)), point, &
+                                             slopes_of(point, 0.0_wp, by_frequency), &
+                                             waves(:, k + 1), found(:, k + 1))
+               end associate
+            end do
+            call self%observed_ring%add_waves(found, sectors)
+            slope(:, h) = reshape(sectors, [self%n_observed])
+         end do
+      end select
+   end subroutine observed_slope
+
+   !> Of all sectors: the load is one wave, on which only that wave of the motion works.
+   subroutine load_work(self, state, h, q, work, slope, row)
+      class(all_sectors), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(in) :: h
+      complex(wp), intent(in) :: q(:)
+      complex(wp), intent(out) :: work, slope
+      complex(wp), intent(out) :: row(:)
+      complex(wp), allocatable :: waves(:, :)
+      complex(wp) :: own(self%n_slots)
+      integer :: j, k
+
+      allocate (waves(self%n_slots, self%n_alike))
+      call waves_of(self, q, waves)
+      k = modulo(self%cyclic%nodal_diameter(self%harmonic(h)), self%n_alike)
+      select type (state)
+      type is (all_sectors_state)
+         associate (point => state%point(k + 1, h))
+            call work_of_sector(self%basis(basis_of(self, k)), point, &
+                                slopes_of(point, 0.0_wp, by_frequency), waves(:, k + 1), work, &
+                                slope, own)
+         end associate
+      end select
+      work = self%n_alike*work
+      slope = self%n_alike*slope
+      do j = 1, self%n_alike
+         row(self%coordinate(:, j)) = conjg(self%cyclic%factor(k, j - 1))*own
+      end do
+   end subroutine load_work
+
+end module fw_all_sectors
