@@ -369,7 +369,7 @@ contains
       integer :: k, na
 
       na = self%active%n_active
-      if (self%preconditioner%may_split .and. self%asked >= near_enough) then
+      if (self%nearly .and. self%asked >= near_enough) then
          call self%problem%structure%multiply_nearly(self%structure_state, vector, &
                                                      self%scratch%active_out)
       else

@@ -31,8 +31,7 @@ contains
    module procedure build_preconditioner
       integer :: h
 
-      self%preconditioner%is_split = self%preconditioner%may_split .and. &
-                                     .not. allocated(self%shift)
+      self%preconditioner%is_split = self%nearly .and. .not. allocated(self%shift)
       if (by_waves(self)) then
          call build_waves(self)
       else if (self%preconditioner%is_split) then

@@ -255,8 +255,7 @@ contains
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       call self%active%reserve(m)
       call self%preconditioner%reserve(m, problem%fourier%n_retained)
-      self%preconditioner%may_split = problem%structure%split_rank() > 0 .and. &
-                                      all_are_static(problem)
+      self%nearly = problem%structure%split_rank() > 0 .and. all_are_static(problem)
       if (problem%structure%n_alike > 1) call self%preconditioner%reserve_waves( &
          problem%structure%n_slots, problem%structure%n_alike, problem%fourier%n_retained)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)

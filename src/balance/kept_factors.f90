@@ -11,10 +11,8 @@ module fw_kept_factors
 
    type :: kept_factors
       type(preconditioner_lu_type), allocatable :: harmonic(:)
-      !> In place of them: two matrices for all harmonics. Whether the problem has that form, and
-      !> whether the factors in use are these.
+      !> In place of them: two matrices for all harmonics; whether the factors in use are these.
       type(split_factors) :: split
-      logical :: may_split = .false.
       logical :: is_split = .false.
       !> Whether these are used although there are those of waves.
       logical :: is_whole = .false.

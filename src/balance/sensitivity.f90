@@ -88,7 +88,7 @@ contains
          self%linear%kind = merge(linear_lu, linear_krylov, state%n <= self%lu_up_to)
          self%linear%keeps = .false.
          ! The transposed problem takes the factors of the harmonics.
-         state%preconditioner%may_split = .false.
+         state%nearly = .false.
          call self%linear%prepare(state, done)
          if (.not. done) return
          call self%slopes%prepare(state, x)

@@ -22,6 +22,9 @@ module fw_krylov
       !> Relative residual that the solution at work is asked for; 0 outside of solutions, where
       !> products are exact. An operator that has a cheaper product of such a precision may take it.
       real(wp) :: asked = 0.0_wp
+      !> Whether it has cheaper products or a preconditioner that rest on such an approximation; who
+      !> solves takes that back where a solution fails with them.
+      logical :: nearly = .false.
    contains
       procedure :: is_interrupted
       procedure(apply_operator), deferred :: apply

@@ -169,6 +169,13 @@ contains
             self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
          end if
       end if
+      if (system%nearly .and. .not. done .and. .not. system%is_interrupted()) then
+         ! Once more with what is exact, and from now on.
+         system%nearly = .false.
+         call build(self, system)
+         call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
+         self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+      end if
       self%fresh_rate = real(self%gmres%iterations, wp)/decades
       self%worth_keeping = done
    end subroutine iterate
