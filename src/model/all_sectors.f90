@@ -287,7 +287,8 @@ contains
          ! The load is delayed from sector to sector.
          k = self%cyclic%nodal_diameter(self%harmonic(h))
          do task = 1, self%n_alike
-            state%unit_load(self%coordinate(:, task), h) = self%cyclic%factor(k, task - 1)*loads(:, h)
+            state%unit_load(self%coordinate(:, task), h) = &
+               self%cyclic%factor(k, task - 1)*loads(:, h)
          end do
       end do
    end subroutine form_all

@@ -67,7 +67,7 @@ def table(found):
     lines = ["", "| law, contact differs by | points | equal | largest difference | different "
              "| all sectors only | annulus only | neither |", "|---|---|---|---|---|---|---|---|"]
     for law, points in [*sorted(found.items()),
-                        ("all", [point for points in found.values() for point in points])]:
+                        ("all", [point for group in found.values() for point in group])]:
         count = Counter(point["what"] for point in points)
         equal = max((p["difference"] for p in points if p["what"] == "equal"), default=0.0)
         lines.append(f"| {law} | {len(points)} | {count['equal']} | {equal:.1e} | "
