@@ -12,7 +12,7 @@ import pytest
 import fretwear as fw
 
 #: Public attributes that every result has, a file without anything in it too.
-ALWAYS = {"name", "path", "attributes", "remarks", "bifurcations"}
+ALWAYS = {"is_mistuned", "parameter_name", "name", "path", "attributes", "remarks", "bifurcations"}
 PUBLIC = {name: value for kind in fw.Result.__mro__[:-1] for name, value in vars(kind).items()
           if not name.startswith("_")}
 PROPERTIES = sorted(name for name, value in PUBLIC.items() if isinstance(value, property))
