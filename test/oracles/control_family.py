@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import h5py
 import numpy as np
+import slow_balance
 from cases import merged, run
 from sections import write_section
 from sensitivity_family import random_case
@@ -28,6 +29,8 @@ from slow_balance import automatic_penalty, equilibrium, law_defect, pair_rows
 TOLERANCE = 1e-9
 #: Instants that both follow, where the law is one of instants.
 INSTANTS = 256
+#: Turns of the march of that code: slip that turns in two directions settles slowly.
+slow_balance.TURNS = 80
 
 
 def controlled_case(seed):
