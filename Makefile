@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint keys docs clean
-.PHONY: fuzz wheel ways sensitivities resonances calibration stops controls
+.PHONY: fuzz wheel ways sensitivities resonances modes calibration stops controls
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -163,6 +163,10 @@ resonances: build ## resonances of 60 random cases over a parameter against swee
 
 controls: build ## 200 random responses of given amplitude against equations of another code
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/control_family.py -o docs/robustness.md
+
+modes: build ## 200 random nonlinear modes against whole structures, in docs/robustness.md
+	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/modes/mode_family.py \
+	   -o docs/robustness.md
 
 scars: build ## steady states of wear against a march of cycles, also of a program BEFORE
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/fretting/steady_states.py \

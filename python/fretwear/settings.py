@@ -35,7 +35,7 @@ class Sensitivity(TypedDict, total=False):
     """Group &sensitivity: derivatives of the response by parameters of the case."""
 
     #: what the response is differentiated by: 'contact%mu', 'load%harmonic_scale', ...; only:
-    #: analysis = 'frf', 'point', 'resonance' (default: none: no derivatives)
+    #: analysis = 'frf', 'point', 'resonance', 'mode' (default: none: no derivatives)
     parameters: str | int | Sequence[str | int]
     #: what is differentiated: first_harmonic, largest, dissipation, wear_volume; only: parameters
     #: (default: all that the case has)

@@ -28,7 +28,7 @@ module fw_sensitivity
    implicit none (type, external)
    private
 
-   public :: sensitivity_finder, by_counts, by_direct, by_adjoint
+   public :: sensitivity_finder, by_counts, by_direct, by_adjoint, change_of
 
    !> How derivatives are found: by whichever way takes fewer solutions, or by one of the two.
    integer, parameter :: by_counts = 0, by_direct = 1, by_adjoint = 2

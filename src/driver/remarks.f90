@@ -11,6 +11,7 @@ module fw_remarks
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dpotrf
+   use fw_harmonics_options, only: method_hbm
    use fw_harmonics_options, only: sampling_uniform
    use fw_laws, only: facts_of
    use fw_laws, only: law_under_accuracy
@@ -127,7 +128,7 @@ contains
          word = "'"//trim(law_words(contact%law))//"'"
          if (contact%law_is_chosen) then
             call remarks%add('law chosen', 'nothing was said of contact%law: rigid friction '// &
-               'is taken, by '//word//trim(why_not_rigid(contact%law)))
+               'is taken, by '//word//trim(why_not_rigid(case)))
             return
          end if
          if (.not. case%harmonics%accuracy > 0.0_wp) return
@@ -139,13 +140,23 @@ contains
    end subroutine remark_law
 
    !> Why the law that was chosen is not the one of high order.
-   pure function why_not_rigid(law) result(words)
-      integer, intent(in) :: law
+   pure function why_not_rigid(case) result(words)
+      type(case_type), intent(in) :: case
       character(140) :: words
 
       words = ''
-      if (law /= usual_law(.true.)) words = ", as 'rigid' goes with one tangential "// &
-         'direction, located events and positive damping: not of high order on masses'
+      associate (c => case%contact, h => case%harmonics)
+         if (c%law == usual_law(.true.)) return
+         if (any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1))) then
+            words = "slip in two directions has no law of high order"
+         else if (h%method /= method_hbm .or. h%sampling == sampling_uniform .or. h%n_time > 0 &
+                  .or. h%adaptive .or. case%output%histories) then
+            words = "instants are asked for, and 'rigid' follows events"
+         else
+            words = "'rigid' needs positive damping of every dof"
+         end if
+      end associate
+      words = ', as '//trim(words)//': not of high order on masses'
    end function why_not_rigid
 
    !> Where a law that follows the motion above the harmonics cannot.

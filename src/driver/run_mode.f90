@@ -1,8 +1,6 @@
 !> Analysis 'mode': a nonlinear mode over its amplitude, its limit cycles, and responses near its
 !> resonance that are put together from it.
 module fw_run_mode
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of
@@ -12,12 +10,15 @@ module fw_run_mode
    use fw_error, only: error_type
    use fw_error, only: status_stopped
    use fw_kinds, only: wp
+   use fw_mode_branching, only: branch_watch
+   use fw_mode_cycles, only: cycle_finder
    use fw_mode_group, only: mode_row
    use fw_mode_group, only: mode_table
    use fw_mode_options, only: control_observed
    use fw_mode_path, only: mode_path
    use fw_mode_remarks, only: remark_internal
    use fw_mode_start, only: mode_start
+   use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
    use fw_point, only: point_type
@@ -26,6 +27,7 @@ module fw_run_mode
    use fw_recovery, only: recover_point
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
+   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_sinks, only: observer_sink
    use fw_sinks, only: sink_list
    use fw_sinks, only: summary_sink
@@ -48,21 +50,15 @@ module fw_run_mode
       type(sink_list) :: sinks
       type(observer_sink) :: to_observer
       integer(int64) :: clock = 0
-      !> Ends of intervals of ln A in which the self-excitation vanishes, with their unknowns
-      !> (n, 2) one after the other.
-      real(wp), allocatable :: bracket(:, :), bracket_y(:, :)
-      !> ln A of the last row, and of the last with damping, with its unknowns.
-      real(wp) :: end_p = 0.0_wp, last_p = 0.0_wp
-      real(wp), allocatable :: last_y(:)
+      type(cycle_finder) :: cycles
+      type(sensitivity_solver) :: sensitivity
+      type(branch_watch) :: watch
+      !> ln A of the last row.
+      real(wp) :: end_p = 0.0_wp
    end type mode_curve
 
    !> Below this part of the stuck frequency nothing holds the motion any more.
    real(wp), parameter :: lost_frequency = 1.0e-3_wp
-   !> The self-excitation of a limit cycle, over its frequency, and halvings to get there.
-   real(wp), parameter :: no_excitation = 1.0e-13_wp
-   integer, parameter :: most_trials = 60
-   !> Self-excitation over the frequency that is none.
-   real(wp), parameter :: no_damping = 1.0e-9_wp
 
 contains
 
@@ -88,6 +84,7 @@ contains
       type(writer_sink), target :: to_file
       type(summary_sink), target :: to_summary
       real(wp), allocatable :: y(:)
+      character(:), allocatable :: derivatives
 
       allocate (curve)
       call curve%start%build(case, error)
@@ -106,10 +103,9 @@ contains
       curve%start%system%interrupt => observer
       curve%start%balance%interrupt => observer
       allocate (y(curve%start%system%n))
-      allocate (curve%bracket(2, 0), curve%bracket_y(size(y), 0))
       call curve%path%start(curve%start%system, case%solver)
       call follow(case, curve, observer, state, y, error)
-      if (.not. allocated(error)) call find_cycles(curve, error)
+      if (.not. allocated(error)) call curve%cycles%find(curve%path, curve%table, error)
       if (allocated(error)) then
          if (error%status == status_stopped) then
             deallocate (error)
@@ -120,10 +116,14 @@ contains
       call observer%on_end()
       if (allocated(error)) return
       call remark_internal(curve%start, curve%table, summary%remarks)
-      call synthesize(case, curve%table)
+      call curve%watch%remark(summary%remarks)
+      call synthesize(case%mode%synthesis, curve%table)
       call writer%add_mode(curve%table, case%model%unit_system, error)
       call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
                                  state%all_converged())
+      call curve%sensitivity%describe(derivatives)
+      call summary%describe_sensitivity(derivatives)
+      call curve%sensitivity%remark(case, curve%start%balance, summary%remarks)
       call summary%describe_mode(curve%table, case%model%observe_name(1)%text, &
                                  case%mode%control == control_observed, case%mode%end)
    end subroutine run_mode
@@ -136,6 +136,7 @@ contains
       table%stuck_omega = start%omega
       table%stuck_damping_ratio = 0.5_wp*start%self_excitation/start%omega
       table%onset_amplitude = start%onset
+      table%slides = start%slides
    end subroutine describe_start
 
    !> Up to the lowest amplitude from where the stuck mode is exact, then along the curve.
@@ -412,6 +413,12 @@ contains
          point%modal_amplitude = row%modal_amplitude
          point%first_harmonic = hypot(row%first(1, :), row%first(2, :))
          row%force = modal_force(curve%start, y)*system%amplitude/row%modal_amplitude
+         if (report%converged .and. served_by == served_by_newton) then
+            call curve%watch%note(system, y)
+         end if
+         if (report%converged .and. case%sensitivity%is_wanted()) then
+            call curve%sensitivity%find_mode(case, system, y, point)
+         end if
       end associate
       call system_clock(now, rate)
       point%seconds = real(now - curve%clock, wp)/real(rate, wp)
@@ -420,7 +427,7 @@ contains
       if (allocated(error)) return
       call state%note(point)
       curve%end_p = log(row%amplitude)
-      call note_zero(curve, row, unknowns)
+      call curve%cycles%note(row, unknowns)
       call curve%table%add(row)
    end subroutine add_row
 
@@ -431,102 +438,5 @@ contains
 
       force = abs(dot_product(start%system%motion(y), start%load))
    end function modal_force
-
-   !> Keep two rows between which the self-excitation changes its sign.
-   subroutine note_zero(curve, row, y)
-      type(mode_curve), intent(inout) :: curve
-      type(mode_row), intent(in) :: row
-      real(wp), intent(in) :: y(:)
-      integer :: n
-
-      n = size(y)
-      ! Round-off of an undamped mode has no sign.
-      if (abs(row%self_excitation) <= no_damping*row%omega) return
-      if (allocated(curve%last_y)) then
-         if (curve%last_y(n)*y(n) < 0.0_wp .and. row%converged) then
-            curve%bracket = reshape([curve%bracket, curve%last_p, log(row%amplitude)], &
-                                    [2, size(curve%bracket, 2) + 1])
-            curve%bracket_y = reshape([curve%bracket_y, curve%last_y, y], &
-                                      [n, size(curve%bracket_y, 2) + 2])
-         end if
-      end if
-      curve%last_p = log(row%amplitude)
-      curve%last_y = y
-   end subroutine note_zero
-
-   !> Where the self-excitation vanishes the motion keeps itself alive: false position with
-   !> halvings of the weight (Illinois), each value of the self-excitation a solution.
-   subroutine find_cycles(curve, error)
-      type(mode_curve), intent(inout), target :: curve
-      type(error_type), allocatable, intent(out) :: error
-      integer :: k
-
-      do k = 1, size(curve%bracket, 2)
-         call find_cycle(curve, curve%bracket(:, k), curve%bracket_y(:, 2*k - 1:2*k), error)
-         if (allocated(error)) return
-      end do
-   end subroutine find_cycles
-
-   subroutine find_cycle(curve, ends, ends_y, error)
-      type(mode_curve), intent(inout), target :: curve
-      real(wp), intent(in) :: ends(2), ends_y(:, :)
-      type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
-      real(wp) :: p(2), y(size(ends_y, 1), 2), trial(size(ends_y, 1)), weight(2), share, middle
-      integer :: k, n, side
-
-      n = size(trial)
-      p = ends
-      y = ends_y
-      weight = ends_y(n, :)
-      do k = 1, most_trials
-         share = weight(1)/(weight(1) - weight(2))
-         middle = p(1) + share*(p(2) - p(1))
-         trial = y(:, 1) + share*(y(:, 2) - y(:, 1))
-         call curve%path%solve(middle, trial, report, error)
-         ! A bracket across a jump of the curve has no limit cycle in it.
-         if (allocated(error) .or. .not. report%converged) return
-         if (abs(trial(n)) <= no_excitation*trial(n - 1) .or. &
-             abs(p(2) - p(1)) <= epsilon(1.0_wp)*max(1.0_wp, abs(middle))) exit
-         ! The new point takes the end of its sign; the other counts half where it stays again.
-         side = merge(1, 2, trial(n)*y(n, 1) > 0.0_wp)
-         if (k > 1 .and. weight(side)*y(n, side) > 0.0_wp .and. &
-             abs(weight(side) - y(n, side)) <= 0.0_wp) weight(3 - side) = 0.5_wp*weight(3 - side)
-         p(side) = middle
-         y(:, side) = trial
-         weight(side) = trial(n)
-      end do
-      ! Stable where damping grows with the amplitude.
-      call curve%table%add_cycle(exp(middle), curve%start%system%frequency_unit*trial(n - 1), &
-                                 (ends_y(n, 2) - ends_y(n, 1))*(ends(2) - ends(1)) > 0.0_wp)
-   end subroutine find_cycle
-
-   !> Responses of one mode: P^2 = a^2 ((omega^2 - W^2)^2 + (2 zeta omega W)^2), which for each
-   !> amplitude a has two frequencies W, or none.
-   subroutine synthesize(case, table)
-      type(case_type), intent(in) :: case
-      type(mode_table), intent(inout) :: table
-      real(wp) :: centre, half, force, zeta
-      integer :: j, k
-
-      if (.not. allocated(case%mode%synthesis) .or. table%n == 0) return
-      table%scale = case%mode%synthesis
-      allocate (table%response_omega(2, table%n, size(table%scale)), &
-                source=ieee_value(1.0_wp, ieee_quiet_nan))
-      do j = 1, size(table%scale)
-         do k = 1, table%n
-            associate (row => table%row(k))
-               zeta = 0.5_wp*row%self_excitation/row%omega
-               force = table%scale(j)*row%force/row%modal_amplitude
-               half = force**2 - 4.0_wp*zeta**2*row%omega**4*(1.0_wp - zeta**2)
-               if (half < 0.0_wp) cycle
-               half = sqrt(half)
-               centre = row%omega**2*(1.0_wp - 2.0_wp*zeta**2)
-               if (centre - half > 0.0_wp) table%response_omega(1, k, j) = sqrt(centre - half)
-               if (centre + half > 0.0_wp) table%response_omega(2, k, j) = sqrt(centre + half)
-            end associate
-         end do
-      end do
-   end subroutine synthesize
 
 end module fw_run_mode

@@ -1,6 +1,7 @@
 !> Runs analysis 'modes', and lists the natural frequencies that a sweep covers.
 module fw_run_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+   use fw_case, only: analysis_mode
    use fw_case, only: analysis_modes
    use fw_case, only: case_type
    use fw_error, only: error_type
@@ -89,13 +90,19 @@ contains
                      to_text(most_checked)//' dofs)')
          return
       end if
-      range = case%sweep%range()
-      if (range(2) <= 0.0_wp) range(2) = range(1)
+      if (case%analysis == analysis_mode) then
+         range = [0.0_wp, huge(1.0_wp)]
+      else
+         range = case%sweep%range()
+         if (range(2) <= 0.0_wp) range(2) = range(1)
+      end if
       call find_natural_modes(case, min(most_listed, most_of(case)), modes, ignored, &
                               diameters_of(case))
       if (allocated(ignored)) return
-      call append(lines, '! natural frequencies ['//trim(unit_words(case%sweep%unit))// &
-                  '] within the sweep:')
+      text = ' within the sweep'
+      if (case%analysis == analysis_mode) text = ''
+      call append(lines, '! natural frequencies ['//trim(unit_words(case%sweep%unit))//']'// &
+                  text//':')
       do j = 1, size(modes%nodal_diameter)
          call line_of(case, modes%open(:, j), range(1), range(2), text)
          name = ''

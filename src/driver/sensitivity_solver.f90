@@ -9,6 +9,8 @@ module fw_sensitivity_solver
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_stuck
    use fw_kinds, only: wp
+   use fw_mode_sensitivity, only: find_mode_slopes
+   use fw_mode_system, only: mode_system
    use fw_parameter_slopes, only: parameter_entry
    use fw_parameters, only: friction_coefficient
    use fw_parameters, only: gap
@@ -23,6 +25,8 @@ module fw_sensitivity_solver
    use fw_point, only: point_sensitivity
    use fw_point, only: point_type
    use fw_remarks, only: remark_list
+   use fw_response_rows, only: mode_damping_ratio
+   use fw_response_rows, only: mode_omega
    use fw_response_rows, only: resonance_omega
    use fw_sensitivity, only: sensitivity_finder
    use fw_sensitivity_options, only: of_itself
@@ -46,6 +50,7 @@ module fw_sensitivity_solver
       logical, private :: is_started = .false.
    contains
       procedure :: find
+      procedure :: find_mode
       procedure :: renew
       procedure :: follow
       procedure :: describe
@@ -82,6 +87,36 @@ contains
       if (is_at_onset(case, system)) self%n_onset = self%n_onset + 1
       call lay_out(self, case, point)
    end subroutine find
+
+   !> The same for a nonlinear mode at a held amplitude, with its frequency and damping.
+   subroutine find_mode(self, case, system, y, point)
+      class(sensitivity_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(mode_system), intent(inout) :: system
+      !> The solution, at the amplitude where the system stands.
+      real(wp), intent(in), contiguous :: y(:)
+      type(point_type), intent(inout) :: point
+      real(wp), allocatable :: omega_by(:), ratio_by(:)
+      logical :: done
+
+      if (.not. self%is_started) call start(self, case)
+      allocate (omega_by(size(self%finder%parameters)), ratio_by(size(self%finder%parameters)))
+      call find_mode_slopes(system, y, self%finder, omega_by, ratio_by, done)
+      self%n_points = self%n_points + 1
+      if (.not. done) then
+         self%n_singular = self%n_singular + 1
+         self%finder%derivative = ieee_value(1.0_wp, ieee_quiet_nan)
+         omega_by = ieee_value(1.0_wp, ieee_quiet_nan)
+         ratio_by = omega_by
+      end if
+      if (any(self%finder%rows%is_tied)) self%n_tied = self%n_tied + 1
+      if (is_at_onset(case, system%balance)) self%n_onset = self%n_onset + 1
+      call lay_out(self, case, point)
+      call add_one(self, case, mode_omega, point%omega, omega_by, point)
+      associate (xi => system%frequency_unit*y(system%n))
+         call add_one(self, case, mode_damping_ratio, 0.5_wp*xi/point%omega, ratio_by, point)
+      end associate
+   end subroutine find_mode
 
    !> The numbers that the words of the case stand for.
    subroutine start(self, case)

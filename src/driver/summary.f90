@@ -405,7 +405,8 @@ contains
       if (by_observed) what = name
       associate (row => table%row)
          call add_line(self%mode, 'mode '//to_text(table%number), trim(short(table%stuck_omega))// &
-                       ' rad/s stuck, '//trim(short(row(table%n)%omega))//' at the end')
+                       ' rad/s '//trim(merge('sliding', 'stuck  ', table%slides))//', '// &
+                       trim(short(row(table%n)%omega))//' at the end')
          if (table%onset_amplitude > 0.0_wp) then
             call add_line(self%mode, 'slips from', what//' = '//trim(short(table%onset_amplitude)))
          end if

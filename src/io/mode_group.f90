@@ -33,6 +33,8 @@ module fw_mode_group
       !> from which on a pair slips or separates; NaN where none does.
       integer :: number = 1
       real(wp) :: stuck_omega = 0.0_wp, stuck_damping_ratio = 0.0_wp, onset_amplitude = 0.0_wp
+      !> Whether it is that with sliding pairs, as none with stuck pairs exists.
+      logical :: slides = .false.
       integer :: n = 0
       type(mode_row), allocatable :: row(:)
       !> Where the self-excitation vanishes: amplitude, omega, and 1 where it grows with the

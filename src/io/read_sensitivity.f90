@@ -1,6 +1,6 @@
 !> Group &sensitivity: which derivatives are wanted, and whether the case has them.
 module fw_read_sensitivity
-   use fw_case, only: case_type, analysis_frf, analysis_point, analysis_resonance
+   use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_point, analysis_resonance
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: method_hbm
@@ -8,11 +8,12 @@ module fw_read_sensitivity
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
    use fw_parameter_checks, only: check_parameter
-   use fw_parameters, only: friction_coefficient, normal_load, parameter_words
+   use fw_parameters, only: friction_coefficient, harmonic_scale, normal_load, parameter_words
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
    use fw_response_rows, only: dissipation, first_harmonic, is_of_pairs, largest, &
-                               quantity_words, resonance_omega, wear_volume
+                               mode_damping_ratio, mode_omega, quantity_words, resonance_omega, &
+                               wear_volume
    use fw_sensitivity_options, only: sensitivity_options
    use fw_solver_options, only: solver_newton
    use fw_text, only: lower_case, string_type
@@ -37,7 +38,7 @@ contains
       call reader%bind_list(key('parameters', 'what the response is differentiated by: '// &
                                 "'contact%mu', 'load%harmonic_scale', ...", &
                                 absent='none: no derivatives', only="analysis = 'frf', 'point', "// &
-                                "'resonance'"), &
+                                "'resonance', 'mode'"), &
                             'names of parameters, such as contact%mu', size(parameter_words), &
                             words, is_text)
       call find_words(reader, 'parameters', words, parameter_words, options%parameters)
@@ -109,13 +110,22 @@ contains
          if (.not. options%is_wanted()) return
          options%has_harmonics = reader%given('harmonics', 'n_harmonics')
          if (case%analysis == analysis_resonance) options%further = [resonance_omega]
+         if (case%analysis == analysis_mode) options%further = [mode_omega, mode_damping_ratio]
          if (size(options%quantities) > 0) return
          options%quantities = [first_harmonic, largest]
+         if (is_cyclic_mode(case)) options%quantities = [first_harmonic]
          if (case%contact%n_pairs == 0) return
-         options%quantities = [first_harmonic, largest, dissipation]
+         options%quantities = [options%quantities, dissipation]
          if (case%wear%coefficient > 0.0_wp) options%quantities = [options%quantities, wear_volume]
       end associate
    end subroutine finish_sensitivity
+
+   !> Higher harmonics of a wave are condensed, and what is observed of them follows the frequency.
+   pure logical function is_cyclic_mode(case)
+      type(case_type), intent(in) :: case
+
+      is_cyclic_mode = case%analysis == analysis_mode .and. case%model%cyclic%is_cyclic
+   end function is_cyclic_mode
 
    !> Refuse what has no derivative, or none that the program knows.
    subroutine check_sensitivity(case, error)
@@ -128,8 +138,9 @@ contains
 
       if (.not. case%sensitivity%is_wanted()) return
       ! Carried positions depend on all points before.
-      if (all(case%analysis /= [analysis_frf, analysis_point, analysis_resonance])) then
-         with = "analysis = 'frf', 'point' or 'resonance'"
+      if (all(case%analysis /= [analysis_frf, analysis_point, analysis_resonance, &
+                                analysis_mode])) then
+         with = "analysis = 'frf', 'point', 'resonance' or 'mode'"
       else if (case%harmonics%method /= method_hbm) then
          with = "harmonics%method = 'hbm'"
       else if (case%contact%memory == memory_carried) then
@@ -148,6 +159,11 @@ contains
       end if
       do k = 1, size(case%sensitivity%parameters)
          call check_parameter(case, case%sensitivity%parameters(k), asks, error)
+         if (case%analysis == analysis_mode .and. .not. allocated(error) .and. &
+             case%sensitivity%parameters(k) == harmonic_scale) then
+            call fatal_error(error, asks//" = '"//trim(parameter_words(harmonic_scale))//"': no "// &
+                             'vibratory load acts on a nonlinear mode; leave it out', status_input)
+         end if
          if (.not. allocated(error)) call check_onset(case, case%sensitivity%parameters(k), error)
          if (allocated(error)) return
       end do
@@ -195,6 +211,9 @@ contains
                call fatal_error(error, "sensitivity%quantities = '"// &
                                 trim(quantity_words(quantity))//"' needs contact pairs, and "// &
                                 'there are none: leave it out', status_input)
+            else if (quantity == largest .and. is_cyclic_mode(case)) then
+               call fatal_error(error, "sensitivity%quantities = 'largest' is not served for "// &
+                                'nonlinear modes of cyclic structures: leave it out', status_input)
             else if (quantity == wear_volume .and. .not. case%wear%coefficient > 0.0_wp) then
                call fatal_error(error, "sensitivity%quantities = 'wear_volume' needs "// &
                                 'wear%coefficient: give it, or leave the quantity out', &

@@ -177,7 +177,6 @@ REFUSALS = [
     ({"harmonics": {"accuracy": 1e-3}}, "give n_harmonics"),
     ({"solver": {"kind": "powell"}}, "use 'newton'"),
     ({"solver": {"jacobian": "difference"}}, "use 'analytic'"),
-    ({"sensitivity": {"parameters": "contact%mu"}}, "goes with analysis = 'frf', 'point'"),
     ({"sweep": {"end": 1.0}}, "leave &sweep out"),
     ({"sweep": {"n_points": 5}}, "leave &sweep out"),
     ({"sweep": {"frequencies": [1.0, 2.0]}}, "leave &sweep out"),
