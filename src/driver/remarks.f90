@@ -16,7 +16,7 @@ module fw_remarks
    use fw_laws, only: facts_of
    use fw_laws, only: law_under_accuracy
    use fw_laws, only: law_words
-   use fw_laws, only: usual_law
+   use fw_laws, only: is_of_high_order
    use fw_peak, only: found_bound
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
@@ -146,7 +146,7 @@ contains
 
       words = ''
       associate (c => case%contact, h => case%harmonics)
-         if (c%law == usual_law(.true.)) return
+         if (is_of_high_order(c%law)) return
          if (any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1))) then
             words = "slip in two directions has no law of high order"
          else if (h%method /= method_hbm .or. h%sampling == sampling_uniform .or. h%n_time > 0 &

@@ -114,12 +114,13 @@ contains
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
       character(*), parameter :: instants = ", or harmonics%sampling = 'uniform'"
+      character(:), allocatable :: place
 
       call run%track%find_first(observer, error)
       if (allocated(error)) return
       if (run%track%outcome%kind /= outcome_found) then
-         call tell('no resonance', 'no resonance to follow at '// &
-                   place(case, run%track%mover%value)//': '// &
+         call name_place(case, run%track%mover%value, place)
+         call tell('no resonance', 'no resonance to follow at '//place//': '// &
                    trim(outcome_words(run%track%outcome%kind))//'; give &sweep a range with a '// &
                    'maximum inside, or more points'//trim(merge(instants, repeat(' ', &
                    len(instants)), run%track%is_located)), observer, summary)
@@ -148,13 +149,13 @@ contains
    end subroutine tell
 
    !> Name and value of the parameter.
-   function place(case, value) result(text)
+   subroutine name_place(case, value, text)
       type(case_type), intent(in) :: case
       real(wp), intent(in) :: value
-      character(:), allocatable :: text
+      character(:), allocatable, intent(out) :: text
 
       text = trim(parameter_words(case%resonance%parameter))//' = '//to_text(value)
-   end function place
+   end subroutine name_place
 
    !> Points at given values.
    subroutine along_values(case, run, observer, summary, state, error)
@@ -191,14 +192,15 @@ contains
       type(run_state), intent(inout) :: state
       real(wp), intent(in) :: value
       character(*), intent(in) :: reason
-      character(:), allocatable :: why
+      character(:), allocatable :: why, place
 
       state%is_incomplete = .true.
       why = ''
       if (case%resonance%continuation /= continuation_arclength) why = '; the resonance may '// &
          "fold over the parameter, which condition = 'phase' with continuation = 'arclength' "// &
          'follows, or leave the range of &sweep, from which it may go half its width'
-      call tell('lost resonance', 'the resonance was lost beyond '//place(case, value)//' of '// &
+      call name_place(case, value, place)
+      call tell('lost resonance', 'the resonance was lost beyond '//place//' of '// &
                 to_text(case%resonance%end)//': '//reason//why, observer, summary)
    end subroutine end_early
 

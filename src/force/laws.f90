@@ -13,7 +13,7 @@ module fw_laws
    private
 
    public :: law_words, law_help, law_number, law_with_tail, new_law, facts_of, is_rigid
-   public :: law_under_accuracy, usual_law, is_viscous
+   public :: law_under_accuracy, usual_law, is_of_high_order, is_viscous
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
@@ -104,6 +104,13 @@ contains
       number = law_number('dlft')
       if (of_high_order) number = law_number('rigid')
    end function usual_law
+
+   !> Whether a law is that of high order.
+   pure logical function is_of_high_order(number)
+      integer, intent(in) :: number
+
+      is_of_high_order = number == usual_law(.true.)
+   end function is_of_high_order
 
    !> Where a word stands among `law_words`; 0 where it does not.
    pure integer function law_number(word)

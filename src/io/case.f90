@@ -99,7 +99,8 @@ contains
                          absent='title of the model file, or name of the namelist'), self%title)
       call keys%bind_word(key('analysis', 'a sweep, one frequency, wear at one frequency, '// &
                               'integration in time, natural frequencies, a nonlinear '// &
-                              'mode, or a resonance over a parameter'), self%analysis, analysis_words)
+                              'mode, or a resonance over a parameter'), &
+                          self%analysis, analysis_words)
       call keys%bind(key('threads', 'OpenMP threads; 0: as many as OpenMP gives', &
                          from_to(0, 1024)), self%threads)
       call keys%bind(key('max_seconds', 'time after which the run ends with the points that '// &

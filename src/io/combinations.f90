@@ -156,8 +156,8 @@ contains
       character(*), parameter :: with = ' does not go with cyclic%mistuned = .true.: '
 
       if (all(case%analysis /= [analysis_frf, analysis_point, analysis_wear])) then
-         call fatal_error(error, "case%analysis"//with//"use 'frf', 'point' or 'wear', or leave "// &
-                          'mistuned out', status_input)
+         call fatal_error(error, "case%analysis"//with//"use 'frf', 'point' or 'wear', or "// &
+                          'leave mistuned out', status_input)
       else if (case%harmonics%method /= method_hbm) then
          call fatal_error(error, 'harmonics%method'//with//"use 'hbm'", status_input)
       else if (case%harmonics%adaptive) then

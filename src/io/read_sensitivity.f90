@@ -37,8 +37,8 @@ contains
       call reader%open(group, 'derivatives of the response by parameters of the case')
       call reader%bind_list(key('parameters', 'what the response is differentiated by: '// &
                                 "'contact%mu', 'load%harmonic_scale', ...", &
-                                absent='none: no derivatives', only="analysis = 'frf', 'point', "// &
-                                "'resonance', 'mode'"), &
+                                absent='none: no derivatives', &
+                                only="analysis = 'frf', 'point', 'resonance', 'mode'"), &
                             'names of parameters, such as contact%mu', size(parameter_words), &
                             words, is_text)
       call find_words(reader, 'parameters', words, parameter_words, options%parameters)
@@ -161,8 +161,9 @@ contains
          call check_parameter(case, case%sensitivity%parameters(k), asks, error)
          if (case%analysis == analysis_mode .and. .not. allocated(error) .and. &
              case%sensitivity%parameters(k) == harmonic_scale) then
-            call fatal_error(error, asks//" = '"//trim(parameter_words(harmonic_scale))//"': no "// &
-                             'vibratory load acts on a nonlinear mode; leave it out', status_input)
+            call fatal_error(error, asks//" = '"//trim(parameter_words(harmonic_scale))// &
+                             "': no vibratory load acts on a nonlinear mode; leave it out", &
+                             status_input)
          end if
          if (.not. allocated(error)) call check_onset(case, case%sensitivity%parameters(k), error)
          if (allocated(error)) return

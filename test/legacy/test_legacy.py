@@ -275,7 +275,7 @@ OK, USAGE, INPUT, NOT_CONVERGED, IO, STOPPED = 0, 2, 3, 4, 5, 6
     ("solve", OK, ""),
     ("small buffer", USAGE, "has room for 2"),
     ("buffer", 1, ""),
-    ("unknown result", USAGE, "there is no result 'forces': must be one of omega, coefficients"),
+    ("unknown result", USAGE, "there is no result 'forces': must be one of omega, parameter"),
     ("no histories", USAGE, "histories need output%histories = .true."),
     ("no such point", USAGE, "point 2: there are 1 points"),
     ("null buffer", USAGE, "null pointer"),
