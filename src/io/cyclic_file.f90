@@ -41,6 +41,7 @@ contains
                           to_text(parts%n_sectors)//', expected at least 1', status_input)
          return
       end if
+      ! Only matrices of nodal diameters have coordinates beyond displacements.
       if (has_attribute(file, group, 'n_physical')) then
          call read_nodal(file, parts, error)
       else
@@ -48,6 +49,7 @@ contains
       end if
    end subroutine read_cyclic_file
 
+   !> Dofs that a sector shares with its neighbours, in pairs.
    subroutine read_interfaces(file, parts, error)
       type(hdf5_file), intent(in) :: file
       type(cyclic_parts), intent(inout) :: parts
@@ -175,6 +177,7 @@ contains
 
    contains
 
+      !> One matrix of the nodal diameter, square and of its size.
       subroutine read_square(key, needed, matrix)
          character(*), intent(in) :: key
          logical, intent(in) :: needed

@@ -127,6 +127,8 @@ contains
       character(:), allocatable :: with
 
       if (.not. case%control%is_wanted()) return
+      ! The factor of the load is an unknown of its own: what follows solves without such a border,
+      ! or for a load that the case gives.
       if (all(case%analysis /= [analysis_frf, analysis_point])) then
          with = "case%analysis: use 'frf' or 'point'"
       else if (case%over%is_wanted()) then

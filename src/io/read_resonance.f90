@@ -40,6 +40,7 @@ contains
                             "followed over, such as 'load%harmonic_scale' or "// &
                             "'contact%normal_load'")
       end if
+      ! Only the phase is one more equation along a branch; the amplitude is searched for.
       if (options%continuation == continuation_arclength .and. &
           options%condition /= condition_phase) then
          call reader%refuse(group, 'continuation', "= 'arclength' goes with condition = "// &
@@ -72,6 +73,7 @@ contains
       end associate
    end subroutine check_ends
 
+   !> Factors and stiffnesses of zero leave nothing to follow.
    pure logical function needs_more(options)
       type(resonance_options), intent(in) :: options
 
