@@ -25,7 +25,7 @@ _BROKEN_PIPE = 141
 
 #: Subcommand: module below `fretwear`, and what it does.
 COMMANDS = {
-    "modes": ("natural_modes", "natural frequencies, free and stuck, beside the sweep"),
+    "modes": ("modes_command", "natural frequencies, free and stuck, beside the sweep"),
     "plot": ("plot", "pictures of a result file"),
     "compare": ("compare", "two result files beside each other"),
     "report": ("report", "one self-contained HTML page of a result file"),

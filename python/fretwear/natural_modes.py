@@ -1,26 +1,19 @@
-"""Natural frequencies with the contact free and stuck, and the command `fretwear modes`."""
+"""Natural frequencies with the contact free and stuck (`analysis = 'modes'`)."""
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._native import namelist_values
-from .case import Case
-from .errors import InputError
 from .result_file import ResultFile
 
-__all__ = ["NaturalModes", "add_arguments", "find_modes", "main", "read_natural_modes"]
+__all__ = ["NaturalModes", "aligned", "read_natural_modes"]
 
 Floats = NDArray[np.float64]
 _TURN = 2.0 * np.pi
-#: Endings of model files.
-_MODEL_FILES = (".h5", ".hdf5")
 
 
 @dataclass(frozen=True)
@@ -61,7 +54,7 @@ class NaturalModes:
         return rows
 
     def __repr__(self) -> str:
-        return _aligned(self.table())
+        return aligned(self.table())
 
     def _repr_html_(self) -> str:
         head, *rows = self.table()
@@ -78,68 +71,8 @@ def read_natural_modes(result: ResultFile) -> NaturalModes:
     return NaturalModes(result["modes/nodal_diameter"].astype(int), free, stuck)
 
 
-def find_modes(case: Case) -> NaturalModes:
-    """Natural frequencies of the structure of a case, whatever its analysis.
-
-    Parameters
-    ----------
-    case : Case
-        Its sweep, and what else is of another analysis, does not count.
-
-    Returns
-    -------
-    NaturalModes
-    """
-    from .analyses import run
-
-    return read_natural_modes(run(case.replace(case={"analysis": "modes"}), in_memory=True))
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of `fretwear modes`."""
-    parser.add_argument("file", help="namelist of a case, or model file (HDF5)")
-    parser.add_argument("-n", type=int, metavar="N", default=10,
-                        help="frequencies of each kind (default: %(default)s)")
-    parser.add_argument("--sweep", nargs=2, type=float, metavar=("START", "END"),
-                        help="mark what lies between [Hz] (default: the sweep of the case)")
-    parser.add_argument("--speed", type=float, metavar="OMEGA",
-                        help="rotation speed of the structure [rad/s]")
-
-
-def main(options: argparse.Namespace) -> int:
-    """Run `fretwear modes`: the table, and what to know of the sweep."""
-    path = Path(options.file)
-    case = Case(path) if path.suffix in _MODEL_FILES else Case.from_file(path)
-    case = case.replace(cyclic={"n_modes": options.n})
-    if options.speed is not None:
-        case = case.replace(structure={"rotation_speed": options.speed})
-    low, high = _range(case, options.sweep)
-    found = find_modes(case)
-    print(_aligned(found.table(low, high)))
-    if np.isfinite(low):
-        count = found.within(low, high)
-        words = f"{count} of them *" if count else "none of them; the response has no peak there"
-        print(f"sweep from {low / _TURN:.6g} to {high / _TURN:.6g} Hz: {words}")
-    return 0
-
-
-def _range(case: Case, given: list[float] | None) -> tuple[float, float]:
-    """Ends of the sweep [rad/s]; NaN where there is none."""
-    if given is not None:
-        if not 0.0 <= given[0] < given[1]:
-            raise InputError(f"--sweep {given[0]:g} {given[1]:g}: must be two frequencies, the "
-                             "lower one first")
-        return given[0] * _TURN, given[1] * _TURN
-    values = namelist_values(case.replace(case={"analysis": "modes"}).namelist())
-    try:
-        ends = sorted((float(values["sweep%start"][0]), float(values["sweep%end"][0])))
-    except (KeyError, ValueError):
-        return np.nan, np.nan
-    factor = _TURN if values.get("sweep%unit") == ["Hz"] else 1.0
-    return factor * ends[0], factor * ends[1]
-
-
-def _aligned(rows: list[list[str]]) -> str:
+def aligned(rows: list[list[str]]) -> str:
+    """The rows of a table as lines of columns."""
     # The star after a number stands beside its column.
     texts = [[text if text.endswith("*") or k == 0 else f"{text}  " for text in row]
              for k, row in enumerate(rows)]

@@ -13,6 +13,8 @@ from .result_file import ResultFile
 __all__ = ["ResonanceTrack", "read_resonance"]
 
 Floats = NDArray[np.float64]
+#: Roots of a derivative with a smaller imaginary part than this are places [steps].
+_REAL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -56,20 +58,26 @@ class ResonanceTrack:
 
     def optimum(self) -> tuple[float, float] | None:
         """Parameter and amplitude where the resonance is smallest between the ends, by the
-        parabola through the smallest point and its neighbours; None where an end is smaller."""
+        polynomial through the smallest point and up to four around it; None where an end is
+        smaller."""
         parameter, amplitude = self.parameter[self.converged], self.amplitude[self.converged]
         if amplitude.size < 3:
             return None
         k = int(np.argmin(amplitude))
         if k in (0, amplitude.size - 1):
             return None
-        near = slice(k - 1, k + 2)
-        # About the middle: far from 0 the coefficients would lose their digits.
-        bend, slope, height = np.polyfit(parameter[near] - parameter[k], amplitude[near], 2)
-        if not bend > 0.0:
+        near = slice(max(k - 2, 0), k + 3)
+        # About the middle, in steps: far from 0 the coefficients would lose their digits.
+        step = 0.5 * (parameter[k + 1] - parameter[k - 1])
+        place = (parameter[near] - parameter[k]) / step
+        curve = np.polynomial.Polynomial.fit(place, amplitude[near], place.size - 1)
+        low, high = np.sort((parameter[[k - 1, k + 1]] - parameter[k]) / step)
+        roots = curve.deriv().roots()
+        inside = roots.real[(abs(roots.imag) < _REAL) & (roots.real > low) & (roots.real < high)]
+        if inside.size == 0:
             return float(parameter[k]), float(amplitude[k])
-        shift = -slope / (2.0 * bend)
-        return float(parameter[k] + shift), float(height + 0.5 * slope * shift)
+        best = inside[np.argmin(curve(inside))]
+        return float(parameter[k] + best * step), float(curve(best))
 
 
 def read_resonance(result: ResultFile) -> ResonanceTrack:

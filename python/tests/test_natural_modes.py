@@ -10,7 +10,7 @@ from project import ROOT
 
 import fretwear as fw
 from fretwear.cli import main
-from fretwear.natural_modes import find_modes
+from fretwear.modes_command import find_modes
 
 TURN = 2.0 * np.pi
 JENKINS = ROOT / "example" / "jenkins" / "jenkins.nml"

@@ -14,8 +14,8 @@ from fretwear.plot import fitting, plot_resonance
 
 #: The closed form of one harmonic: best normal load and its amplitude.
 BEST = (0.40320249672597236, 0.7903043939637545)
-#: What a parabola through rows 0.02 apart leaves of them.
-PARABOLA = (2e-4, 1e-6)
+#: What the polynomial through five rows 0.02 apart leaves of them.
+POLYNOMIAL = (2e-4, 1e-6)
 #: Solutions of the tolerance of the case, through the condition of the peak.
 SAME = 1e-6
 
@@ -68,8 +68,8 @@ def test_it_prints_as_a_table(damper: fw.Result) -> None:
 def test_optimum(damper: fw.Result) -> None:
     best = damper.resonance.optimum()
     assert best is not None
-    assert best[0] == pytest.approx(BEST[0], rel=PARABOLA[0] * 10)
-    assert best[1] == pytest.approx(BEST[1], rel=PARABOLA[1] * 10)
+    assert best[0] == pytest.approx(BEST[0], rel=POLYNOMIAL[0] * 10)
+    assert best[1] == pytest.approx(BEST[1], rel=POLYNOMIAL[1] * 10)
     assert follow(end=0.38).resonance.optimum() is None
 
 
