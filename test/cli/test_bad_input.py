@@ -233,7 +233,7 @@ def test_truncated_model_file(with_model):
      ["stiffness", "not symmetric", "(1,2) = -1"]),
     ({"stiffness": np.full((2, 2), np.nan)}, ["/stiffness holds NaN at index (0, 0)", "finite"]),
     ({"contact/mu": np.array([-0.3])}, ["mu(1) = -0.3", "at least 0"]),
-    ({"contact/mu": np.array([0.3, 0.3])}, ["model.h5", "mu"]),
+    ({"contact/mu": np.array([0.3, 0.3])}, ["holds 2 values of mu", "must be 1"]),
     ({"contact/side_1": np.array([[5, 0, 0]])}, ["side_1(1,1) = 5", "an integer from -2 to 2"]),
     ({"load/cosine": np.array([np.inf, 0.0])}, ["/load/cosine holds Inf", "finite"]),
 ])

@@ -72,12 +72,14 @@ def test_period_doubling_at_a_stop(fw_run, continuation) -> None:
     fw_run.write(STOP, "stop.nml")
     done = fw_run("-o", "stop.h5", "--set", f"sweep%continuation={continuation}", "stop.nml")
     assert done.returncode == 0, done.stderr
-    found = places(fw_run.directory / "stop.h5")
+    # Where the stop is just reached 15 harmonics cannot tell: a branch may say so, twice.
+    found = [place for place in places(fw_run.directory / "stop.h5") if place[0] != "undecided"]
     assert [kind for kind, _ in found] == ["period doubling"] * len(DOUBLINGS)
     assert [omega for _, omega in found] == pytest.approx(DOUBLINGS, rel=STOP_TOLERANCE)
     assert done.stdout.count("period doubling at") == len(DOUBLINGS)
     result = fw.Result(fw_run.directory / "stop.h5")
-    for place, omega in zip(result.bifurcations, DOUBLINGS):
+    decided = [place for place in result.bifurcations if place.kind != "undecided"]
+    for place, omega in zip(decided, DOUBLINGS):
         assert place.multiplier == pytest.approx(-1.0, abs=1e-7)
         assert place.found_by == "multiplier"
         assert abs(place.omega - omega) <= place.error
