@@ -65,6 +65,7 @@ contains
       self%filter_harmonics = case%harmonics%filter_harmonics
    end function new_moved_parameter
 
+   !> Loads are moved by factors of the state, all else by new laws.
    pure logical function is_load(number)
       integer, intent(in) :: number
 

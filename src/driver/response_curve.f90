@@ -267,6 +267,7 @@ contains
       end associate
    end subroutine turn_border
 
+   !> Room for n values; what it held is lost.
    subroutine set_size(vector, n)
       real(wp), allocatable, intent(inout) :: vector(:)
       integer, intent(in) :: n
@@ -338,6 +339,7 @@ contains
       u = moved(1, :) - at_rest(1, :) + v(n + 1)*slope(1, :)
    end subroutine observe_along
 
+   !> What the frequency changes of the observed quantities while the coordinates stay.
    subroutine observed_by_frequency(state, x, slope)
       type(balance_state), intent(inout) :: state
       real(wp), intent(in), contiguous :: x(:)

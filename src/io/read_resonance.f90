@@ -81,6 +81,7 @@ contains
                                              normal_stiffness])
    end function needs_more
 
+   !> What has no meaning below zero, but may be zero.
    pure logical function is_never_below(options)
       type(resonance_options), intent(in) :: options
 
@@ -114,6 +115,7 @@ contains
       end if
    end subroutine check_resonance
 
+   !> Solvers and harmonics that a resonance does not go with.
    subroutine check_combination(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error

@@ -86,6 +86,7 @@ module fw_all_sectors
 
 contains
 
+   !> Bases of all nodal diameters, and transforms between sectors and waves.
    subroutine new_all_sectors(model, relative, harmonic, omega_range, means, self, error)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
@@ -256,6 +257,7 @@ contains
       state%self_excitation = self_excitation
    end subroutine at
 
+   !> Z_n,k of every harmonic and nodal diameter; how many could not be condensed.
    subroutine form_all(self, state, n_failed)
       class(all_sectors), intent(in) :: self
       type(all_sectors_state), intent(inout) :: state
@@ -331,6 +333,7 @@ contains
       !$omp end parallel do
    end subroutine multiply_waves
 
+   !> Waves of the coordinates of all sectors.
    subroutine find_waves(self, sectors, waves)
       class(all_sectors), intent(in) :: self
       complex(wp), intent(inout), contiguous :: sectors(:, :), waves(:, :)
@@ -338,6 +341,7 @@ contains
       call self%ring%find_waves(sectors, waves)
    end subroutine find_waves
 
+   !> Coordinates of all sectors from their waves.
    subroutine add_waves(self, waves, sectors)
       class(all_sectors), intent(in) :: self
       complex(wp), intent(inout), contiguous :: waves(:, :), sectors(:, :)
@@ -382,6 +386,7 @@ contains
       end select
    end subroutine multiply
 
+   !> Products are of the coordinates in use from now on.
    subroutine restrict(self, state, n_active, n_used, used)
       class(all_sectors), intent(in) :: self
       class(structure_state), intent(inout) :: state
@@ -438,6 +443,7 @@ contains
       end do
    end subroutine between_sectors
 
+   !> Z_n of the h-th harmonic in nodal diameter k.
    subroutine wave_block(self, state, h, k, matrix)
       class(all_sectors), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -452,6 +458,7 @@ contains
       end select
    end subroutine wave_block
 
+   !> Z_n of all sectors: block circulant, formed for small rings only.
    subroutine block_of_all(self, state, h, matrix)
       class(all_sectors), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -500,6 +507,7 @@ contains
       end do
    end subroutine fill_block
 
+   !> The same for all sectors: the mean over the nodal diameters.
    complex(wp) function diagonal(self, state, h, coordinate)
       class(all_sectors), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -512,6 +520,7 @@ contains
       end select
    end function diagonal
 
+   !> Wave by wave: the derivative of Z q - F by the frequency, or by the self-excitation.
    subroutine derivative(self, state, parameter, q, slope)
       class(all_sectors), intent(in) :: self
       class(structure_state), intent(inout) :: state
@@ -696,6 +705,7 @@ contains
       end do
    end subroutine scale_loads
 
+   !> Derivative of what is observed by the frequency, wave by wave.
    subroutine observed_slope(self, state, q, slope)
       class(all_sectors), intent(in) :: self
       class(structure_state), intent(in) :: state
