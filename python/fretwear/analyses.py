@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     else:
         from typing_extensions import Unpack
 
-__all__ = ["frf", "mode", "resonance", "run", "run_in_memory", "wear"]
+__all__ = ["frf", "mode", "resonance", "run", "wear"]
 
 #: Called with the number of points done and of points to come (0: not known); True for a line on
 #: the standard error.
@@ -107,11 +107,6 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     finally:
         if isinstance(tell, _Line):
             tell.end()
-
-
-def run_in_memory(case: Case) -> Result:
-    """Run a case, check included, without touching a file, whatever output it names."""
-    return _run(case, None, None, check=True, in_memory=True)
 
 
 def _run(case: Case, tell: _Tell | None, is_stopped: Callable[[], object] | None, *, check: bool,

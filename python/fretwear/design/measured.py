@@ -12,7 +12,7 @@ import scipy.interpolate
 from numpy.typing import ArrayLike, NDArray
 
 from .._arguments import array
-from ..analyses import run_in_memory
+from ..analyses import run
 from ..case import Case
 from ..errors import ConvergenceError, InputError
 from ..steps import Steps
@@ -169,7 +169,7 @@ class ModeData(Measured):
 
     def _at(self, unknowns: Unknowns, values: Floats, case: Case, *, slopes: bool
             ) -> tuple[Floats, Floats | None]:
-        result = run_in_memory(unknowns.case_at(values, case))
+        result = run(unknowns.case_at(values, case), in_memory=True)
         mode = result.mode
         curves = {"frequency": mode.frequency, "damping_ratio": mode.damping_ratio}
         names = list(dict.fromkeys(self.labels))

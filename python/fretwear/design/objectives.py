@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import namelist_values
-from ..analyses import run_in_memory
+from ..analyses import run
 from ..case import Case
 from ..errors import InputError
 from ..sensitivity import Sensitivities
@@ -123,7 +123,7 @@ def _of_peak(name: str, observe: str | None, unknowns: Unknowns, values: Floats)
 
 def _of_point(name: str, observe: str | None, unknowns: Unknowns, values: Floats) -> Evaluation:
     case = differentiated(unknowns.case_at(values), unknowns.keys, [name])
-    result = run_in_memory(case)
+    result = run(case, in_memory=True)
     found = result.sensitivities
     row: tuple[int, ...] = (0, result.index(observe)) if _OF_POINT[name][0] else (0,)
     by_key = {key: array[row] for key, array in found[name].items()}
@@ -132,7 +132,7 @@ def _of_point(name: str, observe: str | None, unknowns: Unknowns, values: Floats
 
 
 def _of_cost(cost: Cost, unknowns: Unknowns, values: Floats) -> Evaluation:
-    result = run_in_memory(differentiated(unknowns.case_at(values), unknowns.keys, []))
+    result = run(differentiated(unknowns.case_at(values), unknowns.keys, []), in_memory=True)
     found = result.sensitivities
     value, weights = cost(found)
     gradient = np.zeros(len(values))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from ..analyses import run_in_memory
+from ..analyses import run
 from ..case import Case
 from ..errors import ConvergenceError
 from ..peaks import Peak
@@ -89,7 +89,7 @@ def peak_values(case: Case, keys: Sequence[str], quantity: str, others: Sequence
     ConvergenceError
         A point has not converged, or the peak cannot be located; the message says which.
     """
-    swept = run_in_memory(case)
+    swept = run(case, in_memory=True)
     column = swept.index(observe)
     guesses = _first_guesses(swept, quantity, column)
     tight: Case = case.replace(solver={"tolerance": min(_TOLERANCE, _tolerance(case))},
