@@ -51,6 +51,12 @@ module fw_branch_peaks
       ! Maxima, and the rows that they lie behind.
       type(peak_type), allocatable, private :: found(:)
       integer, allocatable, private :: place(:)
+      ! The highest row of every quantity since it last fell, and the maximum found since then (0:
+      ! none): where pairs begin to slip corners stand a little above what is solved for.
+      type(peak_type), allocatable, private :: crest(:)
+      integer, allocatable, private :: crowned(:)
+      ! That maximum as it was found.
+      type(peak_type), allocatable, private :: first_found(:)
    contains
       procedure :: add
       procedure :: list
@@ -91,6 +97,9 @@ contains
       self%n_rows = n
       if (n == 1) then
          self%last = point
+         self%crest = [(peak_of(point, i), i=1, size(point%amplitude))]
+         self%first_found = self%crest
+         allocate (self%crowned(size(point%amplitude)), source=0)
          return
       end if
       do i = 1, size(point%amplitude)
@@ -100,11 +109,42 @@ contains
          if (allocated(error)) return
          self%found = [self%found, peak]
          self%place = [self%place, n - 1]
+         self%crowned(i) = size(self%found)
+         self%first_found(i) = peak
       end do
+      call follow_crest(self, point)
       self%n_solved = self%n_solved + segment%n_solved
       self%iterations = self%iterations + segment%iterations
       self%last = point
    end subroutine add
+
+   !> A row that is higher than the maximum beside it takes its place.
+   subroutine follow_crest(self, point)
+      class(branch_peaks), intent(inout) :: self
+      type(point_type), intent(in) :: point
+      integer :: i
+
+      do i = 1, size(self%crest)
+         if (point%amplitude(i) > self%crest(i)%amplitude) then
+            self%crest(i) = peak_of(point, i)
+         else if (point%amplitude(i) < (1.0_wp - prominent)*self%crest(i)%amplitude) then
+            self%crest(i) = peak_of(point, i)
+            self%crowned(i) = 0
+         end if
+         if (self%crowned(i) == 0) cycle
+         associate (peak => self%found(self%crowned(i)), crest => self%crest(i), &
+                    first => self%first_found(i))
+            if (crest%amplitude > (1.0_wp + prominent)*first%amplitude) then
+               ! It was a step on the way up.
+               peak = first
+               self%crowned(i) = 0
+            else if (crest%amplitude > peak%amplitude) then
+               peak = crest
+               peak%found_by = found_row
+            end if
+         end associate
+      end do
+   end subroutine follow_crest
 
    !> Change of the amplitudes along the branch (n_observed).
    pure function rise_of(point) result(rise)
@@ -245,8 +285,7 @@ contains
          do while (j >= 1 .and. j <= self%n_rows)
             associate (at => self%row(j)%amplitude(self%found(k)%observed))
                if (at < floor) exit
-               ! Where pairs begin to slip corners stand a little above what was solved for.
-               stands_out = stands_out .and. at <= (1.0_wp + prominent)*self%found(k)%amplitude
+               stands_out = stands_out .and. at <= self%found(k)%amplitude
             end associate
             j = j + merge(-1, 1, side == 0)
          end do
