@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, Union
 
 import numpy as np
-import scipy.interpolate
 from numpy.typing import ArrayLike, NDArray
 
 from .._arguments import array
@@ -290,6 +290,6 @@ def _between(at: Floats, rows: Floats, onset: float, wanted: Floats) -> Floats:
             continue
         if inside.sum() < 4:  # hardly any of the curve: all of it
             inside = np.ones(len(x), dtype=bool)
-        spline = scipy.interpolate.CubicSpline(x[inside], rows[inside])
+        spline = import_module("scipy.interpolate").CubicSpline(x[inside], rows[inside])
         found[asked] = spline(where[asked])
     return found

@@ -7,11 +7,11 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Union
 
 import numpy as np
-from scipy.stats import qmc
 
 from .._namelist import literal
 from ..errors import InputError, OutputError
@@ -239,6 +239,8 @@ def _hypercube(reader: _Reader, content: Mapping[str, Any],
         reader.wrong(f"{n_samples} is not accepted; expected 1 to {_MOST_POINTS}", "n_samples")
     # Without a seed no restart could find its runs again.
     seed = reader.take(content, "seed", int)
+    # Loading it takes longer than all else that a command loads.
+    qmc = import_module("scipy.stats").qmc
     unit = qmc.LatinHypercube(len(values), seed=np.random.default_rng(seed)).random(n_samples)
     columns: dict[str, list[Setting]] = {}
     for k, (name, given) in enumerate(values.items()):
