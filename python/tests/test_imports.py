@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,8 @@ PACKAGE = Path(fretwear.__file__).parent
 NAMES = sorted(
     ".".join(("fretwear", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
         ".__init__") for path in PACKAGE.rglob("*.py"))
+#: The program of the command runs as it is imported.
+ALONE = [name for name in NAMES if not name.endswith("__main__")]
 #: What optional packages some modules need at once.
 NEEDS = {"fretwear.disk": "skfem", "fretwear.sector": "skfem"}
 
@@ -67,11 +70,48 @@ def test_no_folder_reaches_up_to_what_is_made_of_it() -> None:
         assert not [other for other in imports(f"fretwear.{name}") if other.startswith(upper)]
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if not name.endswith("__main__")])
-def test_every_module_can_be_imported_alone(name: str) -> None:
+#: Imports each module in a process that has nothing of the package, only what `import fretwear`,
+#: which comes before any of its modules, and pictures bring from elsewhere: a fork takes a tenth of
+#: the time of a new interpreter.
+EACH_ALONE = """
+import contextlib, importlib, json, os, sys, tempfile, traceback
+import fretwear
+for package in ("matplotlib.pyplot", "skfem"):
+    with contextlib.suppress(ImportError):
+        importlib.import_module(package)
+for name in [name for name in sys.modules if name.split(".")[0] == "fretwear"]:
+    del sys.modules[name]
+said = {}
+for name in sys.argv[1:]:
+    with tempfile.TemporaryFile("w+") as error:
+        child = os.fork()
+        if child == 0:
+            try:
+                importlib.import_module(name)
+            except BaseException:
+                error.write(traceback.format_exc())
+                error.flush()
+                os._exit(1)
+            os._exit(0)
+        status = os.waitpid(child, 0)[1]
+        error.seek(0)
+        said[name] = error.read() + (f"status {status}" if status else "")
+print(json.dumps(said))
+"""
+
+
+@pytest.fixture(scope="module")
+def said_alone() -> dict[str, str]:
+    """What is said when a module is imported alone: nothing where it can be."""
+    done = subprocess.run([sys.executable, "-c", EACH_ALONE, *ALONE], capture_output=True,
+                          text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_every_module_can_be_imported_alone(name: str, said_alone: dict[str, str]) -> None:
     for module, package in NEEDS.items():
         if name.startswith(module):
             pytest.importorskip(package)
-    done = subprocess.run([sys.executable, "-c", f"import {name}"], capture_output=True, text=True,
-                          check=False)
-    assert done.returncode == 0, done.stderr
+    assert not said_alone[name]
