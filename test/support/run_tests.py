@@ -17,10 +17,13 @@ import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
+#: Of tests at a time.
+PROCESSES = min(2, len(os.sched_getaffinity(0)))
 
 
 def run(command, **options):
@@ -60,9 +63,8 @@ def closing_line(text):
 def fortran_stage(stage, command):
     text, status = run(command)
     counts = verdict(stage, closing_line(text), status)
-    if counts["failed"]:
-        print(text, end="")
-    print(f"{stage}: {counts['passed']} passed, {counts['failed']} failed", flush=True)
+    print(f"{text if counts['failed'] else ''}"
+          f"{stage}: {counts['passed']} passed, {counts['failed']} failed", flush=True)
     return counts
 
 
@@ -75,16 +77,15 @@ def unit_stages(programs):
     if (programs / "joined").exists() and not (programs / "unit_tests.d").exists():
         yield fortran_stage("unit tests under pFUnit", [program])
         return
-    for path in sorted((ROOT / "test" / "unit").glob("*.pf")):
-        yield fortran_stage(f"unit/{path.name}", [program, path.stem])
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        yield from pool.map(lambda path: fortran_stage(f"unit/{path.name}", [program, path.stem]),
+                            sorted((ROOT / "test" / "unit").glob("*.pf")))
 
 
 def pytest_process(python, build, directories, claims, from_the_end):
     """Start pytest on those files that no other takes; the process, and the report it writes."""
     report = Path(claims) / ("end.xml" if from_the_end else "front.xml")
-    # Threads that spin while they wait take the time of the process beside them.
     environment = dict(os.environ, FW_RUN=str(build / "fw_run"), MPLBACKEND="Agg",
-                       OMP_WAIT_POLICY=os.environ.get("OMP_WAIT_POLICY", "passive"),
                        FW_SHARED_OUT=str(claims),
                        PYTHONPATH=os.pathsep.join(filter(None, [
                            str(ROOT / "python"), str(HERE), os.environ.get("PYTHONPATH", "")])))
@@ -121,8 +122,8 @@ def pytest_stage(python, build, tests):
         return Counter()
     sys.stdout.flush()
     with tempfile.TemporaryDirectory() as claims:
-        ends = (False, True) if len(os.sched_getaffinity(0)) > 1 else (False,)
-        started = [pytest_process(python, build, directories, claims, end) for end in ends]
+        started = [pytest_process(python, build, directories, claims, end)
+                   for end in (False, True)[:PROCESSES]]
         total, ran = Counter(), 0
         for process, report in started:
             process.wait()
@@ -149,6 +150,9 @@ def main():
     arguments = parser.parse_args()
     # A shell starts what is in the background with SIGINT ignored, and tests of it inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    # Threads that spin while they wait take the time of the process beside them.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     build = arguments.build.resolve()
     total = Counter()
     for counts in unit_stages(build / "test" / "support"):
