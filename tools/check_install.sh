@@ -2,13 +2,16 @@
 # Install the package into a fresh environment and use it as the README says: run its ten lines,
 # and compare the numbers with those of the fw_run that came along.
 #
-#     tools/check_install.sh WORK_DIRECTORY
+#     tools/check_install.sh WORK_DIRECTORY [CMAKE_BUILD]
+#
+# What CMAKE_BUILD, a build with CMake's own options, has compiled is not compiled again.
 set -euo pipefail
 root=$PWD
 mkdir -p "$1"
 work=$(cd "$1" && pwd)
 started=$SECONDS
 rm -rf "${work:?}"/*
+[ $# -lt 2 ] || export SKBUILD_BUILD_DIR=$2
 python3 -m venv "$work/venv"
 "$work/venv/bin/python" -m pip install --quiet --disable-pip-version-check "$root"
 echo "installed after $((SECONDS - started)) s"
