@@ -6,11 +6,11 @@
 set -euo pipefail
 venv=$1
 python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh
-                selenium pytest gcovr nbclient ipykernel mypy ruff fortitude ford sphinx numpydoc
-                myst_parser fpm)
+                selenium pytest xdist gcovr nbclient ipykernel mypy ruff fortitude ford sphinx
+                numpydoc myst_parser fpm)
 python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed bokeh
-                 selenium pytest gcovr nbclient ipykernel mypy ruff fortitude-lint ford sphinx
-                 numpydoc myst-parser fpm)
+                 selenium pytest pytest-xdist gcovr nbclient ipykernel mypy ruff fortitude-lint
+                 ford sphinx numpydoc myst-parser fpm)
 
 has_command() { command -v "$1" >/dev/null 2>&1; }
 

@@ -5,8 +5,8 @@
 
 Stages: the self-test of the stand-in, the unit tests (each .pf file in a process of its own under
 the stand-in), pytest over test/ and python/tests, or over TESTS. A stage that crashes, or that
-counts no test, is a failed case of its own: silence never passes. pytest runs in two processes that
-share the test files, each file in one of them.
+counts no test, is a failed case of its own: silence never passes. pytest runs in two processes
+(pytest-xdist), each test file in one of them.
 """
 import argparse
 import os
@@ -14,7 +14,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -82,62 +81,30 @@ def unit_stages(programs):
                             sorted((ROOT / "test" / "unit").glob("*.pf")))
 
 
-def pytest_process(python, build, directories, claims, from_the_end):
-    """Start pytest on those files that no other takes; the process, and the report it writes."""
-    report = Path(claims) / ("end.xml" if from_the_end else "front.xml")
-    environment = dict(os.environ, FW_RUN=str(build / "fw_run"), MPLBACKEND="Agg",
-                       FW_SHARED_OUT=str(claims),
-                       PYTHONPATH=os.pathsep.join(filter(None, [
-                           str(ROOT / "python"), str(HERE), os.environ.get("PYTHONPATH", "")])))
-    if from_the_end:
-        environment["FW_FROM_THE_END"] = "1"
-    command = [python, "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider", "-p", "shared_out",
-               f"--junitxml={report}", *map(str, directories)]
-    # What the second one says is shown after the first one's.
-    with report.with_suffix(".txt").open("wb") as said:
-        process = subprocess.Popen(command, cwd=ROOT, env=environment,
-                                   stdout=said if from_the_end else None,
-                                   stderr=subprocess.STDOUT if from_the_end else None)
-    return process, report
-
-
-def counts_of(report):
-    """Counts of a report of pytest."""
-    if not report.exists():
-        return Counter()
-    suite = next(ElementTree.parse(report).getroot().iter("testsuite")).attrib
-    bad = int(suite["failures"]) + int(suite["errors"])
-    counts = Counter(failed=bad, skipped=int(suite["skipped"]))
-    # A case can fail and end in an error as well; it must not make a passed one vanish twice.
-    counts["passed"] = max(int(suite["tests"]) - bad - counts["skipped"], 0)
-    return counts
-
-
 def pytest_stage(python, build, tests):
-    """pytest over the directories that hold tests, in two processes where there are two
-    processors; their own reports are read, not their text."""
+    """pytest over the directories that hold tests, as many processes as PROCESSES sharing the test
+    files; its own report is read, not its text."""
     directories = [path for path in tests if any(path.rglob("test_*.py"))]
     if not directories:
         print("pytest: no test file yet")
         return Counter()
-    sys.stdout.flush()
-    with tempfile.TemporaryDirectory() as claims:
-        started = [pytest_process(python, build, directories, claims, end)
-                   for end in (False, True)[:PROCESSES]]
-        total, ran = Counter(), 0
-        for process, report in started:
-            process.wait()
-            print(report.with_suffix(".txt").read_text(errors="replace"), end="", flush=True)
-            counts = counts_of(report)
-            ran += sum(counts.values())
-            # One of two may find all files taken.
-            if any(counts.values()) or process.returncode:
-                total += verdict("pytest", counts, process.returncode)
-        collected = Path(claims) / "collected"
-        if not collected.exists() or ran < int(collected.read_text()):
-            print(f"pytest: {ran} tests ran, and there are more")
-            total["failed"] += 1
-    return total
+    report = build / "pytest.xml"
+    report.unlink(missing_ok=True)
+    environment = dict(os.environ, FW_RUN=str(build / "fw_run"), MPLBACKEND="Agg",
+                       PYTHONPATH=os.pathsep.join(filter(None, [
+                           str(ROOT / "python"), os.environ.get("PYTHONPATH", "")])))
+    status = subprocess.run(
+        [python, "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider", f"-n{PROCESSES}",
+         "--dist=loadfile", f"--junitxml={report}", *map(str, directories)],
+        cwd=ROOT, env=environment, check=False).returncode
+    counts = Counter()
+    if report.exists():
+        suite = next(ElementTree.parse(report).getroot().iter("testsuite")).attrib
+        bad = int(suite["failures"]) + int(suite["errors"])
+        counts = Counter(failed=bad, skipped=int(suite["skipped"]))
+        # A case can fail and end in an error as well; it must not make a passed one vanish twice.
+        counts["passed"] = max(int(suite["tests"]) - bad - counts["skipped"], 0)
+    return verdict("pytest", counts, status)
 
 
 def main():
