@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 __all__ = ["strings", "write_model_file"]
 
 FORMAT, FORMAT_VERSION = "fretwear-model", 1
+#: Numbers that are packed within a second or two.
+_SMALL = 3_000_000
 
 
 def write_model_file(path: str | Path, datasets: Mapping[str, NDArray[Any]], *, title: str,
@@ -44,8 +46,12 @@ def write_model_file(path: str | Path, datasets: Mapping[str, NDArray[Any]], *, 
                 if text:
                     file.attrs[name] = np.bytes_(text.encode())
             for name, data in datasets.items():
-                # Filters pay for themselves on matrices only.
-                packed = {"compression": "gzip", "compression_opts": 9, "shuffle": True}
+                # Filters pay for themselves on matrices only; the last percent only where it
+                # takes no time.
+                packed = {"compression": "gzip", "shuffle": True,
+                          "compression_opts": 9 if data.size < _SMALL else 4}
+                if name == "mesh/basis":
+                    packed["chunks"] = data.shape   # read as one
                 file.create_dataset(name, data=data, **(packed if data.size > 10_000 else {}))
             for group, numbers in (groups or {}).items():
                 file.require_group(group).attrs.update(

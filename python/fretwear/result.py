@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ from .sensitivity import Sensitivities, read_sensitivities
 if TYPE_CHECKING:
     import pyvista
     import xarray
+
+    from .export.animation import Animation
 
 __all__ = ["DIRECTIONS", "STATES", "Quantity", "Result"]
 
@@ -571,6 +573,22 @@ class Result(ResultFile):
         except ImportError:
             raise InputError("to_pyvista needs pyvista: pip install pyvista") from None
         return pyvista.wrap(export_mesh(self, point, phase, sectors=sectors, axis=axis))
+
+    def animate(self, file: str | Path | None = None, **options: Any) -> Animation:
+        """One period on the mesh of the model, as a picture that moves in a notebook.
+
+        Parameters
+        ----------
+        file : str or Path, optional
+            Picture to write, .gif, .webp or .png.
+        **options
+            See `fretwear.export.animate`: `point`, `scalars`, `sectors`, `frames`, `turn`, ...
+
+        Returns
+        -------
+        Animation
+        """
+        return importlib.import_module("fretwear.export").animate(self, file, **options)
 
     def to_xarray(self) -> xarray.Dataset:
         """Everything with one row per point or per wear step, with coordinates and units.

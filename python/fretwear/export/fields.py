@@ -48,10 +48,10 @@ def export_mesh(result: Result | str | Path, point: int | None = None,
     Returns
     -------
     meshio.Mesh
-        Hexahedra and the facets of the pairs. Point data: `displacement` (at the instant),
+        Cells and the facets of the pairs. Point data: `displacement` (at the instant),
         `displacement_static`, `displacement_cosine`, `displacement_sine` (first harmonic) and
         `vibration`, the largest distance from the static position. Cell data: `body`, `pair`
-        (from 1; 0 on hexahedra), and `pair_fields`, NaN on hexahedra; of several sectors
+        (from 1; 0 on others), and `pair_fields`, NaN on others; of several sectors
         `sector`.
 
     Raises
@@ -112,24 +112,29 @@ class Fields:
             raise InputError("fretwear export needs meshio: pip install meshio") from None
         mesh, n = self.mesh, len(self.turns)
         shift = len(mesh.points) * np.arange(n)
-        nowhere = np.full(n * len(mesh.cells), np.nan)
-        # Facets belong to the body of a cell that has their corners.
-        owner = np.zeros(int(mesh.cells.max()) + 1, dtype=np.int32)
-        owner[mesh.cells] = mesh.body[:, None]
-        cell_data: dict[str, list[Any]] = {
-            "body": [np.tile(mesh.body.astype(np.int32), n),
-                     np.tile(owner[mesh.facets[:, 0]], n)],
-            "pair": [np.zeros(n * len(mesh.cells), dtype=np.int32),
-                     np.tile(mesh.pair.astype(np.int32) + 1, n)]}
+        # Facets belong to the body of a cell that has their first corner.
+        owner = np.zeros(len(mesh.points), dtype=np.int32)
+        owner[np.where(mesh.cells >= 0, mesh.cells, mesh.cells[:, :1])] = mesh.body[:, None]
+        parts: list[tuple[str, Any, Any, Any]] = [
+            (name, mesh.corners(which, name), mesh.body[which], None)
+            for name, which in mesh.blocks()]
+        parts.append(("quad", mesh.facets, owner[mesh.facets[:, 0]], mesh.pair))
+        cell_data: dict[str, list[Any]] = {name: [] for name in ("body", "pair", *self.pairs)}
         if n > 1:
-            cell_data["sector"] = [np.repeat(np.arange(n, dtype=np.int32), len(part))
-                                   for part in (mesh.cells, mesh.facets)]
-        for name, (values, _) in self.pairs.items():
-            cell_data[name] = [nowhere, np.tile(values[mesh.pair], n)]
+            cell_data["sector"] = []
+        for _, corners, body, pair in parts:
+            cell_data["body"].append(np.tile(body.astype(np.int32), n))
+            number = np.zeros(len(corners)) if pair is None else pair + 1
+            cell_data["pair"].append(np.tile(number.astype(np.int32), n))
+            if n > 1:
+                cell_data["sector"].append(np.repeat(np.arange(n, dtype=np.int32), len(corners)))
+            for name, (values, _) in self.pairs.items():
+                cell_data[name].append(np.full(n * len(corners), np.nan) if pair is None
+                                       else np.tile(values[pair], n))
         points = np.asarray(mesh.points, dtype=float)
         return meshio.Mesh(np.concatenate([points @ turn.T for _, turn in self.turns]),
-                           [("hexahedron", np.concatenate([mesh.cells + k for k in shift])),
-                            ("quad", np.concatenate([mesh.facets + k for k in shift]))],
+                           [(name, np.concatenate([corners + k for k in shift]))
+                            for name, corners, _, _ in parts],
                            point_data=self._point_data(phase), cell_data=cell_data)
 
     def summary(self) -> str:
@@ -137,7 +142,7 @@ class Fields:
         length = self.result.units("amplitude")
         n = len(self.turns)
         lines = [f"{self.result.name}: point {self.point + 1}, {n * len(self.mesh.points)} points, "
-                 f"{n * len(self.mesh.cells)} hexahedra, {n * len(self.mesh.facets)} facets in "
+                 f"{n * len(self.mesh.cells)} cells, {n * len(self.mesh.facets)} facets in "
                  "contact" + (f", {n} sectors" if n > 1 else "")]
         shown = {name: (np.linalg.norm(values, axis=1) if values.ndim == 2 else values, length)
                  for name, values in self._point_data(None).items()}

@@ -15,13 +15,14 @@ from .finding import Finding
 from .labels import Dofs, read_label_table
 from .matrices import FORMATS, read_matrices
 from .matrix_file import MatrixFile
-from .sectors import FRAMES, Interfaces, in_sector_frames, read_interfaces
+from .meshes import ImportedMesh, read_mesh_file
+from .sectors import FRAMES, Interfaces, axis_of, in_sector_frames, read_interfaces
 from .tables import Pairs, contact_rows, read_loads, read_pairs
 
-__all__ = ["FORMATS", "Dofs", "Finding", "FullModel", "Interfaces", "MatrixFile", "Pairs",
-           "Source", "add_arguments", "check_model", "contact_rows", "drop", "gather", "main",
-           "model_datasets", "read_interfaces", "read_label_table", "read_loads", "read_matrices",
-           "read_pairs", "save"]
+__all__ = ["FORMATS", "Dofs", "Finding", "FullModel", "ImportedMesh", "Interfaces",
+           "MatrixFile", "Pairs", "Source", "add_arguments", "check_model", "contact_rows", "drop",
+           "gather", "main", "model_datasets", "read_interfaces", "read_label_table", "read_loads",
+           "read_matrices", "read_mesh_file", "read_pairs", "save"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="multiplies the mass, such as 1e-3 from kg to tonnes")
     parser.add_argument("--labels", type=Path, metavar="TABLE",
                         help="equation, node and component of every degree of freedom")
+    parser.add_argument("--mesh", type=Path, metavar="FILE",
+                        help="mesh with the node numbers of the matrices, for ParaView and "
+                             "animations: Nastran .bdf, Abaqus .inp, ANSYS .cdb, or another "
+                             "format of meshio")
     parser.add_argument("--drop-empty", action="store_true",
                         help="leave out degrees of freedom without mass and stiffness")
     parser.add_argument("--pairs", type=Path, metavar="TABLE", help="contact pairs")
@@ -63,8 +68,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="of the disk, by the right hand from left to right: x, y, z, or -x, "
                              "-y, -z; write --axis=-z (default: z)")
     parser.add_argument("--frames", choices=FRAMES, default=FRAMES[0],
-                        help="of the components of interface nodes; Cartesian ones are turned "
-                             "(default: cylindrical)")
+                        help="of the components of interface nodes, and of all nodes of a mesh; "
+                             "Cartesian ones of the right interface are turned (default: "
+                             "cylindrical)")
     parser.add_argument("--by-diameter", action="store_true",
                         help="reduce the sector on its own in every nodal diameter, without its "
                              "interfaces")
@@ -127,7 +133,8 @@ def _read(options: argparse.Namespace) -> FullModel:
         model, observe=observe, title=options.title, unit_system=options.unit_system,
         pairs=None if options.pairs is None else read_pairs(options.pairs, model.dofs,
                                                                rows),
-        loads={} if options.loads is None else read_loads(options.loads, model.dofs))
+        loads={} if options.loads is None else read_loads(options.loads, model.dofs),
+        mesh=None if options.mesh is None else read_mesh_file(options.mesh))
     return _sector(model, options)
 
 
@@ -144,4 +151,5 @@ def _sector(model: FullModel, options: argparse.Namespace) -> FullModel:
                                  options.axis)
     if options.frames == "cartesian":
         model = in_sector_frames(model, interfaces)
-    return replace(model, interfaces=interfaces)
+    return replace(model, interfaces=interfaces, in_cylinder=None if options.frames == "cartesian"
+                   else axis_of(options.axis))

@@ -64,7 +64,8 @@ def read_full(path: Path) -> MatrixFile:
 
     The file has no entries for constrained degrees of freedom; they are marked as held.
     """
-    reader = need("ansys.mapdl.reader", "ansys-mapdl-reader", "reading ANSYS .full files")
+    reader = need("ansys.mapdl.reader", "ansys-mapdl-reader", "reading ANSYS .full files",
+                  "ansys")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         file = reader.read_binary(str(path))

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..mesh import mesh_datasets
 from ..model_file import strings, write_model_file
 from ..reduction import reduce
 from .diameters import reduce_diameters
@@ -19,6 +20,8 @@ from .finding import Finding
 from .labels import Dofs
 from .matrices import read_matrices
 from .matrix_file import HELD, MatrixFile, mirrored, one_triangle
+from .meshes import ImportedMesh
+from .recovery import recovery_mesh
 from .sectors import Interfaces
 from .tables import LOADS, Pairs, contact_rows
 
@@ -76,6 +79,10 @@ class FullModel:
         What was done on the way.
     interfaces : Interfaces or None
         Of one sector of a cyclic structure.
+    mesh : ImportedMesh or None
+        What the motion is shown on.
+    in_cylinder : tuple of float or None
+        Axis about which the components of the nodes of a sector are radial, tangential, axial.
     """
 
     matrices: dict[str, sp.csr_array]
@@ -87,6 +94,8 @@ class FullModel:
     unit_system: str = ""
     notes: list[str] = field(default_factory=list)
     interfaces: Interfaces | None = None
+    mesh: ImportedMesh | None = None
+    in_cylinder: tuple[float, float, float] | None = None
 
 
 def gather(sources: Mapping[str, Source], files: Sequence[Path] = (), *,
@@ -236,6 +245,7 @@ def model_datasets(model: FullModel, n_modes: int | None,
     if cyclic and model.pairs is not None and model.pairs.rows is not None:
         raise InputError("pairs of sectors need degrees of freedom of their own on both sides: "
                          "columns side_1_t1 ... side_2_n and sector_2")
+    basis: Floats | None = None
     if n_modes is None:
         if model.pairs is not None and model.pairs.rows is not None:
             raise InputError("pairs given by nodes and normals, or by rows, are no degrees of "
@@ -251,6 +261,8 @@ def model_datasets(model: FullModel, n_modes: int | None,
         data = (_reduced_sector if cyclic else _reduced)(model, symmetric, n_modes)
         basis = data.pop("basis")
         observed = np.asarray(observed @ basis)
+    if model.mesh is not None:
+        data |= mesh_datasets(recovery_mesh(model, basis))
     if model.pairs is not None:
         data.update(_pair_values(model.pairs))
     if model.observe:
@@ -329,6 +341,10 @@ def _by_diameter(model: FullModel, matrices: dict[str, sp.csr_array],
     """Complex matrices of every nodal diameter; pairs have no sides any more but rows."""
     if n_modes is None:
         raise InputError("--by-diameter goes with --reduce N_MODES")
+    if model.mesh is not None:
+        raise InputError("--mesh does not go with --by-diameter: every nodal diameter has "
+                         "coordinates of its own, which are no motions of one mesh; leave out "
+                         "--by-diameter")
     sectors, data = reduce_diameters(model, matrices, n_modes, _observed(model))
     data |= sectors.datasets()
     if model.pairs is not None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .build import FullModel
 from .finding import Finding
+from .recovery import check_mesh
 from .sectors import check_interfaces, tied_spectrum
 from .spectrum import Spectrum, lowest_modes, negative_directions
 from .tables import DIRECTIONS, Pairs, contact_rows
@@ -50,6 +51,8 @@ def check_model(model: FullModel) -> list[Finding]:
         if not any(finding.kind == "error" for finding in found):
             found += _dependent(model, model.pairs)
     found += _loads(model)
+    if model.mesh is not None:
+        found += check_mesh(model)
     # The spectrum means something only where the matrices do.
     if not any(finding.kind == "error" for finding in found):
         found += _spectrum(model)

@@ -42,13 +42,14 @@ class MatrixFile:
     notes: list[str] = field(default_factory=list)
 
 
-def need(module: str, package: str, purpose: str) -> ModuleType:
-    """Import an optional package, or say how to get it."""
+def need(module: str, package: str, purpose: str, extra: str = "import") -> ModuleType:
+    """Import an optional package, or say how to get it; `extra` of this package brings it."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
         raise InputError(f"{purpose} needs the package {package} ({error}); install it with "
-                         f"pip install {package}, or use another format") from None
+                         f"pip install {package} or 'fretwear[{extra}]', or use another "
+                         "format") from None
 
 
 def mirrored(matrix: Any) -> sp.csr_array:

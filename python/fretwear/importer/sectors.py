@@ -25,8 +25,8 @@ from .tables import read_table
 if TYPE_CHECKING:
     from .build import FullModel
 
-__all__ = ["FRAMES", "Interfaces", "check_interfaces", "in_sector_frames", "read_interfaces", "tie",
-           "tied_spectrum"]
+__all__ = ["FRAMES", "Interfaces", "axis_of", "check_interfaces", "in_sector_frames",
+           "read_interfaces", "tie", "tied_spectrum"]
 
 Floats = NDArray[np.float64]
 
@@ -196,6 +196,13 @@ def _components(dofs: Dofs, left: int, right: int) -> list[tuple[int, int]]:
                          f"{sorted(places[0])}, node {right} of the right one "
                          f"{sorted(places[1])}; both need the same")
     return [(places[0][c], places[1][c]) for c in sorted(places[0])]
+
+
+def axis_of(axis: str) -> tuple[float, float, float]:
+    """Direction of an axis, from its name."""
+    sign = -1.0 if axis.startswith("-") else 1.0
+    x, y, z = (sign * float(name == axis[-1]) for name in "xyz")
+    return x, y, z
 
 
 def _rotation(axis: str, angle: float) -> Floats:
