@@ -1,21 +1,15 @@
 !> Every quantity of a solution point, declared once: what it is called, its unit and dimensions,
-!> when a result holds it, and where its numbers are in a point. The rows of the result file, their
-!> labels, what a caller may ask of a point and what a continued run copies all follow from here.
+!> when a result holds it (fw_quantity_conditions), and where its numbers are in a point
+!> (fw_quantity_values). The rows of the result file, their labels, what a caller may ask of a point
+!> and what a continued run copies all follow from here.
 !>
 !> A new quantity is one line in `point_quantities`, naming the procedure that gives its numbers.
 module fw_point_quantities
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_mode
-   use fw_case, only: analysis_point
-   use fw_case, only: analysis_wear
    use fw_case, only: case_type
    use fw_hdf5, only: growing_integer
    use fw_hdf5, only: growing_logical
    use fw_hdf5, only: growing_real
    use fw_kinds, only: wp
-   use fw_parameters, only: harmonic_scale
    use fw_parameters, only: is_per_pair
    use fw_parameters, only: is_per_spring
    use fw_parameters, only: n_parameter_words
@@ -23,10 +17,60 @@ module fw_point_quantities
    use fw_parameters, only: parameter_words
    use fw_patches, only: count_patches
    use fw_point, only: point_type
+   use fw_quantity_conditions, only: always
+   use fw_quantity_conditions, only: asks_stability
+   use fw_quantity_conditions, only: follows_branch
+   use fw_quantity_conditions, only: follows_frequency
+   use fw_quantity_conditions, only: follows_parameter
+   use fw_quantity_conditions, only: goes_over
+   use fw_quantity_conditions, only: has_levels
+   use fw_quantity_conditions, only: is_accurate
+   use fw_quantity_conditions, only: is_controlled
+   use fw_quantity_conditions, only: is_mode
+   use fw_quantity_conditions, only: is_response
+   use fw_quantity_conditions, only: scales_load
+   use fw_quantity_conditions, only: shows_contact
+   use fw_quantity_conditions, only: wears
+   use fw_quantity_values, only: amplitude
+   use fw_quantity_values, only: coefficients
+   use fw_quantity_values, only: control
+   use fw_quantity_values, only: converged
+   use fw_quantity_values, only: cycles
+   use fw_quantity_values, only: damping_ratio
+   use fw_quantity_values, only: depth
+   use fw_quantity_values, only: dissipation
+   use fw_quantity_values, only: error_estimate
+   use fw_quantity_values, only: first_harmonic
+   use fw_quantity_values, only: fold
+   use fw_quantity_values, only: force
+   use fw_quantity_values, only: force_history
+   use fw_quantity_values, only: fraction
+   use fw_quantity_values, only: harmonics
+   use fw_quantity_values, only: history
+   use fw_quantity_values, only: instants
+   use fw_quantity_values, only: iterations
+   use fw_quantity_values, only: load_scale
+   use fw_quantity_values, only: modal_amplitude
+   use fw_quantity_values, only: multiplier_error
+   use fw_quantity_values, only: multipliers
+   use fw_quantity_values, only: nothing
+   use fw_quantity_values, only: omega
+   use fw_quantity_values, only: place
+   use fw_quantity_values, only: residual
+   use fw_quantity_values, only: seconds
+   use fw_quantity_values, only: self_excitation
+   use fw_quantity_values, only: served_by
+   use fw_quantity_values, only: slip_history
+   use fw_quantity_values, only: stable
+   use fw_quantity_values, only: tangent
+   use fw_quantity_values, only: tangent_omega
+   use fw_quantity_values, only: tangent_parameter
+   use fw_quantity_values, only: wear_energy
+   use fw_quantity_values, only: wear_rate
+   use fw_quantity_values, only: wear_volume
    use fw_response_rows, only: is_of_pairs
    use fw_response_rows, only: value_words
    use fw_sensitivity_options, only: of_itself
-   use fw_solver_options, only: continuation_arclength
    use fw_text, only: string_type
    use fw_text_list, only: words_of
    implicit none (type, external)
@@ -313,402 +357,5 @@ contains
          if (point%sensitivity(k)%parameter == place(2)) values = point%sensitivity(k)%values
       end do
    end subroutine find_sensitivity
-
-   !> Of a quantity that is found in another way.
-   subroutine nothing(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(values)) deallocate (values)
-      associate (unused => point)
-      end associate
-   end subroutine nothing
-
-   ! ---------------------------------------------------------------- when a result holds it
-
-   pure logical function always(case)
-      type(case_type), intent(in) :: case
-
-      associate (unused => case)
-      end associate
-      always = .true.
-   end function always
-
-   !> Harmonic balance, which may fall back from one way of solution to another.
-   pure logical function is_response(case)
-      type(case_type), intent(in) :: case
-
-      is_response = case%analysis == analysis_frf .or. case%analysis == analysis_point
-   end function is_response
-
-   pure logical function is_mode(case)
-      type(case_type), intent(in) :: case
-
-      is_mode = case%analysis == analysis_mode
-   end function is_mode
-
-   !> Only a branch turns back.
-   pure logical function follows_branch(case)
-      type(case_type), intent(in) :: case
-
-      follows_branch = case%sweep%continuation == continuation_arclength
-   end function follows_branch
-
-   !> Along frequencies, or along another parameter.
-   pure logical function follows_frequency(case)
-      type(case_type), intent(in) :: case
-
-      follows_frequency = follows_branch(case) .and. .not. case%over%is_wanted()
-   end function follows_frequency
-
-   pure logical function follows_parameter(case)
-      type(case_type), intent(in) :: case
-
-      follows_parameter = follows_branch(case) .and. case%over%is_wanted()
-   end function follows_parameter
-
-   !> A sweep over another parameter than the frequency.
-   pure logical function goes_over(case)
-      type(case_type), intent(in) :: case
-
-      goes_over = case%over%is_wanted()
-   end function goes_over
-
-   pure logical function scales_load(case)
-      type(case_type), intent(in) :: case
-
-      scales_load = case%over%number == harmonic_scale .or. case%control%is_wanted()
-   end function scales_load
-
-   pure logical function is_controlled(case)
-      type(case_type), intent(in) :: case
-
-      is_controlled = case%control%is_wanted()
-   end function is_controlled
-
-   !> Whether harmonics differ from point to point.
-   pure logical function has_levels(case)
-      type(case_type), intent(in) :: case
-
-      has_levels = case%harmonics%adaptive .or. is_accurate(case)
-   end function has_levels
-
-   !> Whether the harmonics follow from a wanted accuracy.
-   pure logical function is_accurate(case)
-      type(case_type), intent(in) :: case
-
-      is_accurate = case%harmonics%accuracy > 0.0_wp .and. .not. case%harmonics%adaptive
-   end function is_accurate
-
-   pure logical function asks_stability(case)
-      type(case_type), intent(in) :: case
-
-      asks_stability = case%sweep%stability
-   end function asks_stability
-
-   !> Pairs that exist, and that the output has not been told to leave out.
-   pure logical function shows_contact(case)
-      type(case_type), intent(in) :: case
-
-      shows_contact = case%output%contact .and. case%contact%n_pairs > 0
-   end function shows_contact
-
-   pure logical function wears(case)
-      type(case_type), intent(in) :: case
-
-      wears = case%analysis == analysis_wear
-   end function wears
-
-   ! ---------------------------------------------------------------- where its numbers are
-
-   subroutine omega(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%omega]
-   end subroutine omega
-
-   !> (2H+1, n_observed) in memory: h5py shows the observed quantity last, so that it runs fastest.
-   subroutine coefficients(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%coefficients)) values = by_rows(point%coefficients)
-   end subroutine coefficients
-
-   subroutine amplitude(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%amplitude)) values = point%amplitude
-   end subroutine amplitude
-
-   subroutine converged(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [flag(point%converged)]
-   end subroutine converged
-
-   subroutine iterations(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [real(point%iterations, wp)]
-   end subroutine iterations
-
-   subroutine residual(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%residual]
-   end subroutine residual
-
-   subroutine seconds(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%seconds]
-   end subroutine seconds
-
-   subroutine served_by(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [real(point%served_by, wp)]
-   end subroutine served_by
-
-   subroutine fold(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [flag(point%fold)]
-   end subroutine fold
-
-   subroutine tangent_omega(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%tangent_omega]
-   end subroutine tangent_omega
-
-   subroutine tangent_parameter(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%tangent_parameter]
-   end subroutine tangent_parameter
-
-   subroutine load_scale(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%load_scale]
-   end subroutine load_scale
-
-   subroutine control(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%control]
-   end subroutine control
-
-   subroutine place(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [point%place]
-   end subroutine place
-
-   subroutine tangent(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%tangent)) values = by_rows(point%tangent)
-   end subroutine tangent
-
-   subroutine harmonics(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [real(point%n_harmonics, wp)]
-   end subroutine harmonics
-
-   subroutine instants(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      values = [real(point%n_time, wp)]
-   end subroutine instants
-
-   !> Unknown where the point failed or no estimate was possible.
-   subroutine error_estimate(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (point%converged .and. point%error_estimate < huge(1.0_wp)) then
-         values = [point%error_estimate]
-      end if
-   end subroutine error_estimate
-
-   !> Unknown where the multipliers are: -1 in the file, as where they leave it open.
-   subroutine stable(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%multipliers)) values = [real(point%verdict, wp)]
-   end subroutine stable
-
-   !> Real and imaginary part of each, side by side.
-   subroutine multipliers(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-      integer :: n
-
-      if (.not. allocated(point%multipliers)) return
-      n = size(point%multipliers)
-      allocate (values(2*n))
-      values(1::2) = real(point%multipliers, wp)
-      values(2::2) = aimag(point%multipliers)
-   end subroutine multipliers
-
-   !> NaN where no estimate was possible.
-   subroutine multiplier_error(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (.not. allocated(point%multiplier_error)) return
-      values = point%multiplier_error
-      where (.not. values < huge(1.0_wp)) values = ieee_value(1.0_wp, ieee_quiet_nan)
-   end subroutine multiplier_error
-
-   !> Its order in memory (direction, pair, coefficient) is that of h5py reversed already.
-   subroutine force(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%force)) values = reshape(point%force, [size(point%force)])
-   end subroutine force
-
-   !> (3, n_pairs) in memory, as h5py shows it reversed.
-   subroutine fraction(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%fraction)) values = reshape(point%fraction, [size(point%fraction)])
-   end subroutine fraction
-
-   subroutine dissipation(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%dissipation)) values = point%dissipation
-   end subroutine dissipation
-
-   !> (n_time, n_observed) in memory: turned as the coefficients are.
-   subroutine history(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%history)) values = by_rows(point%history)
-   end subroutine history
-
-   !> (3, n_pairs, n_time) in memory, as h5py shows it reversed; displacements likewise.
-   subroutine force_history(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%force_history)) then
-         values = reshape(point%force_history, [size(point%force_history)])
-      end if
-   end subroutine force_history
-
-   subroutine slip_history(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%slip_history)) then
-         values = reshape(point%slip_history, [size(point%slip_history)])
-      end if
-   end subroutine slip_history
-
-   subroutine damping_ratio(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%first_harmonic)) values = [0.5_wp*point%self_excitation/point%omega]
-   end subroutine damping_ratio
-
-   subroutine self_excitation(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%first_harmonic)) values = [point%self_excitation]
-   end subroutine self_excitation
-
-   subroutine modal_amplitude(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%first_harmonic)) values = [point%modal_amplitude]
-   end subroutine modal_amplitude
-
-   subroutine first_harmonic(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%first_harmonic)) values = point%first_harmonic
-   end subroutine first_harmonic
-
-   !> A point with depths is a step of wear; any other has no row in these quantities.
-   subroutine cycles(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%depth)) values = [point%cycles]
-   end subroutine cycles
-
-   subroutine depth(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%depth)) values = point%depth
-   end subroutine depth
-
-   subroutine wear_rate(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%wear_rate)) values = point%wear_rate
-   end subroutine wear_rate
-
-   subroutine wear_energy(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%wear_energy)) values = point%wear_energy
-   end subroutine wear_energy
-
-   subroutine wear_volume(point, values)
-      type(point_type), intent(in) :: point
-      real(wp), allocatable, intent(out) :: values(:)
-
-      if (allocated(point%wear_volume)) values = point%wear_volume
-   end subroutine wear_volume
-
-   !> The elements of a matrix with the second index running fastest.
-   pure function by_rows(array) result(flat)
-      real(wp), intent(in) :: array(:, :)
-      real(wp) :: flat(size(array))
-
-      flat = reshape(transpose(array), [size(array)])
-   end function by_rows
-
-   !> Truth as a number: rows are reals until they are written.
-   pure real(wp) function flag(is_true)
-      logical, intent(in) :: is_true
-
-      flag = merge(1.0_wp, 0.0_wp, is_true)
-   end function flag
 
 end module fw_point_quantities
