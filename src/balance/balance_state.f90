@@ -17,8 +17,10 @@ module fw_balance_state
    use fw_force_law, only: force_workspace
    use fw_force_law, only: prediction_type
    use fw_force_list, only: force_entry
-   use fw_fourier, only: fourier_type
    use fw_fourier, only: to_real
+   use fw_input_rates, only: take_inertias
+   use fw_input_rates, only: take_means
+   use fw_input_rates, only: take_rates
    use fw_kept_factors, only: kept_factors
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
@@ -113,7 +115,8 @@ module fw_balance_state
       end subroutine derive_by_value
    end interface
 
-   ! The linear problem of a Newton step (fw_balance_linear).
+   ! The linear problem of a Newton step (fw_balance_linear, fw_balance_matrix), and derivatives by
+   ! what is not an unknown (fw_balance_slopes).
    interface
       module subroutine linearize(self, n_linear)
          class(balance_state), intent(inout) :: self
@@ -501,73 +504,6 @@ contains
 
       rate_unit = merge(self%frequency(), 1.0_wp, prediction%by_time)
    end function rate_unit
-
-   !> Rates say nothing of mean positions: an element that comes to rest takes them beside.
-   subroutine take_means(fourier, order, y, mean)
-      type(fourier_type), intent(in) :: fourier
-      integer, intent(in) :: order(:)
-      real(wp), intent(in) :: y(:, :, :)
-      !> (element, tangential component).
-      real(wp), intent(inout) :: mean(:, :)
-      integer :: c
-
-      mean = 0.0_wp
-      if (.not. fourier%has_constant()) return
-      do c = 1, min(size(mean, 2), size(y, 2))
-         if (order(c) > 0) mean(:, c) = y(:, c, 1)
-      end do
-   end subroutine take_means
-
-   !> Replace inputs from displacements by inputs from velocities, where the law takes these.
-   subroutine take_rates(fourier, unit, order, y)
-      type(fourier_type), intent(in) :: fourier
-      real(wp), intent(in) :: unit
-      integer, intent(in) :: order(:)
-      real(wp), intent(inout) :: y(:, :, :)
-      real(wp) :: cosine, n
-      integer :: i, c, h, k
-
-      do h = 1, fourier%n_retained
-         k = fourier%column(h)
-         n = unit*real(fourier%harmonic(h), wp)
-         do c = 1, size(y, 2)
-            if (order(c) == 0) cycle
-            if (fourier%harmonic(h) == 0) then
-               y(:, c, k) = 0.0_wp
-               cycle
-            end if
-            do i = 1, size(y, 1)
-               ! d/dtau (a cos n tau + b sin n tau) = n b cos n tau - n a sin n tau.
-               cosine = y(i, c, k)
-               y(i, c, k) = n*y(i, c, k + 1)
-               y(i, c, k + 1) = -n*cosine
-            end do
-         end do
-      end do
-   end subroutine take_rates
-
-   !> Bring inputs from displacements times a stiffness to those times E_n.
-   subroutine take_inertias(fourier, omega, prediction, y)
-      type(fourier_type), intent(in) :: fourier
-      real(wp), intent(in) :: omega
-      type(prediction_type), intent(in) :: prediction
-      real(wp), intent(inout) :: y(:, :, :)
-      complex(wp) :: turned
-      integer :: i, c, h, k
-
-      do h = 1, fourier%n_retained
-         k = fourier%column(h)
-         if (fourier%harmonic(h) == 0) cycle
-         do c = 1, size(y, 2)
-            do i = 1, size(y, 1)
-               turned = prediction%impedance_ratio(i, c, fourier%harmonic(h), omega)* &
-                        cmplx(y(i, c, k), -y(i, c, k + 1), wp)
-               y(i, c, k) = real(turned, wp)
-               y(i, c, k + 1) = -aimag(turned)
-            end do
-         end do
-      end do
-   end subroutine take_inertias
 
    !> What elements must transmit for equilibrium.
    subroutine add_balance(self, row, y)
