@@ -50,8 +50,10 @@ module fw_mode_system
       complex(wp), allocatable :: mass(:, :), observed(:)
       !> M V over its modal amplitude (n_coordinates).
       complex(wp), allocatable :: before(:)
-      !> Columns of cosine and sine of harmonic 1, and unknowns of harmonic 0 (0 or n_coordinates).
-      integer, private :: cosine = 1, sine = 2, n_static = 0
+      !> Unknowns of harmonic 0, which come first (0 or n_coordinates).
+      integer :: n_static = 0
+      !> Columns of cosine and sine of harmonic 1.
+      integer, private :: cosine = 1, sine = 2
       !> Unknowns of the balance and residual at the last point.
       real(wp), allocatable, private :: q(:), r(:)
       !> Rows a of the amplitude and of the phase (n_coordinates, 2): that of the phase is another

@@ -13,31 +13,39 @@ module fw_mode_path
 
    public :: mode_path
 
+   !> Points that are kept, and the first step in ln A.
+   integer, parameter :: most_kept = 4
+   real(wp), parameter :: first_step = 0.25_wp
+
    type :: mode_path
       type(newton_solver) :: newton
       type(mode_system), pointer :: system => null()
-      !> The last points, the newest first: ln A, unknowns (n, 3), and how many there are.
-      real(wp) :: p(3) = 0.0_wp
+      !> The last points, the newest first: ln A, unknowns (n, most_kept), and how many there are.
+      real(wp) :: p(most_kept) = 0.0_wp
       real(wp), allocatable :: y(:, :)
       integer :: kept = 0
+      !> Orders of the polynomials through them, of harmonic 0 and of all else.
+      integer, private :: order(2) = 0
       !> Iterations so far.
       integer :: iterations = 0
+      !> Part of their size by which unknowns may be off their guess: beyond, the solution may be
+      !> one of another curve. Behind a kink guesses come as near as steps are short, behind a fold
+      !> they never do.
+      real(wp) :: leash = 0.1_wp
       !> Step that served last, in ln A.
-      real(wp) :: step = 0.25_wp
+      real(wp) :: step = first_step
    contains
       procedure :: start
       procedure :: reach
       procedure :: solve
       procedure :: remember
+      procedure :: restart
    end type mode_path
 
    !> Longest and shortest step in ln A, and how steps grow and shrink.
    real(wp), parameter :: longest = 0.5_wp, shortest = 1.0e-5_wp, growth = 1.5_wp
    !> Newton steps from which on a step is too long.
    integer, parameter :: most_iterations = 25
-   !> Part of their size by which unknowns may move in a step: beyond, the solution is another.
-   real(wp), parameter :: most_moved = 0.5_wp
-
    !> ln A closer than this are one amplitude.
    real(wp), parameter :: same = 1.0e-9_wp
 
@@ -54,7 +62,7 @@ contains
       ! A step that GMRES leaves unsolved may lead to another curve.
       self%newton%linear%lu_follows = .true.
       self%newton%options%max_iterations = min(options%max_iterations, most_iterations)
-      allocate (self%y(system%n, 3), source=0.0_wp)
+      allocate (self%y(system%n, most_kept), source=0.0_wp)
    end subroutine start
 
    !> Solve at an amplitude from a guess.
@@ -83,7 +91,7 @@ contains
       type(solver_report), intent(out) :: report
       real(wp), intent(out) :: reached
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: next
+      real(wp) :: next, guess(size(y))
       logical :: done
 
       y = self%y(:, 1)
@@ -93,10 +101,11 @@ contains
          ! A rest that is nothing beside the step is taken with it.
          if (abs(p - next) < 0.1_wp*self%step) next = p
          call predict(self, next, y)
+         guess = y
          call self%solve(next, y, report, error)
          if (allocated(error)) return
          done = report%converged
-         if (done) done = norm2(y - self%y(:, 1)) <= most_moved*norm2(self%y(:, 1))
+         if (done) done = norm2(y - guess) <= self%leash*norm2(self%y(:, 1))
          if (done) then
             call self%remember(next, y)
             reached = next
@@ -114,23 +123,35 @@ contains
       end do
    end subroutine reach
 
-   !> The polynomial through the last points.
+   !> The polynomials through the last points: of harmonic 0 over the amplitude, in proportion to
+   !> which pairs that settle elsewhere move it, of all else over its logarithm.
    subroutine predict(self, p, y)
       class(mode_path), intent(in) :: self
       real(wp), intent(in) :: p
-      real(wp), intent(out) :: y(:)
+      real(wp), intent(out), contiguous :: y(:)
+      integer :: n
+
+      n = self%system%n_static
+      call extrapolate(exp(self%p(:self%order(1) + 1) - p), self%y(:n, :), 1.0_wp, y(:n))
+      call extrapolate(self%p(:self%order(2) + 1), self%y(n + 1:, :), p, y(n + 1:))
+   end subroutine predict
+
+   !> The polynomial through the first columns of y, which are values at x, at another place.
+   pure subroutine extrapolate(x, y, at, value)
+      real(wp), intent(in) :: x(:), y(:, :), at
+      real(wp), intent(out) :: value(:)
       real(wp) :: weight
       integer :: i, j
 
-      y = 0.0_wp
-      do i = 1, self%kept
+      value = 0.0_wp
+      do i = 1, size(x)
          weight = 1.0_wp
-         do j = 1, self%kept
-            if (j /= i) weight = weight*(p - self%p(j))/(self%p(i) - self%p(j))
+         do j = 1, size(x)
+            if (j /= i) weight = weight*(at - x(j))/(x(i) - x(j))
          end do
-         y = y + weight*self%y(:, i)
+         value = value + weight*y(:, i)
       end do
-   end subroutine predict
+   end subroutine extrapolate
 
    !> A point for the guesses of the next ones; the same amplitude again replaces it.
    subroutine remember(self, p, y)
@@ -143,11 +164,43 @@ contains
             return
          end if
       end if
-      self%p = [p, self%p(1), self%p(2)]
-      self%y(:, 3) = self%y(:, 2)
-      self%y(:, 2) = self%y(:, 1)
+      call choose_orders(self, p, y)
+      self%p = [p, self%p(:most_kept - 1)]
+      self%y(:, 2:) = self%y(:, :most_kept - 1)
       self%y(:, 1) = y
-      self%kept = min(3, self%kept + 1)
+      self%kept = min(most_kept, self%kept + 1)
    end subroutine remember
+
+   !> Go on from a point alone: those before are of another curve.
+   subroutine restart(self, p, y)
+      class(mode_path), intent(inout) :: self
+      real(wp), intent(in) :: p, y(:)
+
+      self%kept = 0
+      self%step = first_step
+      call self%remember(p, y)
+   end subroutine restart
+
+   !> The orders that would have come nearest to a new point: beyond a kink a high one is worse than
+   !> none.
+   subroutine choose_orders(self, p, y)
+      class(mode_path), intent(inout) :: self
+      real(wp), intent(in) :: p, y(:)
+      real(wp) :: off(2), least(2), guess(size(y))
+      integer :: k, n
+
+      n = self%system%n_static
+      self%order = 0
+      least = huge(1.0_wp)
+      do k = 1, self%kept
+         call extrapolate(exp(self%p(:k) - p), self%y(:n, :), 1.0_wp, guess(:n))
+         call extrapolate(self%p(:k), self%y(n + 1:, :), p, guess(n + 1:))
+         off = [norm2(guess(:n) - y(:n)), norm2(guess(n + 1:) - y(n + 1:))]
+         where (off < least) self%order = k - 1
+         least = min(off, least)
+      end do
+      ! With the new point one more has become possible; nothing is known of it.
+      if (self%kept == 1) self%order = 1
+   end subroutine choose_orders
 
 end module fw_mode_path

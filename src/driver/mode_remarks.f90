@@ -8,7 +8,7 @@ module fw_mode_remarks
    implicit none (type, external)
    private
 
-   public :: remark_internal
+   public :: remark_internal, remark_jump
 
    !> Frequencies this near, as a part of them, meet: the tongues of weak couplings are narrow, and
    !> their damping is of this order.
@@ -104,5 +104,19 @@ contains
       write (text, '(es9.2)') value
       text = adjustl(text)
    end function short
+
+   !> A fold on the way to the first row.
+   subroutine remark_jump(amplitude, start, remarks)
+      !> Where the curve from the stuck mode ended; 0 where it did not.
+      real(wp), intent(in) :: amplitude, start
+      type(remark_list), intent(inout) :: remarks
+
+      if (.not. amplitude > 0.0_wp) return
+      call remarks%add('fold below the start', 'the curve from the stuck mode turns back at '// &
+                       'the amplitude '//to_text(amplitude)//', below mode%start = '// &
+                       to_text(start)//': what begins there may be another part of it, or '// &
+                       "another curve; take a lower mode%start with mode%continuation = "// &
+                       "'arclength' to follow it")
+   end subroutine remark_jump
 
 end module fw_mode_remarks

@@ -1,8 +1,6 @@
-!> Where a nonlinear mode starts: the structure with nothing condensed, at rest, its mode with
-!> closed pairs stuck, and the amplitude from which on a pair slips or separates.
+!> Where a nonlinear mode starts: the structure with nothing condensed, at rest, and its mode with
+!> closed pairs stuck.
 module fw_mode_start
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_case, only: case_type
@@ -44,9 +42,6 @@ module fw_mode_start
       integer :: number = 0
       !> Frequency and self-excitation there [rad/s].
       real(wp) :: omega = 0.0_wp, self_excitation = 0.0_wp
-      !> Amplitude from which on the stuck motion slips or separates, in the unit of the control;
-      !> NaN where it does not up to the highest amplitude.
-      real(wp) :: onset = 0.0_wp
       !> With stuck pairs there is no mode: this is the one with sliding pairs, which the curve
       !> tends to at high amplitudes.
       logical :: slides = .false.
@@ -58,7 +53,6 @@ module fw_mode_start
       complex(wp), allocatable :: load(:)
    contains
       procedure :: build
-      procedure :: departs
    end type mode_start
 
    !> Two frequencies nearer than this part of them are one: the plane of the motion is free.
@@ -68,10 +62,6 @@ module fw_mode_start
    integer, parameter :: most_unknowns = 6000, most_dofs = 3000
    !> Part of its size below which a mode has a node.
    real(wp), parameter :: node = 1.0e-8_wp
-   !> Change of the shares of the period that is no round-off of the march.
-   real(wp), parameter :: share_change = 1.0e-9_wp
-   !> Amplitude over the lowest one at which the motion is that near rest.
-   real(wp), parameter :: near_rest = 1.0e-6_wp
    !> Residual of the position at rest: the first guess of the curve, not its result.
    real(wp), parameter :: rest_tolerance = 1.0e-6_wp
 
@@ -100,7 +90,6 @@ contains
       end if
       call note_frequencies(self, modes)
       call take_mode(self, modes, x, error)
-      if (.not. allocated(error)) call find_onset(self)
    end subroutine build
 
    !> A frequency of the structure's order [rad/s]; of a cyclic one far below, so that no modes of
@@ -363,64 +352,5 @@ contains
          if (size(balance%depth) > 0) force = force + norm2(p%stiffness(:, 3)*min(p%gap, 0.0_wp))
       end associate
    end function static_size
-
-   !> Bisection between rest and the highest amplitude: what the stuck motion does to a pair only
-   !> grows with its amplitude.
-   subroutine find_onset(self)
-      class(mode_start), intent(inout) :: self
-      real(wp), allocatable :: rest(:, :)
-      real(wp) :: low, high, middle
-      logical :: slips
-      integer :: k
-      integer, parameter :: most_halvings = 200
-
-      self%onset = ieee_value(1.0_wp, ieee_quiet_nan)
-      if (self%problem%n_pairs == 0) return
-      allocate (rest(3, self%problem%n_pairs))
-      if (self%slides) then
-         self%onset = 0.0_wp
-         return
-      end if
-      low = near_rest*self%case%mode%start
-      high = self%case%mode%end
-      call shares_of(self, low, rest)
-      if (.not. self%departs(high, rest)) return
-      do k = 1, most_halvings
-         middle = sqrt(low*high)
-         if (middle <= low .or. middle >= high) exit
-         slips = self%departs(middle, rest)
-         if (slips) then
-            high = middle
-         else
-            low = middle
-         end if
-      end do
-      self%onset = low
-   end subroutine find_onset
-
-   !> Whether the stuck motion of an amplitude has other shares of stick, slip and separation than
-   !> at rest.
-   logical function departs(self, amplitude, rest)
-      class(mode_start), intent(inout) :: self
-      real(wp), intent(in) :: amplitude
-      !> (3, n_pairs)
-      real(wp), intent(in) :: rest(:, :)
-      real(wp) :: share(3, size(rest, 2))
-
-      call shares_of(self, amplitude, share)
-      departs = any(abs(share - rest) > share_change)
-   end function departs
-
-   subroutine shares_of(self, amplitude, share)
-      class(mode_start), intent(inout) :: self
-      real(wp), intent(in) :: amplitude
-      real(wp), intent(out) :: share(:, :)
-      type(error_type), allocatable :: ignored
-      real(wp) :: r(self%system%n)
-
-      call self%system%set_parameter(log(amplitude), ignored)
-      call self%system%residual(self%y, r)
-      call self%balance%pair_shares(share)
-   end subroutine shares_of
 
 end module fw_mode_start

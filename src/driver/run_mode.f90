@@ -1,6 +1,8 @@
 !> Analysis 'mode': a nonlinear mode over its amplitude, its limit cycles, and responses near its
 !> resonance that are put together from it.
 module fw_run_mode
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of
@@ -15,8 +17,10 @@ module fw_run_mode
    use fw_mode_group, only: mode_row
    use fw_mode_group, only: mode_table
    use fw_mode_options, only: control_observed
+   use fw_mode_onset, only: onset_finder
    use fw_mode_path, only: mode_path
    use fw_mode_remarks, only: remark_internal
+   use fw_mode_remarks, only: remark_jump
    use fw_mode_start, only: mode_start
    use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
@@ -53,8 +57,12 @@ module fw_run_mode
       type(cycle_finder) :: cycles
       type(sensitivity_solver) :: sensitivity
       type(branch_watch) :: watch
-      !> ln A of the last row.
-      real(wp) :: end_p = 0.0_wp
+      type(onset_finder) :: onset
+      !> ln A of the last row, and the amplitude of a fold below the first one that was passed over.
+      real(wp) :: end_p = 0.0_wp, jumped_at = 0.0_wp
+      !> ln A of the first solution, below the lowest amplitude, and its unknowns.
+      real(wp) :: first_p = 0.0_wp
+      real(wp), allocatable :: first_y(:)
    end type mode_curve
 
    !> Below this part of the stuck frequency nothing holds the motion any more.
@@ -106,6 +114,9 @@ contains
       call curve%path%start(curve%start%system, case%solver)
       call follow(case, curve, observer, state, y, error)
       if (.not. allocated(error)) call curve%cycles%find(curve%path, curve%table, error)
+      if (.not. allocated(error) .and. .not. curve%start%slides) then
+         call curve%onset%find(curve%path, curve%table%onset_amplitude, error)
+      end if
       if (allocated(error)) then
          if (error%status == status_stopped) then
             deallocate (error)
@@ -117,6 +128,7 @@ contains
       if (allocated(error)) return
       call remark_internal(curve%start, curve%table, summary%remarks)
       call curve%watch%remark(summary%remarks)
+      call remark_jump(curve%jumped_at, case%mode%start, summary%remarks)
       call synthesize(case%mode%synthesis, curve%table)
       call writer%add_mode(curve%table, case%model%unit_system, error)
       call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
@@ -135,8 +147,8 @@ contains
       table%number = start%number
       table%stuck_omega = start%omega
       table%stuck_damping_ratio = 0.5_wp*start%self_excitation/start%omega
-      table%onset_amplitude = start%onset
       table%slides = start%slides
+      if (.not. start%slides) table%onset_amplitude = ieee_value(1.0_wp, ieee_quiet_nan)
    end subroutine describe_start
 
    !> Up to the lowest amplitude from where the stuck mode is exact, then along the curve.
@@ -156,6 +168,8 @@ contains
       if (report%converged) then
          call curve%path%reach(log(case%mode%start), y, report, reached, error)
          if (allocated(error)) return
+         if (.not. report%converged) call jump(case, curve, y, report, reached, error)
+         if (allocated(error)) return
       end if
       if (.not. report%converged) then
          call add_row(case, curve, y, report, served_by_newton, state, error)
@@ -168,31 +182,62 @@ contains
       end if
    end subroutine follow
 
-   !> The first solution: just below the onset, where that lies below the lowest amplitude.
+   !> Over a fold below the lowest amplitude, which is not of the curve that was asked for: by long
+   !> steps, from where it began.
+   subroutine jump(case, curve, y, report, reached, error)
+      type(case_type), intent(in) :: case
+      type(mode_curve), intent(inout), target :: curve
+      real(wp), intent(inout), contiguous :: y(:)
+      type(solver_report), intent(inout) :: report
+      real(wp), intent(inout) :: reached
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: longer(2) = [0.5_wp, huge(1.0_wp)]
+      real(wp) :: leash
+      integer :: k
+
+      curve%jumped_at = exp(reached)
+      leash = curve%path%leash
+      do k = 1, size(longer)
+         curve%path%leash = longer(k)
+         call curve%path%restart(curve%first_p, curve%first_y)
+         call curve%path%reach(log(case%mode%start), y, report, reached, error)
+         if (allocated(error) .or. report%converged) exit
+      end do
+      curve%path%leash = leash
+      if (report%converged) call curve%path%restart(reached, y)
+   end subroutine jump
+
+   !> The first solution, below the onset.
    subroutine begin(case, curve, y, report, error)
       type(case_type), intent(in) :: case
       type(mode_curve), intent(inout), target :: curve
       real(wp), intent(inout), contiguous :: y(:)
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
-      real(wp), parameter :: below = 0.99_wp, smaller = 0.1_wp
+      real(wp), parameter :: smaller = 0.1_wp
       integer, parameter :: most_smaller = 8
       real(wp) :: amplitude
       integer :: k
 
-      amplitude = case%mode%start
-      if (curve%start%onset < amplitude) amplitude = below*curve%start%onset
+      call curve%onset%begin(curve%start%system, curve%start%y, case%mode%start, amplitude)
       ! The sliding mode is the limit of high amplitudes.
       if (curve%start%slides) amplitude = case%mode%end
       do k = 1, most_smaller
          y = curve%start%y
          call curve%path%solve(log(amplitude), y, report, error)
-         if (allocated(error) .or. report%converged) exit
-         ! Springs without an onset: nearer to the linear mode.
+         if (allocated(error)) return
+         if (report%converged .and. (curve%start%slides .or. curve%start%problem%n_pairs == 0)) exit
+         if (report%converged) then
+            if (curve%onset%is_stuck(curve%start%system)) exit
+         end if
+         ! About another position, or springs: nearer to the linear mode.
          amplitude = merge(1.0_wp/smaller, smaller, curve%start%slides)*amplitude
       end do
-      if (allocated(error) .or. .not. report%converged) return
-      call curve%path%remember(log(amplitude), y)
+      if (.not. report%converged) return
+      call curve%onset%note(curve%start%system, y)
+      curve%first_p = log(amplitude)
+      curve%first_y = y
+      call curve%path%restart(curve%first_p, y)
    end subroutine begin
 
    !> Points at given amplitudes.
@@ -261,24 +306,39 @@ contains
    end subroutine end_early
 
    !> Turn the motion so that the first observed quantity has a positive cosine and no sine, and
-   !> solve there: paths that start at rest may depend on where the period starts.
+   !> solve there: paths that start at rest depend on where the period starts, so that the turned
+   !> motion may be no solution, and that near it have another phase again.
    subroutine settle_phase(curve, y, report, error)
       type(mode_curve), intent(inout), target :: curve
       real(wp), intent(inout), contiguous :: y(:)
       type(solver_report), intent(inout) :: report
       type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: most_turns = 8
       type(solver_report) :: again
+      real(wp) :: before(size(y))
+      integer :: k
 
       associate (system => curve%start%system)
          if (system%control == control_observed) return
-         call turn(curve%start, y)
-         call system%remember(y)
-         call curve%path%solve(log(system%amplitude), y, again, error)
-         if (allocated(error)) return
-         report%iterations = report%iterations + again%iterations
-         report%residual = again%residual
-         report%converged = again%converged
-         if (again%converged) call curve%path%remember(log(system%amplitude), y)
+         do k = 1, most_turns
+            before = y
+            call turn(curve%start, y)
+            call system%remember(y)
+            call curve%path%solve(log(system%amplitude), y, again, error)
+            if (allocated(error)) return
+            report%iterations = report%iterations + again%iterations
+            if (.not. again%converged) exit
+            report%residual = again%residual
+            if (again%iterations == 0) exit
+         end do
+         if (.not. again%converged) then
+            ! A solution of another phase, rather than none.
+            y = before
+            call system%remember(y)
+            call curve%path%solve(log(system%amplitude), y, again, error)
+            if (allocated(error)) return
+         end if
+         call curve%path%remember(log(system%amplitude), y)
       end associate
    end subroutine settle_phase
 
@@ -391,11 +451,8 @@ contains
       y = unknowns
       associate (system => curve%start%system, balance => curve%start%balance)
          allocate (q(balance%n), r(system%n))
-         ! Where the control holds the phase Newton's method has left the system at this point.
-         if (system%control /= control_observed .or. served_by /= served_by_newton) then
-            call turn(curve%start, y)
-            call system%residual(y, r)
-         end if
+         ! Newton's method has left the system at this point, a branch has gone on.
+         if (served_by /= served_by_newton) call system%residual(y, r)
          call system%to_balance(y, q, row%omega, row%self_excitation)
          point%omega = row%omega
          point%converged = report%converged
@@ -413,6 +470,7 @@ contains
          point%modal_amplitude = row%modal_amplitude
          point%first_harmonic = hypot(row%first(1, :), row%first(2, :))
          row%force = modal_force(curve%start, y)*system%amplitude/row%modal_amplitude
+         if (report%converged) call curve%onset%note(system, y)
          if (report%converged .and. served_by == served_by_newton) then
             call curve%watch%note(system, y)
          end if

@@ -164,7 +164,7 @@ def test_branch_and_amplitudes_agree(tmp_path):
 
 def test_a_file_in_between(tmp_path):
     """A result can be read like any other: no second format."""
-    run(tmp_path, mode_groups(SEVERAL, 0.2, 2.0, 3, n_points=4))
+    run(tmp_path, mode_groups(SEVERAL, 0.2, 1.4, 3, n_points=4))
     found = read_mode(tmp_path)
     assert found["mode/shape"].shape == (4, 4, 2)
     shape = found["coefficients"][:, 1:3].transpose(0, 2, 1)

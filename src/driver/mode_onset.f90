@@ -1,0 +1,230 @@
+!> The amplitude from which on the stuck motion of a mode slips or separates.
+!>
+!> What that motion does to a pair only grows with its amplitude. But the position about which a
+!> pair vibrates may move: under a static load it slips in the first turns, not in the cycle, and
+!> shakes down to another one, in proportion to the amplitude while nothing else begins to. So the
+!> onset is looked for between two rows of the curve, of which one is stuck and the next is not,
+!> about positions in a straight line, and confirmed by a solution just below.
+module fw_mode_onset
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_mode_path, only: mode_path
+   use fw_mode_system, only: mode_system
+   use fw_newton, only: solver_report
+   implicit none (type, external)
+   private
+
+   public :: onset_finder
+
+   type :: onset_finder
+      !> Amplitudes at which the motion is stuck, the highest first, their unknowns (n, 2) and how
+      !> many there are; the lowest at which it is not, once there is one.
+      real(wp), private :: low(2) = 0.0_wp, high = huge(1.0_wp)
+      real(wp), allocatable, private :: y(:, :)
+      integer, private :: n_low = 0
+      logical, private :: departed = .false.
+      !> Shares of stick, slip and separation at rest (3, n_pairs).
+      real(wp), allocatable, private :: rest(:, :)
+   contains
+      procedure :: begin
+      procedure :: is_stuck
+      procedure :: note
+      procedure :: find
+   end type onset_finder
+
+   !> Change of the shares of the period that is no round-off of the march.
+   real(wp), parameter :: share_change = 1.0e-9_wp
+   !> Amplitude over the lowest one at which the motion is that near rest.
+   real(wp), parameter :: near_rest = 1.0e-6_wp
+   !> Ratios of two amplitudes between which the onset is known well enough: by solutions, to look
+   !> at the position there, and about a position that is known.
+   real(wp), parameter :: rough = 1.0_wp + 1.0e-3_wp, coarse = 1.0_wp + 1.0e-4_wp, &
+                          fine = 1.0_wp + 1.0e-13_wp
+
+contains
+
+   !> Take the shares at rest; an amplitude to begin with: the lowest one, or where the motion about
+   !> the position at rest is stuck.
+   subroutine begin(self, system, y, lowest, amplitude)
+      class(onset_finder), intent(inout) :: self
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(in) :: lowest
+      real(wp), intent(out) :: amplitude
+      real(wp), parameter :: apart = 1.02_wp, below = 0.99_wp
+      real(wp) :: high, low, middle
+
+      amplitude = lowest
+      allocate (self%rest(3, system%balance%problem%n_pairs), source=0.0_wp)
+      allocate (self%y(size(y), 2), source=0.0_wp)
+      if (size(self%rest) == 0) return
+      low = near_rest*lowest
+      call evaluate(system, low, y)
+      call system%balance%pair_shares(self%rest)
+      if (departure(self, system, lowest, y) <= 0.0_wp) return
+      high = lowest
+      do while (high > apart*low)
+         middle = sqrt(low*high)
+         if (departure(self, system, middle, y) > 0.0_wp) then
+            high = middle
+         else
+            low = middle
+         end if
+      end do
+      amplitude = below*low
+   end subroutine begin
+
+   !> Whether all pairs have the shares that they have at rest, where the system stands.
+   logical function is_stuck(self, system)
+      class(onset_finder), intent(in) :: self
+      type(mode_system), intent(in) :: system
+
+      is_stuck = departed_by(self, system) <= 0.0_wp
+   end function is_stuck
+
+   !> Largest change of a share from that at rest; none where it is round-off.
+   real(wp) function departed_by(self, system)
+      type(onset_finder), intent(in) :: self
+      type(mode_system), intent(in) :: system
+      real(wp) :: share(3, size(self%rest, 2))
+
+      departed_by = 0.0_wp
+      if (size(share) == 0) return
+      call system%balance%pair_shares(share)
+      departed_by = maxval(abs(share - self%rest))
+      if (departed_by <= share_change) departed_by = 0.0_wp
+   end function departed_by
+
+   !> Take a solution of the curve, where the system stands.
+   subroutine note(self, system, y)
+      class(onset_finder), intent(inout) :: self
+      type(mode_system), intent(in) :: system
+      real(wp), intent(in) :: y(:)
+
+      if (self%departed .or. size(self%rest) == 0) return
+      if (is_stuck(self, system)) then
+         if (system%amplitude > self%low(1)) call take(self, system%amplitude, y)
+      else
+         self%departed = .true.
+         self%high = system%amplitude
+      end if
+   end subroutine note
+
+   subroutine take(self, amplitude, y)
+      type(onset_finder), intent(inout) :: self
+      real(wp), intent(in) :: amplitude, y(:)
+
+      self%low = [amplitude, self%low(1)]
+      self%y(:, 2) = self%y(:, 1)
+      self%y(:, 1) = y
+      self%n_low = self%n_low + 1
+   end subroutine take
+
+   !> NaN where no row departs.
+   subroutine find(self, path, onset, error)
+      class(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      real(wp), intent(out) :: onset
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: high, y(size(self%y, 1))
+
+      onset = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (.not. self%departed) return
+      onset = self%low(1)
+      if (self%n_low == 0) return
+      high = self%high
+      call bisect(self, path%system, coarse, onset, high)
+      y = position(self, onset)
+      call path%solve(log(onset), y, report, error)
+      if (allocated(error)) return
+      if (report%converged .and. is_stuck(self, path%system)) then
+         ! About the position just below nothing moves any more up to the onset.
+         if (report%iterations > 0) call take(self, onset, y)
+      else
+         self%high = onset
+         call bisect_solutions(self, path, error)
+         if (allocated(error)) return
+         onset = self%low(1)
+         high = self%high
+      end if
+      if (departure(self, path%system, high, position(self, high)) > 0.0_wp) then
+         call bisect(self, path%system, fine, onset, high)
+      end if
+   end subroutine find
+
+   !> Unknowns of the stuck motion: positions in a straight line.
+   function position(self, amplitude) result(y)
+      type(onset_finder), intent(in) :: self
+      real(wp), intent(in) :: amplitude
+      real(wp) :: y(size(self%y, 1))
+
+      y = self%y(:, 1)
+      if (self%n_low < 2) return
+      y = y + (amplitude - self%low(1))/(self%low(1) - self%low(2))*(y - self%y(:, 2))
+   end function position
+
+   !> Where the motion departs about positions in a straight line.
+   subroutine bisect(self, system, ratio, low, high)
+      type(onset_finder), intent(in) :: self
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(in) :: ratio
+      real(wp), intent(inout) :: low, high
+      real(wp) :: middle
+
+      do while (high > ratio*low)
+         middle = sqrt(low*high)
+         if (departure(self, system, middle, position(self, middle)) > 0.0_wp) then
+            high = middle
+         else
+            low = middle
+         end if
+      end do
+   end subroutine bisect
+
+   !> The same by a solution at each amplitude, where positions follow no straight line but very
+   !> near the onset. Towards it two directions settle ever more slowly.
+   subroutine bisect_solutions(self, path, error)
+      type(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: middle, y(size(self%y, 1))
+
+      do while (self%high > rough*self%low(1))
+         middle = sqrt(self%low(1)*self%high)
+         y = position(self, middle)
+         call path%solve(log(middle), y, report, error)
+         if (allocated(error)) return
+         if (report%converged .and. is_stuck(self, path%system)) then
+            call take(self, middle, y)
+         else
+            self%high = middle
+         end if
+      end do
+   end subroutine bisect_solutions
+
+   !> That of a motion.
+   real(wp) function departure(self, system, amplitude, y)
+      type(onset_finder), intent(in) :: self
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(in) :: amplitude, y(:)
+
+      call evaluate(system, amplitude, y)
+      departure = departed_by(self, system)
+   end function departure
+
+   subroutine evaluate(system, amplitude, y)
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(in) :: amplitude, y(:)
+      type(error_type), allocatable :: ignored
+      real(wp) :: r(system%n), x(system%n)
+
+      x = y
+      call system%set_parameter(log(amplitude), ignored)
+      call system%residual(x, r)
+   end subroutine evaluate
+
+end module fw_mode_onset
