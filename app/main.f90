@@ -10,6 +10,7 @@ program fw_run_program
    use fw_key_text, only: write_keys
    use fw_outcome, only: outcome_type
    use fw_progress, only: progress_type, new_progress
+   use fw_solver_options, only: unit_hertz
    use fw_read_case, only: case_input, read_input
    use fw_reader_text, only: printable
    use fw_restart_trial, only: try_restart
@@ -98,7 +99,8 @@ contains
          end do
          return
       end if
-      progress = new_progress(options%quiet, options%verbose)
+      progress = new_progress(options%quiet, options%verbose, &
+                              in_hertz=case%sweep%unit == unit_hertz)
       call catch_interrupts()
       call run_case(case, progress, outcome, error)
       if (allocated(error)) return

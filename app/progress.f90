@@ -2,6 +2,8 @@
 module fw_progress
    use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit
+   use fw_kinds, only: i8
+   use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
@@ -13,7 +15,7 @@ module fw_progress
 
    public :: progress_type, new_progress
 
-   integer, parameter :: bar_width = 30
+   integer, parameter :: bar_width = 20
    !> About as many lines stand in a log for a long sweep.
    integer, parameter :: log_lines = 20
    !> Where nobody knows how many points there will be, each line comes this much later than the
@@ -25,8 +27,12 @@ module fw_progress
       logical :: quiet = .false.
       logical :: verbose = .false.
       logical :: draws_bar = .false.
-      !> Whether the line of the terminal is occupied by the bar.
-      logical :: bar_is_shown = .false.
+      !> Characters of the terminal's line that the bar occupies.
+      integer :: shown = 0
+      !> Whether frequencies are typed in Hz, and so shown.
+      logical :: in_hertz = .false.
+      !> When the first point was begun.
+      integer(i8) :: started = 0
       !> Point of the next line, where it is not known how many there will be.
       integer :: next_line = 1
    contains
@@ -35,7 +41,11 @@ module fw_progress
       procedure :: on_message
       procedure :: on_end
       procedure :: poll
+      procedure, private :: draw_bar
       procedure, private :: clear_bar
+      procedure, private :: state_of
+      procedure, private :: time_left
+      procedure, private :: line_of
    end type progress_type
 
    interface
@@ -49,13 +59,16 @@ module fw_progress
 
 contains
 
-   function new_progress(quiet, verbose) result(progress)
+   function new_progress(quiet, verbose, in_hertz) result(progress)
       logical, intent(in) :: quiet, verbose
+      !> Frequencies are to be shown in Hz.
+      logical, intent(in) :: in_hertz
       type(progress_type) :: progress
       integer(c_int), parameter :: standard_error = 2
 
       progress%quiet = quiet
       progress%verbose = verbose
+      progress%in_hertz = in_hertz
       progress%draws_bar = c_isatty(standard_error) == 1
       if (verbose) progress%draws_bar = .false.
    end function new_progress
@@ -74,6 +87,7 @@ contains
       character(:), allocatable :: count
 
       self%next_line = 1
+      call system_clock(self%started)
       if (self%quiet) return
       count = ''
       if (n_points == 1) count = ': 1 point'
@@ -102,13 +116,9 @@ contains
       end if
       if (is_due) then
          call self%clear_bar()
-         write (error_unit, '(a)') point_line(index, n_points, point, self%verbose)
+         write (error_unit, '(a)') self%line_of(index, n_points, point)
       end if
-      if (self%draws_bar) then
-         write (error_unit, '(a)', advance='no') achar(13)//bar_text(index, n_points)
-         flush (error_unit)
-         self%bar_is_shown = .true.
-      end if
+      if (self%draws_bar) call self%draw_bar(index, n_points, point)
    end subroutine on_point
 
    subroutine on_message(self, text)
@@ -126,14 +136,28 @@ contains
       call self%clear_bar()
    end subroutine on_end
 
+   !> The bar in place of the one before it.
+   subroutine draw_bar(self, index, n_points, point)
+      class(progress_type), intent(inout) :: self
+      integer, intent(in) :: index, n_points
+      type(point_type), intent(in) :: point
+      character(:), allocatable :: text
+
+      text = bar_text(index, n_points)//self%state_of(point)//self%time_left(index, n_points)
+      write (error_unit, '(a)', advance='no') achar(13)//text// &
+         repeat(' ', max(0, self%shown - len(text)))
+      flush (error_unit)
+      self%shown = len(text)
+   end subroutine draw_bar
+
    !> Overwrite the bar with blanks and go back to the start of its line.
    subroutine clear_bar(self)
       class(progress_type), intent(inout) :: self
 
-      if (.not. self%bar_is_shown) return
-      write (error_unit, '(a)', advance='no') achar(13)//repeat(' ', bar_width + 30)//achar(13)
+      if (self%shown == 0) return
+      write (error_unit, '(a)', advance='no') achar(13)//repeat(' ', self%shown)//achar(13)
       flush (error_unit)
-      self%bar_is_shown = .false.
+      self%shown = 0
    end subroutine clear_bar
 
    function bar_text(index, n_points) result(text)
@@ -150,26 +174,65 @@ contains
              '/'//to_text(n_points)
    end function bar_text
 
-   function point_line(index, n_points, point, with_details) result(text)
+   !> Frequency and amplitude of a point; of wear the cycles and the largest depth.
+   function state_of(self, point) result(text)
+      class(progress_type), intent(in) :: self
+      type(point_type), intent(in) :: point
+      character(:), allocatable :: text
+
+      if (allocated(point%depth)) then
+         text = ', cycles '//number_text(rounded(point%cycles))
+         if (size(point%depth) > 0) then
+            text = text//', depth '//number_text(rounded(maxval(point%depth)))
+         end if
+      else if (self%in_hertz) then
+         text = ', '//number_text(rounded(point%omega/(2.0_wp*pi)))//' Hz'
+      else
+         text = ', '//number_text(rounded(point%omega))//' rad/s'
+      end if
+      if (.not. allocated(point%amplitude)) return
+      if (size(point%amplitude) == 0) return
+      text = text//', amplitude '//number_text(rounded(maxval(point%amplitude)))
+   end function state_of
+
+   !> How long the rest takes, if it goes on as until now.
+   function time_left(self, index, n_points) result(text)
+      class(progress_type), intent(in) :: self
+      integer, intent(in) :: index, n_points
+      character(:), allocatable :: text
+      integer(i8) :: now, rate
+      integer :: seconds
+
+      text = ''
+      if (index < 1 .or. n_points <= index) return
+      call system_clock(now, rate)
+      if (rate <= 0) return
+      seconds = nint(min(1.0e8_wp, real(now - self%started, wp)/real(rate, wp) &
+                         *real(n_points - index, wp)/real(index, wp)))
+      if (seconds < 600) then
+         text = ', '//to_text(seconds)//' s left'
+      else
+         text = ', '//to_text(seconds/60)//' min left'
+      end if
+   end function time_left
+
+   function line_of(self, index, n_points, point) result(text)
+      class(progress_type), intent(in) :: self
       integer, intent(in) :: index, n_points
       type(point_type), intent(in) :: point
-      logical, intent(in) :: with_details
       character(:), allocatable :: text
+      character(:), allocatable :: state
 
       text = 'point '//to_text(index)
       if (n_points >= index) text = text//' of '//to_text(n_points)
-      text = text//': omega = '//number_text(rounded(point%omega))//' rad/s'
-      if (allocated(point%amplitude)) then
-         if (size(point%amplitude) > 0) then
-            text = text//', amplitude '//number_text(rounded(maxval(point%amplitude)))
-         end if
-      end if
+      state = self%state_of(point)
+      text = text//':'//state(2:)
       if (.not. point%converged) text = text//', NOT CONVERGED'
-      if (with_details .or. .not. point%converged) then
+      if (self%verbose .or. .not. point%converged) then
          text = text//', '//to_text(point%iterations)//' iterations, residual '// &
                 number_text(rounded(point%residual))
       end if
-   end function point_line
+   end function line_of
 
    !> Six digits are enough to read.
    function rounded(number)

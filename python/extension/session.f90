@@ -22,6 +22,9 @@ module fw_python_session
    !> Places in the array through which Python and a run see each other: Python sets the first to
    !> stop the run; the run counts its points in the second, of those in the third (0: not known).
    integer, parameter :: control_stop = 1, control_done = 2, control_total = 3
+   !> Of the last point, as the bits of reals.
+   integer, parameter :: control_omega = 4, control_amplitude = 5, control_cycles = 6, &
+                         control_depth = 7
 
    type :: handle_type
       type(session_type) :: session
@@ -153,10 +156,24 @@ contains
       integer, intent(in) :: n_points
       type(point_type), intent(in) :: point
 
+      self%control(control_omega) = transfer(point%omega, 0_i8)
+      self%control(control_amplitude) = largest(point%amplitude)
+      self%control(control_cycles) = transfer(point%cycles, 0_i8)
+      self%control(control_depth) = largest(point%depth)
       self%control(control_done) = int(index, i8)
       self%control(control_total) = int(n_points, i8)
       self%stop_requested = self%control(control_stop) /= 0_i8
    end subroutine on_point
+
+   !> Bits of the largest of some values, of -1 where there are none.
+   function largest(values) result(bits)
+      real(wp), allocatable, intent(in) :: values(:)
+      integer(i8) :: bits
+
+      bits = transfer(-1.0_wp, 0_i8)
+      if (.not. allocated(values)) return
+      if (size(values) > 0) bits = transfer(maxval(values), 0_i8)
+   end function largest
 
    subroutine on_message(self, text)
       class(python_observer), intent(inout) :: self

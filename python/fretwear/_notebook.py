@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from .errors import FretwearError
 
 if TYPE_CHECKING:
     import xarray
@@ -70,7 +73,8 @@ def _coordinates(result: Result, row: str, lengths: dict[str, int]) -> dict[str,
 
 
 def result_html(result: Result) -> str:
-    """A table of what is asked first: how the run went, its range, its peaks, its remarks."""
+    """A table of what is asked first: how the run went, its range, its peaks, its remarks; and the
+    curve."""
     about = result.attributes
     title = escape(str(about.get("title") or result.name))
     rows = [("status", str(about.get("status", "not known")))]
@@ -101,4 +105,14 @@ def result_html(result: Result) -> str:
     cells = "".join(f'<tr><th style="text-align:left">{escape(name)}</th>'
                     f'<td style="text-align:left">{escape(value)}</td></tr>'
                     for name, value in rows)
-    return f"<table><caption>{title}</caption><tbody>{cells}</tbody></table>"
+    return f"<table><caption>{title}</caption><tbody>{cells}</tbody></table>{_curve(result)}"
+
+
+def _curve(result: Result) -> str:
+    """The picture of the whole run; nothing where there is none, as of a run at work."""
+    try:
+        image = result.plot()._repr_png_()  # type: ignore[attr-defined]
+    except FretwearError:
+        return ""
+    data = base64.b64encode(image).decode()
+    return f'<img src="data:image/png;base64,{data}" style="max-width:100%" alt="the whole run">'

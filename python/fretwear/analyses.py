@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +14,8 @@ from typing import TYPE_CHECKING, Any, Union, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._native import NOT_CONVERGED, STOPPED, Session, raise_status
+from ._native import NOT_CONVERGED, STOPPED, Session, namelist_values, raise_status
+from ._progress import CONTROL, Bar, State, read_state
 from .case import Case, ModelLike
 from .errors import ConvergenceError, InputError, RunInterrupted
 from .result import Result
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["frf", "mode", "resonance", "run", "wear"]
 
-#: Called with the number of points done and of points to come (0: not known); True for a line on
-#: the standard error.
+#: Called with the number of points done and of points to come (0: not known); True for a bar on
+#: the standard error, or in a notebook.
 Progress = Union[bool, Callable[[int, int], object]]
 
 #: What is asked whether to stop.
@@ -63,7 +63,8 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         Raise ConvergenceError where points have not converged (default).
     progress : callable, optional
         Called now and then with the points done and the points to come (0: not known); True shows
-        them in a line, in a notebook too.
+        them with frequency, amplitude and the time left (of wear with cycles and depth), in a
+        notebook too.
     stop : threading.Event or callable, optional
         Set the event, in any thread, to stop the run as Ctrl-C does; a function is called about
         ten times a second, and stops the run by returning what is true.
@@ -101,18 +102,14 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     if in_memory and file is not None:
         raise InputError(f"file: is '{file}', but in_memory is set; one of the two")
     in_memory = in_memory or not case.names_output
-    tell = _Line() if progress is True else progress or None
-    try:
-        return _run(case, tell, is_stopped, check=check, in_memory=in_memory)
-    finally:
-        if isinstance(tell, _Line):
-            tell.end()
+    return _run(case, progress, is_stopped, check=check, in_memory=in_memory)
 
 
-def _run(case: Case, tell: _Tell | None, is_stopped: Callable[[], object] | None, *, check: bool,
-         in_memory: bool) -> Result:
+def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object] | None, *,
+         check: bool, in_memory: bool) -> Result:
     with case.open() as session:
-        status, interrupted = _watched(session, tell, is_stopped, in_memory=in_memory)
+        with _teller(progress, session) as tell:
+            status, interrupted = _watched(session, tell, is_stopped, in_memory=in_memory)
         report = (session.text("remarks") + session.text("summary")).splitlines()
         message, path, image = session.text("message"), session.text("output"), session.image()
     if status not in (NOT_CONVERGED, STOPPED):
@@ -350,29 +347,25 @@ def _stop_function(stop: object) -> Callable[[], object] | None:
     return asked
 
 
-class _Line:
-    """Points done, in one line of the standard error that changes."""
-
-    def __init__(self) -> None:
-        self._started, self._width = time.monotonic(), 0
-
-    def __call__(self, done: int, total: int) -> None:
-        """Show how far the run is, and how long the rest may take."""
-        passed = time.monotonic() - self._started
-        text = f"{done} of {total} points" if total else f"{done} points"
-        text += f", {passed:.0f} s"
-        if 0 < done < total:
-            text += f", {passed / done * (total - done):.0f} s to go"
-        print("\r" + text.ljust(self._width), end="", file=sys.stderr, flush=True)
-        self._width = len(text)
-
-    def end(self) -> None:
-        """Leave the line as it is."""
-        print(file=sys.stderr, flush=True)
+#: What is told how far the run is.
+_Tell = Callable[[State], object]
 
 
-#: What is told of the points done and to come.
-_Tell = Callable[[int, int], object]
+@contextmanager
+def _teller(progress: Progress | None, session: Session) -> Iterator[_Tell | None]:
+    """What is told of a run: a bar, the function of the caller, or nothing."""
+    if callable(progress):
+        told = progress
+        yield lambda state: told(state.done, state.total)
+    elif progress:
+        unit = namelist_values(session.text("namelist")).get("sweep%unit", ["rad/s"])
+        bar = Bar(in_hertz=unit[0].lower() == "hz")
+        try:
+            yield bar.show
+        finally:
+            bar.end()
+    else:
+        yield None
 
 
 def _watched(session: Session, progress: _Tell | None, stop: Callable[[], object] | None, *,
@@ -382,7 +375,7 @@ def _watched(session: Session, progress: _Tell | None, stop: Callable[[], object
     The main thread alone gets signals, and only while it runs Python: the library works in another
     thread, while this one waits.
     """
-    control = np.zeros(3, dtype=np.int64)
+    control = np.zeros(CONTROL, dtype=np.int64)
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main and progress is None and stop is None:
         return session.run(control, in_memory=in_memory), False
@@ -413,7 +406,7 @@ def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: _Tell 
             control[0] = 1
         if progress is not None and told != control[1]:
             told = int(control[1])
-            progress(told, int(control[2]))
+            progress(read_state(control))
         if not at_work:
             return
 

@@ -26,6 +26,7 @@ from .sensitivity import Sensitivities, read_sensitivities
 if TYPE_CHECKING:
     import pyvista
     import xarray
+    from matplotlib.figure import Figure
 
     from .export.animation import Animation
 
@@ -37,6 +38,8 @@ Floats = NDArray[np.float64]
 DIRECTIONS = ("t1", "t2", "n")
 #: Contact states, in the order of `Result.fraction`.
 STATES = ("stick", "slip", "open")
+#: Kinds of pictures that show a whole run, the best one first.
+_WHOLE = ("wear_evolution", "mode", "resonance", "response", "nodal_diameters", "cycle")
 
 
 class Result(ResultFile):
@@ -193,7 +196,7 @@ class Result(ResultFile):
         return f"<Result {self.name!r}: {points}{self._attributes.get('status', 'no status')}>"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """What a notebook shows: a table, and the curve."""
         return result_html(self)
 
     # ------------------------------------------------------------------ points
@@ -544,6 +547,37 @@ class Result(ResultFile):
         return read_peaks(self)
 
     # ------------------------------------------------------------------ notebooks
+
+    def plot(self, kind: str | None = None, *, observe: str | None = None,
+             point: int | None = None) -> Figure:
+        """A picture of the result; as the last line of a cell a notebook shows it.
+
+        Parameters
+        ----------
+        kind : str, optional
+            As of `fretwear plot --kind`; what shows the whole run without it: response, mode,
+            resonance, wear over the cycles, natural frequencies, or one cycle.
+        observe : str, optional
+            Observed quantity; the first one without it.
+        point : int, optional
+            Solution point or wear step from 0; the largest amplitude, or the last step, without it.
+
+        Raises
+        ------
+        InputError
+            There is no such kind, or the result has nothing to draw of it.
+        """
+        # Pictures stand above results: loaded when one is asked for.
+        kinds = importlib.import_module("fretwear.plot.kinds")
+        fitting = kinds.fitting(self)
+        if kind is None:
+            kind = next((name for name in _WHOLE if name in fitting), None)
+        if kind not in fitting:
+            asked = "nothing is there to draw" if kind is None else f"kind = {kind!r} does not fit"
+            raise AbsentError(f"{self.name}: {asked}; of this result "
+                              + (", ".join(fitting) or "no picture") + " can be drawn")
+        figure: Figure = kinds.KINDS[kind].draw(self, kinds.Choices(observe=observe, point=point))
+        return figure
 
     def to_pyvista(self, point: int | None = None, phase: float | None = None, *,
                    sectors: int = 1, axis: str = "z") -> pyvista.UnstructuredGrid:

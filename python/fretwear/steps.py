@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._progress import CONTROL
 from .case import Case
 from .errors import AbsentError, InputError
 
@@ -154,7 +155,7 @@ class Steps:
 
     def advance(self, omega: float) -> bool:
         """Solve at a frequency [rad/s] as `solve`, and copy nothing but whether it converged."""
-        self._session.solve(float(omega), np.zeros(3, dtype=np.int64))
+        self._session.solve(float(omega), np.zeros(CONTROL, dtype=np.int64))
         return bool(self._session.point("converged")[0])
 
     def numbers(self, name: str) -> Floats:

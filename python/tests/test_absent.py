@@ -21,8 +21,8 @@ METHODS: dict[str, tuple[Any, ...]] = {
     "index": (), "amplitude_of": (), "harmonic": (1,), "peak": (), "maximum": (), "cycle": (0,),
     "sector": (1,),
     "declared": ("omega",), "units": ("omega",), "to_xarray": ()}
-#: Neither is asked for data.
-OTHERS = {"open", "save", "from_bytes", "to_pyvista"}
+#: Asked for no data, or only for what is drawn of it.
+OTHERS = {"open", "save", "from_bytes", "to_pyvista", "animate", "plot"}
 
 
 @pytest.fixture

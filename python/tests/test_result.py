@@ -12,7 +12,7 @@ import pytest
 from project import PROGRAM
 
 import fretwear
-from fretwear import InputError, OutputError
+from fretwear import AbsentError, InputError, OutputError
 from fretwear.cli import COMMANDS, main
 from fretwear.result import Result
 
@@ -163,7 +163,16 @@ def test_a_notebook_shows_a_table(result: Result) -> None:
     omega, height = result.maximum()
     peak = f"{height:.6g} at {omega / (2.0 * np.pi):.6g} Hz"
     assert "largest u1" in page and peak in page
-    assert "<script" not in page
+    assert "<script" not in page and "data:image/png;base64," in page
+
+
+def test_pictures_of_a_result(result: Result) -> None:
+    """The whole run without a kind; what does not fit is refused with what does."""
+    axes = result.plot().axes[-1]
+    assert axes.get_xlabel() == "frequency [Hz]"
+    assert len(result.plot("harmonics", point=2).axes) > 0
+    with pytest.raises(AbsentError, match=r"'wear_maps' does not fit; of this result response, .*"):
+        result.plot("wear_maps")
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

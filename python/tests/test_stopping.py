@@ -157,15 +157,33 @@ except KeyboardInterrupt as stopped:
     assert not (tmp_path / "stopped.h5.part").exists()
 
 
-def test_progress_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    fw.frf(RUBBING, 0.6, 1.6, 25, contact={"law": "penalty"}, progress=True)
+@pytest.mark.parametrize("has_tqdm", [True, False])
+def test_progress_in_the_unit_that_was_typed(capsys: pytest.CaptureFixture[str], has_tqdm: bool,
+                                             monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frequency and amplitude of the last point, with tqdm and without it."""
+    if has_tqdm:
+        pytest.importorskip("tqdm")
+    else:
+        monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    law: dict[str, Any] = {"contact": {"law": "penalty"}}
+    fw.frf(RUBBING, 0.6, 1.6, 25, progress=True, **law)
     told = capsys.readouterr().err
-    assert told.startswith("\r") and told.endswith("\n")
-    assert "25 of 25 points" in told.split("\r")[-1]
-    fw.frf(RUBBING, 0.6, 1.6, 3, contact={"law": "penalty"}, progress=False)
+    last = told.strip().split("\r")[-1]
+    assert told.endswith("\n") and ("25/25" if has_tqdm else "25 of 25 points") in last
+    assert "1.6 rad/s, amplitude" in last
+    fw.frf(RUBBING, 0.1, 0.25, 5, unit="Hz", progress=True, **law)
+    assert "0.25 Hz" in capsys.readouterr().err
+    fw.frf(RUBBING, 0.6, 1.6, 3, progress=False, **law)
     assert capsys.readouterr().err == ""
     with pytest.raises(fw.InputError, match="progress: is a int, must be True or a function"):
         fw.frf(RUBBING, 0.6, 1.6, 3, progress=1)  # type: ignore[arg-type]
+
+
+def test_progress_of_wear_says_cycles_and_depth(capsys: pytest.CaptureFixture[str]) -> None:
+    worn = fw.wear(RUBBING, 1.0, coefficient=1e-3, n_cycles=20, scheme="explicit", progress=True,
+                   contact={"law": "penalty", "area": 1.0})
+    last = capsys.readouterr().err.strip().split("\r")[-1]
+    assert f"{worn.cycles[-1]:.4g} cycles, depth {worn.depth[-1].max():.4g}" in last
 
 
 def test_an_error_of_the_progress_function_stops_the_run(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from project import PROGRAM, ROOT
 
 from fretwear.cli import main
 from fretwear.errors import FretwearError, InputError
-from fretwear.study import read_plan, read_table, run_study
+from fretwear.study import read_dataset, read_plan, read_table, run_study
 from fretwear.study.execution import run_job
 from fretwear.study.plan import override
 from fretwear.study.pool import run_jobs
@@ -469,6 +469,10 @@ def test_committed_example(tmp_path: Path) -> None:
     found = read_table(tmp_path / "study.h5")
     peak = (found["max_amplitude"] / found["load%cosine"]).reshape(6, 3)
     assert (found["status"] == "ok").all()
+    data = read_dataset(tmp_path / "study.h5")
+    assert dict(data.sizes) == {"contact%normal_load": 6, "load%cosine": 3}
+    assert data["max_amplitude"].sel({"contact%normal_load": 2.0, "load%cosine": 1.0}) == (
+        found["max_amplitude"].reshape(6, 3)[3, 1])
     best = peak.argmin(axis=0)
     assert (np.diff(best) > 0).all()
     assert peak[0, 0] == pytest.approx(peak[1, 1], rel=SIMILAR)

@@ -8,6 +8,7 @@ from .command import add_arguments, main
 from .plan import Plan, read_plan
 from .run import Record
 from .study import run_study
-from .table import read_table
+from .table import read_dataset, read_table
 
-__all__ = ["Plan", "Record", "add_arguments", "main", "read_plan", "read_table", "run_study"]
+__all__ = ["Plan", "Record", "add_arguments", "main", "read_dataset", "read_plan", "read_table",
+           "run_study"]

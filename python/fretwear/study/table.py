@@ -6,7 +6,7 @@ import importlib
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -18,7 +18,11 @@ from .plan import Plan, Setting
 from .quantities import Value, evaluate
 from .run import Record
 
-__all__ = ["build_table", "is_table", "need_writer", "read_table", "table_parts", "write_table"]
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["build_table", "is_table", "need_writer", "read_dataset", "read_table",
+           "table_parts", "write_table"]
 
 #: A column per name; texts, integers or reals.
 Table = dict[str, NDArray[Any]]
@@ -140,6 +144,41 @@ def table_parts(table: Table) -> tuple[list[str], list[str]]:
     names = list(table)
     return (names[names.index("run") + 1:names.index("exit_status")],
             names[names.index("result") + 1:])
+
+
+def read_dataset(path: str | Path) -> xarray.Dataset:
+    """A results table as an xarray.Dataset.
+
+    A grid of numbers has a dimension for each key that varies; other studies have one, `run`, with
+    the keys as coordinates along it.
+
+    Raises
+    ------
+    InputError
+        xarray is not installed.
+    """
+    try:
+        import xarray
+    except ImportError:
+        raise InputError("datasets need xarray: pip install 'fretwear[xarray]'") from None
+    table = read_table(path)
+    keys, _ = table_parts(table)
+    varied = {key: np.unique(table[key], return_inverse=True) for key in keys
+              if len(set(table[key].tolist())) > 1}
+    n = len(table["run"])
+    shape = tuple(len(values) for values, _ in varied.values())
+    place = (np.ravel_multi_index(tuple(where.ravel() for _, where in varied.values()), shape)
+             if varied else np.zeros(n, dtype=int))
+    if not varied or math.prod(shape) != n or len(np.unique(place)) < n:
+        columns = {name: ("run", column) for name, column in table.items() if name != "run"}
+        data = xarray.Dataset(columns, {"run": table["run"]})
+        return data.set_coords(keys)
+    order = np.argsort(place)
+    gridded = {name: (tuple(varied), column[order].reshape(shape))
+               for name, column in table.items() if name not in varied}
+    fixed = [key for key in keys if key not in varied]
+    data = xarray.Dataset(gridded, {key: values for key, (values, _) in varied.items()})
+    return data.drop_vars(fixed).assign_attrs({key: table[key][0] for key in fixed})
 
 
 def read_table(path: str | Path) -> Table:
