@@ -2,7 +2,9 @@
 !> for all harmonics (fw_split_factors). With g_0 the mean derivative of the forces in harmonic 0
 !> and g_1 that of all others,
 !>
-!>   P_j = (1 - g_j) K + g_j k d,   X_j = (1 - g_j) V.
+!>   P_j = (1 - g_j) K + g_j k d,   X = (1 - g_1) V.
+!>
+!> In harmonic 0 nothing moves: P_0 is real, and has no part of low rank.
 submodule(fw_balance_state:fw_balance_preconditioner) fw_balance_split
    implicit none (type, external)
 
@@ -38,15 +40,17 @@ contains
       associate (split => self%preconditioner%split)
          call split%reserve(na, rank, nh, largest)
          split%v = cmplx(static(:na, na + 1:), kind=sp)
-         do j = 0, 1
-            associate (m => split%static(j)%matrix, scale => split%static(j)%scale)
+         ! P_0 takes shape in the place of P_1, which follows it.
+         do j = merge(0, 1, first_moving(self) == 2), 1
+            associate (m => split%moving%matrix, scale => split%moving%scale)
                m(:na, :na) = cmplx(scale*static(:na, :na), kind=sp)
-               split%u(:, :, j) = cmplx(scale*static(:na, na + 1:), kind=sp)
+               split%u = cmplx(scale*static(:na, na + 1:), kind=sp)
                terms%n = 0
                do k = 1, self%problem%forces%n_laws
                   call add_law(self, self%problem%forces%entry(k), self%work(k), j, scale, m, terms)
                end do
-               call subtract_terms(terms, na, static, m, split%u(:, :, j))
+               call subtract_terms(terms, na, static, m, split%u)
+               if (j == 0) split%constant(:na, :na) = real(m(:na, :na), sp)
             end associate
          end do
          call split%factor(first_moving(self), dynamic)

@@ -4,6 +4,7 @@
 module fw_preconditioner_lu
    use fw_kinds, only: sp
    use fw_kinds, only: wp
+   use fw_lapack, only: cgemm
    use fw_lapack, only: cgetrf
    use fw_lapack, only: claswp
    use fw_lapack, only: ctrsm
@@ -15,6 +16,9 @@ module fw_preconditioner_lu
 
    !> Pivots below this, of entries of the order of one, are none: two of them in a row overflow.
    real(sp), parameter :: smallest_pivot = sqrt(tiny(1.0_sp))
+
+   !> Columns that are factored at a time, and orders from which threads share the others.
+   integer, parameter :: block_width = 128, least_shared = 384
 
    !> The storage only grows, so that refactoring does not allocate.
    type :: preconditioner_lu_type
@@ -58,11 +62,55 @@ contains
       class(preconditioner_lu_type), intent(inout) :: self
       integer :: i, info
 
-      call cgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
+      if (self%n < least_shared) then
+         call cgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
+      else
+         call factor_blocks(self%n, self%matrix, size(self%matrix, 1), self%pivot)
+      end if
       do i = 1, self%n
          if (abs(self%matrix(i, i)) < smallest_pivot) self%matrix(i, i) = (1.0_sp, 0.0_sp)
       end do
    end subroutine factor
+
+   !> As cgetrf; the columns beside those that are factored belong to tasks of their own, which the
+   !> threads of a parallel region share. The numbers do not depend on who does them.
+   subroutine factor_blocks(n, a, lda, pivot)
+      integer, intent(in) :: n, lda
+      complex(sp), intent(inout) :: a(lda, n)
+      integer, intent(inout) :: pivot(n)
+      integer :: first, info, j, n_columns
+
+      do first = 1, n, block_width
+         n_columns = min(block_width, n - first + 1)
+         call cgetrf(n - first + 1, n_columns, a(first, first), lda, pivot(first), info)
+         pivot(first:first + n_columns - 1) = pivot(first:first + n_columns - 1) + first - 1
+         !$omp taskloop default(none) private(j) shared(n, lda, a, pivot) &
+         !$omp firstprivate(first, n_columns) grainsize(1)
+         do j = 1, n, block_width
+            if (j == first) cycle
+            call update_columns(n, lda, first, n_columns, j, min(block_width, n - j + 1), &
+                                pivot, a)
+         end do
+         !$omp end taskloop
+      end do
+   end subroutine factor_blocks
+
+   !> Swap rows of columns j to j + width - 1 as a factored block asks, and eliminate right of it.
+   subroutine update_columns(n, lda, first, n_columns, j, width, pivot, a)
+      integer, intent(in) :: n, lda, first, n_columns, j, width
+      integer, intent(in) :: pivot(n)
+      complex(sp), intent(inout) :: a(lda, n)
+      complex(sp), parameter :: one = (1.0_sp, 0.0_sp)
+      integer :: below
+
+      call claswp(width, a(1, j), lda, first, first + n_columns - 1, pivot, 1)
+      if (j < first) return
+      call ctrsm('L', 'L', 'N', 'U', n_columns, width, one, a(first, first), lda, a(first, j), lda)
+      below = first + n_columns
+      if (below > n) return
+      call cgemm('N', 'N', n - below + 1, width, n_columns, -one, a(below, first), lda, &
+                 a(first, j), lda, one, a(below, j), lda)
+   end subroutine update_columns
 
    !> Solve in place for one right-hand side (n), to single precision.
    subroutine solve(self, b)

@@ -6,8 +6,9 @@
 !>                          [  i s q  ]                                       y = D^-1 b,
 !>
 !> two real products for all harmonics, exact to round-off. The matrices come from memory once, and
-!> not once for each harmonic as complex ones. They are packed into panels, all of them when
-!> the structure is built, rows and columns in use whenever these change.
+!> not once for each harmonic as complex ones. K, M and C are symmetric: the rows of the second
+!> product are the columns that the basis has, with those of the internal modes below, and nothing
+!> is copied. Rows and columns in use are, when they are first asked for.
 module fw_real_products
    use fw_complex_form, only: amplitudes_of
    use fw_complex_form, only: coefficients_of
