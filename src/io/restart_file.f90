@@ -27,6 +27,8 @@ module fw_restart_file
    use fw_restart_rows, only: c_rejected
    use fw_restart_rows, only: c_spacing
    use fw_restart_rows, only: c_steps
+   use fw_restart_rows, only: c_reach
+   use fw_restart_rows, only: c_touch
    use fw_restart_rows, only: c_unsettled
    use fw_restart_rows, only: n_controls
    use fw_restart_rows, only: pair_constants
@@ -302,6 +304,8 @@ contains
       march%n_steps = nint(self%control(c_steps))
       march%n_rejected = nint(self%control(c_rejected))
       march%n_unsettled = nint(self%control(c_unsettled))
+      march%touch%reach = self%control(c_reach)
+      march%touch%in_cycles = self%control(c_touch)
       if (allocated(self%checked_rate)) march%checked_rate = self%checked_rate
    end subroutine give_control
 

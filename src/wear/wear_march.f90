@@ -27,6 +27,7 @@ module fw_wear_march
    use fw_wear_step, only: wear_step_report
    use fw_wear_step, only: wear_stepper
    use fw_wear_system, only: wear_system
+   use fw_wear_touch, only: touch_guard
    use fw_newton, only: solver_report
    implicit none (type, external)
    private
@@ -79,6 +80,8 @@ module fw_wear_march
       character(:), allocatable :: ending
       !> Step that the error allows next (0: not known yet).
       real(wp) :: next_cycles = 0.0_wp
+      !> Where the error is controlled: pairs that are about to touch.
+      type(touch_guard) :: touch
       !> Largest rate so far, and depth and rates at which gross slip was last looked for.
       real(wp) :: largest_rate = 0.0_wp
       real(wp) :: checked_depth = 0.0_wp
@@ -258,6 +261,7 @@ contains
       logical :: held(size(state%rate)), refined
 
       held = is_held(self, system, state)
+      call self%touch%look(system)
       before = state
       iterations = 0
       halvings = 0
@@ -295,7 +299,13 @@ contains
                  max(maxval(after%x(system%n_vibration() + 1:)), tiny(1.0_wp))
          ! Whether the step is taken or refused, the next one has this length.
          call adapt(self, cycles, error)
-         if (error <= self%options%tolerance()) exit
+         if (error <= self%options%tolerance()) then
+            call self%touch%pass(system, after, cycles, error/self%options%tolerance(), &
+                                 self%next_cycles)
+            exit
+         end if
+         call self%touch%retry(system, after, cycles, error/self%options%tolerance(), &
+                               self%next_cycles)
          n_inaccurate = n_inaccurate + 1
          self%gave_up = n_inaccurate > max_inaccurate
          if (self%gave_up) then

@@ -199,24 +199,25 @@ contains
       type(wear_step_report), intent(inout) :: report
       type(solver_report) :: solution
       real(wp) :: rate(size(before%rate), 0:self%tableau%n_stages)
-      real(wp) :: base(size(before%rate))
+      real(wp) :: base(size(before%rate)), point(size(before%x), 0:self%tableau%n_stages)
       integer :: n, s
 
       n = system%n_vibration()
       after%x = before%x
+      point(:, 0) = before%x
       rate(:, 0) = before%rate
       associate (t => self%tableau)
          do s = 1, t%n_stages
             ! What the stages before give at this one; its own rate is the unknown.
             base = before%x(n + 1:) + cycles*matmul(rate(:, 1:s - 1), t%a(s, 1:s - 1))
             call system%begin_step(base, t%gamma*cycles)
-            ! A guess: the rate of the stage before, of the first one that at the start.
-            after%x(n + 1:) = base + t%gamma*cycles*rate(:, s - 1)
+            call guess_stage(t, s, point, after%x)
             call self%newton%solve(system, after%x, solution)
             report%iterations = report%iterations + solution%iterations
             report%converged = solution%converged
             if (.not. solution%converged) return
             rate(:, s) = system%rate
+            point(:, s) = after%x
          end do
          report%error = cycles*matmul(rate, t%error)
          ! Stiffly accurate: the last stage is the end of the step.
@@ -224,6 +225,23 @@ contains
       end associate
       after%residual = solution%residual
    end subroutine implicit_step
+
+   !> A stage starts from the line through the start of the step and the stage before: vibration and
+   !> depths move together, as in a scar that lowers the body. Depths alone would open all of the
+   !> joint where they grow by more than its compression.
+   subroutine guess_stage(tableau, stage, point, x)
+      type(tableau_type), intent(in) :: tableau
+      integer, intent(in) :: stage
+      !> Start of the step (0) and solutions of its stages.
+      real(wp), intent(in) :: point(:, 0:)
+      real(wp), intent(inout) :: x(:)
+      real(wp) :: fraction
+
+      x = point(:, 0)
+      if (stage == 1) return
+      fraction = tableau%time(stage)/tableau%time(stage - 1)
+      x = x + fraction*(point(:, stage - 1) - x)
+   end subroutine guess_stage
 
    !> Linearly implicit Euler: one linear solution for vibration and depths together. Depths only
    !> grow, and by no more than the allowance. What the vibration lags behind is corrected where

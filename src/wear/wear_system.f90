@@ -51,6 +51,7 @@ module fw_wear_system
       procedure :: update_rate
       procedure :: force_of_depth
       procedure :: mean_pressure
+      procedure :: openings
       procedure :: compression
       procedure :: depth_scale
       procedure :: slides
@@ -150,6 +151,20 @@ contains
          end associate
       end associate
    end function mean_pressure
+
+   !> Mean opening of every pair at the last point [length]; zero where it bears in the mean.
+   pure function openings(self) result(opening)
+      class(wear_system), intent(in) :: self
+      real(wp) :: opening(self%n_extra)
+
+      opening = 0.0_wp
+      associate (problem => self%vibration%problem)
+         associate (work => self%vibration%work(problem%forces%pairs))
+            where (problem%joint%row(3, :) > 0 .and. self%normal > 0.0_wp) &
+               opening = max(0.0_wp, work%prediction(:, 3, 1) + work%offset)/self%normal
+         end associate
+      end associate
+   end function openings
 
    !> Largest elastic compression of a pair at the last point: the depth that would unload it
    !> alone [length]. Pairs pressed by dead loads do not count; zero where all are.

@@ -23,6 +23,8 @@ module fw_wear_tableau
       real(wp), allocatable :: a(:, :)
       !> Weights of the rates in the error estimate: at the start of the step (0), at the stages.
       real(wp), allocatable :: error(:)
+   contains
+      procedure :: time
    end type tableau_type
 
 contains
@@ -59,6 +61,14 @@ contains
                             self%a(5, 3) - 225.0_wp/32.0_wp, 0.0_wp, self%gamma]
       end select
    end function new_tableau
+
+   !> Where a stage stands, as a part of the step.
+   pure real(wp) function time(self, stage)
+      class(tableau_type), intent(in) :: self
+      integer, intent(in) :: stage
+
+      time = self%gamma + sum(self%a(stage, :stage - 1))
+   end function time
 
    !> Three stages of order 3 (Alexander 1977).
    pure subroutine fill_third_order(self)

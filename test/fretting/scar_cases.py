@@ -112,6 +112,34 @@ def marched(scar):
     raise AssertionError("no steady state")
 
 
+def slid(compliance, scar, depth, motion):
+    """Path of every cell in a cycle in which the ground is led by `motion` to either side, times
+    its force: cells slide by mu times the gap that is left where the body is raised by
+    motion / mu; they all do where that lifts it off."""
+    gap = scar.gap + depth
+    force, left = pressed(compliance, gap, scar.load)
+    k = np.argmax(force)
+    # What the cell of the largest force says of the approach.
+    approach = gap[k] + compliance[k] @ force - left[k]
+    raised = approach - motion / scar.mu
+    assert raised < gap.min(), "the ground is led too little for gross slip"
+    return force * 4.0 * scar.mu * (gap - raised)
+
+
+def led(scar, motion, cycles):
+    """Depths after so many cycles of gross slip."""
+    compliance = scar.compliance()
+    depth, done = np.zeros(scar.n), 0.0
+    while done < cycles:
+        rate = scar.wear / scar.cell * slid(compliance, scar, depth, motion)
+        step = GROWTH * max(depth.max(), LEAST * scar.gap.max()) / rate.max()
+        step = min(step, cycles - done)
+        middle = depth + 0.5 * step * rate
+        depth = depth + step * scar.wear / scar.cell * slid(compliance, scar, middle, motion)
+        done += step
+    return depth
+
+
 def write_model(path, scar, motion=0.0):
     """The model of `fw_run`: the displacements of the cells across and along, the approach of the
     cylinder, and its tangential motion, which the drag moves to and fro; or is led so far."""
