@@ -139,7 +139,7 @@ paper: build ## figures and tables of the paper on the sector, in docs/paper
 	PYTHONPATH=python $(PYTHON) -m bench.paper.gallery
 
 disk: build ## tables and pictures of docs/shrouded_disk.md
-	PYTHONPATH=python MPLBACKEND=Agg $(PYTHON) -m bench.disk --build $(BUILD)
+	PYTHONPATH=python:$(BUILD)/python MPLBACKEND=Agg $(PYTHON) -m bench.disk --build $(BUILD)
 
 BEFORE ?=
 rest: build ## where pairs of the velocity law come to rest, also of a program BEFORE

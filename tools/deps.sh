@@ -5,10 +5,10 @@
 #     tools/deps.sh VENV_DIRECTORY
 set -euo pipefail
 venv=$1
-python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh
+python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
                 selenium pytest xdist gcovr nbclient ipykernel mypy ruff fortitude ford sphinx
                 numpydoc myst_parser fpm)
-python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed bokeh
+python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
                  selenium pytest pytest-xdist gcovr nbclient ipykernel mypy ruff fortitude-lint
                  ford sphinx numpydoc myst-parser fpm)
 

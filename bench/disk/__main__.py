@@ -91,21 +91,29 @@ def damping(run: Run) -> tuple[list[str], list[Result]]:
             results.append(run(f"damping_{n}_{load:g}", "wave.nml", *where,
                                f"harmonics%n_harmonics={n}", f"load%harmonic_scale={load}"))
     lines = ["", "| load [N] | H = 1: tip/load [mm/N] | at [Hz] | drawn | at [Hz] "
-             "| H = 5: tip/load | at [Hz] | converged |", "|---" * 8 + "|"]
+             "| here there | H = 5: tip/load | at [Hz] | converged |", "|---" * 9 + "|"]
     linear = run("linear", "wave.nml", *sweep(1280, 1292, 241), *TINY)
     size, at = read_damping([linear])[0, 2:]
-    lines.append(f"| linear, closed | {size:.2e} | {at:.1f} | 7.8e-03 | 1288 |  |  |  |")
+    lines.append(f"| linear, closed | {size:.2e} | {at:.1f} | 7.8e-03 | 1288 |  |  |  |  |")
     for one, five in zip(rows[1], rows[5]):
         first, second = read_damping([one])[0], read_damping([five])[0]
         drawn = PEAKS.get(float(first[0]))
-        there = f"{drawn[0]:.1e} | {drawn[1]}" if drawn else " | "
+        there = " |  | " if not drawn else (
+            f"{drawn[0]:.1e} | {drawn[1]} | {response_at(one, drawn[1]) / float(first[0]):.2e}")
         lines.append(f"| {first[0]:g} | {first[2]:.2e} | {first[3]:.0f} | {there} "
                      f"| {second[2]:.2e} | {second[3]:.0f} "
                      f"| {five.converged.sum()} of {five.n_points} |")
     opened = run("open", "wave.nml", *sweep(386, 390, 161), *TINY, "contact%gap=1")
     size, at = read_damping([opened])[0, 2:]
-    lines.append(f"| linear, open | {size:.2e} | {at:.1f} | 7.0e-01 | 388.8 |  |  |  |")
+    lines.append(f"| linear, open | {size:.2e} | {at:.1f} | 7.0e-01 | 388.8 |  |  |  |  |")
     return [*lines, ""], rows[1]
+
+
+def response_at(result: Result, frequency: float) -> float:
+    """Harmonic 1 of the tip between the points around a frequency [Hz]."""
+    order = np.argsort(result.omega)
+    return float(np.interp(2.0 * np.pi * frequency, result.omega[order],
+                           np.abs(result.harmonic(1, "tip"))[order]))
 
 
 def wear(run: Run, folder: Path) -> tuple[list[str], Result]:

@@ -34,7 +34,7 @@ def split_friction(path: Path) -> tuple[str, ...]:
                 second[:, 0], second[:, 1] = second[:, 1], 0
             group[name] = np.concatenate((first, second)) * (2.0 if name == "mu" else 1) if (
                 name != "patch") else np.concatenate((first, second))
-    return f"model%file='{path}'", "contact%normal_stiffness=36633.5"
+    return f"model%file='{path}'", "contact%normal_stiffness=36631.7"
 
 
 def main() -> int:

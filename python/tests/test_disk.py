@@ -29,15 +29,14 @@ from fretwear.disk.rows import turn
 from fretwear.model_file import write_model_file
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "example" / "shrouded_disk"
-#: Another program's disk of the same drawing, first and second family [Hz]; its patches are not
-#: known but for their number, which shows where many nodal diameters rock the shrouds.
+#: Another program's disk of the same drawing, first and second family [Hz].
 OPEN = {0: (387.9, 852.1), 1: (388.5, 851.7), 2: (388.8, 869.4), 3: (388.9, 929.2),
         4: (388.8, 1000.5), 6: (388.7, 1087.7), 9: (388.5, 1138.7), 12: (388.4, 1159.8),
         18: (388.3, 1172.1)}
 CLOSED = {0: 657.9, 1: 863.7, 2: 898.8, 3: 1037.3, 4: 1288.3, 6: 2090.3, 9: 3894.0, 12: 3904.0,
           18: 3478.9}
-#: Relative differences: of the elements, of the patches up to 9 nodal diameters, and above.
-ELEMENTS, PATCHES, ROCKING = 0.0025, 0.0025, 0.02
+#: Relative difference: its nodes on the twisted blade stand elsewhere by a little.
+DRAWING = 0.0025
 #: Of what the reduction leaves; it keeps 30 modes, far above the first families.
 REDUCED = 3e-5
 
@@ -60,9 +59,8 @@ def test_sizes(full: FullDisk, reduced: ReducedDisk) -> None:
 
 @pytest.mark.parametrize("k", OPEN)
 def test_frequencies_of_nodal_diameters(reduced: ReducedDisk, k: int) -> None:
-    assert reduced.frequencies(k, n=2) == pytest.approx(OPEN[k], rel=ELEMENTS)
-    tolerance = PATCHES if k <= 9 else ROCKING
-    assert reduced.frequencies(k, closed=True, n=1)[0] == pytest.approx(CLOSED[k], rel=tolerance)
+    assert reduced.frequencies(k, n=2) == pytest.approx(OPEN[k], rel=DRAWING)
+    assert reduced.frequencies(k, closed=True, n=1)[0] == pytest.approx(CLOSED[k], rel=DRAWING)
 
 
 @pytest.mark.parametrize("k", [0, 4, 18])
@@ -102,7 +100,7 @@ def test_all_sectors_move_as_one(full: FullDisk, name: str) -> None:
 
 def test_the_committed_model_is_the_generated_one(reduced: ReducedDisk, tmp_path: Path) -> None:
     path = EXAMPLE / "disk.h5"
-    assert path.stat().st_size < 1.2e6
+    assert path.stat().st_size < 1e6
     assert read_parameters(path) == DiskParameters()
     begin = time.perf_counter()
     assert main(["-o", str(tmp_path / "disk.h5"), "-q"]) == 0
@@ -120,15 +118,17 @@ def test_what_no_disk_can_be_made_of(tmp_path: Path, capsys: pytest.CaptureFixtu
         DiskParameters(blade_angle=11.0)
     with pytest.raises(ParameterError, match="rim_radius"):
         DiskParameters(rim_radius=50.0)
+    with pytest.raises(ParameterError, match="axial_patches = 6 .* at most 5"):
+        DiskParameters(axial_patches=6)
     assert main(["-o", str(tmp_path / "a.h5"), "--n-sectors", "2"]) == 3
     assert "n_sectors = 2" in capsys.readouterr().err
     assert main(["-o", str(tmp_path / "none" / "a.h5")]) == 5
 
 
 CASE = """&case title = 'disk' threads = 1 /
-&model source = 'hdf5' file = '{file}' rayleigh_mass = 4.0415 rayleigh_stiffness = 6.186e-8 /
+&model source = 'hdf5' file = '{file}' rayleigh_mass = 4.0489 rayleigh_stiffness = 6.1745e-8 /
 {cyclic}
-&contact law = 'penalty' tangential_stiffness = 73267 normal_stiffness = 73267 /
+&contact law = 'penalty' tangential_stiffness = 73263 normal_stiffness = 73263 /
 &load harmonic_scale = 100 /
 &harmonics n_harmonics = 3 sampling = 'uniform' n_time = 144 /
 &sweep start = 1000 unit = 'Hz' n_points = 1 /

@@ -63,6 +63,9 @@ class DiskParameters:
         _require(self.blade_angle < self.pitch_degrees, "blade_angle", self.blade_angle,
                  f"less than the pitch of {self.pitch_degrees:g} degrees")
         _require(self.load_height <= 1.0, "load_height", self.load_height, "a share up to 1")
+        # A face has three nodes along the radius, and a patch one of its own at least.
+        for name, most in (("radial_patches", 3), ("axial_patches", 2 * self.axial_layers + 1)):
+            _require(getattr(self, name) <= most, name, getattr(self, name), f"at most {most}")
         radii = (self.inner_radius, self.rim_radius, self.shroud_radius, self.tip_radius)
         names = ("rim_radius", "shroud_radius", "tip_radius")
         for name, low, high in zip(names, radii, radii[1:]):

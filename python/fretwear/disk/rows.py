@@ -110,29 +110,31 @@ def _face(assembly: Assembly, p: DiskParameters, side: float
           ) -> tuple[sp.csr_array, Floats, Floats]:
     """Rows (n_patches, n_nodes) of the patches of a shroud face, their centres and areas.
 
-    The points of a Gauss rule stand for the patches: their forces have the sum and the moments of
-    a pressure that is linear over the face. Means over equal parts would have less of the moments.
+    Patches are equal parts of the face, and move as the mean of their nodes; a node on the border
+    of several counts as a share in each. That leaves the moments of a pressure that is linear over
+    the face nearly what they are, which means by area would lessen.
     """
     grid = _face_nodes(assembly, p, side)
-    heights, tall = np.polynomial.legendre.leggauss(p.radial_patches)
-    places, wide = np.polynomial.legendre.leggauss(p.axial_patches)
+    tall, wide = _shares(grid.shape[0], p.radial_patches), _shares(grid.shape[1], p.axial_patches)
     rows = sp.lil_array((p.n_patches, assembly.n_nodes))
-    centre, area = np.zeros((p.n_patches, 3)), np.zeros(p.n_patches)
-    for k in range(p.n_patches):
-        i, j = divmod(k, p.axial_patches)
-        along = 0.5 * (places[j] + 1.0) * p.axial_layers
-        layer = min(int(along), p.axial_layers - 1)
-        a, b = 0.5 * (heights[i] + 1.0), along - layer
-        nodes = grid[:, 2 * layer:2 * layer + 3]
-        shape = np.outer(_quadratic(a), _quadratic(b))
-        rows[[k], nodes.ravel()] = shape.ravel()
-        centre[k] = np.tensordot(assembly.nodes[:, nodes], shape, 2)
-        corners = assembly.nodes[:, nodes[::2, ::2]]
-        edges = (np.tensordot(corners, np.outer([-1.0, 1.0], [1.0 - b, b]), 2),
-                 np.tensordot(corners, np.outer([1.0 - a, a], [-1.0, 1.0]), 2))
-        area[k] = (0.25 * tall[i] * wide[j] * p.axial_layers
-                   * np.linalg.norm(np.cross(edges[0], edges[1])))
-    return sp.csr_array(rows), centre, area
+    rows[:, grid.ravel()] = np.kron(tall, wide)
+    return sp.csr_array(rows), rows @ assembly.nodes.T, np.full(
+        p.n_patches, _face_area(assembly.nodes, grid) / p.n_patches)
+
+
+def _shares(n_nodes: int, n_parts: int) -> Floats:
+    """Weights (n_parts, n_nodes) of the nodes of a line in the means of its equal parts."""
+    node, part = np.arange(n_nodes) * n_parts, np.arange(n_parts)[:, None] * (n_nodes - 1)
+    inside = (part <= node) & (node <= part + n_nodes - 1)
+    share = inside / inside.sum(axis=0)
+    return share / share.sum(axis=1, keepdims=True)
+
+
+def _face_area(nodes: Floats, grid: Ints) -> float:
+    """Area between the vertices of the element faces, two triangles each."""
+    corner = nodes[:, grid[::2, ::2]]
+    across, back = corner[:, 1:, 1:] - corner[:, :-1, :-1], corner[:, 1:, :-1] - corner[:, :-1, 1:]
+    return 0.5 * float(np.linalg.norm(np.cross(across, back, axis=0), axis=0).sum())
 
 
 def _face_nodes(assembly: Assembly, p: DiskParameters, side: float) -> Ints:
@@ -150,8 +152,3 @@ def _face_nodes(assembly: Assembly, p: DiskParameters, side: float) -> Ints:
         raise ParameterError("DiskParameters: the shroud faces cannot be told from the rest; use "
                              "less twist or more axial_layers")
     return found[order].reshape(3, -1)
-
-
-def _quadratic(x: float) -> Floats:
-    """Shape functions of an edge with nodes at 0, 1/2 and 1."""
-    return np.array([(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)])
