@@ -12,12 +12,20 @@ submodule(fw_balance_state) fw_balance_preconditioner
    !> Coordinates of all sectors up to which their matrices are factored where waves do not serve:
    !> each takes a second or so.
    integer, parameter :: most_whole = 1500
+   !> Active coordinates from which one matrix for all harmonics is faster than one for each.
+   integer, parameter :: alike_from = 16
 
    ! Two matrices for all harmonics (fw_balance_split).
    interface
       module subroutine build_split(self)
          type(balance_state), intent(inout) :: self
       end subroutine build_split
+
+      !> Whether Z_n is one real matrix in all harmonics, to the last bit, as without mass.
+      module subroutine are_alike(self, is_so)
+         type(balance_state), intent(inout) :: self
+         logical, intent(out) :: is_so
+      end subroutine are_alike
 
       !> complex_in in place, of the active coordinates.
       module subroutine solve_split(self)
@@ -32,6 +40,10 @@ contains
       integer :: h
 
       self%preconditioner%is_split = self%nearly .and. .not. allocated(self%shift)
+      if (.not. (self%nearly .or. allocated(self%shift) .or. by_waves(self))) then
+         if (self%active%n_active >= alike_from .and. self%preconditioner%left_out == 0 .and. &
+             self%has_static_laws) call are_alike(self, self%preconditioner%is_split)
+      end if
       if (by_waves(self)) then
          call build_waves(self)
       else if (self%preconditioner%is_split) then
@@ -271,6 +283,67 @@ contains
             = -aimag(self%scratch%complex_in(:na, h))
       end do
    end procedure precondition
+
+   module procedure precondition_columns
+      integer :: j
+
+      ! All columns at once where each harmonic has its own factors, and these know every
+      ! coordinate.
+      if (self%preconditioner%is_split .or. by_waves(self) .or. .not. knows_all(self)) then
+         do j = 1, size(columns, 2)
+            call self%precondition(columns(:, j))
+         end do
+      else
+         call solve_columns(self, self%active%n_active, self%problem%fourier%n_coefficients, &
+                            size(columns, 2), columns)
+      end if
+   end procedure precondition_columns
+
+   !> Whether the factors are those of the active coordinates, in all harmonics.
+   pure logical function knows_all(self)
+      class(balance_state), intent(in) :: self
+      integer :: k
+
+      knows_all = self%preconditioner%left_out == 0 .and. &
+                  self%preconditioner%n == self%active%n_active
+      if (.not. knows_all) return
+      do k = 1, self%active%n_active
+         if (self%preconditioner%place(k) /= k) knows_all = .false.
+      end do
+   end function knows_all
+
+   !> Harmonic by harmonic with all right-hand sides.
+   subroutine solve_columns(self, na, nc, n_columns, columns)
+      type(balance_state), intent(inout) :: self
+      integer, intent(in) :: na, nc, n_columns
+      real(wp), intent(inout) :: columns(na, nc, n_columns)
+      complex(sp) :: b(na, n_columns)
+      real(wp) :: largest(n_columns), scale
+      integer :: h, j, k
+      logical :: has_sine
+
+      do h = 1, self%problem%fourier%n_retained
+         k = self%problem%fourier%column(h)
+         has_sine = self%problem%fourier%harmonic(h) > 0
+         do j = 1, n_columns
+            ! Single precision ends at 1e38: the entries are brought to the order of one before.
+            largest(j) = maxval(abs(columns(:, k, j)))
+            if (has_sine) largest(j) = max(largest(j), maxval(abs(columns(:, k + 1, j))))
+            if (.not. largest(j) > 0.0_wp) largest(j) = 1.0_wp
+            b(:, j) = cmplx(columns(:, k, j)/largest(j), kind=sp)
+            if (has_sine) b(:, j) = cmplx(columns(:, k, j)/largest(j), &
+                                          -columns(:, k + 1, j)/largest(j), kind=sp)
+         end do
+         associate (factors => self%preconditioner%harmonic(h))
+            call factors%solve_scaled(n_columns, b)
+            do j = 1, n_columns
+               scale = factors%scale*largest(j)
+               columns(:, k, j) = scale*real(b(:, j), wp)
+               if (has_sine) columns(:, k + 1, j) = -scale*real(aimag(b(:, j)), wp)
+            end do
+         end associate
+      end do
+   end subroutine solve_columns
 
    subroutine solve_harmonic(self, h)
       type(balance_state), intent(inout) :: self

@@ -1,5 +1,5 @@
-!> The preconditioner of a structure whose stiffness is that of rest and a low rank: two matrices
-!> for all harmonics (fw_split_factors). With g_0 the mean derivative of the forces in harmonic 0
+!> The preconditioner of a structure whose stiffness is that of rest and a low rank, or of rest
+!> alone: two matrices for all harmonics (fw_split_factors). With g_0 the mean derivative of the forces in harmonic 0
 !> and g_1 that of all others,
 !>
 !>   P_j = (1 - g_j) K + g_j k d,   X = (1 - g_1) V.
@@ -26,14 +26,20 @@ contains
 
       na = self%active%n_active
       nh = self%problem%fourier%n_retained
-      rank = self%problem%structure%split_rank()
+      ! Blocks that are all alike have no part of their own.
+      rank = 0
+      if (self%nearly) rank = self%problem%structure%split_rank()
       allocate (static(self%active%n_used, na + rank), dynamic(rank, rank, nh))
-      call self%problem%structure%static_block(self%structure_state, static)
+      if (self%nearly) then
+         call self%problem%structure%static_block(self%structure_state, static)
+      else
+         call read_alike(self, static)
+      end if
       largest = 0.0_wp
       do k = 1, na
          largest = max(largest, abs(static(k, k)))
       end do
-      do h = 1, nh
+      do h = 1, merge(nh, 0, rank > 0)
          call self%problem%structure%dynamic_block(self%structure_state, h, dynamic(:, :, h))
       end do
       call reserve_terms(self, terms)
@@ -56,6 +62,35 @@ contains
          call split%factor(first_moving(self), dynamic)
       end associate
    end procedure build_split
+
+   !> The block that all harmonics share.
+   subroutine read_alike(self, static)
+      type(balance_state), intent(in) :: self
+      real(wp), intent(out) :: static(:, :)
+      complex(wp), allocatable :: stiffness(:, :)
+
+      allocate (stiffness(size(static, 1), size(static, 2)))
+      call self%problem%structure%active_block(self%structure_state, 1, stiffness)
+      static = real(stiffness, wp)
+   end subroutine read_alike
+
+   module procedure are_alike
+      complex(wp), allocatable :: first(:, :), other(:, :)
+      integer :: h
+
+      is_so = .false.
+      if (self%preconditioner%blocks_differ) return
+      allocate (first(self%active%n_used, self%active%n_active))
+      allocate (other, mold=first)
+      call self%problem%structure%active_block(self%structure_state, 1, first)
+      self%preconditioner%blocks_differ = any(abs(aimag(first)) > 0.0_wp)
+      do h = 2, self%problem%fourier%n_retained
+         if (self%preconditioner%blocks_differ) return
+         call self%problem%structure%active_block(self%structure_state, h, other)
+         self%preconditioner%blocks_differ = any(abs(other - first) > 0.0_wp)
+      end do
+      is_so = .not. self%preconditioner%blocks_differ
+   end procedure are_alike
 
    !> Number of the first harmonic that is not 0.
    pure integer function first_moving(self) result(first)

@@ -61,6 +61,8 @@ module fw_balance_state
       complex(wp), allocatable :: shift(:, :, :)
       !> Let normal components that always bear leave the linear problem.
       logical :: pins_normals = .true.
+      !> Whether the inputs of the laws are displacements alone, the same in all harmonics.
+      logical :: has_static_laws = .false.
       !> The linear problem of a step, see fw_balance_linear.
       type(active_set) :: active
       type(kept_factors) :: preconditioner
@@ -90,6 +92,7 @@ module fw_balance_state
       procedure :: fill_harmonic
       procedure :: preconditioner_fits
       procedure :: precondition
+      procedure :: precondition_columns
       procedure :: strengthen_preconditioner => take_whole
       procedure :: assemble
    end type balance_state
@@ -230,6 +233,11 @@ module fw_balance_state
          class(balance_state), intent(inout) :: self
          real(wp), intent(inout), contiguous :: vector(:)
       end subroutine precondition
+
+      module subroutine precondition_columns(self, columns)
+         class(balance_state), intent(inout) :: self
+         real(wp), intent(inout), contiguous :: columns(:, :)
+      end subroutine precondition_columns
    end interface
 
 contains
@@ -258,7 +266,8 @@ contains
       allocate (self%balance(m, nc), self%load(m, nc), source=0.0_wp)
       call self%active%reserve(m)
       call self%preconditioner%reserve(m, problem%fourier%n_retained)
-      self%nearly = problem%structure%split_rank() > 0 .and. all_are_static(problem)
+      self%has_static_laws = all_are_static(problem)
+      self%nearly = problem%structure%split_rank() > 0 .and. self%has_static_laws
       if (problem%structure%n_alike > 1) call self%preconditioner%reserve_waves( &
          problem%structure%n_slots, problem%structure%n_alike, problem%fourier%n_retained)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)

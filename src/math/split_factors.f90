@@ -3,7 +3,7 @@
 !>
 !>   A_n^-1 x = y - U T_n V^T y,   y = P_1^-1 x,   U = P_1^-1 X,   T_n = S_n (1 + V^T U S_n)^-1.
 !>
-!> In single precision, all harmonics of P_1 at a time.
+!> Of rank 0 the harmonics differ by nothing. In single precision, all harmonics of P_1 at a time.
 module fw_split_factors
    use fw_kinds, only: sp
    use fw_kinds, only: wp
@@ -89,7 +89,7 @@ contains
       !$omp end parallel
       if (first == 2) call mend_pivots(self%constant(:self%n, :self%n))
       call self%panels%pack_factors(self%n, self%moving%matrix, self%moving%pivot)
-      if (size(dynamic, 3) >= first) call find_patterns(self, first, dynamic)
+      if (self%rank > 0 .and. size(dynamic, 3) >= first) call find_patterns(self, first, dynamic)
    end subroutine factor
 
    !> A singular matrix preconditions still, and costs the iterative solver an iteration.
@@ -180,6 +180,7 @@ contains
 
       n_columns = last - first + 1
       call self%panels%solve(n_columns, self%rhs(:, first:last))
+      if (self%rank == 0) return
       call cgemm('T', 'N', self%rank, n_columns, self%n, one, self%v, self%n, &
                  self%rhs(1, first), self%n, zero, self%pattern(1, first), self%rank)
       do h = first, last

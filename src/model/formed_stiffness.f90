@@ -5,6 +5,7 @@ module fw_formed_stiffness
    use fw_complex_form, only: coefficients_of
    use fw_internal_block, only: internal_block
    use fw_kinds, only: wp
+   use fw_lapack, only: dgemm
    use fw_lapack, only: zgemm
    use fw_lapack, only: zgemv
    use fw_load_waves, only: load_waves
@@ -22,6 +23,10 @@ module fw_formed_stiffness
       !> scratch.
       complex(wp), allocatable, private :: active(:)
       complex(wp), allocatable, private :: input(:, :), output(:, :)
+      !> Where neither mass nor damping acts Z_r is one real matrix in all harmonics, and one product
+      !> serves them. It, and its rows and columns in use.
+      logical, private :: is_static = .false.
+      real(wp), allocatable, private :: static(:, :), static_active(:)
    contains
       procedure :: reserve
       procedure :: form
@@ -31,6 +36,8 @@ module fw_formed_stiffness
    end type formed_stiffness
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+   !> Rows up to which products do without a library.
+   integer, parameter :: few = 4
 
 contains
 
@@ -63,6 +70,7 @@ contains
             call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), &
                                load(:, h), n_failed)
          end do
+         call find_static(self)
          return
       end if
       !$omp parallel do default(none) shared(self, basis, harmonic, theta, s, load) private(h) &
@@ -73,6 +81,23 @@ contains
       end do
       !$omp end parallel do
    end subroutine form
+
+   !> Whether Z_r is one real matrix in all harmonics, to the last bit.
+   subroutine find_static(self)
+      class(formed_stiffness), intent(inout) :: self
+      integer :: h, j
+
+      self%is_static = .false.
+      if (size(self%matrix, 1) <= few) return
+      ! Of structures with mass the first columns differ.
+      do h = 1, size(self%matrix, 3)
+         do j = 1, size(self%matrix, 2)
+            if (any(abs(self%matrix(:, j, h) - real(self%matrix(:, j, 1), wp)) > 0.0_wp)) return
+         end do
+      end do
+      self%is_static = .true.
+      self%static = real(self%matrix(:, :, 1), wp)
+   end subroutine find_static
 
    !> One harmonic, in a thread of its own: D, the load without internal modes, and Z_r.
    subroutine form_harmonic(basis, n, theta, s, matrix, load, n_failed)
@@ -245,11 +270,24 @@ contains
       !> Coordinates and product (m, n_coefficients).
       real(wp), intent(in) :: q(m, *)
       real(wp), intent(inout) :: product(m, *)
+      integer :: n
 
+      if (self%is_static) then
+         n = coefficient_total(harmonic, column)
+         call dgemm('N', 'N', m, n, m, 1.0_wp, self%static, m, q, m, 0.0_wp, product, m)
+         return
+      end if
       call amplitudes_of(harmonic, column, m, q, m, self%input)
       call multiply_harmonics(self, size(harmonic), m, m, self%matrix)
       call coefficients_of(harmonic, column, m, m, self%output, product)
    end subroutine multiply
+
+   !> Coefficients of the harmonics: the last one has a sine but for harmonic 0.
+   pure integer function coefficient_total(harmonic, column) result(n)
+      integer, intent(in) :: harmonic(:), column(:)
+
+      n = maxval(column + merge(1, 0, harmonic > 0))
+   end function coefficient_total
 
    !> output = matrix input of every harmonic.
    subroutine multiply_harmonics(self, n_harmonics, n_rows, n_columns, matrix)
@@ -278,7 +316,6 @@ contains
       integer, intent(in) :: n_rows, n_columns
       complex(wp), intent(in) :: matrix(n_rows, n_columns), input(n_columns)
       complex(wp), intent(inout) :: output(n_rows)
-      integer, parameter :: few = 4
       integer :: j
 
       if (n_rows > few) then
@@ -301,6 +338,11 @@ contains
 
       m = size(self%matrix, 1)
       if (n_active == m) return
+      if (self%is_static) then
+         self%static_active = reshape(self%static(used(:n_used), used(:n_active)), &
+                                      [n_used*n_active])
+         return
+      end if
       n = n_used*n_active*size(self%matrix, 3)
       if (allocated(self%active)) then
          if (size(self%active) < n) deallocate (self%active)
@@ -326,6 +368,11 @@ contains
 
       if (n_active == m) then
          call self%multiply(harmonic, column, m, v, product)
+         return
+      end if
+      if (self%is_static) then
+         call dgemm('N', 'N', n_used, coefficient_total(harmonic, column), n_active, 1.0_wp, &
+                    self%static_active, max(1, n_used), v, max(1, n_active), 0.0_wp, product, m)
          return
       end if
       call amplitudes_of(harmonic, column, n_active, v, m, self%input)

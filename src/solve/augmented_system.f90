@@ -18,6 +18,7 @@
 module fw_augmented_system
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_lapack, only: dgemv
    use fw_linalg, only: lu_type
    use fw_parameter_system, only: parameter_system
    implicit none (type, external)
@@ -40,7 +41,7 @@ module fw_augmented_system
       type(lu_type), private :: complement
       logical, private :: is_bordered = .false.
       !> Scratch (n_extra), (inner%n).
-      real(wp), allocatable, private :: unit(:), adjusted(:), term(:)
+      real(wp), allocatable, private :: unit(:), adjusted(:)
       !> The two parts of a vector (inner%n, 1), (n_extra, 1).
       real(wp), allocatable, private :: inner_part(:, :), extra_part(:, :)
    contains
@@ -176,9 +177,9 @@ contains
       self%reference = inner%reference
       self%reduced = inner%reduced
       self%interrupt => inner%interrupt
-      if (allocated(self%unit)) deallocate (self%unit, self%adjusted, self%term, &
-                                            self%inner_part, self%extra_part)
-      allocate (self%unit(n_extra), self%adjusted(inner%n), self%term(inner%n), source=0.0_wp)
+      if (allocated(self%unit)) deallocate (self%unit, self%adjusted, self%inner_part, &
+                                            self%extra_part)
+      allocate (self%unit(n_extra), self%adjusted(inner%n), source=0.0_wp)
       allocate (self%inner_part(inner%n, 1), self%extra_part(n_extra, 1), source=0.0_wp)
    end subroutine augment
 
@@ -319,8 +320,8 @@ contains
          self%unit = 0.0_wp
          self%unit(j) = 1.0_wp
          call self%add_columns(self%unit(:n), self%columns(:, j))
-         call self%inner%precondition(self%columns(:, j))
       end do
+      call self%inner%precondition_columns(self%columns)
       call self%subtract_rows(self%columns, self%complement%matrix(:n, :n), is_built=.false.)
       call self%complement%factor(singular)
       self%is_bordered = .not. singular
@@ -349,7 +350,7 @@ contains
    subroutine precondition(self, vector)
       class(augmented_system), intent(inout) :: self
       real(wp), intent(inout), contiguous :: vector(:)
-      integer :: j, k, n
+      integer :: k, n
 
       k = self%n_linear_inner
       n = self%n_linear_extra
@@ -360,12 +361,7 @@ contains
       call self%subtract_rows(self%inner_part(:k, :), self%extra_part(:n, :), is_built=.true.)
       call self%complement%solve(self%extra_part(:n, 1))
       vector(k + 1:) = self%extra_part(:n, 1)
-      self%inner_part(:k, 1) = 0.0_wp
-      do j = 1, n
-         self%term(:k) = self%extra_part(j, 1)*self%columns(:, j)
-         self%inner_part(:k, 1) = self%inner_part(:k, 1) + self%term(:k)
-      end do
-      vector(:k) = vector(:k) - self%inner_part(:k, 1)
+      call dgemv('N', k, n, -1.0_wp, self%columns, max(1, k), self%extra_part, 1, 1.0_wp, vector, 1)
    end subroutine precondition
 
    !> Column by column: rows of the conditions take what the product of the inner system leaves.

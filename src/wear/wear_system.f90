@@ -11,20 +11,18 @@
 module fw_wear_system
    use fw_augmented_system, only: augmented_system
    use fw_balance_state, only: balance_state
-   use fw_complex_form, only: amplitudes_of
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_stuck
-   use fw_fourier, only: to_complex
    use fw_kinds, only: wp
-   use fw_lapack, only: zgemm
+   use fw_lapack, only: dgemm
    implicit none (type, external)
    private
 
    public :: wear_system, new_wear_system
 
-   complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
+   complex(wp), parameter :: one = (1.0_wp, 0.0_wp)
 
    type, extends(augmented_system) :: wear_system
       !> The inner system; its depths are those of the last point.
@@ -42,9 +40,12 @@ module fw_wear_system
       real(wp), allocatable, private :: weight(:)
       !> Pairs whose depth stays in the linear problem (first n_linear_extra entries).
       integer, allocatable, private :: wearing(:)
-      !> Displacements of vectors of the preconditioner (n_coordinates, n_retained, vectors), and
-      !> Z_n of those of one harmonic (n_coordinates, vectors).
-      complex(wp), allocatable, private :: amplitudes(:, :, :), balance(:, :)
+      !> Of the preconditioner: the rows g_q (n_linear_inner, n_linear_extra), and the pairs that
+      !> they are of.
+      real(wp), allocatable, private :: slopes(:, :)
+      integer, allocatable, private :: built_for(:)
+      !> Cycles of the step when it was built.
+      real(wp), private :: built_cycles = 0.0_wp
    contains
       procedure :: begin_step
       procedure :: n_vibration
@@ -65,6 +66,7 @@ module fw_wear_system
       procedure :: rows
       procedure :: subtract_rows
       procedure :: corner
+      procedure :: preconditioner_fits
    end type wear_system
 
 contains
@@ -381,112 +383,153 @@ contains
       real(wp), intent(in), contiguous :: v(:, :)
       real(wp), intent(inout) :: rows(:, :)
       logical, intent(in) :: is_built
-      integer :: h, j
+      integer :: k, n
 
-      ! While the preconditioner is built there are many columns, for which Z_n is formed once a
-      ! harmonic; in its application there is one vector, which the exact product serves.
-      call reserve(self, size(v, 2))
-      associate (b => self%vibration, fourier => self%vibration%problem%fourier)
-         do j = 1, size(v, 2)
-            call amplitudes_of(fourier%harmonic, fourier%column, b%active%n_active, v(:, j), &
-                               size(self%amplitudes, 1), self%amplitudes(:, :, j))
-         end do
-         if (takes_balance(self) .and. is_built) then
-            call b%problem%structure%multiply_active(b%structure_state, v, b%scratch%active_out)
-            call to_complex(fourier, size(b%scratch%active_out, 1), b%scratch%active_out, &
-                            b%scratch%complex_out)
-         end if
-         do h = 1, fourier%n_retained
-            if (takes_balance(self)) then
-               if (is_built) then
-                  self%balance(:, 1) = b%scratch%complex_out(:, h)
-               else
-                  call multiply_block(self, h, size(v, 2))
-               end if
-            end if
-            call subtract_harmonic(self, h, size(v, 2), self%amplitudes(:, h, :), rows)
-         end do
-      end associate
+      if (.not. is_built) call find_slopes(self)
+      k = self%n_linear_inner
+      n = self%n_linear_extra
+      call dgemm('T', 'N', n, size(v, 2), k, -1.0_wp, self%slopes, max(1, k), v, &
+                 max(1, size(v, 1)), 1.0_wp, rows, size(rows, 1))
    end subroutine subtract_rows
 
-   !> Room for the displacements of several vectors.
-   subroutine reserve(self, n)
-      class(wear_system), intent(inout) :: self
-      integer, intent(in) :: n
-      integer :: m
-
-      if (allocated(self%amplitudes)) then
-         if (size(self%amplitudes, 3) >= n) return
-         deallocate (self%amplitudes, self%balance)
-      end if
-      associate (problem => self%vibration%problem)
-         m = problem%structure%n_coordinates
-         allocate (self%amplitudes(m, problem%fourier%n_retained, n), source=zero)
-         allocate (self%balance(m, n), source=zero)
-      end associate
-   end subroutine reserve
-
-   !> balance = Z_n amplitudes of one harmonic, rows in use.
-   subroutine multiply_block(self, h, n)
-      class(wear_system), intent(inout) :: self
-      integer, intent(in) :: h, n
+   !> The rows g_q of the depths that stay, as vectors of the active coordinates: the gradient of
+   !> the sliding turned back into coordinates. A row of sliding reads
+   !> -scale sum_c g_c^T (k_c B_c d v - A_c v), the last term where the law takes the balance.
+   subroutine find_slopes(self)
+      type(wear_system), intent(inout) :: self
       complex(wp), allocatable :: stiffness(:, :)
+      integer :: h, j
 
-      associate (b => self%vibration, active => self%vibration%active)
-         allocate (stiffness(active%n_used, active%n_active))
-         call b%problem%structure%active_block(b%structure_state, h, stiffness)
-         call zgemm('N', 'N', active%n_used, n, active%n_active, one, stiffness, active%n_used, &
-                    self%amplitudes(1, h, 1), size(self%amplitudes, 1)*size(self%amplitudes, 2), &
-                    zero, self%balance, size(self%balance, 1))
+      call reserve_slopes(self)
+      self%built_for = self%wearing(:self%n_linear_extra)
+      self%built_cycles = self%cycles
+      associate (b => self%vibration, fourier => self%vibration%problem%fourier)
+         do j = 1, self%n_linear_extra
+            self%slopes(:, j) = 0.0_wp
+            call add_inputs(self, self%wearing(j), self%slopes(:, j))
+         end do
+         if (.not. takes_balance(self)) return
+         allocate (stiffness(b%active%n_used, b%active%n_active))
+         do h = 1, fourier%n_retained
+            call b%problem%structure%active_block(b%structure_state, h, stiffness)
+            do j = 1, self%n_linear_extra
+               call add_balance(self, h, self%wearing(j), b%active%n_active, stiffness, &
+                                self%slopes(:, j))
+            end do
+         end do
       end associate
-   end subroutine multiply_block
+   end subroutine find_slopes
 
-   !> rows = rows - C z for displacements z of one harmonic, active coordinates; where the pairs
-   !> take the balance, Z_n z is in `balance`.
-   subroutine subtract_harmonic(self, h, n_right, z, rows)
+   !> Their number changes with the states of the pairs.
+   subroutine reserve_slopes(self)
+      type(wear_system), intent(inout) :: self
+
+      if (allocated(self%slopes)) then
+         if (all(shape(self%slopes) == [self%n_linear_inner, self%n_linear_extra])) return
+         deallocate (self%slopes)
+      end if
+      allocate (self%slopes(self%n_linear_inner, self%n_linear_extra))
+   end subroutine reserve_slopes
+
+   !> From S to the residual of the condition of a pair.
+   pure real(wp) function slide_scale(self, pair)
       class(wear_system), intent(in) :: self
-      integer, intent(in) :: h, n_right
-      !> (n_coordinates, n_right)
-      complex(wp), intent(in) :: z(:, :)
-      real(wp), intent(inout) :: rows(:, :)
-      complex(wp) :: input(n_right), turn
-      integer :: c, i, j, k, n, nc, place, row
+      integer, intent(in) :: pair
+
+      slide_scale = self%weight(pair)*self%cycles*self%factor(pair)
+   end function slide_scale
+
+   !> slope = slope - scale sum_c k_c B_c^T d^T g_c of one pair.
+   subroutine add_inputs(self, pair, slope)
+      type(wear_system), intent(in) :: self
+      integer, intent(in) :: pair
+      real(wp), intent(inout) :: slope(:)
+      real(wp) :: turned(self%vibration%problem%fourier%n_coefficients)
+      complex(wp) :: turn
+      integer :: c, h, k, n, nc, row
 
       associate (b => self%vibration, problem => self%vibration%problem)
          nc = problem%fourier%n_coefficients
-         n = problem%fourier%harmonic(h)
          associate (p => problem%forces%entry(problem%forces%pairs)%law%prediction, &
-                    work => b%work(problem%forces%pairs))
-            do j = 1, self%n_linear_extra
-               i = self%wearing(j)
-               do c = 1, 3
-                  row = problem%joint%row(c, i)
-                  if (row == 0) cycle
-                  ! d/dtau is a factor i n of the complex coefficient.
+                    g => b%work(problem%forces%pairs)%slip_derivative(:, pair))
+            do c = 1, 3
+               row = problem%joint%row(c, pair)
+               if (row == 0) cycle
+               do h = 1, problem%fourier%n_retained
+                  n = problem%fourier%harmonic(h)
+                  k = problem%fourier%column(h)
+                  ! d/dtau is a factor i n of the complex coefficient. Of a factor in the inputs,
+                  ! the gradient uc + i us takes the same.
                   turn = one
                   if (p%order(c) > 0) turn = cmplx(0.0_wp, b%rate_unit(p)*n, wp)
-                  turn = turn*p%impedance_ratio(i, c, n, b%frequency())
-                  call problem%incidence%gather_harmonic(row, h, b%active%place, &
-                                                         b%active%n_active, &
-                                                         turn*p%stiffness(i, c), z, input)
-                  ! The prediction changes by eps E d z - Z_n z, the latter where the law takes the
-                  ! balance.
-                  place = b%active%place(problem%incidence%coordinate_of(row))
-                  if (p%takes_balance .and. place > 0) then
-                     input = input - self%balance(place, :n_right)
-                  end if
-                  k = (c - 1)*nc + problem%fourier%column(h)
-                  associate (g => work%slip_derivative(:, i), &
-                             scale => self%weight(i)*self%cycles*self%factor(i))
-                     ! C = -scale g^T d(prediction): to subtract C z is to add. Cosines are real
-                     ! parts, sines the negative imaginary ones.
-                     rows(j, :) = rows(j, :) + scale*g(k)*real(input, wp)
-                     if (n > 0) rows(j, :) = rows(j, :) - scale*g(k + 1)*aimag(input)
-                  end associate
+                  turn = turn*p%impedance_ratio(pair, c, n, b%frequency())
+                  turn = turn*gradient(g, (c - 1)*nc + k, n)
+                  turned(k) = real(turn, wp)
+                  if (n > 0) turned(k + 1) = aimag(turn)
                end do
+               call problem%incidence%scatter_row(row, b%active%place, b%active%n_active, &
+                                                  b%active%n_active, -slide_scale(self, pair)* &
+                                                  p%stiffness(pair, c), turned, slope)
             end do
          end associate
       end associate
-   end subroutine subtract_harmonic
+   end subroutine add_inputs
+
+   !> Cosine and sine entry of a gradient, as one complex number.
+   pure complex(wp) function gradient(g, k, n)
+      real(wp), intent(in) :: g(:)
+      integer, intent(in) :: k, n
+
+      gradient = cmplx(g(k), kind=wp)
+      if (n > 0) gradient = cmplx(g(k), g(k + 1), wp)
+   end function gradient
+
+   !> slope = slope + scale sum_c A_c^T g_c of one pair and harmonic.
+   subroutine add_balance(self, h, pair, na, stiffness, slope)
+      type(wear_system), intent(in) :: self
+      integer, intent(in) :: h, pair, na
+      !> Z_n of rows in use (n_used, n_active).
+      complex(wp), intent(in) :: stiffness(:, :)
+      !> (n_active, n_coefficients)
+      real(wp), intent(inout) :: slope(na, *)
+      complex(wp) :: factor
+      integer :: c, k, n, nc, place, row
+
+      associate (problem => self%vibration%problem)
+         nc = problem%fourier%n_coefficients
+         n = problem%fourier%harmonic(h)
+         k = problem%fourier%column(h)
+         associate (g => self%vibration%work(problem%forces%pairs)%slip_derivative(:, pair))
+            do c = 1, 3
+               row = problem%joint%row(c, pair)
+               if (row == 0) cycle
+               place = self%vibration%active%place(problem%incidence%coordinate_of(row))
+               if (place == 0) cycle
+               factor = slide_scale(self, pair)*gradient(g, (c - 1)*nc + k, n)
+               slope(:, k) = slope(:, k) + real(factor*stiffness(place, :na), wp)
+               if (n > 0) slope(:, k + 1) = slope(:, k + 1) + aimag(factor*stiffness(place, :na))
+            end do
+         end associate
+      end associate
+   end subroutine add_balance
+
+   !> Within a step the pairs that wear and the active coordinates are mostly the same ones; the
+   !> length of the step is the same in all its stages.
+   pure logical function preconditioner_fits(self)
+      class(wear_system), intent(in) :: self
+
+      preconditioner_fits = self%vibration%preconditioner_fits()
+      if (.not. preconditioner_fits .or. self%n_linear_extra == 0) return
+      preconditioner_fits = allocated(self%built_for)
+      if (.not. preconditioner_fits) return
+      preconditioner_fits = size(self%built_for) == self%n_linear_extra .and. &
+                            abs(self%built_cycles - self%cycles) <= 0.0_wp
+      if (.not. preconditioner_fits) return
+      associate (factors => self%vibration%preconditioner, active => self%vibration%active)
+         preconditioner_fits = all(self%built_for == self%wearing(:self%n_linear_extra)) .and. &
+                               factors%n == active%n_active .and. &
+                               all(factors%place(:active%n_active) > 0)
+      end associate
+   end function preconditioner_fits
 
 end module fw_wear_system
