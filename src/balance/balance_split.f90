@@ -1,6 +1,6 @@
 !> The preconditioner of a structure whose stiffness is that of rest and a low rank, or of rest
-!> alone: two matrices for all harmonics (fw_split_factors). With g_0 the mean derivative of the forces in harmonic 0
-!> and g_1 that of all others,
+!> alone: two matrices for all harmonics (fw_split_factors). With g_0 the mean derivative of the
+!> forces in harmonic 0 and g_1 that of all others,
 !>
 !>   P_j = (1 - g_j) K + g_j k d,   X = (1 - g_1) V.
 !>

@@ -23,8 +23,8 @@ module fw_formed_stiffness
       !> scratch.
       complex(wp), allocatable, private :: active(:)
       complex(wp), allocatable, private :: input(:, :), output(:, :)
-      !> Where neither mass nor damping acts Z_r is one real matrix in all harmonics, and one product
-      !> serves them. It, and its rows and columns in use.
+      !> Where neither mass nor damping acts Z_r is one real matrix in all harmonics, and one
+      !> product serves them. It, and its rows and columns in use.
       logical, private :: is_static = .false.
       real(wp), allocatable, private :: static(:, :), static_active(:)
    contains
