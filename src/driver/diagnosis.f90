@@ -7,11 +7,16 @@ module fw_diagnosis
    use fw_kinds, only: wp
    use fw_newton, only: solver_report
    use fw_solution, only: solution_method
+   use fw_text, only: to_text
    implicit none (type, external)
    private
 
    public :: explain_failure, finer, takes_scale
 
+   !> A relative residual that is a solution to every purpose: what ends there without converging
+   !> was asked for more than round-off leaves.
+   ! Round-off of the balance stays below 1e-13 where the load is not hidden by a resonance.
+   real(wp), parameter :: as_good_as_solved = 1.0e-10_wp
    !> Halvings of the interval in which the largest share of the load is looked for that converges.
    ! To 1.6 % of the load: the number is for a reader.
    integer, parameter :: n_halvings = 6
@@ -19,12 +24,12 @@ module fw_diagnosis
 contains
 
    !> Solve the static position, then for the largest share of the vibratory load that has a
-   !> periodic solution, at the frequency and depths of the system.
+   !> periodic solution, at the frequency and depths of the system; all within the time of a point.
    subroutine explain_failure(system, method, reason)
       type(balance_state), intent(inout), target :: system
       type(solution_method), intent(inout) :: method
       character(:), allocatable, intent(out) :: reason
-      real(wp) :: x(system%n)
+      real(wp) :: x(system%n), residual
       logical :: done
 
       if (method%unbounded) then
@@ -35,16 +40,22 @@ contains
       ! The guess for the position at rest is one without the vibratory load.
       call solve_share(system, method, 0.0_wp, x, done, only_set=.true.)
       call stuck_guess(system, x)
-      call solve_share(system, method, 0.0_wp, x, done)
-      if (done) then
-         call explain_vibration(system, method, x, reason)
-      else
-         reason = 'the joint cannot carry its static load: no position at rest was found; it '// &
-                  'needs more preload, friction or support, or a smaller static load'
-      end if
+      associate (options => method%newton%options)
+         if (associated(system%interrupt)) call system%interrupt%limit_point(options%max_seconds)
+         call solve_share(system, method, 0.0_wp, x, done, residual=residual)
+         if (.not. done .and. residual <= as_good_as_solved) then
+            call blame_tolerance(residual, options%tolerance, reason)
+         else if (done) then
+            call explain_vibration(system, method, x, reason)
+         else
+            reason = 'the joint cannot carry its static load: no position at rest was found; '// &
+                     'it needs more preload, friction or support, or a smaller static load'
+         end if
+      end associate
       ! The whole load again, for whoever goes on with the system.
       call solve_share(system, method, 1.0_wp, x, done, only_set=.true.)
       if (system%is_interrupted()) reason = 'why was not looked for to the end'
+      if (associated(system%interrupt)) call system%interrupt%limit_point(0.0_wp)
    end subroutine explain_failure
 
    !> The largest share of the vibratory load that has a solution, from the position at rest on.
@@ -55,11 +66,14 @@ contains
       real(wp), intent(inout), contiguous :: x(:)
       character(:), allocatable, intent(out) :: reason
       character(8) :: percent
-      real(wp) :: lower
+      real(wp) :: lower, residual
       logical :: done
 
-      call solve_share(system, method, 1.0_wp, x, done)
-      if (done) then
+      call solve_share(system, method, 1.0_wp, x, done, residual=residual)
+      if (.not. done .and. residual <= as_good_as_solved) then
+         call blame_tolerance(residual, method%newton%options%tolerance, reason)
+         return
+      else if (done) then
          reason = 'the vibration itself converges from its position at rest; try smaller '// &
                   'steps, or another solver%kind or scheme'
          return
@@ -85,6 +99,15 @@ contains
                   'response is small; an undamped resonance needs damping'
       end if
    end subroutine explain_vibration
+
+   !> Where everything converged but for the last digits.
+   subroutine blame_tolerance(residual, tolerance, reason)
+      real(wp), intent(in) :: residual, tolerance
+      character(:), allocatable, intent(out) :: reason
+
+      reason = 'the residual ends at '//to_text(residual)//', which is round-off, and '// &
+               'solver%tolerance = '//to_text(tolerance)//' asks for less; take 1e-10 or more'
+   end subroutine blame_tolerance
 
    !> Whether the case accepts a penalty_scale: its pairs have a rigid law.
    pure logical function takes_scale(system)
@@ -131,7 +154,7 @@ contains
    end subroutine find_largest_share
 
    !> Solve under a share of the vibratory load, from x, which stays where that fails.
-   subroutine solve_share(system, method, share, x, done, only_set)
+   subroutine solve_share(system, method, share, x, done, only_set, residual)
       type(balance_state), intent(inout), target :: system
       type(solution_method), intent(inout) :: method
       real(wp), intent(in) :: share
@@ -139,10 +162,13 @@ contains
       logical, intent(out) :: done
       !> Bring the system to the share and leave it there.
       logical, intent(in), optional :: only_set
+      !> Relative residual where it ended.
+      real(wp), intent(out), optional :: residual
       type(error_type), allocatable :: error
       type(solver_report) :: report
       real(wp) :: trial(size(x))
 
+      if (present(residual)) residual = huge(1.0_wp)
       system%load_share = share
       call system%set_frequency(system%frequency(), error)
       done = .not. allocated(error)
@@ -150,6 +176,7 @@ contains
       trial = x
       call method%solve(system, trial, report)
       done = report%converged
+      if (present(residual)) residual = report%residual
       if (done) x = trial
    end subroutine solve_share
 

@@ -36,6 +36,16 @@ def test_a_point_that_does_not_converge_was_served_by_none(fw_run) -> None:
     assert "none" in _served_by(fw_run.directory / "case.h5")
 
 
+def test_a_tolerance_below_round_off_is_blamed(fw_run) -> None:
+    """Not the joint, which has its solution to the last digits."""
+    done = fw_run("-o", "case.h5", "--set", "solver%tolerance=1e-30", "--set", "sweep%n_points=1",
+                  "--set", "solver%fallback=.false.", EXAMPLE / "frf.nml")
+    assert done.returncode == 4
+    assert "which is round-off, and solver%tolerance" in done.stderr
+    with h5py.File(fw_run.directory / "case.h5") as file:
+        assert (file["residual"][:] < 1e-12).all()
+
+
 def test_branches_say_so(fw_run) -> None:
     done = fw_run("-q", "-o", "case.h5", "--set", "sweep%continuation='arclength'", "case.nml")
     assert done.returncode == 0, done.stderr
