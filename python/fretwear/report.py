@@ -54,6 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", help="result file")
     parser.add_argument("-o", "--output", metavar="HTML",
                         help="page to write (default: RESULT.html in the current folder)")
+    parser.add_argument("--interactive", action="store_true",
+                        help="with pictures that answer: a click on the response shows the loops "
+                             "and the flanks of that point; 2 MB more (needs bokeh)")
     parser.add_argument("--linear", metavar="FILE",
                         help="result with every pair stuck, drawn dashed in the response")
     parser.add_argument("--observe", metavar="NAME",
@@ -64,12 +67,14 @@ def main(options: argparse.Namespace) -> int:
     """Run `fretwear report`."""
     result = Result(options.result)
     target = Path(options.output or f"{Path(result.name).stem}.html")
-    write_report(result, target, Choices(observe=options.observe, linear=options.linear))
+    write_report(result, target, Choices(observe=options.observe, linear=options.linear),
+                 interactive=options.interactive)
     print(target)
     return 0
 
 
-def write_report(result: Result, path: str | Path, choices: Choices | None = None) -> None:
+def write_report(result: Result, path: str | Path, choices: Choices | None = None, *,
+                 interactive: bool = False) -> None:
     """Write the page of a result.
 
     Parameters
@@ -80,16 +85,22 @@ def write_report(result: Result, path: str | Path, choices: Choices | None = Non
         HTML file.
     choices : Choices, optional
         What to draw of it.
+    interactive : bool
+        Whether the page begins with pictures that answer to clicks.
     """
     path = Path(path)
     if not path.absolute().parent.is_dir():
         raise OutputError(f"{path}: there is no folder {path.absolute().parent}")
-    path.write_text(render_report(result, choices or Choices()), encoding="utf-8")
+    page = render_report(result, choices or Choices(), interactive=interactive)
+    path.write_text(page, encoding="utf-8")
 
 
-def render_report(result: Result, choices: Choices) -> str:
+def render_report(result: Result, choices: Choices, *, interactive: bool = False) -> str:
     """The page as text: nothing in it refers to anything outside of it."""
-    sections = [("numbers", "Numbers", _numbers(result))]
+    head, sections = "", [("numbers", "Numbers", _numbers(result))]
+    if interactive:
+        head, pictures = _answering(result)
+        sections.insert(0, ("look", "Look around", pictures))
     for name in fitting(result):
         try:
             content = _image(KINDS[name].draw(result, choices), KINDS[name].title)
@@ -107,8 +118,20 @@ def render_report(result: Result, choices: Choices) -> str:
     title = escape(result.title or Path(result.name).name)
     return (f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
             '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-            f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
+            f"<title>{title}</title>\n<style>{_STYLE}</style>\n{head}\n</head>\n<body>\n"
             f"<h1>{title}</h1>\n{_status(result)}\n<nav>{links}</nav>\n{body}\n</body>\n</html>\n")
+
+
+def _answering(result: Result) -> tuple[str, str]:
+    """Pictures that answer to clicks."""
+    if not KINDS["response"].fits(result):
+        raise AbsentError(f"{result.name}: is no sweep: --interactive has nothing to click on")
+    try:
+        from .explore.standing import standing_page
+    except ImportError as error:
+        raise InputError(f"--interactive needs bokeh ({error}): pip install 'fretwear[explore]'"
+                         ) from None
+    return standing_page(result)
 
 
 def _status(result: Result) -> str:

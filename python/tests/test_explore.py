@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import json
-import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from browsing import headless_browser, wait_for
 
 import fretwear as fw
 from fretwear.errors import InputError
 from fretwear.explore.sliders import read_slider, settings_of, usual_sliders
 from fretwear.explore.solver import Answer, Solver
+
+__all__ = ["headless_browser"]  # a fixture
 
 RUBBING = """
 &case title = 'A mass that rubs' /
@@ -141,33 +143,6 @@ _WORDS = """return [...Bokeh.documents[0]._all_models.values()]
   .filter(m => m.type == "Div").map(m => m.text).join(" ")"""
 
 
-@pytest.fixture(name="browser")
-def headless_browser() -> Iterator[Any]:
-    """A Chromium without a window."""
-    webdriver = pytest.importorskip("selenium.webdriver")
-    pytest.importorskip("bokeh")
-    driver = shutil.which("chromedriver")
-    if driver is None:
-        pytest.skip("no Chromium with its driver (Debian: chromium-driver)")
-    options = webdriver.ChromeOptions()
-    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000"):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"performance": "ALL"})
-    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    browser.set_script_timeout(60)
-    yield browser
-    browser.quit()
-
-
-def _wait_for(browser: Any, script: str, met: Callable[[Any], bool]) -> Any:
-    for _ in range(300):
-        found = browser.execute_script(f"try {{ {script} }} catch (e) {{ return null }}")
-        if found is not None and met(found):
-            return found
-        time.sleep(0.1)
-    raise AssertionError(f"the page did not come to what was waited for; last: {found}")
-
-
 def test_page_in_a_browser(case: fw.Case, browser: Any) -> None:
     """Mouse and keys turn the sliders; the answer is that of a run; nothing leaves the machine."""
     from selenium.webdriver.common.action_chains import ActionChains
@@ -180,7 +155,7 @@ def test_page_in_a_browser(case: fw.Case, browser: Any) -> None:
     thread.start()
     try:
         browser.get(f"http://127.0.0.1:{server.port}/")
-        _wait_for(browser, _WORDS, lambda words: "highest" in words)
+        wait_for(browser, _WORDS, lambda words: "highest" in words)
         sliders = browser.execute_script(_SLIDERS)
         load, friction = (next(s for s in sliders if s[1].startswith(word))
                           for word in ("factor", "friction"))
@@ -189,14 +164,14 @@ def test_page_in_a_browser(case: fw.Case, browser: Any) -> None:
         assert handle.get_attribute("role") == "slider"
         ActionChains(browser).drag_and_drop_by_offset(handle, 40, 0).perform()
         browser.execute_script(_HANDLE, friction[0]).send_keys(Keys.ARROW_LEFT)
-        changed = _wait_for(browser, _SLIDERS, lambda now: all(
+        changed = wait_for(browser, _SLIDERS, lambda now: all(
             new[2] != old[2] for new, old in zip(now, sliders) if old in (load, friction)))
         values = {title: value for _, title, value in changed}
         expected = fw.run(case.replace(
             load={"harmonic_scale": round(values[load[1]], 6)},
             contact={"mu": round(values[friction[1]], 6)}), in_memory=True)
         _, height = expected.maximum()
-        _wait_for(browser, _WORDS, lambda words: f"highest {height:.4g} " in words)
+        wait_for(browser, _WORDS, lambda words: f"highest {height:.4g} " in words)
         for width in (360, 800, 1600):
             browser.set_window_size(width, 900)
             wide = browser.execute_script("return document.documentElement.scrollWidth")

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import base64
+import json
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+from browsing import headless_browser, wait_for
+from rubbing import RUBBING
 
+import fretwear as fw
 from fretwear.cli import main
 from fretwear.plot import KINDS, Choices, fitting
 from fretwear.report import render_report, write_report
 from fretwear.result import Result
+
+__all__ = ["headless_browser"]  # a fixture
 
 _VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -156,3 +163,54 @@ def test_command_line(coarse: Result, tmp_path: Path, monkeypatch: pytest.Monkey
     assert Path("coarse.html").read_text().startswith("<!DOCTYPE html>")
     assert main(["report", str(coarse.path), "-o", "none/a.html"]) == 5
     assert "there is no folder" in capsys.readouterr().err
+
+
+#: Where the response stands on the screen at a frequency.
+_PLACE = """const p = [...Bokeh.documents[0]._all_models.values()].find(
+  m => m.type == "Figure" && m.title.text.startsWith("response"))
+const v = Bokeh.index.find_one_by_id(p.id), r = v.canvas_view.el.getBoundingClientRect()
+return [r.left + v.frame.x_scale.compute(arguments[0]), r.top + v.frame.bbox.vcenter]"""
+#: Point of the slider, data of the first loop, share of the first cell, all texts.
+_SHOWN = """const all = [...Bokeh.documents[0]._all_models.values()]
+const loop = all.find(m => m.type == "Figure" && m.title.text.startsWith("pairs"))
+const map = all.find(m => m.type == "Figure" && m.title.text.includes("share"))
+const data = f => f.renderers[0].data_source.data
+return [all.find(m => m.type == "Slider").value, Array.from(data(loop).y),
+        Array.from(data(map).share), loop.title.text,
+        all.filter(m => m.type == "Div").map(m => m.text).join(" ")]"""
+
+
+def test_an_interactive_page_answers_without_a_server(tmp_path: Path, browser: Any) -> None:
+    """A click shows the loops and the shares of that point; keys move it; nothing is asked for."""
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    result = fw.frf(RUBBING, 0.6, 1.6, 11, contact={"law": "penalty"}, output={"histories": True})
+    write_report(result, tmp_path / "page.html", interactive=True)
+    browser.get((tmp_path / "page.html").as_uri())
+    first = wait_for(browser, _SHOWN, lambda found: found[0] == result.peak() + 1)
+    browser.execute_script("window.scrollTo(0, 0)")
+    x, y = browser.execute_script(_PLACE, float(result.frequency[7]))
+    ActionChains(browser).move_by_offset(round(x), round(y)).click().perform()
+    found = wait_for(browser, _SHOWN, lambda now: now[0] == 8 and now[1] != first[1])
+    cycle = result.cycle(7)
+    c = int(np.argmax(np.ptp(cycle.displacement[:, 0], axis=0)))
+    drawn = np.linspace(0, len(cycle.force) - 1, 129).round().astype(int)
+    ratio = np.array(found[1]) / cycle.force[drawn, 0, c]
+    assert ratio == pytest.approx(np.full(129, 10.0 ** round(np.log10(ratio[0]))), rel=1e-5)
+    assert found[2] == pytest.approx(result.fraction[7, :, 1].tolist(), abs=1e-6)
+    assert f"at {result.frequency[7]:.6g} Hz" in found[3] and f"{result.amplitude[7, 0]:.5g}" in (
+        found[4])
+    handle = browser.execute_script("""return Bokeh.index.find_one_by_id([...Bokeh.documents[0]
+      ._all_models.values()].find(m => m.type == "Slider").id).shadow_el
+      .querySelector(".noUi-handle")""")
+    handle.send_keys(Keys.ARROW_LEFT)
+    wait_for(browser, _SHOWN, lambda now: now[0] == 7)
+    asked = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    addresses = {one["params"]["request"]["url"] for one in asked
+                 if one["method"] == "Network.requestWillBeSent"}
+    assert all(address.startswith(("file:", "data:")) for address in addresses), addresses
+    for width in (360, 800, 1600):
+        browser.set_window_size(width, 900)
+        assert browser.execute_script("return document.documentElement.scrollWidth <= "
+                                      "window.innerWidth")

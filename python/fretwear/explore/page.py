@@ -10,28 +10,31 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.events import Tap
 from bokeh.layouts import column, row
-from bokeh.models import ColumnDataSource, CustomJS, HoverTool, LinearColorMapper
-from bokeh.models.annotations import ColorBar, Title
+from bokeh.models import ColumnDataSource, CustomJS
+from bokeh.models.annotations import Title
 from bokeh.models.widgets import Button, Div, Select
 from bokeh.models.widgets import Slider as Handle
-from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from ..case import Case
-from ..errors import AbsentError, InputError
-from ..plot.flanks import find_flanks
-from ..plot.style import CURVE, PALETTE, label, scale, units_of
+from ..errors import AbsentError
+from ..plot.style import label, scale, units_of
 from ..result import STATES, Result
+from .figures import (
+    LOOPS,
+    WRAPPED,
+    choices,
+    loop_figure,
+    map_figure,
+    places_of_pairs,
+    response_figure,
+)
 from .sliders import Slider, settings_of
 from .solver import Answer, Solver
 
 __all__ = ["Page"]
 
 _WIDTH = 300
-#: Pairs whose loops are drawn: those that dissipate most.
-_LOOPS = 3
-_GREY = "#9aa5b1"
-_WRAPPED = {"flex-wrap": "wrap"}
 #: What a screen reader reads; Bokeh gives its handles a role and a value, but no name.
 _NAME_THEM = """
 for (const [id, name] of Object.entries(names)) {
@@ -70,13 +73,13 @@ class Page:
         self._first = ColumnDataSource({"x": [], "y": []})
         self._missing = ColumnDataSource({"x": [], "y": []})
         self._chosen = ColumnDataSource({"x": [], "y": []})
-        self._loops = [ColumnDataSource({"x": [], "y": []}) for _ in range(_LOOPS)]
+        self._loops = [ColumnDataSource({"x": [], "y": []}) for _ in range(LOOPS)]
         self._cells = ColumnDataSource({"x": [], "y": [], "w": [], "h": [], "share": [],
                                         "name": []})
         self._handles = [self._handle(slider) for slider in self._sliders]
         self._observed = Select(title="observed", options=[], width=_WIDTH, visible=False)
         self._state = Select(title="map shows the share of the period in", value="slip",
-                             options=_choices(STATES), width=_WIDTH)
+                             options=choices(STATES), width=_WIDTH)
         self._words = Div(width=_WIDTH)
         self._loop_title = Title(text="loops of the pairs that dissipate most")
         self._map_title = Title(text="flanks")
@@ -95,37 +98,10 @@ class Page:
         return handle
 
     def _build(self, title: str) -> None:
-        tools = "pan,wheel_zoom,box_zoom,reset,save"
-        self._response = figure(height=330, sizing_mode="stretch_width", tools=tools,
-                                title="response (click a point for its loops)",
-                                x_axis_label="frequency [Hz]", y_axis_label="amplitude")
-        self._response.line("x", "y", source=self._first, color=_GREY, line_dash="dashed",
-                            legend_label="as the case has it")
-        now = self._response.line("x", "y", source=self._curve, color=CURVE, line_width=2,
-                                  legend_label="now")
-        self._response.scatter("x", "y", source=self._missing, marker="x", size=8,
-                               color="#c0392b")
-        self._response.scatter("x", "y", source=self._chosen, size=9, color=PALETTE[1])
-        self._response.add_tools(HoverTool(renderers=[now], tooltips=[("frequency", "@x{0.0000}"),
-                                                                      ("amplitude", "@y")]))
-        # Above the curves, where it covers none of them on a narrow screen.
-        legend = self._response.legend[0]
-        legend.orientation, legend.click_policy = "horizontal", "hide"
-        legend.border_line_color = None
-        self._response.add_layout(legend, "above")
+        self._response = response_figure(self._curve, self._missing, self._chosen, self._first)
         self._response.on_event(Tap, self._tapped)
-        self._loop = figure(height=280, sizing_mode="stretch_width", min_width=300, tools=tools,
-                            title=self._loop_title)
-        for source, colour in zip(self._loops, PALETTE):
-            self._loop.line("x", "y", source=source, color=colour, line_width=2)
-        colours = LinearColorMapper(palette="Viridis256", low=0.0, high=1.0)
-        self._map = figure(height=280, sizing_mode="stretch_width", min_width=300,
-                           tools=tools + ",hover", title=self._map_title,
-                           tooltips=[("pair", "@name"), ("share", "@share{0.00}")])
-        self._map.rect("x", "y", width="w", height="h", source=self._cells, line_color="white",
-                       fill_color={"field": "share", "transform": colours})
-        self._map.add_layout(ColorBar(color_mapper=colours, width=10), "right")
-        self._map.axis.visible, self._map.grid.visible = False, False
+        self._loop = loop_figure(self._loops, self._loop_title)
+        self._map = map_figure(self._cells, self._map_title)
         self._observed.on_change("value", lambda _name, _old, _new: self._draw())
         self._state.on_change("value", lambda _name, _old, _new: self._draw_map())
         back = Button(label="back to the case", width=_WIDTH)
@@ -135,10 +111,10 @@ class Page:
         side = column(*self._handles, self._observed, self._state, back, self._words,
                       width=_WIDTH + 20)
         # Side by side where there is room, one below the other on a telephone.
-        contact = row(self._loop, self._map, sizing_mode="stretch_width", styles=_WRAPPED)
+        contact = row(self._loop, self._map, sizing_mode="stretch_width", styles=WRAPPED)
         pictures = column(self._response, contact, sizing_mode="stretch_width",
                           styles={"flex": "1 1 320px"})
-        body = row(side, pictures, sizing_mode="stretch_width", styles=_WRAPPED)
+        body = row(side, pictures, sizing_mode="stretch_width", styles=WRAPPED)
         self._document.add_root(column(heading, body, sizing_mode="stretch_width"))
         self._document.title = title
         names = {handle.id: slider.title for handle, slider in zip(self._handles, self._sliders)}
@@ -167,7 +143,7 @@ class Page:
             return
         self._result = answer.result
         if not self._observed.options:
-            self._observed.options = _choices(answer.result.observed)
+            self._observed.options = choices(answer.result.observed)
             self._observed.value = answer.result.observed[0]
             self._observed.visible = len(answer.result.observed) > 1
         self._draw()
@@ -243,7 +219,7 @@ class Page:
         moved, length = scale(float(np.abs(cycle.displacement).max()),
                               units_of(result, "amplitude"))
         pressed, force = scale(float(np.abs(cycle.force).max()), units_of(result, "contact/force"))
-        pairs = np.argsort(-result.dissipation[point], kind="stable")[:_LOOPS]
+        pairs = np.argsort(-result.dissipation[point], kind="stable")[:LOOPS]
         for source, pair in zip(self._loops, pairs):
             c = int(np.argmax(np.ptp(cycle.displacement[:, pair], axis=0)))
             source.data = {"x": (moved * cycle.displacement[:, pair, c]).tolist(),
@@ -258,36 +234,9 @@ class Page:
         if result is None or point is None or "contact/fraction" not in result:
             return
         share = result.fraction[point, :, STATES.index(self._state.value)]
-        x, y, width, height = _places(result)
+        x, y, width, height = places_of_pairs(result)
         self._cells.data = {"x": x.tolist(), "y": y.tolist(), "w": width.tolist(),
                             "h": height.tolist(), "share": share.tolist(),
                             "name": [str(pair + 1) for pair in range(result.n_pairs)]}
         self._map_title.text = (f"{self._state.value}, share of the period at "
                                 f"{result.frequency[point]:.5g} Hz")
-
-
-def _choices(names: Sequence[str]) -> list[str | tuple[Any, str]]:
-    """Names as a Select takes them."""
-    return [*names]
-
-
-def _places(result: Result) -> tuple[NDArray[np.float64], ...]:
-    """Centre and size of the cell of every pair: flanks side by side, or all pairs in a row."""
-    n = result.n_pairs
-    x, y = np.arange(1.0, n + 1.0), np.zeros(n)
-    width, height = np.full(n, 0.9), np.ones(n)
-    try:
-        flanks = find_flanks(result)
-    except InputError:
-        return x, y, width, height
-    left = 0.0
-    for flank in flanks:
-        size = np.where(np.isnan(flank.size), np.nanmax(np.append(flank.size, 0.0)) or 1.0,
-                        flank.size)
-        low = (flank.place - 0.5 * size).min(axis=0)
-        right = (flank.place + 0.5 * size).max(axis=0)[0]
-        x[flank.pairs] = left + flank.place[:, 0] - low[0]
-        y[flank.pairs] = flank.place[:, 1] - low[1]
-        width[flank.pairs], height[flank.pairs] = size.T
-        left += 1.15 * (right - low[0])
-    return x, y, width, height
