@@ -17,9 +17,11 @@ from ._native import namelist_values
 from .errors import AbsentError, InputError, OutputError
 from .plot import KINDS, Choices, fitting
 from .plot.style import label, units_of
+from .plot.table import plot_table
 from .result import Result
+from .study.table import is_table, read_table
 
-__all__ = ["add_arguments", "main", "render_report", "write_report"]
+__all__ = ["add_arguments", "main", "render_report", "render_study", "write_report"]
 
 #: Rows of the table of points; of a longer result every k-th, the peak and failures are shown.
 _MOST_ROWS = 500
@@ -51,7 +53,7 @@ pre { overflow-x: auto; background: #f4f6f8; padding: .8rem; font-size: .85rem; 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `fretwear report`."""
-    parser.add_argument("result", help="result file")
+    parser.add_argument("result", help="result file, or the table of a study")
     parser.add_argument("-o", "--output", metavar="HTML",
                         help="page to write (default: RESULT.html in the current folder)")
     parser.add_argument("--interactive", action="store_true",
@@ -65,6 +67,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Run `fretwear report`."""
+    if is_table(options.result):
+        if options.interactive or options.linear or options.observe:
+            raise InputError("the report of a study takes no --interactive, --linear, --observe")
+        target = Path(options.output or f"{Path(options.result).stem}.html")
+        _write(target, render_study(options.result))
+        print(target)
+        return 0
     result = Result(options.result)
     target = Path(options.output or f"{Path(result.name).stem}.html")
     write_report(result, target, Choices(observe=options.observe, linear=options.linear),
@@ -88,11 +97,34 @@ def write_report(result: Result, path: str | Path, choices: Choices | None = Non
     interactive : bool
         Whether the page begins with pictures that answer to clicks.
     """
-    path = Path(path)
+    _write(Path(path), render_report(result, choices or Choices(), interactive=interactive))
+
+
+def _write(path: Path, page: str) -> None:
     if not path.absolute().parent.is_dir():
         raise OutputError(f"{path}: there is no folder {path.absolute().parent}")
-    page = render_report(result, choices or Choices(), interactive=interactive)
     path.write_text(page, encoding="utf-8")
+
+
+def render_study(path: str | Path) -> str:
+    """The page of a study: its quantities over what varies, and its table."""
+    table = read_table(path)
+    n, good = len(table["run"]), int((table["status"] == "ok").sum())
+    status = (f'<p class="status">{escape(Path(path).name)}: {n} runs, {good} without a '
+              "complaint</p>")
+    if good < n:
+        status += (f'\n<p class="warning">{n - good} of {n} runs did not end well: see the column '
+                   "status.</p>")
+    sections = []
+    try:
+        sections.append(("curves", "Quantities", _image(plot_table(path), "quantities of a study")))
+    except AbsentError as error:
+        sections.append(("curves", "Quantities", f'<p class="warning">{escape(str(error))}</p>'))
+    names = [name for name in table if name not in ("run", "exit_status", "result")
+             and not (name == "message" and good == n)]
+    rows = zip(*(table[name].tolist() for name in names))
+    sections.append(("runs", "Runs", _table(names, rows, (table["status"] != "ok").tolist())))
+    return _page(Path(path).stem, status, sections)
 
 
 def render_report(result: Result, choices: Choices, *, interactive: bool = False) -> str:
@@ -112,14 +144,18 @@ def render_report(result: Result, choices: Choices, *, interactive: bool = False
     if "wear/depth" in result:
         sections.append(("steps", "Wear steps", _steps(result)))
     sections.append(("input", "Input", f"<pre>{escape(result.namelist)}</pre>"))
-    links = "".join(f'<a href="#{key}">{escape(title)}</a> ' for key, title, _ in sections)
-    body = "\n".join(f'<section id="{key}"><h2>{escape(title)}</h2>\n{content}</section>'
-                     for key, title, content in sections)
-    title = escape(result.title or Path(result.name).name)
+    title = result.title or Path(result.name).name
+    return _page(title, _status(result), sections, head)
+
+
+def _page(title: str, status: str, sections: Sequence[tuple[str, str, str]], head: str = "") -> str:
+    links = "".join(f'<a href="#{key}">{escape(name)}</a> ' for key, name, _ in sections)
+    body = "\n".join(f'<section id="{key}"><h2>{escape(name)}</h2>\n{content}</section>'
+                     for key, name, content in sections)
     return (f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
             '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-            f"<title>{title}</title>\n<style>{_STYLE}</style>\n{head}\n</head>\n<body>\n"
-            f"<h1>{title}</h1>\n{_status(result)}\n<nav>{links}</nav>\n{body}\n</body>\n</html>\n")
+            f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n{head}\n</head>\n<body>\n"
+            f"<h1>{escape(title)}</h1>\n{status}\n<nav>{links}</nav>\n{body}\n</body>\n</html>\n")
 
 
 def _answering(result: Result) -> tuple[str, str]:

@@ -16,6 +16,8 @@ from fretwear.plot import (
     fitting,
     plot_campbell,
     plot_damping,
+    plot_envelope,
+    plot_force,
     plot_nodal_diameters,
     plot_safe,
     plot_wave,
@@ -118,6 +120,23 @@ def test_damping_curve(wave: Result, folder: Path) -> None:
     assert found[0, 2] == pytest.approx(largest / load)
     upper, _ = plot_damping([double, wave], "u6").axes
     assert upper.lines[0].get_xdata() == pytest.approx(found[:, 0] / 0.08)
+    in_proportion, peaks = plot_force([double, wave], "u6").axes[0].lines
+    assert peaks.get_xdata() == pytest.approx([1.0, 2.0])     # two dofs: by the factor
+    assert peaks.get_ydata() == pytest.approx(found[:, 2] * found[:, 0])
+    assert in_proportion.get_ydata()[1] == pytest.approx(2.0 * load * found[0, 2])
+
+
+def test_envelope_of_sweeps(wave: Result, folder: Path) -> None:
+    """Between the points of one sweep the other one has some; outside of both is nothing."""
+    finer = run(DISK, folder / "finer.h5", "sweep%n_points=5", "load%harmonic_scale=2")
+    axes = plot_envelope([wave, finer], "u6").axes[0]
+    largest = axes.lines[-1]
+    frequency = np.unique(np.concatenate([wave.frequency, finer.frequency]))
+    assert largest.get_xdata() == pytest.approx(frequency)
+    order = [np.argsort(result.frequency) for result in (wave, finer)]
+    both = [np.interp(frequency, r.frequency[k], r.amplitude_of("u6")[k])
+            for r, k in zip((wave, finer), order)]
+    assert largest.get_ydata() == pytest.approx(np.max(both, axis=0))
 
 
 def test_what_cannot_be_drawn(modes: Result, wave: Result, folder: Path) -> None:

@@ -18,6 +18,7 @@ from project import PROGRAM, ROOT
 
 from fretwear.cli import main
 from fretwear.errors import FretwearError, InputError
+from fretwear.report import render_study
 from fretwear.study import read_dataset, read_plan, read_table, run_study
 from fretwear.study.execution import run_job
 from fretwear.study.plan import override
@@ -469,6 +470,8 @@ def test_committed_example(tmp_path: Path) -> None:
     found = read_table(tmp_path / "study.h5")
     peak = (found["max_amplitude"] / found["load%cosine"]).reshape(6, 3)
     assert (found["status"] == "ok").all()
+    page = render_study(tmp_path / "study.h5")
+    assert "18 runs, 18 without a complaint" in page and page.count("<tr>") == 19
     data = read_dataset(tmp_path / "study.h5")
     assert dict(data.sizes) == {"contact%normal_load": 6, "load%cosine": 3}
     assert data["max_amplitude"].sel({"contact%normal_load": 2.0, "load%cosine": 1.0}) == (

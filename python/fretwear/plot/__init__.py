@@ -7,7 +7,7 @@
 """
 
 from .backbone import plot_backbone
-from .campaigns import plot_campbell, plot_damping, read_damping
+from .campaigns import plot_campbell, plot_damping, plot_force, read_damping
 from .command import add_arguments, main
 from .convergence import plot_convergence
 from .cycle import plot_cycle, plot_harmonics, plot_hysteresis
@@ -26,12 +26,13 @@ from .response import (
 )
 from .sensitivity import plot_sensitivity
 from .table import plot_table
-from .together import plot_responses
+from .together import plot_envelope, plot_responses
 from .wear import plot_wear_bars, plot_wear_evolution, plot_wear_maps
 
 __all__ = ["KINDS", "Choices", "Kind", "Response", "add_arguments", "fitting", "friction_damping",
            "half_power_damping", "main", "plot_backbone", "plot_calibration", "plot_campbell",
-           "plot_convergence", "plot_cycle", "plot_damping", "plot_flanks", "plot_harmonics",
+           "plot_convergence", "plot_cycle", "plot_damping", "plot_envelope",
+           "plot_flanks", "plot_force", "plot_harmonics",
            "plot_hysteresis", "plot_mode", "plot_nodal_diameters", "plot_optimum",
            "plot_resonance", "plot_response", "plot_responses", "plot_safe", "plot_sensitivity",
            "plot_table", "plot_wave", "plot_wear_bars", "plot_wear_evolution", "plot_wear_maps",

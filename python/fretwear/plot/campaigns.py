@@ -9,12 +9,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from .._native import namelist_values
 from ..errors import AbsentError, InputError
 from ..result import Result
 from .disks import rotation_speed
-from .style import CURVE, PALETTE, Floats, Source, as_result, label, new_figure, tidy, units_of
+from .style import (
+    CURVE,
+    PALETTE,
+    Floats,
+    Source,
+    as_result,
+    label,
+    new_figure,
+    scale_axis,
+    tidy,
+    units_of,
+)
 
-__all__ = ["plot_campbell", "plot_damping", "read_damping"]
+__all__ = ["plot_campbell", "plot_damping", "plot_force", "read_damping"]
 
 #: Lines of engine orders in a Campbell diagram without an order of the case.
 _ORDERS = (1, 2, 3, 4, 5, 6)
@@ -151,6 +163,59 @@ def plot_damping(sources: Sequence[Source], observe: str | None = None) -> Figur
         tidy(axes)
     figure.suptitle("Damping curve", fontsize=11)
     return figure
+
+
+def plot_force(sources: Sequence[Source], observe: str | None = None) -> Figure:
+    """Peak amplitude over the load, beside what a linear structure would do from the smallest load.
+
+    Parameters
+    ----------
+    sources, observe
+        See `plot_damping`.
+    """
+    results: list[Result] = [as_result(source) for source in sources]
+    load, _, compliance, frequency = read_damping(results, observe).T
+    length, force = units_of(results[0], "amplitude"), units_of(results[0], "contact/force")
+    height = compliance * load
+    by_factor = _unit_load(results)
+    if by_factor is not None:
+        # Loads of a reduced model have no size of their own.
+        load, compliance = load / by_factor, compliance * by_factor
+    figure = new_figure(7.6, 5.2)
+    axes = figure.subplots()
+    axes.plot([0.0, load[-1]], [0.0, compliance[0] * load[-1]], "--", color="0.6", linewidth=1.2,
+              label="in proportion to the smallest load")
+    axes.plot(load, height, "o-", color=CURVE, markersize=4.0, label="peak")
+    for k in (0, len(load) - 1):
+        axes.annotate(f"{frequency[k]:.5g} Hz", (load[k], height[k]), xytext=(4, -12),
+                      textcoords="offset points", fontsize=8, annotation_clip=False)
+    top = max(float(height.max()), compliance[0] * load[-1])
+    axes.set_xlim(0.0, 1.08 * load[-1])
+    axes.set_ylim(0.0, 1.08 * top)
+    name = results[0].observed[results[0].index(observe)]
+    axes.set_ylabel(label(f"peak of {name}, harmonic 1", scale_axis(axes.yaxis, top, length)))
+    axes.set_xlabel("factor of the load, load%harmonic_scale" if by_factor is not None
+                    else label("load", scale_axis(axes.xaxis, float(load[-1]), force)))
+    tidy(axes)
+    axes.legend(frameon=False)
+    figure.suptitle("Amplitude over force", fontsize=11)
+    return figure
+
+
+def _unit_load(results: Sequence[Result]) -> float | None:
+    """The largest entry of the load at `load%harmonic_scale` = 1, where several dofs are loaded;
+    None for one dof, whose load is a force, or where it is not the same in all results."""
+    found = []
+    for result in results:
+        with result.case.open() as session:
+            size = np.hypot(session.part("load/cosine"), session.part("load/sine"))
+        if np.count_nonzero(size) < 2:
+            return None
+        values = namelist_values(result.namelist)
+        factor = float(values.get("load%harmonic_scale", ["1"])[0])
+        found.append(float(size.max()) / factor if factor != 0.0 else 0.0)
+    alike = min(found) > 0.0 and max(found) - min(found) <= 1e-9 * max(found)
+    return found[0] if alike else None
 
 
 def _ratio(over: str, under: str) -> str:

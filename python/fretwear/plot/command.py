@@ -13,10 +13,10 @@ from ..result import Result
 from ..rows import choose_point
 from ..study.table import is_table
 from .backbone import plot_backbone
-from .campaigns import plot_campbell, plot_damping
+from .campaigns import plot_campbell, plot_damping, plot_force
 from .kinds import KINDS, Choices, fitting
 from .table import plot_table
-from .together import plot_responses
+from .together import plot_envelope, plot_responses
 
 __all__ = ["add_arguments", "main"]
 
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 #: What is drawn of several results.
-TOGETHER = ("response", "backbone", "campbell", "damping")
+TOGETHER = ("response", "backbone", "campbell", "damping", "force", "envelope")
 
 
 def main(options: argparse.Namespace) -> int:
@@ -76,7 +76,8 @@ def _draw_together(options: argparse.Namespace) -> int:
     if kind == "campbell":
         figure = plot_campbell(options.result, options.nodal_diameter)
     else:
-        draw = {"response": plot_responses, "backbone": plot_backbone, "damping": plot_damping}
+        draw = {"response": plot_responses, "backbone": plot_backbone, "damping": plot_damping,
+                "force": plot_force, "envelope": plot_envelope}
         figure = draw[kind](options.result, options.observe)
     return _save(figure, options.output, stem)
 

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
+from ..result import Result
 from .response import Response, read_response
 from .style import PALETTE, Source, as_result, label, new_figure, scale_axis, tidy
 
-__all__ = ["plot_responses"]
+__all__ = ["plot_envelope", "plot_responses"]
 
 
 def plot_responses(sources: Sequence[Source], observe: str | None = None) -> Figure:
@@ -33,15 +34,7 @@ def plot_responses(sources: Sequence[Source], observe: str | None = None) -> Fig
     InputError
         There are none, one has no response, or their amplitudes have different units.
     """
-    if not sources:
-        raise InputError("sources: names no result")
-    results = [as_result(source) for source in sources]
-    curves = [read_response(results[0], observe)]
-    curves += [read_response(result, curves[0].name) for result in results[1:]]
-    units = sorted({curve.units for curve in curves})
-    if len(units) > 1:
-        raise InputError("the results have different units: "
-                         + ", ".join(one or "not known" for one in units))
+    results, curves = _read(sources, observe)
     figure = new_figure(8.0, 4.8)
     axes = figure.subplots()
     for k, (name, curve) in enumerate(zip(_names([result.name for result in results]), curves)):
@@ -51,12 +44,72 @@ def plot_responses(sources: Sequence[Source], observe: str | None = None) -> Fig
                   color=PALETTE[k % len(PALETTE)], label=name)
     largest = max(_largest(curve) for curve in curves)
     axes.set_ylabel(label(f"amplitude of {curves[0].name}",
-                          scale_axis(axes.yaxis, largest, units[0])))
+                          scale_axis(axes.yaxis, largest, curves[0].units)))
     axes.set_ylim(0.0, 1.08 * largest or None)
     axes.set_xlabel("frequency [Hz]")
     tidy(axes)
     axes.legend(frameon=False)
     return figure
+
+
+def plot_envelope(sources: Sequence[Source], observe: str | None = None) -> Figure:
+    """Largest and smallest amplitude of several sweeps at every frequency that all of them cover.
+
+    Parameters
+    ----------
+    sources, observe
+        See `plot_responses`; natural sweeps, whose frequency goes one way.
+
+    Raises
+    ------
+    InputError
+        As there; or a curve folds back, or the sweeps have no frequency in common.
+    """
+    results, curves = _read(sources, observe)
+    grids = []
+    for result, curve in zip(results, curves):
+        order = np.argsort(curve.frequency)
+        if not (np.diff(curve.frequency[order]) > 0.0).all() or not (
+                (np.diff(order) == 1).all() or (np.diff(order) == -1).all()):
+            raise InputError(f"{result.name}: its curve folds back: an envelope is drawn of "
+                             "natural sweeps")
+        grids.append((curve.frequency[order],
+                      np.where(curve.converged, curve.amplitude, np.nan)[order]))
+    low, high = max(x[0] for x, _ in grids), min(x[-1] for x, _ in grids)
+    frequency = np.unique(np.concatenate([x for x, _ in grids]))
+    frequency = frequency[(frequency >= low) & (frequency <= high)]
+    if not len(frequency):
+        raise InputError("the sweeps have no frequency in common")
+    values = np.array([np.interp(frequency, x, y) for x, y in grids])
+    figure = new_figure(8.0, 4.8)
+    axes = figure.subplots()
+    top, bottom = values.max(axis=0), values.min(axis=0)
+    axes.fill_between(frequency, bottom, top, color=PALETTE[5], alpha=0.35, linewidth=0.0,
+                      label=f"range of {len(values)} results")
+    axes.plot(frequency, values.T, color="0.55", linewidth=0.7)
+    axes.plot(frequency, top, color=PALETTE[0], linewidth=2.0, label="largest")
+    largest = float(np.nanmax(top, initial=0.0))
+    axes.set_ylabel(label(f"amplitude of {curves[0].name}",
+                          scale_axis(axes.yaxis, largest, curves[0].units)))
+    axes.set_ylim(0.0, 1.08 * largest or None)
+    axes.set_xlabel("frequency [Hz]")
+    tidy(axes)
+    axes.legend(frameon=False)
+    return figure
+
+
+def _read(sources: Sequence[Source], observe: str | None) -> tuple[list[Result], list[Response]]:
+    """Results and their responses, of one quantity in one unit."""
+    if not sources:
+        raise InputError("sources: names no result")
+    results = [as_result(source) for source in sources]
+    curves = [read_response(results[0], observe)]
+    curves += [read_response(result, curves[0].name) for result in results[1:]]
+    units = sorted({curve.units for curve in curves})
+    if len(units) > 1:
+        raise InputError("the results have different units: "
+                         + ", ".join(one or "not known" for one in units))
+    return results, curves
 
 
 def _largest(curve: Response) -> float:
