@@ -9,9 +9,6 @@ submodule(fw_balance_state) fw_balance_preconditioner
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
    !> Share of the active coordinates that may have joined or left since a preconditioner was built.
    real(wp), parameter :: most_changed = 0.05_wp
-   !> Coordinates of all sectors up to which their matrices are factored where waves do not serve:
-   !> each takes a second or so.
-   integer, parameter :: most_whole = 1500
    !> Active coordinates from which one matrix for all harmonics is faster than one for each.
    integer, parameter :: alike_from = 16
 
@@ -75,7 +72,7 @@ contains
 
    module procedure take_whole
 
-      is_stronger = by_waves(self) .and. self%problem%structure%n_coordinates <= most_whole
+      is_stronger = by_waves(self) .and. self%problem%fits_whole()
       if (.not. is_stronger) return
       self%preconditioner%is_whole = .true.
       ! What was built does not serve any more.

@@ -40,9 +40,22 @@ module fw_balance_problem
    contains
       procedure :: coordinate_of
       procedure :: scale_forces
+      procedure :: fits_whole
    end type balance_problem
 
+   !> Coordinates of all sectors up to which matrices of all of them are factored: each takes a
+   !> second or so.
+   integer, parameter :: most_whole = 1500
+
 contains
+
+   !> Whether a matrix of all equal sectors together is worth its factors where waves, which take
+   !> contact for the same in all of them, do not serve.
+   pure logical function fits_whole(self)
+      class(balance_problem), intent(in) :: self
+
+      fits_whole = self%structure%n_coordinates <= most_whole
+   end function fits_whole
 
    !> Put the parts together; laws that take the balance need `scale_forces` then.
    subroutine new_balance_problem(joint, structure, fourier, forces, depth, self)

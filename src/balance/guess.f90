@@ -14,8 +14,9 @@ module fw_guess
    ! For the submodule alone, which gfortran lets reach no private procedures.
    public :: mean_slope, elastic_slope, solve_free, find_tension
 
-   !> Rounds of opening pairs under tension; each opens at least one pair or is the last.
-   integer, parameter :: max_rounds = 20
+   !> Rounds of opening pairs under tension; each opens at least one pair or is the last. Those of
+   !> them that also close pairs.
+   integer, parameter :: max_rounds = 20, rounds_of_both = 12
 
    ! The same where equal sectors are told apart (fw_wave_guess).
    interface
@@ -39,18 +40,33 @@ contains
    subroutine stuck_guess(system, x)
       type(balance_state), intent(in) :: system
       real(wp), intent(out), contiguous :: x(:)
-      logical :: closed(system%problem%n_pairs)
+      logical :: closed(system%problem%n_pairs), bears(system%problem%n_pairs)
       real(wp) :: tension(system%problem%n_pairs)
       integer :: round
 
       closed = .true.
       do round = 1, max_rounds
-         call linear_solution(system, closed, x, tension)
-         if (.not. any(closed .and. tension > 0.0_wp)) exit
-         ! Only ever opened: a round that closed pairs again could go on for ever.
-         closed = closed .and. .not. tension > 0.0_wp
+         call linear_solution(system, closed, .true., x, tension)
+         bears = .not. tension > 0.0_wp
+         ! Of late only opened: rounds that close pairs again could go on for ever.
+         if (round > rounds_of_both .or. .not. closes_again(system)) bears = bears .and. closed
+         if (all(bears .eqv. closed)) exit
+         closed = bears
       end do
+      call linear_solution(system, closed, .false., x, tension)
    end subroutine stuck_guess
+
+   !> Whether the tension of open pairs is known, negative where they would bear: of elastic pairs,
+   !> whose sectors differ (open ones of neighbours let each other close).
+   logical function closes_again(system)
+      type(balance_state), intent(in) :: system
+
+      closes_again = system%problem%structure%n_alike > 1
+      if (.not. closes_again) return
+      associate (forces => system%problem%forces)
+         closes_again = .not. forces%entry(forces%pairs)%law%prediction%takes_balance
+      end associate
+   end function closes_again
 
    !> The linear solution without any contact force.
    subroutine free_guess(system, x)
@@ -60,7 +76,7 @@ contains
       real(wp) :: tension(system%problem%n_pairs)
 
       closed = .false.
-      call linear_solution(system, closed, x, tension)
+      call linear_solution(system, closed, .false., x, tension)
    end subroutine free_guess
 
    !> Whether the structure, with every law but that of its contact, holds a static load where it
@@ -155,10 +171,12 @@ contains
    end function held_without_friction
 
    !> Solve with closed pairs stuck; tension is their mean normal force (positive: it pulls).
-   subroutine linear_solution(system, closed, x, tension)
+   subroutine linear_solution(system, closed, at_rest, x, tension)
       type(balance_state), intent(in) :: system
       !> Pairs that are taken for stuck (n_pairs).
       logical, intent(in) :: closed(:)
+      !> Harmonic 0 alone; the others are zero.
+      logical, intent(in) :: at_rest
       real(wp), intent(out), contiguous :: x(:)
       !> Zero where there is no normal dof, and without a harmonic 0.
       real(wp), intent(out) :: tension(:)
@@ -167,7 +185,7 @@ contains
       logical :: held(system%problem%structure%n_coordinates)
       integer :: h, j, m
 
-      if (system%problem%structure%n_alike > 1) then
+      if (system%problem%structure%n_alike > 1 .and. .not. system%problem%fits_whole()) then
          call solve_sectors(system, closed, x, tension)
          return
       end if
@@ -178,6 +196,7 @@ contains
       do h = 1, system%problem%fourier%n_retained
          ! A harmonic of many pairs takes tenths of a second; nobody looks at the rest then.
          if (system%is_interrupted()) exit
+         if (at_rest .and. system%problem%fourier%harmonic(h) > 0) exit
          call system%problem%structure%block(system%structure_state, h, stiffness)
          force = system%structure_state%load(:, h)
          ! Only the vibratory load is raised from zero; the static one acts throughout.

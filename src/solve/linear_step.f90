@@ -27,7 +27,7 @@ module fw_linear_step
    integer, parameter :: kept_excess = 4
 
    !> Iterations from which on a stronger preconditioner is taken, where the system has one.
-   integer, parameter :: too_many = 100
+   integer, parameter :: too_many = 30
 
    type :: linear_step_type
       !> linear_auto, linear_lu or linear_krylov.

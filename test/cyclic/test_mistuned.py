@@ -211,3 +211,27 @@ def test_values_of_one_sector_or_of_all(tmp_path):
     assert np.array_equal(found[0], found[1])
     assert np.array_equal(found[2], found[3])
     assert not np.allclose(found[0], found[3], rtol=1e-6)
+
+
+def test_a_pattern_around_the_ring_moves_as_one_period_of_it(tmp_path):
+    """24 sectors whose contact repeats every six, under engine order 4: six under engine order 1.
+    Gaps that differ as much as shrouds are pressed on each other leave a part of them open, which
+    the position at rest has to tell pair by pair."""
+    rng = np.random.default_rng([49])
+    case = random_case(rng, law="penalty", n_sectors=6, engine_order=1, n_pairs=2)
+    case["contact"]["gap"] = (-0.05 * (1.0 + 1.5 * rng.uniform(-1.0, 1.0, 12))).tolist()
+    case["mistuned"] = True
+    values = {key: value * 4 for key, value in case["contact"].items() if len(value) == 12}
+    found = []
+    for name, model in (("period", case),
+                        ("ring", {**case, "n_sectors": 24, "engine_order": 4,
+                                  "contact": case["contact"] | values})):
+        (tmp_path / name).mkdir()
+        found.append(run_at(tmp_path / name, model, OMEGAS, n_harmonics=3, sampling="uniform",
+                            n_time=48))
+    period, ring = found
+    assert period["converged"].all() and ring["converged"].all()
+    assert difference(ring["coefficients"],
+                      np.tile(period["coefficients"], (1, 1, 4))) < EQUAL
+    open_share = period["contact/fraction"][:, :, 2]
+    assert (open_share > 0.1).any() and (open_share == 0.0).any()
