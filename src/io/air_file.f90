@@ -10,6 +10,7 @@ module fw_air_file
    use fw_error, only: status_input
    use fw_hdf5, only: dataset_failure
    use fw_hdf5, only: hdf5_file
+   use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
    use fw_model_file_parts, only: read_matrix
    use fw_text, only: to_text
@@ -43,6 +44,9 @@ contains
                               'matters as /aero/sector/M or /aero/nodal_diameter/K', error)
          return
       end do
+      call refuse_strangers(file, '/aero', [character(14) :: 'sector', 'nodal_diameter', 'modes'], &
+                            error)
+      if (allocated(error)) return
       found%by_diameter = file%exists(by_diameter)
       if (found%by_diameter .eqv. file%exists(by_sector)) then
          call fatal_error(error, file%path//': /aero holds '// &
@@ -81,6 +85,8 @@ contains
 
       ! By name: nothing says how many there are, nor in what order.
       allocate (air%number(0))
+      call refuse_strangers(file, group, [character(1) ::], error, [1 - n_sectors, n_sectors - 1])
+      if (allocated(error)) return
       do k = 1 - n_sectors, n_sectors - 1
          name = group//'/'//to_text(k)
          if (.not. file%exists(name)) cycle

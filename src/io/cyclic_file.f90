@@ -15,6 +15,7 @@ module fw_cyclic_file
    use fw_hdf5, only: read_attribute
    use fw_hdf5, only: read_dataset
    use fw_hdf5, only: read_text
+   use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
    use fw_text, only: string_type
    use fw_text, only: to_text
@@ -41,6 +42,8 @@ contains
                           to_text(parts%n_sectors)//', expected at least 1', status_input)
          return
       end if
+      call refuse_strangers(file, group, [character(5) :: 'left', 'right'], error)
+      if (allocated(error)) return
       ! Only matrices of nodal diameters have coordinates beyond displacements.
       if (has_attribute(file, group, 'n_physical')) then
          call read_nodal(file, parts, error)
@@ -108,6 +111,10 @@ contains
                           '", expected "delay" or "advance"', status_input)
          return
       end if
+      ! Those above N/2 are the conjugates of others: what the file says of them would not count.
+      call refuse_strangers(file, '/nodal_diameter', [character(1) ::], error, &
+                            [0, parts%n_sectors/2])
+      if (allocated(error)) return
       allocate (parts%nodal(parts%n_sectors/2 + 1))
       do k = 0, parts%n_sectors/2
          if (.not. file%exists('/nodal_diameter/'//to_text(k))) cycle
@@ -150,6 +157,14 @@ contains
       character(:), allocatable :: message
       integer :: n
 
+      call refuse_strangers(file, name(:len(name) - 1), &
+                            [character(18) :: 'mass', 'stiffness', 'damping', &
+                             'stiffness_rotation', 'coriolis', 'load', 'observe'], error)
+      if (.not. allocated(error)) call refuse_strangers( &
+         file, name//'load', [character(15) :: 'static', 'cosine', 'sine', 'static_rotation'], &
+         error)
+      if (.not. allocated(error)) call refuse_strangers(file, name//'observe', ['matrix'], error)
+      if (allocated(error)) return
       n = 0
       call read_square('mass', .true., nodal%mass)
       if (allocated(error)) return

@@ -11,7 +11,6 @@ module fw_all_sectors
    use fw_complex_form, only: amplitudes_of
    use fw_complex_form, only: coefficients_of
    use fw_cyclic_data, only: cyclic_type
-   use fw_cyclic_data, only: nodal_matrices
    use fw_cyclic_relative, only: cyclic_relative
    use fw_error, only: error_type
    use fw_error, only: fatal_error
@@ -20,16 +19,12 @@ module fw_all_sectors
    use fw_lapack, only: zgemv
    use fw_model, only: model_type
    use fw_ring_fft, only: ring_fft
-   use fw_sector, only: sector_at
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
    use fw_sector_stiffness, only: derive_sector
    use fw_sector_stiffness, only: form_sector
    use fw_sector_stiffness, only: harmonic_point
-   use fw_sector_stiffness, only: observed_sector_slope
-   use fw_sector_stiffness, only: recover_sector
    use fw_sector_stiffness, only: slopes_of
-   use fw_sector_stiffness, only: work_of_sector
    use fw_structure_operator, only: by_frequency
    use fw_structure_operator, only: lay_out_coefficients
    use fw_structure_operator, only: structure_operator
@@ -40,6 +35,8 @@ module fw_all_sectors
    private
 
    public :: all_sectors, new_all_sectors
+   ! For the submodules alone, which gfortran lets reach no private procedures.
+   public :: basis_of, waves_of
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
 
@@ -84,122 +81,84 @@ module fw_all_sectors
       complex(wp), allocatable, private :: amplitude(:, :), in(:, :, :), out(:, :, :)
    end type all_sectors_state
 
+   ! Its bases (fw_all_sectors_setup).
+   interface
+      !> Bases of all nodal diameters, and transforms between sectors and waves.
+      module subroutine new_all_sectors(model, relative, harmonic, omega_range, means, self, error)
+         type(model_type), intent(in) :: model
+         type(cyclic_relative), intent(in) :: relative
+         !> Harmonics in use.
+         integer, intent(in) :: harmonic(:)
+         !> Lowest and highest frequency that will be asked for [rad/s].
+         real(wp), intent(in) :: omega_range(2)
+         !> Of fw_sector_means.
+         integer, intent(in) :: means
+         type(all_sectors), intent(out) :: self
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine new_all_sectors
+   end interface
+
+   ! Matrices of all sectors (fw_all_sectors_blocks).
+   interface
+      !> Z_n of all sectors: block circulant, formed for small rings only.
+      module subroutine block_of_all(self, state, h, matrix)
+         class(all_sectors), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         integer, intent(in) :: h
+         complex(wp), intent(out), contiguous :: matrix(:, :)
+      end subroutine block_of_all
+
+      module subroutine block_in_use(self, state, h, matrix)
+         class(all_sectors), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         integer, intent(in) :: h
+         complex(wp), intent(out), contiguous :: matrix(:, :)
+      end subroutine block_in_use
+
+      !> What flows in pseudo-time would take, which cyclic structures do not have.
+      pure module subroutine mass(self, matrix)
+         class(all_sectors), intent(in) :: self
+         real(wp), intent(out) :: matrix(:, :)
+      end subroutine mass
+
+      !> Coriolis with the damping, the air with the stiffness, as of a wave.
+      pure module subroutine parts(self, h, stiffness, mass, damping, observe)
+         class(all_sectors), intent(in) :: self
+         integer, intent(in) :: h
+         complex(wp), intent(out) :: stiffness(:, :), mass(:, :), damping(:, :), observe(:, :)
+      end subroutine parts
+   end interface
+
+   ! What leaves the coordinates (fw_all_sectors_observed).
+   interface
+      !> Observed quantities of a sector, sector after sector.
+      module subroutine recover(self, state, q, observed)
+         class(all_sectors), intent(in) :: self
+         class(structure_state), intent(inout) :: state
+         complex(wp), intent(in), contiguous :: q(:, :)
+         complex(wp), intent(out), contiguous :: observed(:, :)
+      end subroutine recover
+
+      !> Derivative of what is observed by the frequency, wave by wave.
+      module subroutine observed_slope(self, state, q, slope)
+         class(all_sectors), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         complex(wp), intent(in) :: q(:, :)
+         complex(wp), intent(out) :: slope(:, :)
+      end subroutine observed_slope
+
+      !> Of all sectors: the load is one wave, on which only that wave of the motion works.
+      module subroutine load_work(self, state, h, q, work, slope, row)
+         class(all_sectors), intent(in) :: self
+         class(structure_state), intent(in) :: state
+         integer, intent(in) :: h
+         complex(wp), intent(in) :: q(:)
+         complex(wp), intent(out) :: work, slope
+         complex(wp), intent(out) :: row(:)
+      end subroutine load_work
+   end interface
+
 contains
-
-   !> Bases of all nodal diameters, and transforms between sectors and waves.
-   subroutine new_all_sectors(model, relative, harmonic, omega_range, means, self, error)
-      type(model_type), intent(in) :: model
-      type(cyclic_relative), intent(in) :: relative
-      !> Harmonics in use.
-      integer, intent(in) :: harmonic(:)
-      !> Lowest and highest frequency that will be asked for [rad/s].
-      real(wp), intent(in) :: omega_range(2)
-      !> Of fw_sector_means.
-      integer, intent(in) :: means
-      type(all_sectors), intent(out) :: self
-      type(error_type), allocatable, intent(out) :: error
-
-      call lay_out_coefficients(self, harmonic)
-      self%cyclic%n_sectors = model%cyclic%n_sectors
-      self%cyclic%engine_order = model%cyclic%engine_order
-      self%n_alike = self%cyclic%n_sectors
-      self%n_relative = self%n_alike*relative%n_coordinates
-      self%n_observed = self%n_alike*size(model%observe_matrix, 1)
-      call find_bases(model, relative, omega_range, self, error)
-      if (allocated(error)) return
-      call self%means%take(model, relative, means, error)
-      if (allocated(error)) return
-      call self%ring%plan(self%n_slots, self%n_alike)
-      call self%observed_ring%plan(size(model%observe_matrix, 1), self%n_alike)
-   end subroutine new_all_sectors
-
-   !> A basis for each nodal diameter, with coordinates at places that all share.
-   subroutine find_bases(model, relative, omega_range, self, error)
-      type(model_type), intent(in) :: model
-      type(cyclic_relative), intent(in) :: relative
-      real(wp), intent(in) :: omega_range(2)
-      type(all_sectors), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
-      type(nodal_matrices), allocatable :: nodal(:)
-      integer :: i, k, n, n_kept
-
-      n = self%n_alike/2
-      allocate (self%basis(n + 1), nodal(n + 1))
-      n_kept = 0
-      do k = 0, n
-         call require_diameter(model, k, error)
-         if (.not. allocated(error)) call sector_at(model, k, nodal(k + 1), error)
-         if (.not. allocated(error)) then
-            call self%basis(k + 1)%find_modes(k, nodal(k + 1), relative%at(k + 1), error)
-         end if
-         if (.not. allocated(error) .and. k == 0) then
-            if (self%basis(1)%pushes_free_mode(nodal(1))) call fatal_error(error, &
-               '&load static pushes a part of the sectors that neither stiffness nor contact '// &
-               'holds; hold it or remove the load', status_input)
-         end if
-         if (allocated(error)) return
-         call self%basis(k + 1)%keep_resonances(self%harmonic, omega_range, &
-                                                nodal(k + 1)%has_whirl())
-         n_kept = max(n_kept, size(self%basis(k + 1)%kept))
-      end do
-      call number_coordinates(relative%n_coordinates, n_kept, self)
-      do k = 0, n
-         call self%basis(k + 1)%transform( &
-            nodal(k + 1), [relative%slots(k), (relative%n_coordinates + i, &
-                                               i=1, size(self%basis(k + 1)%kept))], self%n_slots)
-      end do
-   end subroutine find_bases
-
-   !> Refuse what the model does not hold of a nodal diameter: all of them take part.
-   subroutine require_diameter(model, k, error)
-      type(model_type), intent(in) :: model
-      integer, intent(in) :: k
-      type(error_type), allocatable, intent(out) :: error
-      complex(wp), allocatable :: forward(:, :), backward(:, :)
-
-      if (.not. model%cyclic%holds(k)) then
-         call fatal_error(error, '&cyclic mistuned = .true.: every nodal diameter takes part, '// &
-                          'and the model holds no matrices of '//to_text(k)//': must have '// &
-                          '/nodal_diameter/'//to_text(k), status_input)
-         return
-      end if
-      if (.not. allocated(model%cyclic%air)) return
-      call model%cyclic%air_stiffness(k, forward)
-      call model%cyclic%air_stiffness(-k, backward)
-      if (allocated(forward) .and. allocated(backward)) return
-      call fatal_error(error, '&cyclic mistuned = .true.: every nodal diameter takes part, and '// &
-                       'the model holds no forces of the air of '// &
-                       to_text(merge(-k, k, allocated(forward)))//': must have '// &
-                       '/aero/nodal_diameter of all', status_input)
-   end subroutine require_diameter
-
-   !> Relative coordinates of all sectors stand before all kept modes.
-   subroutine number_coordinates(n_relative, n_kept, self)
-      integer, intent(in) :: n_relative, n_kept
-      type(all_sectors), intent(inout) :: self
-      !> More than a choice of modes that is told from another needs.
-      integer, parameter :: many = 997
-      integer :: c, j, k, label
-
-      self%n_slots = n_relative + n_kept
-      self%n_coordinates = self%n_alike*self%n_slots
-      allocate (self%coordinate(self%n_slots, self%n_alike))
-      allocate (self%slot(self%n_coordinates), self%sector(self%n_coordinates))
-      do j = 1, self%n_alike
-         self%coordinate(:n_relative, j) = [((j - 1)*n_relative + c, c=1, n_relative)]
-         self%coordinate(n_relative + 1:, j) = [(self%n_relative + (j - 1)*n_kept + c, c=1, n_kept)]
-         self%slot(self%coordinate(:, j)) = [(c, c=1, self%n_slots)]
-         self%sector(self%coordinate(:, j)) = j
-      end do
-      ! A place stands for other modes where other modes are kept.
-      label = 0
-      do k = 1, size(self%basis)
-         do c = 1, size(self%basis(k)%kept)
-            label = modulo(31*label + k*self%basis(k)%kept(c) + c, many)
-         end do
-      end do
-      self%kept = [(label*self%n_alike*n_kept + c, c=1, self%n_alike*n_kept)]
-   end subroutine number_coordinates
 
    subroutine new_state(self, state)
       class(all_sectors), intent(in) :: self
@@ -426,23 +385,6 @@ contains
       end select
    end subroutine multiply_active
 
-   !> What matrices of the nodal diameters k = 0 .. N - 1 are between sectors: the motion of one to
-   !> the force on the one so many further, from 0 (n_slots, n_slots, n_sectors).
-   pure subroutine between_sectors(self, wave, between)
-      class(all_sectors), intent(in) :: self
-      complex(wp), intent(in) :: wave(:, :, :)
-      complex(wp), intent(out) :: between(:, :, :)
-      integer :: j, k
-
-      between = zero
-      do j = 0, self%n_alike - 1
-         do k = 0, self%n_alike - 1
-            between(:, :, j + 1) = between(:, :, j + 1) + &
-                                   self%cyclic%factor(k, j)/self%n_alike*wave(:, :, k + 1)
-         end do
-      end do
-   end subroutine between_sectors
-
    !> Z_n of the h-th harmonic in nodal diameter k.
    subroutine wave_block(self, state, h, k, matrix)
       class(all_sectors), intent(in) :: self
@@ -457,55 +399,6 @@ contains
          matrix = state%wave(:, :, k + 1, h)
       end select
    end subroutine wave_block
-
-   !> Z_n of all sectors: block circulant, formed for small rings only.
-   subroutine block_of_all(self, state, h, matrix)
-      class(all_sectors), intent(in) :: self
-      class(structure_state), intent(in) :: state
-      integer, intent(in) :: h
-      complex(wp), intent(out), contiguous :: matrix(:, :)
-      integer :: j
-
-      select type (state)
-      type is (all_sectors_state)
-         call fill_block(self, state%wave(:, :, :, h), [(j, j=1, self%n_coordinates)], &
-                         self%n_coordinates, matrix)
-      end select
-   end subroutine block_of_all
-
-   subroutine block_in_use(self, state, h, matrix)
-      class(all_sectors), intent(in) :: self
-      class(structure_state), intent(in) :: state
-      integer, intent(in) :: h
-      complex(wp), intent(out), contiguous :: matrix(:, :)
-
-      select type (state)
-      type is (all_sectors_state)
-         call fill_block(self, state%wave(:, :, :, h), state%used(:state%n_used), &
-                         state%n_active, matrix)
-      end select
-   end subroutine block_in_use
-
-   !> A block circulant matrix: rows `used`, the first n_active of them as columns.
-   pure subroutine fill_block(self, wave, used, n_active, matrix)
-      class(all_sectors), intent(in) :: self
-      complex(wp), intent(in) :: wave(:, :, :)
-      integer, intent(in) :: used(:)
-      integer, intent(in) :: n_active
-      complex(wp), intent(inout) :: matrix(:, :)
-      complex(wp), allocatable :: between(:, :, :)
-      integer :: i, j
-
-      allocate (between(self%n_slots, self%n_slots, self%n_alike))
-      call between_sectors(self, wave, between)
-      do j = 1, n_active
-         do i = 1, size(used)
-            matrix(i, j) = between(self%slot(used(i)), self%slot(used(j)), &
-                                   modulo(self%sector(used(i)) - self%sector(used(j)), &
-                                          self%n_alike) + 1)
-         end do
-      end do
-   end subroutine fill_block
 
    !> The same for all sectors: the mean over the nodal diameters.
    complex(wp) function diagonal(self, state, h, coordinate)
@@ -554,32 +447,6 @@ contains
       call coefficients_of(self%harmonic, self%column, m, m, amplitude, slope)
    end subroutine derivative
 
-   !> Observed quantities of a sector, sector after sector.
-   subroutine recover(self, state, q, observed)
-      class(all_sectors), intent(in) :: self
-      class(structure_state), intent(inout) :: state
-      complex(wp), intent(in), contiguous :: q(:, :)
-      complex(wp), intent(out), contiguous :: observed(:, :)
-      complex(wp), allocatable :: waves(:, :), found(:, :), sectors(:, :)
-      integer :: h, k, n
-
-      n = self%n_observed/self%n_alike
-      allocate (waves(self%n_slots, self%n_alike))
-      allocate (found(n, self%n_alike), sectors(n, self%n_alike))
-      select type (state)
-      type is (all_sectors_state)
-         do h = 1, size(self%harmonic)
-            call waves_of(self, q(:, h), waves)
-            do k = 0, self%n_alike - 1
-               call recover_sector(self%basis(basis_of(self, k)), state%point(k + 1, h), &
-                                   state%load_factor(h), waves(:, k + 1), found(:, k + 1))
-            end do
-            call self%observed_ring%add_waves(found, sectors)
-            observed(:, h) = reshape(sectors, [self%n_observed])
-         end do
-      end select
-   end subroutine recover
-
    pure real(wp) function static_stiffness(self, coordinate)
       class(all_sectors), intent(in) :: self
       integer, intent(in) :: coordinate
@@ -595,63 +462,6 @@ contains
 
       call self%means%split(self%slot(coordinate), limit, m, c, k)
    end subroutine split
-
-   !> What flows in pseudo-time would take, which cyclic structures do not have.
-   pure subroutine mass(self, matrix)
-      class(all_sectors), intent(in) :: self
-      real(wp), intent(out) :: matrix(:, :)
-      integer :: j, k
-
-      matrix = 0.0_wp
-      do k = 0, self%n_alike - 1
-         do j = 1, self%n_alike
-            matrix(self%coordinate(:, j), self%coordinate(:, j)) = &
-               matrix(self%coordinate(:, j), self%coordinate(:, j)) + &
-               real(self%basis(basis_of(self, k))%blocks(:self%n_slots, :, 2), wp)/self%n_alike
-         end do
-      end do
-   end subroutine mass
-
-   !> Coriolis with the damping, the air with the stiffness, as of a wave.
-   pure subroutine parts(self, h, stiffness, mass, damping, observe)
-      class(all_sectors), intent(in) :: self
-      integer, intent(in) :: h
-      complex(wp), intent(out) :: stiffness(:, :), mass(:, :), damping(:, :), observe(:, :)
-      complex(wp), allocatable :: wave(:, :, :, :), rows(:, :, :), between(:, :, :)
-      integer :: every(self%n_coordinates), j, k, m, n, n_rows
-
-      m = self%n_slots
-      n = self%n_alike
-      n_rows = self%n_observed/n
-      allocate (wave(m, m, n, 3), rows(n_rows, m, n), between(n_rows, m, n), source=zero)
-      do k = 0, n - 1
-         associate (b => self%basis(basis_of(self, k)))
-            wave(:, :, k + 1, :b%n_blocks) = b%blocks(:m, :, :)
-            if (allocated(b%coriolis)) wave(:, :, k + 1, 3) = wave(:, :, k + 1, 3) + &
-                                                              b%coriolis(:m, :m)
-            rows(:, :, k + 1) = b%observe_q
-            if (2*k > n) then
-               wave(:, :, k + 1, :) = conjg(wave(:, :, k + 1, :))
-               rows(:, :, k + 1) = conjg(rows(:, :, k + 1))
-            end if
-            if (allocated(b%aero) .and. self%harmonic(h) > 0) then
-               wave(:, :, k + 1, 1) = wave(:, :, k + 1, 1) + &
-                                      b%aero(:m, :m, merge(2, 1, 2*k > n))
-            end if
-         end associate
-      end do
-      every = [(j, j=1, self%n_coordinates)]
-      call fill_block(self, wave(:, :, :, 1), every, self%n_coordinates, stiffness)
-      call fill_block(self, wave(:, :, :, 2), every, self%n_coordinates, mass)
-      call fill_block(self, wave(:, :, :, 3), every, self%n_coordinates, damping)
-      call between_sectors(self, rows, between)
-      do j = 1, self%n_coordinates
-         do k = 1, n
-            observe((k - 1)*n_rows + 1:k*n_rows, j) = between(:, self%slot(j), &
-                                                              modulo(k - self%sector(j), n) + 1)
-         end do
-      end do
-   end subroutine parts
 
    !> In the nodal diameter of the first harmonic.
    pure subroutine held_modes(self, frequency, half_width)
@@ -704,66 +514,5 @@ contains
          end associate
       end do
    end subroutine scale_loads
-
-   !> Derivative of what is observed by the frequency, wave by wave.
-   subroutine observed_slope(self, state, q, slope)
-      class(all_sectors), intent(in) :: self
-      class(structure_state), intent(in) :: state
-      complex(wp), intent(in) :: q(:, :)
-      complex(wp), intent(out) :: slope(:, :)
-      complex(wp), allocatable :: waves(:, :), found(:, :), sectors(:, :)
-      integer :: h, k, n
-
-      n = self%n_observed/self%n_alike
-      allocate (waves(self%n_slots, self%n_alike))
-      allocate (found(n, self%n_alike), sectors(n, self%n_alike))
-      slope = zero
-      select type (state)
-      type is (all_sectors_state)
-         do h = 1, size(self%harmonic)
-            if (self%harmonic(h) == 0) cycle
-            call waves_of(self, q(:, h), waves)
-            do k = 0, self%n_alike - 1
-               associate (point => state%point(k + 1, h))
-                  call observed_sector_slope(self%basis(basis_of(self, k)), point, &
-                                             slopes_of(point, 0.0_wp, by_frequency), &
-                                             waves(:, k + 1), found(:, k + 1))
-               end associate
-            end do
-            call self%observed_ring%add_waves(found, sectors)
-            slope(:, h) = reshape(sectors, [self%n_observed])
-         end do
-      end select
-   end subroutine observed_slope
-
-   !> Of all sectors: the load is one wave, on which only that wave of the motion works.
-   subroutine load_work(self, state, h, q, work, slope, row)
-      class(all_sectors), intent(in) :: self
-      class(structure_state), intent(in) :: state
-      integer, intent(in) :: h
-      complex(wp), intent(in) :: q(:)
-      complex(wp), intent(out) :: work, slope
-      complex(wp), intent(out) :: row(:)
-      complex(wp), allocatable :: waves(:, :)
-      complex(wp) :: own(self%n_slots)
-      integer :: j, k
-
-      allocate (waves(self%n_slots, self%n_alike))
-      call waves_of(self, q, waves)
-      k = modulo(self%cyclic%nodal_diameter(self%harmonic(h)), self%n_alike)
-      select type (state)
-      type is (all_sectors_state)
-         associate (point => state%point(k + 1, h))
-            call work_of_sector(self%basis(basis_of(self, k)), point, &
-                                slopes_of(point, 0.0_wp, by_frequency), waves(:, k + 1), work, &
-                                slope, own)
-         end associate
-      end select
-      work = self%n_alike*work
-      slope = self%n_alike*slope
-      do j = 1, self%n_alike
-         row(self%coordinate(:, j)) = conjg(self%cyclic%factor(k, j - 1))*own
-      end do
-   end subroutine load_work
 
 end module fw_all_sectors

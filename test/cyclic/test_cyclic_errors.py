@@ -82,6 +82,11 @@ def turn(diameters):
 NODAL = {
     "not Hermitian": (skew, ["stiffness", "nodal diameter 1", "Hermitian"]),
     "not real": (turn, ["mass", "nodal diameter 3", "real"]),
+    "above N/2": (lambda d: d.update({4: dict(d[1])}), ["/nodal_diameter/4", "from 0 to 3"]),
+    "misspelt": (lambda d: d[1].update({"dampimg": d[1]["damping"]}),
+                 ["/nodal_diameter/1/dampimg", "damping", "coriolis"]),
+    "misspelt load": (lambda d: d[1].update({"load/cosin": d[1]["load/cosine"]}),
+                      ["/nodal_diameter/1/load/cosin", "static, cosine"]),
     "missing": (lambda d: d.pop(2), ["harmonic 2", "nodal diameter 2"]),
 }
 

@@ -1,0 +1,80 @@
+!> All sectors at once: what is observed in each of them, and the work of their load, wave by wave.
+submodule(fw_all_sectors) fw_all_sectors_observed
+   use fw_sector_stiffness, only: observed_sector_slope
+   use fw_sector_stiffness, only: recover_sector
+   use fw_sector_stiffness, only: work_of_sector
+   implicit none (type, external)
+
+contains
+
+   module procedure recover
+      complex(wp), allocatable :: waves(:, :), found(:, :), sectors(:, :)
+      integer :: h, k, n
+
+      n = self%n_observed/self%n_alike
+      allocate (waves(self%n_slots, self%n_alike))
+      allocate (found(n, self%n_alike), sectors(n, self%n_alike))
+      select type (state)
+      type is (all_sectors_state)
+         do h = 1, size(self%harmonic)
+            call waves_of(self, q(:, h), waves)
+            do k = 0, self%n_alike - 1
+               call recover_sector(self%basis(basis_of(self, k)), state%point(k + 1, h), &
+                                   state%load_factor(h), waves(:, k + 1), found(:, k + 1))
+            end do
+            call self%observed_ring%add_waves(found, sectors)
+            observed(:, h) = reshape(sectors, [self%n_observed])
+         end do
+      end select
+   end procedure recover
+
+   module procedure observed_slope
+      complex(wp), allocatable :: waves(:, :), found(:, :), sectors(:, :)
+      integer :: h, k, n
+
+      n = self%n_observed/self%n_alike
+      allocate (waves(self%n_slots, self%n_alike))
+      allocate (found(n, self%n_alike), sectors(n, self%n_alike))
+      slope = zero
+      select type (state)
+      type is (all_sectors_state)
+         do h = 1, size(self%harmonic)
+            if (self%harmonic(h) == 0) cycle
+            call waves_of(self, q(:, h), waves)
+            do k = 0, self%n_alike - 1
+               associate (point => state%point(k + 1, h))
+                  call observed_sector_slope(self%basis(basis_of(self, k)), point, &
+                                             slopes_of(point, 0.0_wp, by_frequency), &
+                                             waves(:, k + 1), found(:, k + 1))
+               end associate
+            end do
+            call self%observed_ring%add_waves(found, sectors)
+            slope(:, h) = reshape(sectors, [self%n_observed])
+         end do
+      end select
+   end procedure observed_slope
+
+   module procedure load_work
+      complex(wp), allocatable :: waves(:, :)
+      complex(wp) :: own(self%n_slots)
+      integer :: j, k
+
+      allocate (waves(self%n_slots, self%n_alike))
+      call waves_of(self, q, waves)
+      k = modulo(self%cyclic%nodal_diameter(self%harmonic(h)), self%n_alike)
+      select type (state)
+      type is (all_sectors_state)
+         associate (point => state%point(k + 1, h))
+            call work_of_sector(self%basis(basis_of(self, k)), point, &
+                                slopes_of(point, 0.0_wp, by_frequency), waves(:, k + 1), work, &
+                                slope, own)
+         end associate
+      end select
+      work = self%n_alike*work
+      slope = self%n_alike*slope
+      do j = 1, self%n_alike
+         row(self%coordinate(:, j)) = conjg(self%cyclic%factor(k, j - 1))*own
+      end do
+   end procedure load_work
+
+end submodule fw_all_sectors_observed
