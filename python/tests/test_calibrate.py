@@ -84,7 +84,7 @@ def mode_data(**deviations: Any) -> ModeData:
 def test_exact_modes_give_the_truth() -> None:
     data = mode_data(frequency_deviation=1e-3, damping_deviation=3e-3)
     found = calibrate(mode_case(), data, over=OVER, bounds=BOUNDS)
-    assert found.converged
+    assert found.converged and found.is_exact
     assert (np.abs(found.values - TRUTH) < BETWEEN_ROWS * found.errors).all()
     assert found.chi_square < BETWEEN_ROWS
 

@@ -40,7 +40,7 @@ module fw_mode_onset
    real(wp), parameter :: near_rest = 1.0e-6_wp
    !> Ratios of two amplitudes between which the onset is known well enough: by solutions, to look
    !> at the position there, and about a position that is known.
-   real(wp), parameter :: rough = 1.0_wp + 1.0e-3_wp, coarse = 1.0_wp + 1.0e-4_wp, &
+   real(wp), parameter :: rough = 1.0_wp + 4.0e-3_wp, coarse = 1.0_wp + 1.0e-4_wp, &
                           fine = 1.0_wp + 1.0e-13_wp
 
 contains
@@ -129,7 +129,7 @@ contains
       real(wp), intent(out) :: onset
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      real(wp) :: high, y(size(self%y, 1))
+      real(wp) :: high, ratio, y(size(self%y, 1))
 
       onset = ieee_value(1.0_wp, ieee_quiet_nan)
       if (.not. self%departed) return
@@ -143,15 +143,17 @@ contains
       if (report%converged .and. is_stuck(self, path%system)) then
          ! About the position just below nothing moves any more up to the onset.
          if (report%iterations > 0) call take(self, onset, y)
+         ratio = fine
       else
          self%high = onset
          call bisect_solutions(self, path, error)
          if (allocated(error)) return
          onset = self%low(1)
          high = self%high
+         ratio = coarse
       end if
       if (departure(self, path%system, high, position(self, high)) > 0.0_wp) then
-         call bisect(self, path%system, fine, onset, high)
+         call bisect(self, path%system, ratio, onset, high)
       end if
    end subroutine find
 
