@@ -18,6 +18,9 @@ PYTHON := build/venv/bin/python
 EXAMPLE := example/blade_sector
 # Options for CMake, such as CMAKE_OPTIONS=-DCMAKE_PREFIX_PATH=/some/where
 CMAKE_OPTIONS ?=
+# auto, system, or scipy: the OpenBLAS of the Python package scipy-openblas32
+BLAS ?= auto
+export BLAS
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 24
@@ -32,9 +35,11 @@ build/deps.stamp: tools/deps.sh
 
 build: build/deps.stamp ## optimised program build/release/fw_run
 	@if ! grep -qs FRETWEAR_PYTHON:BOOL=ON $(BUILD)/CMakeCache.txt || \
+	   ! grep -qs FRETWEAR_BLAS:STRING=$(BLAS)$$ $(BUILD)/CMakeCache.txt || \
 	   [ ! -f $(BUILD)/build.ninja ] || [ -n "$(CMAKE_OPTIONS)" ]; then \
+	   tools/deps.sh build/venv; \
 	   cmake -S . -B $(BUILD) -G Ninja -DFRETWEAR_NATIVE=ON -DFRETWEAR_PYTHON=ON \
-	      "-DPython3_EXECUTABLE=$(CURDIR)/$(PYTHON)" $(CMAKE_OPTIONS); \
+	      "-DPython3_EXECUTABLE=$(CURDIR)/$(PYTHON)" -DFRETWEAR_BLAS=$(BLAS) $(CMAKE_OPTIONS); \
 	fi
 	@cmake --build $(BUILD) --target fw_run fretwear_python fretwear_shared
 

@@ -3,6 +3,9 @@
 # that is allowed, Python packages into a virtual environment. Otherwise say what is missing.
 #
 #     tools/deps.sh VENV_DIRECTORY
+#
+# With BLAS=scipy, or where the system's OpenBLAS does not know this processor, the newer one of the
+# Python package scipy-openblas32 goes into the environment too.
 set -euo pipefail
 venv=$1
 python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
@@ -106,5 +109,37 @@ if ! { [ -x "$venv/bin/python" ] && has_modules "$venv/bin/python"; }; then
          echo "deps: pip could not install ${python_packages[*]} into $venv" >&2
          exit 1
       fi
+   fi
+fi
+
+# Does OpenBLAS run a kernel below what the processor can do?
+has_slow_blas() {
+   local directory here
+   here=$PWD
+   directory=$(mktemp -d)
+   (cd "$directory" && gcc -c "$here/src/base/blas_kernel.c" &&
+      gfortran "$here/src/base/blas.f90" "$here/cmake/blas_probe.f90" blas_kernel.o -lopenblas \
+         -o probe) 2>/dev/null || { rm -r "$directory"; return 1; }
+   "$directory/probe" | grep -q '^slow'
+   local slow=$?
+   rm -r "$directory"
+   return $slow
+}
+
+# An environment without pip takes the package through that of the system.
+install_blas() {
+   local place
+   "$venv/bin/python" -m pip install --quiet --disable-pip-version-check scipy-openblas32 \
+      2>/dev/null && return
+   place=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+   python3 -m pip install --quiet --disable-pip-version-check --no-deps --target "$place" \
+      scipy-openblas32
+}
+
+blas=${BLAS:-auto}
+if [ "$blas" = scipy ] || { [ "$blas" = auto ] && has_slow_blas; }; then
+   if ! "$venv/bin/python" -c 'import scipy_openblas32' 2>/dev/null; then
+      echo "deps: scipy-openblas32 into $venv" >&2
+      install_blas || echo "deps: scipy-openblas32 could not be installed" >&2
    fi
 fi

@@ -282,18 +282,26 @@ contains
    end procedure precondition
 
    module procedure precondition_columns
-      integer :: j
+      integer :: h, j, last
 
-      ! All columns at once where each harmonic has its own factors, and these know every
-      ! coordinate.
-      if (self%preconditioner%is_split .or. by_waves(self) .or. .not. knows_all(self)) then
-         do j = 1, size(columns, 2)
-            call self%precondition(columns(:, j))
+      associate (kept => self%preconditioner, nc => self%problem%fourier%n_coefficients, &
+                 nh => self%problem%fourier%n_retained, na => self%active%n_active)
+         ! At once only with factors that know every coordinate, of each harmonic or of all.
+         if (by_waves(self) .or. .not. knows_all(self) .or. (kept%is_split .and. self%nearly)) then
+            do j = 1, size(columns, 2)
+               call self%precondition(columns(:, j))
+            end do
+            return
+         end if
+         h = 1
+         do while (h <= nh)
+            last = h
+            ! All but harmonic 0 share a matrix.
+            if (kept%is_split .and. self%problem%fourier%harmonic(h) > 0) last = nh
+            call solve_columns(self, na, nc, size(columns, 2), h, last, columns)
+            h = last + 1
          end do
-      else
-         call solve_columns(self, self%active%n_active, self%problem%fourier%n_coefficients, &
-                            size(columns, 2), columns)
-      end if
+      end associate
    end procedure precondition_columns
 
    !> Whether the factors are those of the active coordinates, in all harmonics.
@@ -309,36 +317,52 @@ contains
       end do
    end function knows_all
 
-   !> Harmonic by harmonic with all right-hand sides.
-   subroutine solve_columns(self, na, nc, n_columns, columns)
+   !> Harmonics first to last, which share a matrix, with all right-hand sides.
+   subroutine solve_columns(self, na, nc, n_columns, first, last, columns)
       type(balance_state), intent(inout) :: self
-      integer, intent(in) :: na, nc, n_columns
+      integer, intent(in) :: na, nc, n_columns, first, last
       real(wp), intent(inout) :: columns(na, nc, n_columns)
-      complex(sp) :: b(na, n_columns)
-      real(wp) :: largest(n_columns), scale
-      integer :: h, j, k
+      complex(sp), allocatable :: b(:, :)
+      real(wp), allocatable :: largest(:)
+      real(wp) :: scale
+      integer :: h, i, j, k, place
       logical :: has_sine
 
-      do h = 1, self%problem%fourier%n_retained
+      allocate (b(na, n_columns*(last - first + 1)), largest(n_columns))
+      do j = 1, n_columns
+         ! Single precision ends at 1e38: the entries are brought to the order of one before.
+         largest(j) = maxval(abs(columns(:, :, j)))
+         if (.not. largest(j) > 0.0_wp) largest(j) = 1.0_wp
+      end do
+      do h = first, last
          k = self%problem%fourier%column(h)
          has_sine = self%problem%fourier%harmonic(h) > 0
          do j = 1, n_columns
-            ! Single precision ends at 1e38: the entries are brought to the order of one before.
-            largest(j) = maxval(abs(columns(:, k, j)))
-            if (has_sine) largest(j) = max(largest(j), maxval(abs(columns(:, k + 1, j))))
-            if (.not. largest(j) > 0.0_wp) largest(j) = 1.0_wp
-            b(:, j) = cmplx(columns(:, k, j)/largest(j), kind=sp)
-            if (has_sine) b(:, j) = cmplx(columns(:, k, j)/largest(j), &
-                                          -columns(:, k + 1, j)/largest(j), kind=sp)
-         end do
-         associate (factors => self%preconditioner%harmonic(h))
-            call factors%solve_scaled(n_columns, b)
-            do j = 1, n_columns
-               scale = factors%scale*largest(j)
-               columns(:, k, j) = scale*real(b(:, j), wp)
-               if (has_sine) columns(:, k + 1, j) = -scale*real(aimag(b(:, j)), wp)
+            place = (h - first)*n_columns + j
+            do i = 1, na
+               b(i, place) = cmplx(columns(i, k, j)/largest(j), kind=sp)
             end do
-         end associate
+            if (.not. has_sine) cycle
+            do i = 1, na
+               b(i, place) = cmplx(real(b(i, place)), -columns(i, k + 1, j)/largest(j), kind=sp)
+            end do
+         end do
+      end do
+      if (self%preconditioner%is_split) then
+         call self%preconditioner%split%solve_alike(self%problem%fourier%harmonic(first) == 0, b)
+         scale = self%preconditioner%split%moving%scale
+      else
+         call self%preconditioner%harmonic(first)%solve_scaled(size(b, 2), b)
+         scale = self%preconditioner%harmonic(first)%scale
+      end if
+      do h = first, last
+         k = self%problem%fourier%column(h)
+         has_sine = self%problem%fourier%harmonic(h) > 0
+         do j = 1, n_columns
+            place = (h - first)*n_columns + j
+            columns(:, k, j) = scale*largest(j)*real(b(:, place), wp)
+            if (has_sine) columns(:, k + 1, j) = -scale*largest(j)*real(aimag(b(:, place)), wp)
+         end do
       end do
    end subroutine solve_columns
 

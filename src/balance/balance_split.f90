@@ -76,20 +76,25 @@ contains
 
    module procedure are_alike
       complex(wp), allocatable :: first(:, :), other(:, :)
-      integer :: h
+      integer :: h, m
 
-      is_so = .false.
-      if (self%preconditioner%blocks_differ) return
-      allocate (first(self%active%n_used, self%active%n_active))
-      allocate (other, mold=first)
-      call self%problem%structure%active_block(self%structure_state, 1, first)
-      self%preconditioner%blocks_differ = any(abs(aimag(first)) > 0.0_wp)
-      do h = 2, self%problem%fourier%n_retained
-         if (self%preconditioner%blocks_differ) return
-         call self%problem%structure%active_block(self%structure_state, h, other)
-         self%preconditioner%blocks_differ = any(abs(other - first) > 0.0_wp)
-      end do
-      is_so = .not. self%preconditioner%blocks_differ
+      associate (kept => self%preconditioner, place => [self%frequency(), self%value])
+         is_so = kept%is_alike
+         if (all(abs(kept%compared_at - place) <= 0.0_wp)) return
+         ! Blocks that were found to differ are not compared again.
+         if (kept%compared_at(1) > 0.0_wp .and. .not. kept%is_alike) return
+         kept%compared_at = place
+         m = self%problem%structure%n_coordinates
+         allocate (first(m, m), other(m, m))
+         call self%problem%structure%block(self%structure_state, 1, first)
+         kept%is_alike = .not. any(abs(aimag(first)) > 0.0_wp)
+         do h = 2, self%problem%fourier%n_retained
+            if (.not. kept%is_alike) exit
+            call self%problem%structure%block(self%structure_state, h, other)
+            kept%is_alike = .not. any(abs(other - first) > 0.0_wp)
+         end do
+         is_so = kept%is_alike
+      end associate
    end procedure are_alike
 
    !> Number of the first harmonic that is not 0.

@@ -39,6 +39,7 @@ module fw_split_factors
       procedure :: reserve
       procedure :: factor
       procedure :: solve
+      procedure :: solve_alike
    end type split_factors
 
    !> Pivots below this, of entries of the order of one, are none, as in fw_preconditioner_lu.
@@ -154,6 +155,23 @@ contains
          b(:self%n, h) = self%moving%scale*largest(h)*cmplx(self%rhs(:, h), kind=wp)
       end do
    end subroutine solve
+
+   !> P_0^-1 (`is_constant`) or P_1^-1 of many right-hand sides of the order of one, in place; for rank
+   !> 0 alone. Those of P_0 are real.
+   subroutine solve_alike(self, is_constant, b)
+      class(split_factors), intent(inout) :: self
+      logical, intent(in) :: is_constant
+      complex(sp), intent(inout), contiguous :: b(:, :)
+      integer :: j
+
+      if (.not. is_constant) then
+         call self%panels%solve(size(b, 2), b)
+         return
+      end if
+      do j = 1, size(b, 2)
+         call solve_constant(self, b(:, j))
+      end do
+   end subroutine solve_alike
 
    !> Harmonic 0, which is real.
    subroutine solve_constant(self, b)
