@@ -218,8 +218,8 @@ def test_threads(prefix, tmp_path):
     output = run(program, SECTOR / "sector_16.h5", tmp_path)
     assert output.endswith("0 differences\n")
     sizes = [int(n) for n in re.findall(r"status [04], (\d+) values", output)]
-    assert len(sizes) == 8 and min(sizes) > 800
-    assert "case 8: status 3, 0 values" in output
+    assert len(sizes) == 11 and min(sizes) > 800
+    assert "case 11: status 3, 0 values" in output
     with h5py.File(tmp_path / "result.h5") as result:
         assert result.attrs["status"] in (b"complete", "complete")
 

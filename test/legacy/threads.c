@@ -4,7 +4,8 @@
  *    threads sector_16.h5 directory [rounds]
  *
  * The cases differ in what they use: model files and result files (HDF5), long transforms (FFTW),
- * MINPACK, KINSOL, CVODE, wear, steps of their own and wrong input. */
+ * MINPACK, KINSOL, CVODE, wear, given amplitudes, resonances, modes, steps of their own and wrong
+ * input. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,12 +13,12 @@
 
 #include <fretwear.h>
 
-enum { n_cases = 9, most_values = 200000 };
+enum { n_cases = 12, wear = 7, mode = 10, most_values = 200000 };
 
-/* Cases that are run as a whole always: steps write no file and wear nothing. */
+/* Cases that are run as a whole always: steps write no file, wear nothing and follow nothing. */
 static int only_whole(int number)
 {
-   return number == 6 || number == 7;
+   return number >= 6 && number <= mode;
 }
 
 static const char *model_path, *directory;
@@ -33,6 +34,11 @@ static const char *const keys[n_cases][5][2] = {
    {{"contact%mu", "0.7"}, {"output%file", "result.h5"}},
    {{"case%analysis", "wear"}, {"wear%coefficient", "1e-9"}, {"wear%max_depth_step", "1e-4"},
     {"wear%max_steps", "3"}, {"sweep%start", "1023"}},
+   {{"control%amplitude", "0.1"}, {"sweep%n_points", "4"}},
+   {{"case%analysis", "resonance"}, {"resonance%parameter", "load%harmonic_scale"},
+    {"resonance%start", "0.45"}, {"resonance%end", "0.55"}, {"resonance%n_points", "3"}},
+   {{"case%analysis", "mode"}, {"mode%start", "1e-2"}, {"mode%end", "1e-1"},
+    {"mode%n_points", "4"}},
    {{"contact%mu", "-1"}, {"solver%tolerence", "1e-9"}},
 };
 
@@ -53,7 +59,7 @@ static void collect(fw_handle handle, struct task *task)
    task->n_values = 0;
    if (fw_count(handle, "points", &n_points) != FW_OK) exit(11);
    for (int k = 0; k < n_points; k++)
-      for (int i = 0; i < (task->number == 7 ? 9 : 7); i++) {
+      for (int i = 0; i < (task->number == wear ? 9 : 7); i++) {
          size_t n;
          if (fw_size(handle, names[i], k, &n) != FW_OK) exit(12);
          if (task->n_values + n > most_values) exit(13);
@@ -77,10 +83,12 @@ static void *run(void *argument)
    fw_set(handle, "load%harmonic_scale", "0.5");
    fw_set(handle, "harmonics%n_harmonics", "3");
    fw_set(handle, "harmonics%n_time", "128");
-   fw_set(handle, "sweep%unit", "Hz");
-   fw_set(handle, "sweep%start", "1017");
-   fw_set(handle, "sweep%end", "1029");
-   fw_set(handle, "sweep%n_points", "13");
+   if (task->number != mode) {
+      fw_set(handle, "sweep%unit", "Hz");
+      fw_set(handle, "sweep%start", "1017");
+      fw_set(handle, "sweep%end", "1029");
+      fw_set(handle, "sweep%n_points", "13");
+   }
    for (int i = 0; i < 5 && keys[task->number][i][0]; i++) {
       const char *value = keys[task->number][i][1];
       if (!strcmp(keys[task->number][i][0], "output%file")) {

@@ -9,11 +9,11 @@ from optimisation import plain_build
 
 HERE = Path(__file__).resolve().parent
 MODEL = ROOT / "example" / "blade_sector" / "sector_16.h5"
-LEAST_CASES = 8
+LEAST_CASES = 11
 
 
 def races(setting):
-    """Nine handles at the same time, their library watched by the thread sanitizer."""
+    """Twelve handles at the same time, their library watched by the thread sanitizer."""
     directory, _ = build(setting, "races", "-DFRETWEAR_SANITIZE=thread",
                          "-DCMAKE_Fortran_FLAGS=-O1 -g", "-DFRETWEAR_PYTHON=OFF",
                          "-DFRETWEAR_SHARED=OFF", "-DFRETWEAR_TESTS=OFF")
