@@ -10,7 +10,7 @@ from optimisation import plain_build
 SECTOR = ROOT / "example" / "blade_sector"
 #: Tests of the program alone: the package would load an instrumented library into an interpreter
 #: that is not instrumented.
-OF_THE_PROGRAM = ("test/cli", "test/oracles")
+OF_THE_PROGRAM = ("test/cli", "test/oracles", "test/modes", "test/resonance")
 HEAD = ["| tests | warnings | passed | failed | skipped |", "|---|---|---|---|---|"]
 
 

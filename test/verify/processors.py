@@ -13,7 +13,7 @@ from pathlib import Path
 from common import build, run_tests
 
 #: Tests whose numbers come from the program.
-NUMBERS = ("test/cli", "test/oracles")
+NUMBERS = ("test/cli", "test/oracles", "test/modes", "test/resonance")
 HEAD = ["| build | warnings | kernels | tests | passed | failed | skipped |",
         "|---|---|---|---|---|---|---|"]
 #: Kernels of OpenBLAS on x86-64 and what a processor needs for them, as /proc/cpuinfo names it.
