@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 .PHONY: help deps build debug run test lint keys docs clean
-.PHONY: fuzz wheel ways sensitivities resonances modes calibration stops controls
+.PHONY: fuzz notebooks wheel ways sensitivities resonances modes calibration stops controls
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -84,6 +84,9 @@ keys: build ## tables of keys in the user guide, settings of the Python package
 
 docs: build/deps.stamp ## documents as a site, references of library and package: build/docs
 	@$(PYTHON) tools/build_docs.py build/docs
+
+notebooks: build ## run docs/notebooks and keep what they show
+	@PYTHONPATH=python:$(BUILD)/python $(PYTHON) tools/run_notebooks.py
 
 wheel: build/deps.stamp ## a wheel that needs no compiler and no library, tried: build/wheel
 	@tools/build_wheel.sh build/wheel $(PYTHON)

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 #: Formats of moving pictures that Pillow writes.
 _FORMATS = {".gif": "GIF", ".webp": "WEBP", ".png": "PNG"}
 #: Largest displacement that is drawn, over the size of the mesh.
-_SHOWN = 0.06
+_SHOWN = 0.12
 #: How much of the bodies is seen, so that the faces between them are.
 _OPACITY = 0.18
 
@@ -110,6 +110,7 @@ def animate(result: Result | str | Path, file: str | Path | None = None, *,
     drawn = _SHOWN * scene.length / scene.largest if factor is None and scene.largest > 0.0 \
         else factor or 1.0
     scene.plotter.view_vector(view, up)
+    scene.plotter.camera.zoom(0.9)   # room for the motion, and for the bar
     pictures = [scene.draw(360.0 * k / frames, drawn, turn / frames) for k in range(frames)]
     scene.plotter.close()
     image = _packed(pictures, _FORMATS[target.suffix.lower()])
@@ -175,7 +176,8 @@ class _Scene:
                     clim=_limits(fields.pairs[scalars][0], units),
                     scalar_bar_args={"title": title, "color": "black", "n_labels": 2,
                                      "title_font_size": 18, "label_font_size": 16, "fmt": "%.2g",
-                                     "position_x": 0.3, "width": 0.4, "height": 0.09})
+                                     "position_x": 0.3, "position_y": 0.01,
+                                     "width": 0.4, "height": 0.09})
             else:
                 self.plotter.add_mesh(surface, color="#7a8694", opacity=_OPACITY,
                                       silhouette={"color": "#303840", "line_width": 1.5})
