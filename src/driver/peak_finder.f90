@@ -21,6 +21,7 @@ module fw_peak_finder
    use fw_peak_rules, only: find_edge
    use fw_peak_rules, only: find_gap
    use fw_peak_rules, only: find_next
+   use fw_peak_rules, only: find_way_past
    use fw_peak_rules, only: highest_of
    use fw_peak_rules, only: is_bound
    use fw_peak_rules, only: is_maximum
@@ -214,6 +215,7 @@ contains
          call climb(self, case, budget, error)
          if (.not. allocated(error)) call measure_widths(self, case, budget, error)
          if (.not. allocated(error)) call look_beyond(self, case, budget, more, error)
+         if (.not. allocated(error)) call look_past(self, case, budget, more, error)
       end do
       ! What becomes a row now is known here already.
       self%is_active = .false.
@@ -394,6 +396,42 @@ contains
          end do
       end do
    end subroutine look_beyond
+
+   !> Solve past a sample that stands on another branch, right next to the highest peak: this goes on
+   !> there, or the response falls.
+   subroutine look_past(self, case, budget, more, error)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: budget
+      !> Set where a peak goes on.
+      logical, intent(inout) :: more
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: goes_on = 0.9_wp
+      real(wp) :: omega, height
+      integer :: i, j, k, side
+      logical :: found
+
+      if (self%samples%n < 3) return
+      do i = 1, size(self%samples%item(1)%at%amplitude)
+         k = place_of_highest(self%samples, i)
+         if (self%n_solved >= budget) exit
+         if (.not. is_maximum(self%samples, k, i)) cycle
+         call find_way_past(self%samples, k, i, side, omega, found)
+         if (.not. found) cycle
+         height = goes_on*self%samples%item(k)%at%amplitude(i)
+         self%samples%item(side)%at%is_edge = .true.
+         call solve_at(self, case, omega, budget, error, k)
+         if (allocated(error)) return
+         do j = 2, self%samples%n - 1
+            if (abs(self%samples%item(j)%at%omega - omega) > 0.0_wp) cycle
+            found = self%samples%item(j)%at%amplitude(i) >= height
+            if (.not. found) exit
+            more = .true.
+            call self%samples%drop(merge(j - 1, j + 1, self%samples%item(j - 1)%at%is_edge))
+            exit
+         end do
+      end do
+   end subroutine look_past
 
    !> The maximum that is not known well enough and may be the highest, relative to what is known of
    !> its quantity.

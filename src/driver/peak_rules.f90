@@ -8,6 +8,7 @@ module fw_peak_rules
    use fw_peak, only: found_search
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
+   use fw_samples, only: position_of
    use fw_samples, only: sample_list
    use fw_samples, only: sample_type
    use fw_samples, only: swing_of
@@ -16,7 +17,7 @@ module fw_peak_rules
    private
 
    public :: is_maximum, is_bound, highest_of, place_of_highest
-   public :: find_next, find_edge, find_gap, negligible, list_peaks
+   public :: find_next, find_edge, find_gap, find_way_past, negligible, list_peaks
 
    !> Rise above both neighbours below which a maximum is round-off of the solutions, relative.
    real(wp), parameter :: round_off = 1.0e-7_wp
@@ -65,7 +66,7 @@ contains
       !> Rise above the mean position that may be found.
       real(wp), intent(out) :: promise
       logical, intent(out) :: done
-      real(wp) :: curvature, vertex, share
+      real(wp) :: curvature, vertex, share, mean
       logical :: left_is_known, right_is_known
 
       share = near
@@ -73,10 +74,11 @@ contains
       associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
                  right => samples%item(k + 1)%at)
          call vertex_of(left, middle, right, i, vertex, promise, curvature)
-         left_is_known = side_is_known(left, middle, right, i, share)
-         right_is_known = side_is_known(right, middle, left, i, share)
+         mean = position_of(left, middle, right, i)
+         left_is_known = side_is_known(left, middle, right, i, mean, share)
+         right_is_known = side_is_known(right, middle, left, i, mean, share)
          omega = within(vertex, left%omega, middle%omega, right%omega)
-         done = promise <= (1.0_wp + small_gain)*swing_of(middle, i, middle%mean(i))
+         done = promise <= (1.0_wp + small_gain)*swing_of(middle, i, mean)
          if (.not. done) then
             ! A vertex next to the middle tells nothing where a neighbour is far below.
             done = abs(omega - middle%omega) <= same_frequency*middle%omega
@@ -85,9 +87,9 @@ contains
          done = left_is_known .and. right_is_known
          if (done) return
          if (right_is_known) then
-            omega = beside(left, middle, i, curvature, share)
+            omega = beside(left, middle, i, mean, curvature, share)
          else
-            omega = beside(right, middle, i, curvature, share)
+            omega = beside(right, middle, i, mean, curvature, share)
          end if
          done = abs(omega - middle%omega) <= same_frequency*middle%omega
       end associate
@@ -95,27 +97,30 @@ contains
 
    !> Whether nothing higher can lie between the middle and a neighbour: it belongs to the peak, or
    !> what rises towards the middle from the other side cannot gain more on the way.
-   pure logical function side_is_known(side, middle, other, i, share) result(known)
+   pure logical function side_is_known(side, middle, other, i, mean, share) &
+      result(known)
       type(sample_type), intent(in) :: side, middle, other
       integer, intent(in) :: i
+      !> Position of the three [length].
+      real(wp), intent(in) :: mean
       !> Of the height, from which on a neighbour belongs to the peak.
       real(wp), intent(in) :: share
       real(wp) :: slope, swing
 
-      swing = swing_of(middle, i, middle%mean(i))
-      known = swing_of(side, i, middle%mean(i)) >= share*swing .or. &
+      swing = swing_of(middle, i, mean)
+      known = swing_of(side, i, mean) >= share*swing .or. &
               abs(side%omega - middle%omega) <= same_frequency*middle%omega
-      if (known .or. swing_of(other, i, middle%mean(i)) < share*swing) return
+      if (known .or. swing_of(other, i, mean) < share*swing) return
       slope = (middle%amplitude(i) - other%amplitude(i))/ &
               max(abs(middle%omega - other%omega), tiny(1.0_wp))
       known = slope*abs(side%omega - middle%omega) <= small_gain*swing
    end function side_is_known
 
    !> A frequency towards a neighbour that is far below, where the peak would have fallen a little.
-   pure real(wp) function beside(side, middle, i, curvature, share) result(omega)
+   pure real(wp) function beside(side, middle, i, mean, curvature, share) result(omega)
       type(sample_type), intent(in) :: side, middle
       integer, intent(in) :: i
-      real(wp), intent(in) :: curvature
+      real(wp), intent(in) :: mean, curvature
       !> What a neighbour should have of the height, at least.
       real(wp), intent(in) :: share
       !> Of the rise of 1/A**2 up to there.
@@ -126,7 +131,7 @@ contains
       half = 0.5_wp*abs(side%omega - middle%omega)
       distance = half
       if (curvature > 0.0_wp) then
-         distance = sqrt(rise/curvature)/swing_of(middle, i, middle%mean(i)) &
+         distance = sqrt(rise/curvature)/swing_of(middle, i, mean) &
                     /(2.0_wp*middle%omega)
       end if
       distance = min(max(distance, 2.0_wp*margin*half), half)
@@ -176,6 +181,47 @@ contains
          return
       end do
    end subroutine find_gap
+
+   !> A place just past a neighbour that stands far below a peak and next to it: on another branch,
+   !> while that of the peak may go on.
+   pure subroutine find_way_past(samples, k, i, side, omega, found)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      !> The neighbour.
+      integer, intent(out) :: side
+      !> [rad/s]
+      real(wp), intent(out) :: omega
+      logical, intent(out) :: found
+      !> Over what is known of the peak: how near the neighbour is, and how far to go past it.
+      real(wp), parameter :: next_to = 0.02_wp, past = 0.1_wp
+      real(wp) :: peak, mean, known
+      integer :: direction, j
+
+      omega = 0.0_wp
+      side = 0
+      found = .false.
+      mean = samples%item(k)%at%mean(i)
+      peak = swing_of(samples%item(k)%at, i, mean)
+      do direction = -1, 1, 2
+         side = k + direction
+         if (side <= 1 .or. side >= samples%n) cycle
+         if (samples%item(side)%at%is_edge) cycle
+         if (swing_of(samples%item(side)%at, i, mean) > near*peak) cycle
+         j = k - direction
+         do while (j > 1 .and. j < samples%n)
+            if (swing_of(samples%item(j)%at, i, mean) < near*peak) exit
+            j = j - direction
+         end do
+         if (j < 1 .or. j > samples%n) cycle
+         known = abs(samples%item(j)%at%omega - samples%item(k)%at%omega)
+         associate (at => samples%item(side)%at, next => samples%item(side + direction)%at)
+            found = abs(at%omega - samples%item(k)%at%omega) < next_to*known
+            if (.not. found) cycle
+            omega = at%omega + direction*min(past*known, 0.5_wp*abs(next%omega - at%omega))
+         end associate
+         return
+      end do
+   end subroutine find_way_past
 
    !> Whether the response falls from the peak all at once.
    pure logical function lies_on_jump(samples, k, i)
@@ -329,7 +375,10 @@ contains
          call find_next(samples, k, i, omega, promise, done)
          ! Lower ones are not looked at so closely.
          has_gap = place_of_highest(samples, i) == k
-         if (has_gap) call find_gap(samples, k, i, omega, from, has_gap)
+         if (has_gap) then
+            call find_gap(samples, k, i, omega, from, has_gap)
+            if (.not. has_gap) call find_way_past(samples, k, i, from, omega, has_gap)
+         end if
          peak%found_by = merge(found_row, found_search, at%row > 0)
          if (lies_on_jump(samples, k, i)) peak%found_by = found_jump
          if (.not. done .or. has_gap .or. any(failed > samples%item(k - 1)%at%omega .and. &

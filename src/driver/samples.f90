@@ -10,7 +10,8 @@ module fw_samples
    implicit none (type, external)
    private
 
-   public :: sample_type, sample_list, new_sample, phase_step, vertex_of, balance_point, swing_of
+   public :: sample_type, sample_list, new_sample, phase_step, vertex_of, balance_point
+   public :: swing_of, position_of
 
    type :: sample_type
       !> [rad/s]
@@ -32,6 +33,8 @@ module fw_samples
       real(wp) :: fraction(3) = -1.0_wp
       !> A search may start from here.
       logical :: is_needed = .false.
+      !> No way was found from a neighbour far above, on another branch, past this sample.
+      logical :: is_edge = .false.
    contains
       procedure :: forget
    end type sample_type
@@ -46,6 +49,7 @@ module fw_samples
       type(sample_pointer), allocatable :: item(:)
    contains
       procedure :: insert
+      procedure :: drop
       procedure :: thin
       procedure :: clear
    end type sample_list
@@ -105,6 +109,19 @@ contains
       self%item(place)%at = sample
       self%n = self%n + 1
    end subroutine insert
+
+   !> Forget a sample.
+   subroutine drop(self, place)
+      class(sample_list), intent(inout) :: self
+      integer, intent(in) :: place
+      integer :: i
+
+      deallocate (self%item(place)%at)
+      do i = place, self%n - 1
+         self%item(i) = self%item(i + 1)
+      end do
+      self%n = self%n - 1
+   end subroutine drop
 
    !> Drop every second sample that no search needs. Those that are left enclose the same maxima:
    !> what lies between them rises or falls all the way.
@@ -176,7 +193,8 @@ contains
    end function balance_point
 
    !> What an amplitude rises above a mean position: a static load moves every sample alike, and
-   !> must not make a small vibration look flat.
+   !> must not make a small vibration look flat. Contact moves samples of large vibration further:
+   !> a small one is measured from its own place then, else it would seem to rest.
    pure real(wp) function swing_of(sample, i, mean) result(swing)
       type(sample_type), intent(in) :: sample
       integer, intent(in) :: i
@@ -185,24 +203,34 @@ contains
       !> Part of an amplitude that is round-off.
       real(wp), parameter :: least = 1.0e-12_wp
 
-      swing = max(sample%amplitude(i) - mean, least*sample%amplitude(i))
+      swing = max(sample%amplitude(i) - min(mean, sample%mean(i)), least*sample%amplitude(i))
    end function swing_of
+
+   !> The one position from which three samples are measured: a parabola through them wants the same
+   !> for all.
+   pure real(wp) function position_of(left, middle, right, i) result(mean)
+      type(sample_type), intent(in) :: left, middle, right
+      integer, intent(in) :: i
+
+      mean = min(left%mean(i), middle%mean(i), right%mean(i))
+   end function position_of
 
    !> The parabola through three samples of which the middle one is the highest.
    pure subroutine vertex_of(left, middle, right, i, omega, amplitude, curvature)
       type(sample_type), intent(in) :: left, middle, right
       integer, intent(in) :: i
-      !> Of the vertex [rad/s], and its rise above the mean position of the middle; the middle where
-      !> there is none.
+      !> Of the vertex [rad/s], and its rise above the position of the three; the middle where there
+      !> is none.
       real(wp), intent(out) :: omega, amplitude
       !> Half of the second derivative of 1/A**2, A above the mean position, by omega**2.
       real(wp), intent(out) :: curvature
-      real(wp) :: s(2), g(2), slope, least, swing
+      real(wp) :: s(2), g(2), slope, least, swing, mean
 
-      swing = swing_of(middle, i, middle%mean(i))
+      mean = position_of(left, middle, right, i)
+      swing = swing_of(middle, i, mean)
       ! Steps from the middle.
       s = [left%omega, right%omega]**2 - middle%omega**2
-      g = [swing_of(left, i, middle%mean(i)), swing_of(right, i, middle%mean(i))]
+      g = [swing_of(left, i, mean), swing_of(right, i, mean)]
       omega = middle%omega
       amplitude = swing
       curvature = 0.0_wp
