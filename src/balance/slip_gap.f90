@@ -25,6 +25,12 @@ module fw_slip_gap
 
    !> g H above which friction is not solved.
    real(wp), parameter :: limit = 1.0_wp
+   !> The same where no pair that is judged has a mass of its own: below what ripple makes of it.
+   real(wp), parameter :: massless_limit = 3.0_wp
+   !> Mass of its own, as a part of what moves along with it, below which a pair has none.
+   real(wp), parameter :: least_mass = 1.0e-9_wp
+   !> Above every mode [rad/s].
+   real(wp), parameter :: above_all = 1.0e60_wp
    !> Slip below this part of Q/eps, in the mean of the pairs, is not judged: of pairs that hardly
    !> move, the ripple is all there is.
    real(wp), parameter :: least_slip = 0.05_wp
@@ -41,7 +47,8 @@ contains
       type(balance_state), intent(in) :: system
       !> (n_coordinates * n_coefficients).
       real(wp), intent(in), contiguous :: x(:)
-      real(wp) :: done, possible, slip, size_of_slip, all_slip, all_sizes
+      real(wp) :: done, possible, slip, size_of_slip, all_slip, all_sizes, most
+      logical :: governs, is_massive
       integer :: i
 
       lacks = .false.
@@ -51,18 +58,21 @@ contains
       possible = 0.0_wp
       all_slip = 0.0_wp
       all_sizes = 0.0_wp
+      most = massless_limit
       associate (problem => system%problem, &
                  p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
          if (.not. p%takes_balance) return
          do i = 1, problem%n_pairs
-            if (knows_tail(p, i) .or. .not. mass_governs(system, i)) cycle
+            call judge_mass(system, i, governs, is_massive)
+            if (knows_tail(p, i) .or. .not. governs) cycle
+            if (is_massive) most = limit
             call add_pair(system, size(system%balance, 1), x, i, done, possible, slip, size_of_slip)
             all_slip = all_slip + slip
             all_sizes = all_sizes + size_of_slip
          end do
          if (all_slip <= least_slip*all_sizes) return
          ! g H > limit, without a division by a path of zero.
-         lacks = maxval(problem%fourier%harmonic)*(possible - done) > limit*possible
+         lacks = maxval(problem%fourier%harmonic)*(possible - done) > most*possible
       end associate
    end function lacks_friction
 
@@ -76,23 +86,30 @@ contains
    end function knows_tail
 
    !> Whether the structure is a mass rather than a spring to a tangential direction of a pair, at
-   !> the first harmonic that the balance lacks.
-   pure logical function mass_governs(system, pair) result(governs)
+   !> the first harmonic that the balance lacks, and whether that is a mass of its own: one that
+   !> stays where every mode of the structure follows by its inertia.
+   pure subroutine judge_mass(system, pair, governs, is_massive)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: pair
-      real(wp) :: first, m, c, k
+      logical, intent(out) :: governs, is_massive
+      real(wp) :: first, m, c, k, own
       integer :: j
 
       governs = .false.
+      is_massive = .false.
       associate (problem => system%problem)
          first = (maxval(problem%fourier%harmonic) + 1)*system%frequency()
          do j = 1, 2
             if (problem%joint%row(j, pair) == 0) cycle
             call problem%structure%split(problem%coordinate_of(j, pair), first, m, c, k)
-            governs = governs .or. m*first**2 > k
+            if (m*first**2 <= k) cycle
+            governs = .true.
+            call problem%structure%split(problem%coordinate_of(j, pair), above_all, own, &
+                                         c, k)
+            is_massive = is_massive .or. own > least_mass*m
          end do
       end associate
-   end function mass_governs
+   end subroutine judge_mass
 
    !> Add int lambda v and int Q |v| of a pair; slip is its share of the latter times eps, and its
    !> size mean(Q)**2.
