@@ -11,7 +11,7 @@ module fw_lapack
 
    public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
-   public :: zggev, sgetrf, strsv
+   public :: zggev, sgetrf, strsv, dlaswp, dtrsm
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -66,6 +66,22 @@ module fw_lapack
          real(wp), intent(inout) :: a(lda, *)
          integer, intent(out) :: ipiv(*), info
       end subroutine dgetrf
+
+      !> Swap the rows k1 to k2 as the pivots say, forwards for incx = 1.
+      subroutine dlaswp(n, a, lda, k1, k2, ipiv, incx)
+         import :: wp
+         integer, intent(in) :: n, lda, k1, k2, ipiv(*), incx
+         real(wp), intent(inout) :: a(lda, *)
+      end subroutine dlaswp
+
+      !> B = alpha op(A)^-1 B or alpha B op(A)^-1 with a triangular A (side 'L', 'R').
+      subroutine dtrsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+         import :: wp
+         character, intent(in) :: side, uplo, transa, diag
+         integer, intent(in) :: m, n, lda, ldb
+         real(wp), intent(in) :: alpha, a(lda, *)
+         real(wp), intent(inout) :: b(ldb, *)
+      end subroutine dtrsm
 
       !> Solutions by the factors of dgetrf, in place of the right-hand sides.
       subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)

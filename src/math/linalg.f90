@@ -4,6 +4,7 @@ module fw_linalg
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_failure
+   use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgetrf
    use fw_lapack, only: dgetrs
@@ -12,6 +13,8 @@ module fw_linalg
    use fw_lapack, only: ztrsv
    use fw_lapack, only: dsyevd
    use fw_lapack, only: dsygvd
+   use fw_lu_in_parts, only: factor_in_parts
+   use fw_lu_in_parts, only: whole_up_to
    implicit none (type, external)
    private
 
@@ -62,12 +65,19 @@ contains
       allocate (self%matrix(n, n), self%pivot(n))
    end subroutine reserve_real
 
-   !> Factor the matrix in place; singular is true where a pivot is exactly zero.
-   subroutine factor_real(self, singular)
+   !> Factor the matrix in place; singular is true where a pivot is exactly zero, and where an
+   !> interrupt ended the work.
+   subroutine factor_real(self, singular, interrupt)
       class(lu_type), intent(inout) :: self
       logical, intent(out) :: singular
+      class(interrupt_type), pointer, intent(in), optional :: interrupt
       integer :: info
 
+      if (self%n > whole_up_to .and. present(interrupt)) then
+         call factor_in_parts(self%n, self%matrix, size(self%matrix, 1), self%pivot, singular, &
+                              interrupt)
+         return
+      end if
       call dgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
       singular = info /= 0
    end subroutine factor_real

@@ -34,7 +34,7 @@ contains
       call system%linearize(n)
       call self%lu%reserve(n)
       call system%assemble(self%lu%matrix)
-      call self%lu%factor(singular)
+      call self%lu%factor(singular, system%interrupt)
    end subroutine prepare
 
    !> The step for residuals r of the system, then of the conditions.

@@ -225,7 +225,7 @@ contains
 
       call self%lu%reserve(n)
       call system%assemble(self%lu%matrix)
-      call self%lu%factor(singular)
+      call self%lu%factor(singular, system%interrupt)
       self%factorizations = self%factorizations + 1
       done = .not. singular
       self%factored = done

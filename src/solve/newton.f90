@@ -76,7 +76,8 @@ contains
          if (report%interrupted) exit
          call self%linear%solve(system, self%r, forcing, self%step, done)
          report%iterations = report%iterations + 1
-         ! A singular derivative, or one that no linear solver copes with.
+         ! A singular derivative, one that no linear solver copes with, or a stop.
+         if (.not. done) report%interrupted = system%is_interrupted()
          if (.not. done) exit
          before = norm
          call search(self, system, x, norm, done)

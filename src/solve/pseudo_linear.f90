@@ -62,7 +62,7 @@ contains
       if (self%direct) then
          call self%lu%reserve(n_linear)
          call system%assemble(self%lu%matrix)
-         call self%lu%factor(singular)
+         call self%lu%factor(singular, system%interrupt)
          done = .not. singular
       else
          ! Without a shift of its own: the system knows that one is set.
