@@ -10,20 +10,20 @@ module fw_point
    public :: served_words, served_by_none, served_by_newton, served_by_other_guess, &
              served_by_smaller_steps, served_by_raised_load, served_by_pseudo_time, &
              served_by_free_guess, served_by_powell, served_by_kinsol, served_by_arclength, &
-             served_by_other_balance
+             served_by_other_balance, served_by_integration
 
    !> What gave the solution of a point, in the order of the constants, from 0. The solver that the
    !> case asks for has its own word where its first guess was enough; the words of the fallbacks
    !> say from where Newton's method (or that solver) reached the solution.
-   character(*), parameter :: served_words(0:10) = &
+   character(*), parameter :: served_words(0:11) = &
       [character(13) :: 'none', 'newton', 'other guess', 'pseudo-time', 'smaller steps', &
        'raised load', 'free guess', 'powell', 'kinsol', 'arclength', &
-       'other balance']
+       'other balance', 'integration']
    integer, parameter :: served_by_none = 0, served_by_newton = 1, served_by_other_guess = 2, &
                          served_by_pseudo_time = 3, served_by_smaller_steps = 4, &
                          served_by_raised_load = 5, served_by_free_guess = 6, &
                          served_by_powell = 7, served_by_kinsol = 8, served_by_arclength = 9, &
-                         served_by_other_balance = 10
+                         served_by_other_balance = 10, served_by_integration = 11
 
    !> Derivatives of one quantity by one parameter, or the deviation of the quantity.
    type :: point_sensitivity

@@ -18,6 +18,7 @@ module fw_known_tail
    use fw_balance_state, only: balance_state
    use fw_fourier, only: to_complex
    use fw_fourier, only: to_real
+   use fw_kept_modes, only: complete_modes
    use fw_kinds, only: wp
    use fw_linalg, only: complex_lu_type
    use fw_linear_step, only: linear_step_type
@@ -97,7 +98,7 @@ contains
       call self%linear%prepare(system, done)
       if (.not. done) return
       call carry_solution(system, self%coarse, self%finer, self%x)
-      call complete(self, done)
+      call complete_modes(self%finer, self%n_kept, self%x, done)
       if (.not. done) return
       call self%finer%residual(self%x, self%r)
       call answer_above(self, done)
@@ -164,7 +165,7 @@ contains
       tail = self%x
       call carry_solution(system, self%coarse, self%finer, self%x)
       call join(self%n_kept, self%finer, tail, self%x)
-      call complete(self, done)
+      call complete_modes(self%finer, self%n_kept, self%x, done)
       if (.not. done) return
       call move_alloc(self%coefficients, before)
       call observe(self, self%coefficients)
@@ -306,37 +307,6 @@ contains
          end do
       end associate
    end subroutine add_pairs
-
-   !> Internal modes that are coordinates follow the others, in harmonics up to H: the balance of N
-   !> harmonics may keep more of them.
-   subroutine complete(self, done)
-      class(known_tail), intent(inout) :: self
-      logical, intent(out) :: done
-      type(complex_lu_type) :: lu
-      complex(wp), allocatable :: z(:, :), q(:, :), rhs(:, :)
-      logical :: singular
-      integer :: h, m, n
-
-      done = .true.
-      m = self%problem%structure%n_coordinates
-      n = self%problem%structure%n_relative
-      if (m == n) return
-      allocate (z(m, m), q(m, self%problem%fourier%n_retained), rhs(m - n, 1))
-      call to_complex(self%problem%fourier, m, self%x, q)
-      call lu%reserve(m - n)
-      do h = 1, self%problem%fourier%n_retained
-         if (self%problem%fourier%harmonic(h) > self%n_kept) exit
-         call self%problem%structure%block(self%finer%structure_state, h, z)
-         lu%matrix = z(n + 1:, n + 1:)
-         rhs(:, 1) = self%finer%structure_state%load(n + 1:, h) - matmul(z(n + 1:, :n), q(:n, h))
-         call lu%factor(singular)
-         done = .not. singular
-         if (singular) return
-         call lu%solve(1, rhs)
-         q(n + 1:, h) = rhs(:, 1)
-      end do
-      call to_real(self%problem%fourier, m, q, self%x)
-   end subroutine complete
 
    !> Observed coefficients of the present answer, its tail among them.
    subroutine observe(self, coefficients)

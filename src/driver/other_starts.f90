@@ -1,6 +1,7 @@
 !> Starts for a point that no way of its own balance reaches: the solutions of easier balances of
-!> the same case. In the order that pays:
+!> the same case, or its integration in time. In the order that pays:
 !>
+!> * a few periods of integration in time, where that costs little;
 !> * with fewer harmonics, lifted from level to level: slow stick-slip, whose many harmonics of a
 !>   square wave let Newton's method wander, has a smooth beginning. The level that led there goes
 !>   along with the sweep, so that the next points that fail have a start at the price of its own;
@@ -8,11 +9,15 @@
 module fw_other_starts
    use fw_case, only: case_type
    use fw_error, only: error_type
+   use fw_integrated_start, only: can_integrate
+   use fw_integrated_start, only: integrate_a_few
    use fw_kinds, only: wp
    use fw_level, only: harmonic_levels
    use fw_level, only: level_type
    use fw_point, only: point_type
+   use fw_point, only: served_by_integration
    use fw_point, only: served_by_other_balance
+   use fw_point_solver, only: point_solver
    use fw_strategy, only: point_request
    use fw_text, only: to_text
    implicit none (type, external)
@@ -26,6 +31,13 @@ module fw_other_starts
    !> Times the stiffness of elastic pairs, and times the eps of rigid ones: softer ones lead on to
    !> stiffer ones; for eps there is no such order.
    real(wp), parameter :: softer(3) = [0.03_wp, 0.1_wp, 0.3_wp], other_eps(2) = [3.0_wp, 0.3_wp]
+
+   !> What a solver knows, to be given back where a start leads nowhere.
+   type :: known_solutions
+      real(wp), allocatable :: last(:), before(:)
+      real(wp) :: omega_last = 0.0_wp, omega_before = 0.0_wp
+      integer :: n_converged = 0, point_failures = 0
+   end type known_solutions
 
 contains
 
@@ -41,31 +53,45 @@ contains
       logical, intent(in) :: everywhere
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
-      integer :: work, harmonics, spent
+      integer :: work, harmonics, served, spent
       logical :: done
 
       work = 0
       spent = point%iterations
+      served = served_by_other_balance
       done = .false.
       if (associated(below)) then
          harmonics = below%harmonics%n_harmonics
          call from_below(case, below, level, request, point, work, done, error)
          if (allocated(error)) return
       end if
+      if (done) point%note = trim(started_from(harmonics))
+      if (.not. done .and. everywhere .and. can_integrate(case, level)) then
+         call by_integration(case, level, request, point, spent, done, error)
+         if (allocated(error)) return
+         if (done) served = served_by_integration
+         if (done) point%note = 'started from some periods of integration in time'
+      end if
       if (.not. done .and. everywhere) then
          call by_fewer_harmonics(case, level, below, request, point, work, done, harmonics, error)
          if (allocated(error)) return
+         if (done) point%note = trim(started_from(harmonics))
       end if
-      if (done) then
-         point%note = 'started from '//to_text(harmonics)//' harmonics'
-      else if (everywhere .and. case%contact%n_pairs > 0 .and. work < most_work) then
+      if (.not. done .and. everywhere .and. case%contact%n_pairs > 0 .and. work < most_work) then
          call by_stiffness(case, level, request, point, work, done, error)
          if (allocated(error)) return
          if (done) point%note = 'started from another stiffness of its pairs'
       end if
       point%iterations = spent + work
-      if (done) point%served_by = served_by_other_balance
+      if (done) point%served_by = served
    end subroutine start_elsewhere
+
+   pure function started_from(harmonics) result(words)
+      integer, intent(in) :: harmonics
+      character(40) :: words
+
+      words = 'started from '//to_text(harmonics)//' harmonics'
+   end function started_from
 
    !> A step of the level with fewer harmonics, and from there.
    subroutine from_below(case, below, level, request, point, work, done, error)
@@ -239,50 +265,98 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Whether every way of its own balance is gone from there (default).
       logical, intent(in), optional :: deep
+      type(known_solutions) :: known
+
+      known = solutions_of(level%solver)
+      call level%take_over(last)
+      call go_from_here(case, level, known, request, point, work, done, error, deep)
+   end subroutine arrive
+
+   !> From the last period of an integration. What this way spends says nothing of the others, nor
+   !> theirs of it.
+   subroutine by_integration(case, level, request, point, spent, done, error)
+      type(case_type), intent(in) :: case
+      type(level_type), intent(inout), target :: level
+      type(point_request), intent(in) :: request
+      type(point_type), intent(inout) :: point
+      !> Iterations.
+      integer, intent(inout) :: spent
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: x(:)
+      type(known_solutions) :: known
+      integer :: work
+
+      call integrate_a_few(case, level, request, x, done, error)
+      if (allocated(error) .or. .not. done) return
+      known = solutions_of(level%solver)
+      call level%solver%know(x, request%place())
+      work = 0
+      call go_from_here(case, level, known, request, point, work, done, error)
+      spent = spent + work
+   end subroutine by_integration
+
+   !> Solve from what the solver has just been given; it takes back what it knew where that fails.
+   subroutine go_from_here(case, level, known, request, point, work, done, error, deep)
+      type(case_type), intent(in) :: case
+      type(level_type), intent(inout), target :: level
+      type(known_solutions), intent(in) :: known
+      type(point_request), intent(in) :: request
+      type(point_type), intent(inout) :: point
+      integer, intent(inout) :: work
+      logical, intent(out) :: done
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: deep
       type(point_request) :: plain
-      logical :: goes_deep
       type(point_type) :: trial
-      real(wp), allocatable :: x(:), before(:)
-      real(wp) :: omega, omega_before
-      integer :: n, failures
+      logical :: goes_deep
 
       done = .false.
-      associate (solver => level%solver)
-         ! What the solver knows is given back where this leads nowhere.
-         x = solver%last
-         before = solver%before
-         omega = solver%omega_last
-         omega_before = solver%omega_before
-         n = solver%n_converged
-         failures = solver%point_failures
-         call level%take_over(last)
-         plain = request
-         plain%fallback = .false.
+      plain = request
+      plain%fallback = .false.
+      call level%solve(case, plain, trial, error)
+      if (allocated(error)) return
+      work = work + trial%iterations
+      goes_deep = work < most_work
+      if (present(deep)) goes_deep = goes_deep .and. deep
+      if (.not. trial%converged .and. goes_deep) then
+         ! Pseudo-time flows on from here, where Newton's method has gone astray.
+         plain%fallback = .true.
+         level%solver%flow_failures = 0
          call level%solve(case, plain, trial, error)
          if (allocated(error)) return
          work = work + trial%iterations
-         goes_deep = work < most_work
-         if (present(deep)) goes_deep = goes_deep .and. deep
-         if (.not. trial%converged .and. goes_deep) then
-            ! Pseudo-time flows on from here, where Newton's method has gone astray.
-            plain%fallback = .true.
-            solver%flow_failures = 0
-            call level%solve(case, plain, trial, error)
-            if (allocated(error)) return
-            work = work + trial%iterations
-         end if
-         done = trial%converged
-         if (done) then
-            point = trial
-            return
-         end if
-         solver%last = x
-         solver%before = before
-         solver%omega_last = omega
-         solver%omega_before = omega_before
-         solver%n_converged = n
-         solver%point_failures = failures
-      end associate
-   end subroutine arrive
+      end if
+      done = trial%converged
+      if (done) then
+         point = trial
+      else
+         call give_back(known, level%solver)
+      end if
+   end subroutine go_from_here
+
+   pure function solutions_of(solver) result(known)
+      type(point_solver), intent(in) :: solver
+      type(known_solutions) :: known
+
+      known%last = solver%last
+      known%before = solver%before
+      known%omega_last = solver%omega_last
+      known%omega_before = solver%omega_before
+      known%n_converged = solver%n_converged
+      known%point_failures = solver%point_failures
+   end function solutions_of
+
+   pure subroutine give_back(known, solver)
+      type(known_solutions), intent(in) :: known
+      type(point_solver), intent(inout) :: solver
+
+      solver%last = known%last
+      solver%before = known%before
+      solver%omega_last = known%omega_last
+      solver%omega_before = known%omega_before
+      solver%n_converged = known%n_converged
+      solver%point_failures = known%point_failures
+   end subroutine give_back
 
 end module fw_other_starts

@@ -6,6 +6,7 @@
 !> both each other and the ground) become combinations of the coordinates.
 module fw_relative
    use fw_kinds, only: wp
+   use fw_linalg, only: lu_type
    implicit none (type, external)
    private
 
@@ -28,6 +29,8 @@ module fw_relative
       real(wp), allocatable :: c(:, :), r(:, :)
       !> Whether a row introduced a coordinate, or depends on earlier rows (n_rows).
       logical, allocatable :: independent(:)
+   contains
+      procedure :: rows => rows_of_dofs
    end type relative_type
 
    !> Entries below this are round-off of the elimination, which adds and subtracts +-1.
@@ -160,5 +163,28 @@ contains
       self%free = pack([(i, i=1, self%n_dof)], is_free)
       self%r = echelon(:m, self%free)
    end subroutine finish
+
+   !> The coordinates as combinations of the dofs, q = rows u (n_coordinates, n_dof).
+   subroutine rows_of_dofs(self, rows)
+      class(relative_type), intent(in) :: self
+      real(wp), allocatable, intent(out) :: rows(:, :)
+      type(lu_type) :: lu
+      logical :: singular
+      integer :: i, j
+
+      allocate (rows(self%n_coordinates, self%n_dof), source=0.0_wp)
+      if (self%n_coordinates == 0) return
+      do i = 1, self%n_coordinates
+         rows(i, self%pivot(i)) = 1.0_wp
+      end do
+      rows(:, self%free) = self%r
+      call lu%reserve(self%n_coordinates)
+      lu%matrix = self%c
+      ! Regular: the rows are independent.
+      call lu%factor(singular)
+      do j = 1, self%n_dof
+         if (maxval(abs(rows(:, j))) > 0.0_wp) call lu%solve(rows(:, j))
+      end do
+   end subroutine rows_of_dofs
 
 end module fw_relative

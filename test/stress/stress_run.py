@@ -26,7 +26,7 @@ INLINE_DOFS = 12
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "HDF5_USE_FILE_LOCKING": "FALSE"}
 # Words of `served_by` for what is tried where the first guess fails.
 FALLBACKS = ("other guess", "pseudo-time", "smaller steps", "raised load", "free guess",
-             "other balance")
+             "other balance", "integration")
 # What a message has to say for a failure to be one in words: what to try.
 REMEDIES = ("needs", "need ", "use ", "try ", "give it", "check ", "raise", "smaller", "help")
 
