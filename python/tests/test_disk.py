@@ -118,7 +118,7 @@ def test_what_no_disk_can_be_made_of(tmp_path: Path, capsys: pytest.CaptureFixtu
         DiskParameters(blade_angle=11.0)
     with pytest.raises(ParameterError, match="rim_radius"):
         DiskParameters(rim_radius=50.0)
-    with pytest.raises(ParameterError, match="axial_patches = 6 .* at most 5"):
+    with pytest.raises(ParameterError, match=r"axial_patches = 6 .* at most 5"):
         DiskParameters(axial_patches=6)
     assert main(["-o", str(tmp_path / "a.h5"), "--n-sectors", "2"]) == 3
     assert "n_sectors = 2" in capsys.readouterr().err
