@@ -123,8 +123,8 @@ bench-time: build ## harmonic balance against integration in time
 	PYTHONPATH=python $(PYTHON) -m bench.run time
 
 # Models that are not there yet are generated into build/bench first; 768 pairs take long.
-bench-scaling: build ## time and memory of a frequency, 16 to 768 pairs and 1 to 31 harmonics
-	PYTHONPATH=python $(PYTHON) -m bench.run scaling
+bench-scaling: build ## time and memory of a frequency, 16 to 768 pairs, beside BEFORE=fw_run
+	PYTHONPATH=python $(PYTHON) -m bench.run scaling $(if $(BEFORE),--before $(BEFORE))
 
 bench-limit: build ## where the time goes against its floor, and what is skipped
 	PYTHONPATH=python $(PYTHON) -m bench.run limit skips

@@ -1,6 +1,6 @@
 """Measure, and write docs/benchmarks.md with its pictures and pages.
 
-    python -m bench.run [PART ...] [--build build/release] [--quick] [-o docs]
+    python -m bench.run [PART ...] [--build build/release] [--before fw_run] [--quick] [-o docs]
 
 Parts: speed, precision, events, solvers, paper, iterations, aliasing, time, scaling, limit, skips,
 peers, or all; without any, speed. A part replaces its page, docs/benchmarks/PART.md, and the
@@ -39,7 +39,8 @@ from bench.solvers.many_starts import measure_solvers
 from bench.solvers.report import write_solvers
 from bench.speed.limit import measure_limit, write_limit
 from bench.speed.report import Measurements, write_speed
-from bench.speed.scaling import measure_scaling, write_scaling
+from bench.speed.scaling import measure_scaling
+from bench.speed.scaling_report import write_scaling
 from bench.speed.skips import measure_skips, write_skips
 
 
@@ -55,6 +56,7 @@ class Job:
     images : folder of the pictures
     step : says what is being measured
     peer_python : interpreter that may have pyHarm
+    before : another fw_run that is measured beside it, or None
     """
 
     bench: Bench
@@ -63,6 +65,7 @@ class Job:
     images: Path
     step: Callable[[str], None]
     peer_python: Path = Path(sys.executable)
+    before: Path | None = None
 
     def program(self, name: str) -> Path:
         """A measuring program, built if need be."""
@@ -130,7 +133,8 @@ def peers(job: Job) -> str:
 
 def scaling(job: Job) -> str:
     """Time and memory against pairs and harmonics."""
-    return write_scaling(job.images, *measure_scaling(job.bench, job.step))
+    other = Bench(job.before, job.work / "before", job.bench.quick) if job.before else None
+    return write_scaling(job.images, measure_scaling(job.bench, job.step, other))
 
 
 def limit(job: Job) -> str:
@@ -160,6 +164,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="only try the scripts")
     parser.add_argument("--peer-python", type=Path, default=Path(sys.executable),
                         help="Python with pyharm-os, for the part peers")
+    parser.add_argument("--before", type=Path,
+                        help="another fw_run, for the part scaling: measured beside this one")
     parser.add_argument("-o", "--output", type=Path, help="folder of the report (default: docs)")
     options = parser.parse_args()
     parts = list(ORDER) if "all" in options.parts else options.parts

@@ -1,42 +1,43 @@
-"""Time and memory of a frequency against the number of pairs and of harmonics, with exponents."""
+"""Time and memory of a frequency against the number of pairs and of harmonics, and of two threads.
+
+Another program, one from before a change, runs every case right before this one does.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import os
+import statistics
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 from scipy.linalg import eigh
 
-from bench.common.layout import COLOURS, table
-from bench.common.measure import Bench, Cost, Run
+from bench.common.measure import Bench, Cost, Groups, Run
 from bench.common.sector import COARSE, FAST, case, sector_file
 
-__all__ = ["Measured", "measure_scaling", "write_scaling"]
+__all__ = ["Measured", "Scaling", "Threads", "measure_scaling"]
 
 PAIRS = (16, 48, 96, 192, 384, 768)
 HARMONICS = (1, 3, 7, 17, 31)
 #: Most unknowns that are measured: beyond, a frequency takes minutes.
 MOST_UNKNOWNS = 41000
 N_TIME = 128
-#: Instants and harmonics of the paper's table, the cost ratio that is wanted, and the paper's.
-PAPER_TIME, PAPER_HARMONICS, WANTED_RATIO, PAPER_RATIO = 105, (1, 17), 12.0, 521.0
+#: Instants and harmonics of the paper's table.
+PAPER_TIME, PAPER_HARMONICS = 105, (1, 17)
+#: Pairs and harmonics that two threads are measured on, and how often each is run.
+THREADED_PAIRS, THREADED_HARMONICS, THREADED_RUNS = (48, 96, 192, 384), (3, 7, 17), 3
+#: Most harmonics that the other program is measured on: what it took longest for.
+OTHER_HARMONICS = 17
 #: Friction moves the peak from the stuck frequency by this share of it.
 PEAK_SHIFT = -5e-4
 #: Spacing of the frequencies [Hz]; how many there are falls with the size of the problem.
 SPACING, MOST_POINTS, FEWEST_POINTS = 0.25, 9, 3
-#: Pairs and harmonics whose lines show where the growth comes from.
-MIDDLE = 192, 7
 #: Unknowns up to which there are the most points, and a median of several runs.
 SMALL, REPEATS = 6000, 3
-#: Size of a real matrix of the order of the unknowns [MB] from where memory tells that none is.
-TELLING = 200.0
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class Measured:
     """A size: seconds of a frequency and of everything before, memory [MB], and counts.
 
     `stuck` is the first natural frequency [Hz] with every pair stuck, `peak` the largest tip
-    amplitude found [mm]; Newton steps and GMRES iterations are means of a frequency.
+    amplitude found [mm]; Newton steps and GMRES iterations are means of a frequency. `before` and
+    `memory_before` are those of the other program, NaN where there is none.
     """
 
     pairs: int
@@ -60,6 +62,8 @@ class Measured:
     points: int
     stuck: float
     peak: float
+    before: float = math.nan
+    memory_before: float = math.nan
 
     @property
     def full_matrix(self) -> float:
@@ -67,17 +71,54 @@ class Measured:
         return 8e-6 * self.unknowns**2
 
 
-def measure_scaling(bench: Bench, step: Callable[[str], None]
-                    ) -> tuple[list[Measured], list[Measured]]:
-    """Every size, and both ends of the paper's table with its number of instants."""
+@dataclass(frozen=True)
+class Threads:
+    """Wall time of a frequency [s] in one thread and in two."""
+
+    pairs: int
+    n_harmonics: int
+    one: float
+    two: float
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Every size, both ends of the paper's table with its number of instants, and two threads."""
+
+    rows: list[Measured]
+    paper: list[Measured]
+    threads: list[Threads]
+
+
+def measure_scaling(bench: Bench, step: Callable[[str], None], other: Bench | None = None
+                    ) -> Scaling:
+    """All of it; the other program, where there is one, up to OTHER_HARMONICS harmonics."""
     sizes = PAIRS[:2] if bench.quick else PAIRS
     rows = []
     for pairs in sizes:
         step(f"{pairs} pairs")
-        rows += [measure_size(bench, pairs, n) for n in HARMONICS[:2 if bench.quick else None]
+        rows += [measure_size(bench, pairs, n, other=other if n <= OTHER_HARMONICS else None)
+                 for n in HARMONICS[:2 if bench.quick else None]
                  if unknowns_of(pairs, n) <= MOST_UNKNOWNS]
     paper = [measure_size(bench, PAIRS[0], n, PAPER_TIME) for n in PAPER_HARMONICS]
-    return rows, paper
+    step("two threads")
+    return Scaling(rows, paper, measure_two_threads(bench))
+
+
+def measure_two_threads(bench: Bench) -> list[Threads]:
+    """One thread and two by turns, the fastest of each."""
+    if len(os.sched_getaffinity(0)) < 2:
+        return []
+    rows = []
+    for pairs in THREADED_PAIRS[:1] if bench.quick else THREADED_PAIRS:
+        for n in THREADED_HARMONICS[:1] if bench.quick else THREADED_HARMONICS:
+            if unknowns_of(pairs, n) > MOST_UNKNOWNS:
+                continue
+            groups = groups_of(bench, pairs, n, FEWEST_POINTS)[0]
+            runs = [[bench.run(groups, threads).seconds.mean() for threads in (1, 2)]
+                    for _ in range(1 if bench.quick else THREADED_RUNS)]
+            rows.append(Threads(pairs, n, *(float(min(times)) for times in zip(*runs))))
+    return rows
 
 
 def unknowns_of(pairs: int, n_harmonics: int) -> int:
@@ -95,184 +136,38 @@ def stuck_frequency(path: Path) -> float:
     return float(np.sqrt(eigh(stiffness, mass, eigvals_only=True)[0]) / (2.0 * math.pi))
 
 
-def measure_size(bench: Bench, pairs: int, n_harmonics: int, n_time: int = N_TIME) -> Measured:
-    """A sweep down through the peak; the first frequency starts from nothing and is left out."""
+def groups_of(bench: Bench, pairs: int, n_harmonics: int, n_points: int) -> tuple[Groups, float]:
+    """A sweep down through the peak, and the stuck frequency [Hz]."""
     path = sector_file(pairs, bench.folder, COARSE)
     stuck = stuck_frequency(path)
-    small = unknowns_of(pairs, n_harmonics) <= SMALL and not bench.quick
-    n_points = MOST_POINTS if small else FEWEST_POINTS
     centre, half = stuck * (1.0 + PEAK_SHIFT), 0.5 * SPACING * (n_points - 1)
     sweep = {"start": centre + half, "end": centre - half, "n_points": n_points, "unit": "Hz"}
-    groups = case(pairs, n_harmonics, sweep, "krylov", path)
+    return case(pairs, n_harmonics, sweep, "krylov", path), stuck
+
+
+def measure_size(bench: Bench, pairs: int, n_harmonics: int, n_time: int = N_TIME,
+                 other: Bench | None = None) -> Measured:
+    """The first frequency of a sweep starts from nothing and is left out."""
+    small = unknowns_of(pairs, n_harmonics) <= SMALL and not bench.quick
+    n_points = MOST_POINTS if small else FEWEST_POINTS
+    groups, stuck = groups_of(bench, pairs, n_harmonics, n_points)
     groups["harmonics"]["n_time"] = n_time
     repeats = REPEATS if small else 1
-    found = [bench.run_and_weigh(groups) for _ in range(repeats)]
+    before, found = [], []
+    for _ in range(repeats):
+        if other:
+            before.append(other.run_and_weigh(groups))
+        found.append(bench.run_and_weigh(groups))
     run, cost = sorted(found, key=lambda one: processor_seconds(*one))[repeats // 2]
     return Measured(pairs, n_harmonics, processor_seconds(run, cost),
                     cost.processor - cost.share * float(run.seconds.sum()),
                     cost.memory, run.unknowns, run.unknowns_left, float(run.iterations.mean()),
                     cost.krylov_iterations / n_points, run.usable, n_points, stuck,
-                    float(run.amplitude[:, 0].max()))
+                    float(run.amplitude[:, 0].max()),
+                    *((statistics.median(processor_seconds(*one) for one in before),
+                       before[0][1].memory) if before else ()))
 
 
 def processor_seconds(run: Run, cost: Cost) -> float:
     """Of one frequency behind the first: its wall time times the share that the run had."""
     return float(run.seconds[1:].mean()) * cost.share
-
-
-def exponent(x: Sequence[float], y: Sequence[float]) -> float:
-    """Slope of a straight line through the logarithms."""
-    return float(np.polyfit(np.log(x), np.log(y), 1)[0]) if len(x) > 1 else math.nan
-
-
-def write_scaling(images: Path, rows: list[Measured], paper: list[Measured]) -> str:
-    """The part of the document."""
-    draw(images / "benchmark_scaling.png", rows)
-    columns = ("pairs", "H", "unknowns", "in linear problems", "usable", "Newton steps",
-               "GMRES iterations", "time [ms]", "set-up [s]", "memory [MB]", "full matrix [MB]")
-    return "\n".join([
-        "## Scaling", "",
-        "Bladed-disk sector at 4400 rpm with finer and finer flanks and a mesh away from them that "
-        f"is coarser than the default (`python -m fretwear.sector --pairs N {coarse_options()}`), "
-        f"tip force 0.5 N, `n_time = {N_TIME}`, `linear = 'krylov'`, one thread; {MOST_POINTS} "
-        f"frequencies around the peak, {SPACING:g} Hz apart ({FEWEST_POINTS} above {SMALL} "
-        f"unknowns). Sizes of more than {MOST_UNKNOWNS} unknowns are left out: a frequency takes "
-        "minutes. Steps, iterations and times are means of a frequency, times in processor "
-        "seconds without the first frequency, which starts from the linear solution; "
-        f"up to {SMALL} unknowns medians of {REPEATS} runs. "
-        "Set-up is everything that is done once: reading the model, modes, room. Memory is "
-        "the peak of the process; a real matrix of the order of the unknowns would take the "
-        "last column alone.",
-        "",
-        *table(columns, ((r.pairs, r.n_harmonics, r.unknowns, r.unknowns_left,
-                          f"{r.usable} of {r.points}", f"{r.newton:.1f}", f"{r.krylov:.0f}",
-                          f"{1e3 * r.seconds:.3g}", f"{r.setup:.2f}", f"{r.memory:.0f}",
-                          f"{r.full_matrix:.3g}") for r in rows)),
-        "", "![Time and memory against pairs and harmonics](images/benchmark_scaling.png)", "",
-        *largest_matrix(rows), "",
-        "### Exponents", "",
-        "Least-squares slopes of the logarithms over all sizes of a line; beside them the slope "
-        "of one GMRES iteration, which is free of how many steps and iterations a size takes. "
-        "Targets: linear in H, no worse than quadratic in the pairs.",
-        "", *exponents(rows), *reasons(rows), "",
-        "### Many harmonics against one", "", *over_harmonics(paper), "",
-        "### Finer flanks", "", *finer_flanks(rows)])
-
-
-def coarse_options() -> str:
-    """The mesh away from the flanks, on the command line of the generator."""
-    return " ".join(f"--{key} {value}" for key, value in COARSE.items())
-
-
-def largest_matrix(rows: list[Measured]) -> list[str]:
-    """Whether memory allows a matrix of the order of the unknowns."""
-    large = [r for r in rows if r.full_matrix > TELLING]
-    if not large:
-        return []
-    worst = max(large, key=lambda r: r.memory / r.full_matrix)
-    if worst.memory >= worst.full_matrix:
-        return [f"Memory does not rule out a matrix of the order of the unknowns at {worst.pairs} "
-                f"pairs, H = {worst.n_harmonics}."]
-    share = 100.0 * worst.memory / worst.full_matrix
-    return ["There is no matrix of the order of the unknowns: where one would take more than "
-            f"{TELLING:g} MB, the whole process takes {share:.0f} % of it at most ({worst.pairs} "
-            f"pairs, H = {worst.n_harmonics})."]
-
-
-def exponents(rows: list[Measured]) -> list[str]:
-    """Tables of slopes over pairs for each H, and over H for each number of pairs."""
-    lines = []
-    for fixed, varied, target in (("n_harmonics", "pairs", 2.0), ("pairs", "n_harmonics", 1.0)):
-        cells = []
-        for value in sorted({getattr(r, fixed) for r in rows}):
-            mine = [r for r in rows if getattr(r, fixed) == value]
-            x = [getattr(r, varied) for r in mine]
-            slopes = [exponent(x, y) for y in ([r.seconds for r in mine],
-                                               [r.seconds / max(r.krylov, 1.0) for r in mine],
-                                               [r.memory for r in mine])]
-            verdict = "met" if slopes[0] <= target else f"missed by {slopes[0] - target:.2f}"
-            cells.append((value, *(f"{slope:.2f}" for slope in slopes), f"{target:g}: {verdict}"))
-        names = {"pairs": "pairs", "n_harmonics": "H"}
-        over = names[varied]
-        lines += [*table((names[fixed], f"time over {over}", f"time of an iteration over {over}",
-                          f"memory over {over}", "target of the time"), cells), ""]
-    return lines[:-1]
-
-
-def reasons(rows: list[Measured]) -> list[str]:
-    """What of the growth is no work of an iteration."""
-    pairs = [r for r in rows if r.n_harmonics == MIDDLE[1]]
-    harmonics = [r for r in rows if r.pairs == MIDDLE[0]]
-    if len(pairs) < 2 or len(harmonics) < 2:
-        return []
-    (few, many), (low, high) = ((line[0], line[-1]) for line in (pairs, harmonics))
-    return [f"What is above the targets is the number of steps and iterations: from {few.pairs} to "
-            f"{many.pairs} pairs (H = {few.n_harmonics}) the Newton steps of a frequency grow from "
-            f"{few.newton:.1f} to {many.newton:.1f}, because more pairs change between stick and "
-            f"slip on the way, and the GMRES iterations of a step from "
-            f"{few.krylov / few.newton:.0f} to {many.krylov / many.newton:.0f}. From H = "
-            f"{low.n_harmonics} to {high.n_harmonics} ({low.pairs} pairs) the steps grow from "
-            f"{low.newton:.1f} to {high.newton:.1f}, and the iterations of a step from "
-            f"{low.krylov / low.newton:.0f} to {high.krylov / high.newton:.0f}: the preconditioner "
-            "takes each harmonic by itself, and slip couples them."]
-
-
-def over_harmonics(paper: list[Measured]) -> list[str]:
-    """What many harmonics cost with the instants of the paper."""
-    few, many = paper
-    ratio = many.seconds / few.seconds
-    verdict = "met" if ratio <= WANTED_RATIO else "missed"
-    return [f"{few.pairs} pairs, `n_time = {PAPER_TIME}`: H = {many.n_harmonics} takes "
-            f"{1e3 * many.seconds:.3g} ms, H = {few.n_harmonics} takes {1e3 * few.seconds:.3g} ms, "
-            f"{ratio:.1f} times less (target at most {WANTED_RATIO:g}: {verdict}; "
-            f"{PAPER_RATIO:g} in the paper's table)."]
-
-
-def finer_flanks(rows: list[Measured]) -> list[str]:
-    """That all sizes are the same sector: stuck frequency and peak, H = 3."""
-    mine = [r for r in rows if r.n_harmonics == HARMONICS[1]]
-    finest = mine[-1]
-    return ["All sizes are the same sector on meshes that follow the flanks: first frequency with "
-            "every pair stuck, and peak of the tip at the frequencies measured, H = 3.", "",
-            *table(("pairs", "stuck [Hz]", "of the finest", "peak [mm]", "of the finest"),
-                   ((r.pairs, f"{r.stuck:.1f}", f"{100 * (r.stuck / finest.stuck - 1):+.2f} %",
-                     f"{r.peak:.4f}", f"{100 * (r.peak / finest.peak - 1):+.1f} %")
-                    for r in mine))]
-
-
-def draw(path: Path, rows: list[Measured]) -> None:
-    """Time against pairs and against harmonics, memory against pairs."""
-    figure = Figure(figsize=(9.6, 3.6), dpi=130, layout="constrained")
-    over_pairs, over_h, memory = figure.subplots(1, 3)
-    by_harmonics = [(f"H = {n}", [r for r in rows if r.n_harmonics == n])
-                    for n in sorted({r.n_harmonics for r in rows})]
-    by_pairs = [(f"{n} pairs", [r for r in rows if r.pairs == n])
-                for n in sorted({r.pairs for r in rows})]
-    plot(over_pairs, by_harmonics, "pairs", "seconds", 2.0)
-    plot(over_h, by_pairs, "n_harmonics", "seconds", 1.0)
-    plot(memory, by_harmonics, "pairs", "memory", None)
-    over_pairs.set(xlabel="contact pairs", ylabel="time of a frequency [s]")
-    over_h.set(xlabel="harmonics H", ylabel="time of a frequency [s]")
-    memory.set(xlabel="contact pairs", ylabel="memory of the process [MB]")
-    for axes in (over_pairs, over_h):
-        axes.legend(frameon=False, fontsize=7, ncol=3, loc="lower center",
-                    bbox_to_anchor=(0.5, 1.0), columnspacing=1.0)
-    figure.savefig(path)
-
-
-def plot(axes: Axes, lines: list[tuple[str, list[Measured]]], x: str, y: str,
-         slope: float | None) -> None:
-    """Lines in double logarithmic axes, and the slope that is wanted as a dashed one."""
-    for colour, (label, mine) in zip(COLOURS, lines):
-        axes.loglog([getattr(r, x) for r in mine], [getattr(r, y) for r in mine], "o-", ms=3.5,
-                    lw=1.2, color=colour, label=label)
-    ticks = sorted({getattr(r, x) for _, mine in lines for r in mine})
-    if slope is not None:
-        # Below the lowest line, so that it crosses none.
-        lowest = min(getattr(r, y) / getattr(r, x)**slope for _, mine in lines for r in mine)
-        ends = np.array([ticks[0], ticks[-1]], dtype=float)
-        axes.loglog(ends, 0.6 * lowest * ends**slope, "--", color="0.5", lw=1.0,
-                    label=f"slope {slope:g}")
-    axes.set_xticks(ticks, [str(t) for t in ticks])
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.grid(alpha=0.3)

@@ -11,7 +11,7 @@ module fw_model_forming
    implicit none (type, external)
    private
 
-   public :: model_origin, form_structure
+   public :: model_origin, form_structure, form_matrices, finish_structure
 
    !> What a model is made of, to make it again with other options.
    type :: model_origin
@@ -36,6 +36,17 @@ contains
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
 
+      call form_matrices(options, raw, static, model)
+      call finish_structure(options, raw, wanted, model, error)
+   end subroutine form_structure
+
+   !> Mass, stiffness and static load at speed, and damping without that of modes.
+   subroutine form_matrices(options, raw, static, model)
+      type(model_options), intent(in) :: options
+      type(file_model_type), intent(in) :: raw
+      real(wp), intent(in) :: static(:)
+      type(model_type), intent(inout) :: model
+
       model%n_dof = size(raw%stiffness, 1)
       model%mass = raw%mass
       model%stiffness = raw%stiffness
@@ -52,6 +63,18 @@ contains
       end if
       model%damping = model%damping + options%rayleigh_mass*model%mass &
                       + options%rayleigh_stiffness*model%stiffness
+      model%rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)
+   end subroutine form_matrices
+
+   !> Modal damping, and derivatives by what is wanted; without any of these the matrices that were
+   !> given are not needed any more.
+   subroutine finish_structure(options, raw, wanted, model, error)
+      type(model_options), intent(in) :: options
+      type(file_model_type), intent(in) :: raw
+      integer, intent(in) :: wanted(:)
+      type(model_type), intent(inout) :: model
+      type(error_type), allocatable, intent(out) :: error
+
       ! Last: its modes are those of the rotating structure, contact open.
       if (model%cyclic%is_cyclic) then
          ! Modes are those of the tied sectors.
@@ -60,10 +83,9 @@ contains
          call add_modal_damping(model%mass, model%stiffness, options%modal_damping, &
                                 model%damping, error)
       end if
-      model%rotates = allocated(raw%stiffness_rotation) .or. allocated(raw%load_static_rotation)
       if (model%cyclic%is_cyclic .or. allocated(error)) return
       call find_changes(options, raw, wanted, model, error)
-   end subroutine form_structure
+   end subroutine finish_structure
 
    !> Centrifugal stiffness and load grow with the square of the speed.
    subroutine add_rotation(speed, raw, model)

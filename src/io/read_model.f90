@@ -11,7 +11,7 @@ module fw_read_model
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type, read_model_hdf5
-   use fw_model_forming, only: form_structure, model_origin
+   use fw_model_forming, only: finish_structure, form_matrices, model_origin
    use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads
    use fw_model_keys, only: source_words, source_inline, source_hdf5, source_matrix_market, &
                             source_memory
@@ -217,7 +217,14 @@ contains
          origin%static = static
          origin%wanted = wanted
       end if
-      call form_structure(options, raw, static, wanted, model, error)
+      call form_matrices(options, raw, static, model)
+      ! Large ones make room for what is to come.
+      if (size(wanted) == 0 .and. .not. allocated(origin)) then
+         deallocate (raw%mass, raw%stiffness)
+         if (allocated(raw%damping)) deallocate (raw%damping)
+         if (allocated(raw%stiffness_rotation)) deallocate (raw%stiffness_rotation)
+      end if
+      call finish_structure(options, raw, wanted, model, error)
    end subroutine finish_model
 
    !> A speed that nothing depends on.

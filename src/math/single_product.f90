@@ -1,5 +1,8 @@
-!> Products of one real matrix in single precision with few columns: as fw_panel_product, at half
-!> of its memory and twice its speed, for what only has to be near.
+!> Products of one real matrix in single precision with few columns, many times over, for what only
+!> has to be near. The matrix is packed once into panels of rows, in the order in which they are
+!> read: panels are (row of the panel, column of the matrix, panel), right-hand sides (column of a
+!> group, row, group), both filled up with zeros. Panels are independent of each other: threads
+!> share them, and the numbers are the same for any count of threads.
 module fw_single_product
    use fw_kinds, only: sp
    use fw_kinds, only: wp

@@ -51,7 +51,7 @@ contains
       type(reduction_type), intent(in) :: basis
       real(wp), intent(in) :: omega_h
       type(dynamic_part), intent(out) :: self
-      real(wp), allocatable :: x(:, :), q(:, :), values(:), e(:), w(:, :)
+      real(wp), allocatable :: q(:, :), values(:), e(:), w(:, :), rows(:, :)
       integer :: j, m, n
 
       m = basis%n_coordinates
@@ -59,11 +59,10 @@ contains
       e = [(basis%blocks(j, j, 1), j=1, m)]
       if (any(e <= 0.0_wp) .or. any(basis%k_i <= 0.0_wp)) return
       e = 1.0_wp/sqrt(e)
-      call fill_motion(basis, omega_h, e, x)
       ! As many as are needed, from few to more.
       n = 2*spare
       do
-         call find_patterns(x, n, q, values)
+         call find_patterns(basis, omega_h, e, n, q, values)
          self%rank = count(values > negligible)
          if (self%rank <= n - spare) exit
          self%rank = 0
@@ -77,55 +76,93 @@ contains
          self%v(:, j) = self%v(:, j)/e
          w(:, j) = w(:, j)*e
       end do
-      self%mass = matmul(transpose(w), matmul(basis%blocks(:m, :, 2), w))
-      self%mass_i = matmul(basis%blocks(m + 1:, :, 2), w)
+      rows = product_of('N', 'N', basis%blocks(:, :, 2), w)
+      self%mass = product_of('T', 'N', w, rows(:m, :))
+      self%mass_i = rows(m + 1:, :)
       allocate (self%damping(self%rank, self%rank), self%damping_i(basis%n_internal, self%rank), &
                 source=0.0_wp)
       if (basis%n_blocks == 2) return
-      self%damping = matmul(transpose(w), matmul(basis%blocks(:m, :, 3), w))
-      self%damping_i = matmul(basis%blocks(m + 1:, :, 3), w)
+      rows = product_of('N', 'N', basis%blocks(:, :, 3), w)
+      self%damping = product_of('T', 'N', w, rows(:m, :))
+      self%damping_i = rows(m + 1:, :)
    end subroutine find_dynamic_part
 
-   !> X of the module header.
-   pure subroutine fill_motion(basis, omega_h, e, x)
+   !> X of the module header times a matrix; X itself would take as much room as M and C.
+   function times_motion(basis, omega_h, e, other) result(product)
       type(reduction_type), intent(in) :: basis
-      real(wp), intent(in) :: omega_h, e(:)
-      real(wp), allocatable, intent(out) :: x(:, :)
+      real(wp), intent(in) :: omega_h, e(:), other(:, :)
+      real(wp), allocatable :: product(:, :)
+      real(wp), allocatable :: right(:, :)
       integer :: j, m, n_i
 
       m = basis%n_coordinates
       n_i = basis%n_internal
-      allocate (x(m, n_i + (basis%n_blocks - 1)*m))
-      do j = 1, n_i
-         x(:, j) = omega_h**2/sqrt(basis%k_i(j))*e*basis%blocks(m + j, :, 2)
+      allocate (right(m + n_i, size(other, 2)))
+      do j = 1, size(other, 2)
+         right(:m, j) = omega_h**2*e*other(n_i + 1:n_i + m, j)
+         right(m + 1:, j) = omega_h**2/sqrt(basis%k_i)*other(:n_i, j)
       end do
-      do j = 1, m
-         x(:, n_i + j) = omega_h**2*e*basis%blocks(:m, j, 2)*e(j)
-         if (basis%n_blocks == 3) x(:, n_i + m + j) = omega_h*e*basis%blocks(:m, j, 3)*e(j)
+      product = product_of('T', 'N', basis%blocks(:, :, 2), right)
+      if (basis%n_blocks == 3) then
+         do j = 1, size(other, 2)
+            right(:m, j) = omega_h*e*other(n_i + m + 1:, j)
+            right(m + 1:, j) = 0.0_wp
+         end do
+         product = product + product_of('T', 'N', basis%blocks(:, :, 3), right)
+      end if
+      do j = 1, size(other, 2)
+         product(:, j) = e*product(:, j)
       end do
-   end subroutine fill_motion
+   end function times_motion
 
-   !> Leading left singular vectors of x in columns, and singular values in descending order, from
-   !> products of x with a few vectors (two passes of a randomized search, a fixed seed).
-   subroutine find_patterns(x, n, q, values)
-      real(wp), intent(in) :: x(:, :)
+   !> The transpose of X times a matrix.
+   function times_motion_transposed(basis, omega_h, e, q) result(product)
+      type(reduction_type), intent(in) :: basis
+      real(wp), intent(in) :: omega_h, e(:), q(:, :)
+      real(wp), allocatable :: product(:, :)
+      real(wp), allocatable :: rows(:, :), right(:, :)
+      integer :: j, m, n_i
+
+      m = basis%n_coordinates
+      n_i = basis%n_internal
+      allocate (product(n_i + (basis%n_blocks - 1)*m, size(q, 2)), right(m, size(q, 2)))
+      do j = 1, size(q, 2)
+         right(:, j) = e*q(:, j)
+      end do
+      rows = product_of('N', 'N', basis%blocks(:, :, 2), right)
+      do j = 1, size(q, 2)
+         product(:n_i, j) = omega_h**2/sqrt(basis%k_i)*rows(m + 1:, j)
+         product(n_i + 1:n_i + m, j) = omega_h**2*e*rows(:m, j)
+      end do
+      if (basis%n_blocks == 2) return
+      rows = product_of('N', 'N', basis%blocks(:, :, 3), right)
+      do j = 1, size(q, 2)
+         product(n_i + m + 1:, j) = omega_h*e*rows(:m, j)
+      end do
+   end function times_motion_transposed
+
+   !> Leading left singular vectors of X in columns, and singular values in descending order, from
+   !> products of X with a few vectors (two passes of a randomized search, a fixed seed).
+   subroutine find_patterns(basis, omega_h, e, n, q, values)
+      type(reduction_type), intent(in) :: basis
+      real(wp), intent(in) :: omega_h, e(:)
       integer, intent(in) :: n
       real(wp), allocatable, intent(out) :: q(:, :), values(:)
       real(wp), allocatable :: other(:, :), small(:, :)
       type(error_type), allocatable :: error
       integer :: i, j, n_kept, pass
 
-      allocate (other(size(x, 2), n))
+      allocate (other(basis%n_internal + (basis%n_blocks - 1)*basis%n_coordinates, n))
       do j = 1, n
-         do i = 1, size(x, 2)
+         do i = 1, size(other, 1)
             ! Numbers without a pattern, the same in every run.
             other(i, j) = modulo(sin(12.9898_wp*i + 78.233_wp*j)*43758.5453_wp, 1.0_wp) - 0.5_wp
          end do
       end do
       do pass = 1, 3
-         q = product_of('N', 'N', x, other)
+         q = times_motion(basis, omega_h, e, other)
          call orthonormalize(q)
-         other = product_of('T', 'N', x, q)
+         other = times_motion_transposed(basis, omega_h, e, q)
       end do
       ! Singular values and vectors of Q^T X = other^T by those of its square.
       small = product_of('T', 'N', other, other)

@@ -10,22 +10,18 @@
 !> product are the columns that the basis has, with those of the internal modes below, and nothing
 !> is copied. Rows and columns in use are, when they are first asked for.
 module fw_real_products
+   use fw_column_product, only: multiply_columns
    use fw_complex_form, only: amplitudes_of
    use fw_complex_form, only: coefficients_of
    use fw_internal_block, only: internal_block
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_panel_product, only: group_count
-   use fw_panel_product, only: group_width
-   use fw_panel_product, only: multiply_panels
-   use fw_panel_product, only: panel_count
-   use fw_panel_product, only: panel_height
    use fw_reduction, only: reduction_type
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
 
-   public :: real_products, harmonic_factors, packed_blocks
+   public :: real_products, harmonic_factors
 
    !> What belongs to the harmonics at a frequency: Z_n = k K - theta_n M + i s_n C.
    type :: harmonic_factors
@@ -38,24 +34,15 @@ module fw_real_products
       real(wp), allocatable :: s(:)
    end type harmonic_factors
 
-   !> K, M and C of rows and columns in use, packed.
-   type :: packed_blocks
-      !> Rows, and those among them, the first, that are columns too.
-      integer :: n_used = 0
-      integer :: n_active = 0
-      !> [K_qq M_qq C_qq K_qi M_qi C_qi] and [K_iq M_iq C_iq] in panels.
-      real(wp), allocatable, private :: rows(:), modes(:)
-   contains
-      procedure :: pack_blocks
-   end type packed_blocks
-
    type :: real_products
       integer :: n_coefficients = 0
       !> D of each harmonic.
       type(internal_block), allocatable :: internal(:)
-      !> Rows and columns in use, where these are not all.
-      type(packed_blocks) :: active
-      !> Scratch: multiples of a vector and, behind them, of the internal modes, in groups.
+      !> Rows and columns in use, where these are not all: their numbers, and K, M and C as the
+      !> basis has them (n_active + n_internal, n_used, n_blocks).
+      integer, private :: n_active = 0, n_used = 0
+      real(wp), allocatable, private :: active(:)
+      !> Scratch: multiples of a vector and, below them, of the internal modes.
       real(wp), allocatable, private :: multiples(:)
       !> Products of the blocks, (n_coordinates + n_internal) rows; internal modes
       !> (n_internal, n_coefficients), their multiples and complex amplitudes.
@@ -66,6 +53,7 @@ module fw_real_products
       procedure :: reserve
       procedure :: factor
       procedure :: multiply
+      procedure :: gather_active
       procedure :: multiply_active
       procedure :: multiply_blocks
       procedure :: solve_internal
@@ -83,8 +71,7 @@ contains
       associate (m => basis%n_coordinates, n_i => basis%n_internal, nb => basis%n_blocks, &
                  nc => n_coefficients)
          allocate (self%internal(n_harmonics))
-         ! Columns are rounded up to whole groups, which are filled with zeros.
-         allocate (self%multiples((m + n_i)*nb*group_count(nc)*group_width), source=0.0_wp)
+         allocate (self%multiples((m + n_i)*nb*nc), source=0.0_wp)
          allocate (self%products((m + n_i)*nc), source=0.0_wp)
          allocate (self%modes(n_i, nc), self%mode_multiples(n_i*nb*nc), source=0.0_wp)
          allocate (self%amplitudes(n_i, n_harmonics), source=(0.0_wp, 0.0_wp))
@@ -107,111 +94,56 @@ contains
       end do
    end subroutine factor
 
-   !> Copy rows and columns in use.
-   subroutine pack_blocks(self, basis, n_active, n_used, used)
-      class(packed_blocks), intent(inout) :: self
+   !> Copy rows and columns in use, and the internal modes below the columns.
+   pure subroutine gather_active(self, basis, n_active, n_used, used)
+      class(real_products), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n_active, n_used
       !> First n_used entries; the first n_active of them are columns.
       integer, intent(in) :: used(:)
-      integer :: n_inner, n_stored
+      integer :: n
 
-      self%n_used = n_used
       self%n_active = n_active
-      n_inner = (n_active + basis%n_internal)*basis%n_blocks
-      n_stored = panel_height*n_inner*panel_count(n_used)
-      call make_room(self%rows, n_stored)
-      call make_room(self%modes, panel_height*n_active*basis%n_blocks* &
-                     panel_count(basis%n_internal))
-      call fill_rows(basis, n_active, n_used, used, n_inner, self%rows)
-      call fill_modes(basis, n_active, used, self%modes)
-   end subroutine pack_blocks
-
-   !> Room that grows by need, with a tenth to spare, and stays.
-   pure subroutine make_room(array, n)
-      real(wp), allocatable, intent(inout) :: array(:)
-      integer, intent(in) :: n
-
-      if (allocated(array)) then
-         if (size(array) >= n) return
-         deallocate (array)
-         allocate (array(n + n/10))
-      else
-         allocate (array(n))
+      self%n_used = n_used
+      n = (n_active + basis%n_internal)*n_used*basis%n_blocks
+      ! Room that grows by need, with a tenth to spare, and stays.
+      if (allocated(self%active)) then
+         if (size(self%active) < n) deallocate (self%active)
       end if
-   end subroutine make_room
+      if (.not. allocated(self%active)) allocate (self%active(n + n/10))
+      call fill_active(basis, n_active, n_used, used, n_active + basis%n_internal, self%active)
+   end subroutine gather_active
 
-   !> [K_qq M_qq C_qq K_qi M_qi C_qi] of the rows in use: one product takes them all.
-   pure subroutine fill_rows(basis, n_active, n_used, used, n_inner, panels)
+   pure subroutine fill_active(basis, n_active, n_used, used, n_inner, active)
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n_active, n_used, n_inner
-      !> Coordinates in use; the first n_active of them are columns.
       integer, intent(in) :: used(:)
-      real(wp), intent(inout) :: panels(panel_height, n_inner, *)
-      integer :: b, i, j, k, p
+      real(wp), intent(inout) :: active(n_inner, n_used, *)
+      integer :: b, i
 
-      ! Row i stands in panel (i - 1)/panel_height + 1. The last panel may have rows to spare,
-      ! which stay zero.
-      panels(:, :, panel_count(n_used)) = 0.0_wp
       do b = 1, basis%n_blocks
-         do j = 1, n_active
-            do i = 1, n_used
-               p = (i - 1)/panel_height
-               panels(i - p*panel_height, (b - 1)*n_active + j, p + 1) = &
-                  basis%blocks(used(i), used(j), b)
-            end do
+         do i = 1, n_used
+            active(:n_active, i, b) = basis%blocks(used(:n_active), used(i), b)
+            active(n_active + 1:, i, b) = basis%blocks(basis%n_coordinates + 1:, used(i), b)
          end do
       end do
-      ! Behind K, M and C of the coordinates those of the internal modes, in the same order.
-      k = n_active*basis%n_blocks
-      do i = 1, n_used
-         p = (i - 1)/panel_height
-         do b = 1, basis%n_blocks
-            do j = 1, basis%n_internal
-               panels(i - p*panel_height, k + (b - 1)*basis%n_internal + j, p + 1) = &
-                  basis%coupling(j, b, used(i))
-            end do
-         end do
-      end do
-   end subroutine fill_rows
+   end subroutine fill_active
 
-   !> [K_iq M_iq C_iq] of the columns in use.
-   pure subroutine fill_modes(basis, n_active, used, panels)
-      type(reduction_type), intent(in) :: basis
-      integer, intent(in) :: n_active
-      integer, intent(in) :: used(:)
-      real(wp), intent(inout) :: panels(panel_height, n_active*basis%n_blocks, *)
-      integer :: b, i, j, p
-
-      if (basis%n_internal == 0) return
-      panels(:, :, panel_count(basis%n_internal)) = 0.0_wp
-      do j = 1, n_active
-         do b = 1, basis%n_blocks
-            do i = 1, basis%n_internal
-               p = (i - 1)/panel_height
-               panels(i - p*panel_height, (b - 1)*n_active + j, p + 1) = &
-                  basis%coupling(i, b, used(j))
-            end do
-         end do
-      end do
-   end subroutine fill_modes
-
-   !> product = Z_r v for packed rows and columns; product has n_stored rows.
-   subroutine multiply(self, basis, factors, packed, v, n_stored, product)
+   !> product = Z_r v of all coordinates; product has n_stored rows.
+   subroutine multiply(self, basis, factors, v, n_stored, product)
       class(real_products), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
       type(harmonic_factors), intent(in) :: factors
-      type(packed_blocks), intent(in) :: packed
       integer, intent(in) :: n_stored
-      !> Coordinates of the packed columns (n_active, n_coefficients).
+      !> (n_coordinates, n_coefficients).
       real(wp), intent(in) :: v(*)
       real(wp), intent(inout) :: product(n_stored, *)
 
-      call multiply_packed(self, basis, factors, packed%n_used, packed%n_active, packed%rows, &
-                           packed%modes, v, n_stored, product)
+      call multiply_by(self, basis, factors, basis%n_coordinates, basis%n_coordinates, &
+                       basis%blocks, v, n_stored, product)
    end subroutine multiply
 
-   !> As `multiply` of the rows and columns in use.
+   !> As `multiply`, of the rows and columns in use.
    subroutine multiply_active(self, basis, factors, v, n_stored, product)
       class(real_products), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
@@ -220,55 +152,64 @@ contains
       real(wp), intent(in) :: v(*)
       real(wp), intent(inout) :: product(n_stored, *)
 
-      call multiply_packed(self, basis, factors, self%active%n_used, self%active%n_active, &
-                           self%active%rows, self%active%modes, v, n_stored, product)
+      call multiply_by(self, basis, factors, self%n_active, self%n_used, self%active, v, n_stored, &
+                       product)
    end subroutine multiply_active
 
-   !> Both products of the module header, with the panels that serve: all, or those in use.
-   subroutine multiply_packed(self, basis, factors, n_used, n_active, rows, modes, v, n_stored, &
-                              product)
+   !> Both products of the module header, with the columns that serve: all, or those in use.
+   subroutine multiply_by(self, basis, factors, n_active, n_used, columns, v, n_stored, product)
       class(real_products), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
       type(harmonic_factors), intent(in) :: factors
-      integer, intent(in) :: n_used, n_active, n_stored
-      !> Packed blocks, as packed_blocks has them.
-      real(wp), intent(in) :: rows(*), modes(*)
+      integer, intent(in) :: n_active, n_used, n_stored
+      real(wp), intent(in) :: columns(n_active + basis%n_internal, n_used, basis%n_blocks)
       real(wp), intent(in) :: v(*)
       real(wp), intent(inout) :: product(n_stored, *)
-      integer :: n_i, n_inner, n_short, nc
-      logical :: threaded
+      integer :: n_inner
 
-      nc = self%n_coefficients
-      n_i = basis%n_internal
-      n_short = n_active*basis%n_blocks
-      n_inner = n_short + n_i*basis%n_blocks
-      threaded = n_used >= coordinates_for_threads
-      if (n_i > 0) then
-         ! b of the header in self%modes, then y = D^-1 b in its place.
-         call group_multiples(factors, n_active, basis%n_blocks, 1.0_wp, v, 0, n_short, &
-                              self%multiples)
-         call multiply_panels(n_i, n_short, nc, modes, self%multiples, threaded, n_i, self%modes)
+      n_inner = n_active + basis%n_internal
+      call place_multiples(factors, n_active, basis%n_blocks, 1.0_wp, v, 0, n_inner, &
+                           self%multiples)
+      if (basis%n_internal > 0) then
+         call multiply_modes(self, basis, n_active, n_used, columns, self%multiples)
          call self%solve_internal(factors)
+         ! Below the multiples of v those of -y: one product gives both terms.
+         call place_multiples(factors, basis%n_internal, basis%n_blocks, -1.0_wp, self%modes, &
+                              n_active, n_inner, self%multiples)
       end if
-      ! Once more, since a group is longer by the modes now: multiples of v and, below, of -y, so
-      ! that one product gives both terms.
-      call group_multiples(factors, n_active, basis%n_blocks, 1.0_wp, v, 0, n_inner, &
-                           self%multiples)
-      call group_multiples(factors, n_i, basis%n_blocks, -1.0_wp, self%modes, n_short, n_inner, &
-                           self%multiples)
-      call multiply_panels(n_used, n_inner, nc, rows, self%multiples, threaded, n_stored, product)
-   end subroutine multiply_packed
+      call multiply_columns(n_used, n_inner, basis%n_blocks, self%n_coefficients, columns, &
+                            self%multiples, n_used >= coordinates_for_threads, n_stored, product)
+   end subroutine multiply_by
 
-   !> sign times k v, -theta v and i s v behind `first` rows of the groups. In real form, of
+   !> b of the module header, in the place of the modes.
+   subroutine multiply_modes(self, basis, n_active, n_used, columns, multiples)
+      class(real_products), intent(inout) :: self
+      type(reduction_type), intent(in) :: basis
+      integer, intent(in) :: n_active, n_used
+      real(wp), intent(in) :: columns(n_active + basis%n_internal, n_used, basis%n_blocks)
+      real(wp), intent(in) :: multiples(n_active + basis%n_internal, basis%n_blocks, *)
+      integer :: b, n_inner
+
+      n_inner = n_active + basis%n_internal
+      self%modes = 0.0_wp
+      do b = 1, basis%n_blocks
+         ! The rows of the modes stand below those of the columns.
+         call dgemm('N', 'N', basis%n_internal, self%n_coefficients, n_active, 1.0_wp, &
+                    columns(n_active + 1, 1, b), n_inner, multiples(1, b, 1), &
+                    n_inner*basis%n_blocks, 1.0_wp, self%modes, basis%n_internal)
+      end do
+   end subroutine multiply_modes
+
+   !> sign times k v, -theta v and i s v below `first` rows of each. In real form, of
    !> U = uc - i us: -theta U = -(Re uc + Im us) + i (Re us - Im uc) and i s U = s us + i s uc.
-   pure subroutine group_multiples(factors, n, n_blocks, sign, v, first, n_inner, groups)
+   pure subroutine place_multiples(factors, n, n_blocks, sign, v, first, n_inner, multiples)
       type(harmonic_factors), intent(in) :: factors
       integer, intent(in) :: n, n_blocks
       real(wp), intent(in) :: sign
       !> Coordinates, or internal modes (n, n_coefficients).
       real(wp), intent(in) :: v(n, *)
       integer, intent(in) :: first, n_inner
-      real(wp), intent(inout) :: groups(group_width, n_inner, *)
+      real(wp), intent(inout) :: multiples(n_inner, n_blocks, *)
       real(wp) :: re, im
       integer :: h, k
 
@@ -278,36 +219,27 @@ contains
          im = aimag(factors%theta(h))
          if (factors%harmonic(h) == 0) then
             call fill_column(n, n_blocks, sign, v(1, k), v(1, k), factors%k, -re, 0.0_wp, 0.0_wp, &
-                             first, n_inner, k, groups)
+                             first, n_inner, multiples(1, 1, k))
          else
             call fill_column(n, n_blocks, sign, v(1, k), v(1, k + 1), factors%k, -re, -im, &
-                             factors%s(h), first, n_inner, k, groups)
+                             factors%s(h), first, n_inner, multiples(1, 1, k))
             call fill_column(n, n_blocks, sign, v(1, k + 1), v(1, k), factors%k, -re, im, &
-                             -factors%s(h), first, n_inner, k + 1, groups)
+                             -factors%s(h), first, n_inner, multiples(1, 1, k + 1))
          end if
       end do
-   end subroutine group_multiples
+   end subroutine place_multiples
 
-   !> One column of the groups: k a, re a + im b and s b.
-   pure subroutine fill_column(n, n_blocks, sign, a, b, k, re, im, s, first, n_inner, column, &
-                               groups)
+   !> One column: k a, re a + im b and s b.
+   pure subroutine fill_column(n, n_blocks, sign, a, b, k, re, im, s, first, n_inner, column)
       integer, intent(in) :: n, n_blocks
       real(wp), intent(in) :: sign
       real(wp), intent(in) :: a(n), b(n), k, re, im, s
-      integer, intent(in) :: first, n_inner, column
-      real(wp), intent(inout) :: groups(group_width, n_inner, *)
-      integer :: g, i, p
+      integer, intent(in) :: first, n_inner
+      real(wp), intent(inout) :: column(n_inner, n_blocks)
 
-      g = (column - 1)/group_width + 1
-      p = column - (g - 1)*group_width
-      do i = 1, n
-         groups(p, first + i, g) = sign*(k*a(i))
-         groups(p, first + n + i, g) = sign*(re*a(i) + im*b(i))
-      end do
-      if (n_blocks == 2) return
-      do i = 1, n
-         groups(p, first + 2*n + i, g) = sign*(s*b(i))
-      end do
+      column(first + 1:first + n, 1) = sign*(k*a)
+      column(first + 1:first + n, 2) = sign*(re*a + im*b)
+      if (n_blocks == 3) column(first + 1:first + n, 3) = sign*(s*b)
    end subroutine fill_column
 
    !> products = [K M C] [v; -theta v; i s v] of all coordinates: their rows, then those of the
@@ -322,41 +254,11 @@ contains
 
       n_rows = basis%n_coordinates + basis%n_internal
       n_inner = basis%n_coordinates*basis%n_blocks
-      call fill_multiples(factors, basis%n_coordinates, basis%n_blocks, v, self%multiples)
+      call place_multiples(factors, basis%n_coordinates, basis%n_blocks, 1.0_wp, v, 0, &
+                           basis%n_coordinates, self%multiples)
       call dgemm('N', 'N', n_rows, self%n_coefficients, n_inner, 1.0_wp, basis%blocks, n_rows, &
                  self%multiples, n_inner, 0.0_wp, self%products, n_rows)
    end subroutine multiply_blocks
-
-   !> k v, -theta v and i s v, one below the other. In real form, of U = uc - i us:
-   !> -theta U = -(Re uc + Im us) + i (Re us - Im uc) and i s U = s us + i s uc.
-   pure subroutine fill_multiples(factors, n, n_blocks, v, multiples)
-      type(harmonic_factors), intent(in) :: factors
-      integer, intent(in) :: n, n_blocks
-      !> Coefficients (n, n_coefficients), and their multiples.
-      real(wp), intent(in) :: v(n, *)
-      real(wp), intent(inout) :: multiples(n, n_blocks, *)
-      real(wp) :: re, im, s
-      integer :: h, k
-
-      do h = 1, size(factors%harmonic)
-         k = factors%column(h)
-         re = real(factors%theta(h), wp)
-         im = aimag(factors%theta(h))
-         s = factors%s(h)
-         multiples(:, 1, k) = factors%k*v(:, k)
-         if (factors%harmonic(h) == 0) then
-            multiples(:, 2, k) = -re*v(:, k)
-            if (n_blocks == 3) multiples(:, 3, k) = 0.0_wp
-         else
-            multiples(:, 1, k + 1) = factors%k*v(:, k + 1)
-            multiples(:, 2, k) = -(re*v(:, k) + im*v(:, k + 1))
-            multiples(:, 2, k + 1) = -(re*v(:, k + 1) - im*v(:, k))
-            if (n_blocks == 2) cycle
-            multiples(:, 3, k) = s*v(:, k + 1)
-            multiples(:, 3, k + 1) = -s*v(:, k)
-         end if
-      end do
-   end subroutine fill_multiples
 
    !> modes = D^-1 modes.
    subroutine solve_internal(self, factors)
@@ -382,8 +284,8 @@ contains
       integer :: n
 
       n = basis%n_internal*basis%n_blocks
-      call fill_multiples(factors, basis%n_internal, basis%n_blocks, self%modes, &
-                          self%mode_multiples)
+      call place_multiples(factors, basis%n_internal, basis%n_blocks, 1.0_wp, self%modes, 0, &
+                           basis%n_internal, self%mode_multiples)
       call dgemm('T', 'N', basis%n_coordinates, self%n_coefficients, n, -1.0_wp, basis%coupling, &
                  n, self%mode_multiples, n, 1.0_wp, product, basis%n_coordinates)
    end subroutine subtract_modes

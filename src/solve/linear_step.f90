@@ -170,11 +170,13 @@ contains
          end if
       end if
       if (system%nearly .and. .not. done .and. .not. system%is_interrupted()) then
-         ! Once more with what is exact, and from now on.
+         ! Once more with what is exact, and from now on where that has helped: a derivative that is
+         ! all but singular is no reason to pay for it at all later steps.
          system%nearly = .false.
          call build(self, system)
          call self%gmres%solve(system, self%rhs, self%solution, tolerance, done)
          self%krylov_iterations = self%krylov_iterations + self%gmres%iterations
+         system%nearly = .not. done
       end if
       self%fresh_rate = real(self%gmres%iterations, wp)/decades
       self%worth_keeping = done
