@@ -100,7 +100,7 @@ def test_all_sectors_move_as_one(full: FullDisk, name: str) -> None:
 
 def test_the_committed_model_is_the_generated_one(reduced: ReducedDisk, tmp_path: Path) -> None:
     path = EXAMPLE / "disk.h5"
-    assert path.stat().st_size < 1.2e6
+    assert path.stat().st_size < 1e6
     assert read_parameters(path) == DiskParameters()
     begin = time.perf_counter()
     assert main(["-o", str(tmp_path / "disk.h5"), "-q"]) == 0
