@@ -392,6 +392,9 @@ class Mode(TypedDict, total=False):
     near: float
     #: of near; results are in rad/s (default: 'rad/s')
     unit: Literal["rad/s", "Hz"]
+    #: [L] a rising list of amplitudes, in place of start, end and n_points; only: analysis =
+    #: 'mode', natural steps (default: none)
+    amplitudes: ArrayLike
     #: [L] lowest amplitude; only: analysis = 'mode' (required)
     start: float
     #: [L] highest amplitude; only: analysis = 'mode' (required)

@@ -17,8 +17,6 @@ from fretwear.errors import ConvergenceError, InputError
 TRUTH = (0.6, 1.2)
 OVER = ["contact%normal_load", "contact%tangential_stiffness"]
 BOUNDS = [(0.1, 3.0), (0.2, 5.0)]
-#: Interpolation of a curve between its rows, in standard errors of the data here.
-BETWEEN_ROWS = 0.1
 
 
 def oscillator(values: Any = (0.5, 1.0), **groups: Any) -> fw.Case:
@@ -85,8 +83,8 @@ def test_exact_modes_give_the_truth() -> None:
     data = mode_data(frequency_deviation=1e-3, damping_deviation=3e-3)
     found = calibrate(mode_case(), data, over=OVER, bounds=BOUNDS)
     assert found.converged and found.is_exact
-    assert (np.abs(found.values - TRUTH) < BETWEEN_ROWS * found.errors).all()
-    assert found.chi_square < BETWEEN_ROWS
+    np.testing.assert_allclose(found.values, TRUTH, rtol=1e-6)
+    assert found.chi_square < 1e-8
 
 
 def test_unknown_deviations_come_from_the_residuals() -> None:

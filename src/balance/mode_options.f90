@@ -30,6 +30,8 @@ module fw_mode_options
       !> Lowest and highest amplitude, as `control` has it.
       real(wp) :: start = 0.0_wp
       real(wp) :: end = 0.0_wp
+      !> In place of both, each by itself, rising.
+      real(wp), allocatable :: amplitudes(:)
       integer :: control = control_observed
       !> Points, evenly spaced in the logarithm of the amplitude; of a branch the number that sets
       !> its longest step.
@@ -51,6 +53,7 @@ contains
       class(key_visitor), intent(inout) :: keys
       !> Whether the analysis is that of a mode.
       logical, intent(in) :: is_mode
+      logical :: is_range
 
       call keys%open('mode', 'a nonlinear mode over its amplitude')
       call keys%bind(key('number', 'of the elastic modes of the structure with its closed '// &
@@ -59,10 +62,15 @@ contains
                          'place of number; 0: by number', at_least(0.0_wp), unit='unit'), &
                      self%near)
       call keys%bind_word(key('unit', 'of near; results are in rad/s'), self%unit, unit_words)
+      call keys%bind(key('amplitudes', 'a rising list of amplitudes, in place of start, end '// &
+                         'and n_points', above(0.0_wp), unit='L', shape=':', repeats=.false., &
+                         absent='none', only="analysis = 'mode', natural steps"), self%amplitudes)
+      is_range = is_mode .and. .not. allocated(self%amplitudes)
       call keys%bind(key('start', 'lowest amplitude', above(0.0_wp), unit='L', &
-                         absent='required', only="analysis = 'mode'"), self%start, needed=is_mode)
+                         absent='required', only="analysis = 'mode'"), self%start, &
+                     needed=is_range)
       call keys%bind(key('end', 'highest amplitude', above(0.0_wp), unit='L', &
-                         absent='required', only="analysis = 'mode'"), self%end, needed=is_mode)
+                         absent='required', only="analysis = 'mode'"), self%end, needed=is_range)
       call keys%bind_word(key('control', 'what the amplitude is: of the first harmonic of the '// &
                               'first observed quantity, or modal, sqrt(U^H M U) of it'), &
                           self%control, control_words)

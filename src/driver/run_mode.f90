@@ -271,12 +271,16 @@ contains
       end do
    end subroutine along_amplitudes
 
-   !> ln A of point k, evenly spaced, both ends exact.
+   !> ln A of point k: of a list, or evenly spaced, both ends exact.
    pure real(wp) function amplitude_of(case, k) result(p)
       type(case_type), intent(in) :: case
       integer, intent(in) :: k
       real(wp) :: share
 
+      if (allocated(case%mode%amplitudes)) then
+         p = log(case%mode%amplitudes(k))
+         return
+      end if
       share = real(k - 1, wp)/real(case%mode%n_points - 1, wp)
       p = (1.0_wp - share)*log(case%mode%start) + share*log(case%mode%end)
    end function amplitude_of

@@ -13,6 +13,7 @@ module fw_read_options
    use fw_parameters, only: parameter_words
    use fw_reader, only: reader_type
    use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength
+   use fw_solver_options, only: continuation_natural
    use fw_text, only: to_text
    use fw_values, only: number_text
    implicit none (type, external)
@@ -22,6 +23,8 @@ module fw_read_options
 
    !> Responses that are put together from a mode.
    integer, parameter :: most_scales = 100
+   !> Part of an amplitude that two texts of it may differ by.
+   real(wp), parameter :: round_off = 1.0e-12_wp
 
 contains
 
@@ -205,8 +208,10 @@ contains
       else
          call reader%amend('mode', 'near', '')
       end if
-      if (reader%given('mode', 'start') .and. reader%given('mode', 'end') .and. &
-          options%end <= options%start) then
+      if (allocated(options%amplitudes)) then
+         call take_amplitudes(reader, options)
+      else if (reader%given('mode', 'start') .and. reader%given('mode', 'end') .and. &
+               options%end <= options%start) then
          call reader%refuse('mode', 'end', '= '//number_text(options%end)//': must be above '// &
                             'start = '//number_text(options%start)//', the lowest amplitude')
       end if
@@ -216,6 +221,50 @@ contains
                             ' factors: at most '//to_text(most_scales)//' are served')
       end if
    end subroutine read_mode
+
+   !> Amplitudes one by one.
+   subroutine take_amplitudes(reader, options)
+      type(reader_type), intent(inout) :: reader
+      type(mode_options), intent(inout) :: options
+      character(*), parameter :: others(*) = [character(8) :: 'start', 'end', 'n_points']
+      integer :: i, n
+
+      if (reader%given('mode', 'continuation') .and. &
+          options%continuation == continuation_arclength) then
+         call reader%refuse('mode', 'amplitudes', "does not go with continuation = "// &
+                            "'arclength', whose points are its own: give start and end")
+      end if
+      options%continuation = continuation_natural
+      call reader%amend('mode', 'continuation', "'natural'")
+      ! Refused before: it was given, but not as it must be.
+      n = size(options%amplitudes)
+      if (n == 0) return
+      if (any(options%amplitudes(2:) <= options%amplitudes(:n - 1))) then
+         call reader%refuse('mode', 'amplitudes', 'must rise from each to the next')
+      end if
+      associate (list => options%amplitudes)
+         call refuse_other(reader, 'start', abs(options%start - list(1)) > round_off*list(1))
+         call refuse_other(reader, 'end', abs(options%end - list(n)) > round_off*list(n))
+      end associate
+      call refuse_other(reader, 'n_points', options%n_points /= n)
+      do i = 1, size(others)
+         call reader%amend('mode', trim(others(i)), '')
+      end do
+      options%n_points = n
+      options%start = options%amplitudes(1)
+      options%end = options%amplitudes(n)
+   end subroutine take_amplitudes
+
+   !> A key that says something else than the list.
+   subroutine refuse_other(reader, name, differs)
+      type(reader_type), intent(inout) :: reader
+      character(*), intent(in) :: name
+      logical, intent(in) :: differs
+
+      if (.not. (differs .and. reader%given('mode', name))) return
+      call reader%refuse('mode', name, 'does not agree with amplitudes, which says it: leave '// &
+                         'it out')
+   end subroutine refuse_other
 
    !> Frequencies one by one.
    subroutine take_list(reader, analysis, options)

@@ -3,8 +3,7 @@ docs/design.md.
 
     python test/design/calibration_trials.py [--count 100] [--seed 0] [-o docs/design.md]
 
-The case that is calibrated makes the data: noise is all that is wrong with them. Exact rows of
-runs, not of the curves that calibration interpolates.
+The case that is calibrated makes the data: noise is all that is wrong with them.
 """
 import argparse
 import sys

@@ -174,3 +174,20 @@ def test_a_file_in_between(tmp_path):
         found["mode/first_harmonic"])
     assert found["mode/damping_ratio"] == pytest.approx(
         found["mode/self_excitation"] / (2 * found["omega"]))
+
+
+def test_amplitudes_of_a_list(tmp_path):
+    """Rows at amplitudes of their own, however far apart; what disagrees is refused."""
+    wanted = [0.21, 0.9, 1.3]
+    groups = merged(mode_groups(SEVERAL, None, None, 3, n_points=None),
+                    {"mode": {"amplitudes": wanted, "continuation": None}})
+    run(tmp_path, groups)
+    found = read_mode(tmp_path)
+    assert found["mode/modal_amplitude"] == pytest.approx(wanted, rel=1e-9)
+    for k, amplitude in enumerate(wanted):
+        omega, zeta = at_amplitude(tmp_path, SEVERAL, amplitude, 3)
+        assert found["omega"][k] == pytest.approx(omega, rel=1e-10)
+        assert found["mode/damping_ratio"][k] == pytest.approx(zeta, rel=1e-8)
+    for changes in ({"start": 0.3}, {"n_points": 4}, {"continuation": "arclength"},
+                    {"amplitudes": [0.3, 0.2]}):
+        assert "mode" in run(tmp_path, merged(groups, {"mode": changes}), status=3).stderr

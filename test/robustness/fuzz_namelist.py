@@ -30,8 +30,8 @@ KEYS = {
     "time": ["n_periods", "steps_per_period"],
     "resonance": ["parameter", "start", "end", "n_points", "spacing", "as", "condition", "quantity",
                   "continuation", "max_points"],
-    "mode": ["number", "near", "unit", "start", "end", "control", "n_points", "continuation",
-             "max_points", "synthesis"],
+    "mode": ["number", "near", "unit", "amplitudes", "start", "end", "control", "n_points",
+             "continuation", "max_points", "synthesis"],
     "output": ["file", "histories", "contact", "tail", "observe"],
 }
 

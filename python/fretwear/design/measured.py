@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, Union
 
 import numpy as np
@@ -25,8 +24,6 @@ Deviation = Union[float, ArrayLike, None]
 
 #: Relative step of differences, whose error is then that of the solver over it.
 _STEP = 1e-4
-#: Rows of a mode curve between which is interpolated, a decade of the amplitude, and at least.
-_ROWS_PER_DECADE, _LEAST_ROWS = 40, 25
 
 
 @dataclass(frozen=True)
@@ -119,7 +116,7 @@ class ModeData(Measured):
     frequency_deviation, damping_deviation : float or (n,), optional
         Standard deviations; all or none.
     case : Case, optional
-        With `analysis = 'mode'`; its start, end, n_points and continuation are set here.
+        With `analysis = 'mode'`; its amplitudes are set here.
     """
 
     def __init__(self, amplitude: ArrayLike, frequency: ArrayLike | None = None,
@@ -161,11 +158,12 @@ class ModeData(Measured):
         return Predicted(found, np.stack(columns, axis=1), 1 + 2 * len(values))
 
     def _curve(self, case: Case) -> Case:
-        """Rows about the measured amplitudes, dense enough for cubics between them."""
-        low, high = 0.999 * self.amplitude.min(), 1.001 * self.amplitude.max()
-        rows = max(_LEAST_ROWS, int(np.ceil(_ROWS_PER_DECADE * np.log10(high / low))))
-        return case.replace(mode={"start": float(low), "end": float(high), "n_points": rows,
-                                  "continuation": "natural"})
+        """Rows at the measured amplitudes; of one alone a second one beside it."""
+        rows = np.unique(self.amplitude).tolist()
+        if len(rows) == 1:
+            rows.append(1.001 * rows[0])
+        return case.replace(mode={"amplitudes": rows, "start": rows[0], "end": rows[-1],
+                                  "n_points": len(rows), "continuation": "natural"})
 
     def _at(self, unknowns: Unknowns, values: Floats, case: Case, *, slopes: bool
             ) -> tuple[Floats, Floats | None]:
@@ -173,18 +171,15 @@ class ModeData(Measured):
         mode = result.mode
         curves = {"frequency": mode.frequency, "damping_ratio": mode.damping_ratio}
         names = list(dict.fromkeys(self.labels))
-
-        def between(rows: Floats) -> Floats:
-            return _between(mode.amplitude, rows, mode.onset, self.amplitude)
-
-        found = np.concatenate([between(curves[name]) for name in names])
+        rows = np.searchsorted(np.unique(self.amplitude), self.amplitude)
+        found = np.concatenate([curves[name][rows] for name in names])
         if not slopes:
             return found, None
         by, blocks = result.sensitivities, []
         for name in names:
             quantity, factor = (("mode_omega", 0.5 / np.pi) if name == "frequency"
                                 else ("mode_damping_ratio", 1.0))
-            blocks.append(between(factor * unknowns.chain(by[quantity])))
+            blocks.append(factor * unknowns.chain(by[quantity])[rows])
         return found, np.concatenate(blocks)
 
 
@@ -275,21 +270,3 @@ def _has_derivatives(case: Case, keys: Sequence[str]) -> bool:
             raise
         return False
     return True
-
-
-def _between(at: Floats, rows: Floats, onset: float, wanted: Floats) -> Floats:
-    """Cubics through rows over the logarithm of the amplitude, on either side of the onset.
-
-    The damping has a corner there, which cubics across it would round off.
-    """
-    x, where = np.log(at), np.log(wanted)
-    found = np.empty((len(where), *rows.shape[1:]))
-    corner = np.log(onset) if onset > 0.0 else -np.inf
-    for inside, asked in ((x <= corner, where <= corner), (x > corner, where > corner)):
-        if not asked.any():
-            continue
-        if inside.sum() < 4:  # hardly any of the curve: all of it
-            inside = np.ones(len(x), dtype=bool)
-        spline = import_module("scipy.interpolate").CubicSpline(x[inside], rows[inside])
-        found[asked] = spline(where[asked])
-    return found
