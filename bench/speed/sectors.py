@@ -40,7 +40,7 @@ REPEATS = 3
 POINTS_OF_ANNULUS = 5
 #: Of all sectors with contact that differs by up to such a part of friction and interference; above
 #: the resonances of the sectors, and without a search for the maxima of each.
-POINTS_OF_ALL, SPREADS, ALL_START = 11, (0.0, 0.1, 0.5), 1400.0
+POINTS_OF_ALL, SPREADS, ALL_START = 11, (0.0, 0.1), 1400.0
 
 
 @dataclass(frozen=True)
