@@ -182,7 +182,7 @@ def main() -> None:
         print(f"{time.perf_counter() - start:6.1f} s  {title}", flush=True)
 
     job = Job(Bench(build / "fw_run", work, options.quick), build, work, images, step,
-              options.peer_python)
+              options.peer_python, options.before.absolute() if options.before else None)
     for part in parts:
         step(part)
         machine = describe_machine(build)
