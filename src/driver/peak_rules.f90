@@ -160,8 +160,8 @@ contains
                  beyond => samples%item(k + direction)%at)
          step = abs([middle%omega - last%omega, last%omega - before%omega])
          if (.not. all(step > 0.0_wp)) return
-         slope = [middle%amplitude(i) - last%amplitude(i), &
-                  last%amplitude(i) - before%amplitude(i)]/step
+         slope = [middle%amplitude(i) - last%amplitude(i), last%amplitude(i) - before%amplitude(i)] &
+                 /step
          if (.not. slope(1) > 0.0_wp) return
          ! Where the slope, which falls from one step to the next, comes to nothing.
          way = min(0.5_wp*abs(beyond%omega - middle%omega), onwards*step(1))
