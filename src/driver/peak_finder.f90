@@ -47,7 +47,7 @@ module fw_peak_finder
    !> search; each halves the way that is tried.
    integer, parameter :: most_trials = 6, most_failures = 5
    !> Solutions of a search in all: so many, or this part of the rows, but no more than the last.
-   integer, parameter :: least_budget = 80, budget_share = 20, most_budget = 200
+   integer, parameter :: least_budget = 40, budget_share = 20, most_budget = 200
    !> Part of the first interval at which it is seen whether the amplitude rises into the range.
    real(wp), parameter :: step_inside = 0.1_wp
    !> Samples from which on those far from maxima are thinned out: long sweeps need no more memory.
@@ -349,24 +349,20 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: budget
       type(error_type), allocatable, intent(out) :: error
-      ! A first solution between the peak and a sample behind another mode may miss the edge.
-      integer, parameter :: most_looks = 2
       real(wp) :: omega
-      integer :: i, k, side, look
+      integer :: i, k, side
       logical :: found, known
 
       if (self%samples%n < 3) return
       do i = 1, size(self%samples%item(1)%at%amplitude)
          do side = -1, 1, 2
-            do look = 1, most_looks
-               ! Found anew, for a solution moves the places.
-               k = place_of_highest(self%samples, i)
-               if (.not. is_maximum(self%samples, k, i)) exit
-               call find_edge(self%samples, k, i, side, omega, found, known)
-               if (known .or. .not. found) exit
-               call solve_at(self, case, omega, budget, error, k)
-               if (allocated(error)) return
-            end do
+            ! Found anew, for a solution moves the places.
+            k = place_of_highest(self%samples, i)
+            if (.not. is_maximum(self%samples, k, i)) exit
+            call find_edge(self%samples, k, i, side, omega, found, known)
+            if (known .or. .not. found) cycle
+            call solve_at(self, case, omega, budget, error, k)
+            if (allocated(error)) return
          end do
       end do
    end subroutine measure_widths

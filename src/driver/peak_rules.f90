@@ -77,9 +77,6 @@ contains
          mean = position_of(left, middle, right, i)
          left_is_known = side_is_known(left, middle, right, i, mean, share)
          right_is_known = side_is_known(right, middle, left, i, mean, share)
-         if (left_is_known .neqv. right_is_known) then
-            vertex = further(samples, k, i, merge(1, -1, left_is_known), vertex)
-         end if
          omega = within(vertex, left%omega, middle%omega, right%omega)
          done = promise <= (1.0_wp + small_gain)*swing_of(middle, i, mean)
          if (.not. done) then
@@ -140,37 +137,6 @@ contains
       distance = min(max(distance, 2.0_wp*margin*half), half)
       omega = middle%omega + sign(distance, side%omega - middle%omega)
    end function beside
-
-   !> The vertex, or where the near side of the peak leads if that is further: behind an edge where
-   !> the response jumps, the far side stands on another branch and tells nothing of the peak.
-   pure real(wp) function further(samples, k, i, direction, vertex) result(omega)
-      type(sample_list), intent(in) :: samples
-      integer, intent(in) :: k, i
-      !> Of the side that is not known: 1 above, -1 below.
-      integer, intent(in) :: direction
-      real(wp), intent(in) :: vertex
-      !> Longest step over what is known, so as to stay on the branch.
-      real(wp), parameter :: onwards = 1.5_wp
-      real(wp) :: step(2), slope(2), way
-
-      omega = vertex
-      if (k - 2*direction < 1 .or. k - 2*direction > samples%n) return
-      associate (middle => samples%item(k)%at, last => samples%item(k - direction)%at, &
-                 before => samples%item(k - 2*direction)%at, &
-                 beyond => samples%item(k + direction)%at)
-         step = abs([middle%omega - last%omega, last%omega - before%omega])
-         if (.not. all(step > 0.0_wp)) return
-         slope = [middle%amplitude(i) - last%amplitude(i), last%amplitude(i) - before%amplitude(i)] &
-                 /step
-         if (.not. slope(1) > 0.0_wp) return
-         ! Where the slope, which falls from one step to the next, comes to nothing.
-         way = min(0.5_wp*abs(beyond%omega - middle%omega), onwards*step(1))
-         if (slope(2) > slope(1)) then
-            way = min(way, 0.5_wp*sum(step)*slope(1)/(slope(2) - slope(1)) - 0.5_wp*step(1))
-         end if
-         if (way > direction*(vertex - middle%omega)) omega = middle%omega + direction*way
-      end associate
-   end function further
 
    !> Keep a frequency off the samples.
    pure real(wp) function within(omega, left, middle, right) result(inside)

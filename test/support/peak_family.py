@@ -125,10 +125,3 @@ def reported(path):
     known = [words[code] for code in codes]
     return (float(amplitude.max()),
             "not resolved" in known or known[int(amplitude.argmax())] in REMARKS)
-
-
-def stands_elsewhere(path, true):
-    """Whether a row of the sweep of few points is above the highest of the fine one: it has come
-    to another solution, which the fine sweep does not reach, and the peak is that of this."""
-    with h5py.File(path) as file:
-        return bool(file["amplitude"][:, 0].max() > true * (1.0 + RIGHT))
