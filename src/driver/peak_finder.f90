@@ -397,8 +397,8 @@ contains
       end do
    end subroutine look_beyond
 
-   !> Solve past a sample that stands on another branch, right next to the highest peak: this goes on
-   !> there, or the response falls.
+   !> Solve past a sample that stands on another branch, right next to the highest peak: this goes
+   !> on there, or the response falls.
    subroutine look_past(self, case, budget, more, error)
       type(peak_finder), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -407,7 +407,7 @@ contains
       logical, intent(inout) :: more
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: goes_on = 0.9_wp
-      real(wp) :: omega, height
+      real(wp) :: omega, edge, height
       integer :: i, j, k, side
       logical :: found
 
@@ -420,6 +420,7 @@ contains
          if (.not. found) cycle
          height = goes_on*self%samples%item(k)%at%amplitude(i)
          self%samples%item(side)%at%is_edge = .true.
+         edge = self%samples%item(side)%at%omega
          call solve_at(self, case, omega, budget, error, k)
          if (allocated(error)) return
          do j = 2, self%samples%n - 1
@@ -427,7 +428,7 @@ contains
             found = self%samples%item(j)%at%amplitude(i) >= height
             if (.not. found) exit
             more = .true.
-            call self%samples%drop(merge(j - 1, j + 1, self%samples%item(j - 1)%at%is_edge))
+            call self%samples%drop(merge(j - 1, j + 1, omega > edge))
             exit
          end do
       end do

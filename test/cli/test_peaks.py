@@ -30,6 +30,25 @@ def test_a_nonlinear_peak_is_that_of_a_fine_sweep_or_has_a_remark(tmp_path, seed
     assert remark or true is None or peak == pytest.approx(true, rel=peak_family.RIGHT)
 
 
+def test_a_peak_whose_contact_moves_the_mean_is_resolved_by_a_few_rows(tmp_path):
+    """A row far below, at another mean, was taken for one that rests: the search halved the way to
+    the other neighbour until nothing was left of its solutions."""
+    case = {"model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 0.53],
+                      "stiffness": [2.87, -1.63, -1.63, 3.27],
+                      "rayleigh_mass": 0.0158, "rayleigh_stiffness": 0.0158},
+            "contact": {"n_pairs": 2, "law": "penalty", "side_1": [0, 0, -2, 0, 0, -2],
+                        "gap": [-0.222, 0.283], "normal_stiffness": [2.2, 0.62]},
+            "load": {"cosine": [0.386, 0.0], "sine": [-0.13, 0.0], "static": [0.0, 0.753]},
+            "harmonics": {"n_harmonics": 7}, "output": {"observe": [1]},
+            "sweep": {"start": 0.62, "end": 9.96, "n_points": 8}}
+    run(tmp_path, case)
+    peak, remark = peak_family.reported(tmp_path / "case.h5")
+    run(tmp_path, merged(case, {"sweep": {"end": 2.0, "n_points": 801}}))
+    with h5py.File(tmp_path / "case.h5") as file:
+        true = file["peak/amplitude"][:].max()
+    assert not remark and peak == pytest.approx(true, rel=peak_family.RIGHT)
+
+
 @pytest.mark.parametrize(("seed", "true"), [(297, 4.270588), (417, 0.597972)])
 def test_two_peaks_side_by_side_are_not_taken_for_one(tmp_path, seed, true):
     """A resonance that goes on behind a dip, which falls from there all at once, and two humps that
