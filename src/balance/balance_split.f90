@@ -78,22 +78,22 @@ contains
       complex(wp), allocatable :: first(:, :), other(:, :)
       integer :: h, m
 
-      associate (kept => self%preconditioner, place => [self%frequency(), self%value])
-         is_so = kept%is_alike
-         if (all(abs(kept%compared_at - place) <= 0.0_wp)) return
+      associate (place => [self%frequency(), self%value])
+         is_so = self%is_alike
+         if (all(abs(self%compared_at - place) <= 0.0_wp)) return
          ! Blocks that were found to differ are not compared again.
-         if (kept%compared_at(1) > 0.0_wp .and. .not. kept%is_alike) return
-         kept%compared_at = place
+         if (self%compared_at(1) > 0.0_wp .and. .not. self%is_alike) return
+         self%compared_at = place
          m = self%problem%structure%n_coordinates
          allocate (first(m, m), other(m, m))
          call self%problem%structure%block(self%structure_state, 1, first)
-         kept%is_alike = .not. any(abs(aimag(first)) > 0.0_wp)
+         self%is_alike = .not. any(abs(aimag(first)) > 0.0_wp)
          do h = 2, self%problem%fourier%n_retained
-            if (.not. kept%is_alike) exit
+            if (.not. self%is_alike) exit
             call self%problem%structure%block(self%structure_state, h, other)
-            kept%is_alike = .not. any(abs(other - first) > 0.0_wp)
+            self%is_alike = .not. any(abs(other - first) > 0.0_wp)
          end do
-         is_so = kept%is_alike
+         is_so = self%is_alike
       end associate
    end procedure are_alike
 

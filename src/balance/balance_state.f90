@@ -62,7 +62,11 @@ module fw_balance_state
       !> Let normal components that always bear leave the linear problem.
       logical :: pins_normals = .true.
       !> Whether the inputs of the laws are displacements alone, the same in all harmonics.
-      logical :: has_static_laws = .false.
+      logical, private :: has_static_laws = .false.
+      !> Whether the blocks Z_n of all harmonics are one, and the frequency and the value of the
+      !> parameter where they were compared.
+      logical, private :: is_alike = .false.
+      real(wp), private :: compared_at(2) = -huge(1.0_wp)
       !> The linear problem of a step, see fw_balance_linear.
       type(active_set) :: active
       type(kept_factors) :: preconditioner

@@ -14,10 +14,6 @@ module fw_kept_factors
       !> In place of them: two matrices for all harmonics; whether the factors in use are these.
       type(split_factors) :: split
       logical :: is_split = .false.
-      !> Whether the blocks of all harmonics are one, and the frequency and the value of the
-      !> parameter where they were compared.
-      logical :: is_alike = .false.
-      real(wp) :: compared_at(2) = -huge(1.0_wp)
       !> Whether these are used although there are those of waves.
       logical :: is_whole = .false.
       !> Of waves around equal sectors in their place (n_sectors, n_retained), with scratch (slots
