@@ -3,7 +3,14 @@ program blas_probe
    use fw_blas, only: slow_kernel
    use fw_blas, only: text_length
    implicit none (type, external)
-   external :: dscal
+   interface
+      subroutine dscal(n, a, x, incx)
+         implicit none (type, external)
+         integer, intent(in) :: n, incx
+         double precision, intent(in) :: a
+         double precision, intent(inout) :: x(*)
+      end subroutine dscal
+   end interface
    logical :: is_slow
    character(text_length) :: kernel, better
    double precision :: x(1)
