@@ -146,7 +146,11 @@ contains
          ratio = fine
       else
          self%high = onset
-         call bisect_solutions(self, path, error)
+         call bisect_solutions(self, path, rough, error)
+         if (allocated(error)) return
+         ! A position that is not known there yet, or does not tell.
+         if (departure(self, path%system, self%high, position(self, self%high)) <= 0.0_wp) &
+            call bisect_solutions(self, path, coarse, error)
          if (allocated(error)) return
          onset = self%low(1)
          high = self%high
@@ -188,14 +192,15 @@ contains
 
    !> The same by a solution at each amplitude, where positions follow no straight line but very
    !> near the onset. Towards it two directions settle ever more slowly.
-   subroutine bisect_solutions(self, path, error)
+   subroutine bisect_solutions(self, path, ratio, error)
       type(onset_finder), intent(inout) :: self
       type(mode_path), intent(inout) :: path
+      real(wp), intent(in) :: ratio
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
       real(wp) :: middle, y(size(self%y, 1))
 
-      do while (self%high > rough*self%low(1))
+      do while (self%high > ratio*self%low(1))
          middle = sqrt(self%low(1)*self%high)
          y = position(self, middle)
          call path%solve(log(middle), y, report, error)

@@ -217,6 +217,9 @@ contains
             report%converged = solution%converged
             if (.not. solution%converged) return
             rate(:, s) = system%rate
+            ! Exactly what this rate gives: a stage that grows by less than the solver's tolerance
+            ! converges where it starts.
+            after%x(n + 1:) = base + t%gamma*cycles*system%rate
             point(:, s) = after%x
          end do
          report%error = cycles*matmul(rate, t%error)
