@@ -122,7 +122,8 @@ contains
       self%n_low = self%n_low + 1
    end subroutine take
 
-   !> NaN where no row departs.
+   !> NaN where no row departs; 0 where a pair does at every amplitude, as one that closes without a
+   !> gap or an interference.
    subroutine find(self, path, onset, error)
       class(onset_finder), intent(inout) :: self
       type(mode_path), intent(inout) :: path
@@ -132,7 +133,8 @@ contains
       real(wp) :: high, ratio, y(size(self%y, 1))
 
       onset = ieee_value(1.0_wp, ieee_quiet_nan)
-      if (.not. self%departed) return
+      if (any(self%rest > share_change .and. self%rest < 1.0_wp - share_change)) onset = 0.0_wp
+      if (onset == 0.0_wp .or. .not. self%departed) return
       onset = self%low(1)
       if (self%n_low == 0) return
       high = self%high

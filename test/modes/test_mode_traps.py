@@ -40,6 +40,17 @@ def test_pole_of_the_condensation(tmp_path):
     assert not found["iterations"][stuck][1:].any()
 
 
+def test_a_pair_that_parts_at_every_amplitude_has_its_onset_at_zero(tmp_path):
+    """One degree of freedom that rests on an elastic stop: half of every period is in the air."""
+    groups = {"model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0},
+              "contact": {"n_pairs": 1, "law": "penalty", "side_1": [0, 0, 1], "gap": 0.0,
+                          "normal_stiffness": 0.3}, "output": {"observe": [1]}}
+    found = follow(tmp_path, groups, 0.1, 1.0, 7, n_points=3)
+    assert found["attributes of mode"]["onset_amplitude"] == 0.0
+    # Two half periods, of either spring.
+    assert found["omega"] == pytest.approx(2.0 / (1.0 + 1.0 / np.sqrt(1.3)), rel=1e-3)
+
+
 def test_onset_has_a_kink_in_damping_alone(tmp_path):
     """Damping grows at once beyond the onset, the frequency with the power 3/2 of the excess; the
     curve goes on in order, and no step fails for it."""
