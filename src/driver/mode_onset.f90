@@ -151,9 +151,10 @@ contains
          call bisect_solutions(self, path, rough, error)
          if (allocated(error)) return
          ! A position that is not known there yet, or does not tell.
-         if (departure(self, path%system, self%high, position(self, self%high)) <= 0.0_wp) &
+         if (departure(self, path%system, self%high, position(self, self%high)) <= 0.0_wp) then
             call bisect_solutions(self, path, coarse, error)
-         if (allocated(error)) return
+            if (allocated(error)) return
+         end if
          onset = self%low(1)
          high = self%high
          ratio = coarse

@@ -47,7 +47,7 @@ module fw_peak_finder
    !> search; each halves the way that is tried.
    integer, parameter :: most_trials = 6, most_failures = 5
    !> Solutions of a search in all: so many, or this part of the rows, but no more than the last.
-   integer, parameter :: least_budget = 40, budget_share = 20, most_budget = 200
+   integer, parameter :: least_budget = 80, budget_share = 20, most_budget = 200
    !> Part of the first interval at which it is seen whether the amplitude rises into the range.
    real(wp), parameter :: step_inside = 0.1_wp
    !> Samples from which on those far from maxima are thinned out: long sweeps need no more memory.
@@ -349,20 +349,24 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: budget
       type(error_type), allocatable, intent(out) :: error
+      ! A first solution between the peak and a sample behind another mode may miss the edge.
+      integer, parameter :: most_looks = 2
       real(wp) :: omega
-      integer :: i, k, side
+      integer :: i, k, side, look
       logical :: found, known
 
       if (self%samples%n < 3) return
       do i = 1, size(self%samples%item(1)%at%amplitude)
          do side = -1, 1, 2
-            ! Found anew, for a solution moves the places.
-            k = place_of_highest(self%samples, i)
-            if (.not. is_maximum(self%samples, k, i)) exit
-            call find_edge(self%samples, k, i, side, omega, found, known)
-            if (known .or. .not. found) cycle
-            call solve_at(self, case, omega, budget, error, k)
-            if (allocated(error)) return
+            do look = 1, most_looks
+               ! Found anew, for a solution moves the places.
+               k = place_of_highest(self%samples, i)
+               if (.not. is_maximum(self%samples, k, i)) exit
+               call find_edge(self%samples, k, i, side, omega, found, known)
+               if (known .or. .not. found) exit
+               call solve_at(self, case, omega, budget, error, k)
+               if (allocated(error)) return
+            end do
          end do
       end do
    end subroutine measure_widths
@@ -406,9 +410,10 @@ contains
       !> Set where a peak goes on.
       logical, intent(inout) :: more
       type(error_type), allocatable, intent(out) :: error
-      real(wp), parameter :: goes_on = 0.9_wp
-      real(wp) :: omega, edge, height
-      integer :: i, j, k, side
+      real(wp), parameter :: goes_on = 0.9_wp, nearer = 0.3_wp
+      integer, parameter :: most_looks = 3
+      real(wp) :: omega, edge, height, way
+      integer :: i, k, look, side
       logical :: found
 
       if (self%samples%n < 3) return
@@ -421,18 +426,39 @@ contains
          height = goes_on*self%samples%item(k)%at%amplitude(i)
          self%samples%item(side)%at%is_edge = .true.
          edge = self%samples%item(side)%at%omega
-         call solve_at(self, case, omega, budget, error, k)
-         if (allocated(error)) return
-         do j = 2, self%samples%n - 1
-            if (abs(self%samples%item(j)%at%omega - omega) > 0.0_wp) cycle
-            found = self%samples%item(j)%at%amplitude(i) >= height
-            if (.not. found) exit
-            more = .true.
-            call self%samples%drop(merge(j - 1, j + 1, omega > edge))
-            exit
+         way = omega - edge
+         do look = 1, most_looks
+            call solve_at(self, case, edge + way, budget, error, place_of_highest(self%samples, i))
+            if (allocated(error)) return
+            call leave_edge(self, edge, edge + way, height, i, found)
+            more = more .or. found
+            if (found) exit
+            ! The branch may end sooner.
+            way = nearer*way
          end do
       end do
    end subroutine look_past
+
+   !> Where the response past a sample on another branch is as high as the peak, that is no edge.
+   subroutine leave_edge(self, edge, omega, height, i, goes_on)
+      type(peak_finder), intent(inout) :: self
+      !> The sample, and one past it [rad/s].
+      real(wp), intent(in) :: edge, omega
+      !> What is high, of quantity i.
+      real(wp), intent(in) :: height
+      integer, intent(in) :: i
+      logical, intent(out) :: goes_on
+      integer :: j
+
+      goes_on = .false.
+      do j = 2, self%samples%n - 1
+         if (abs(self%samples%item(j)%at%omega - omega) > 0.0_wp) cycle
+         if (self%samples%item(j)%at%amplitude(i) < height) return
+         goes_on = .true.
+         call self%samples%drop(merge(j - 1, j + 1, omega > edge))
+         return
+      end do
+   end subroutine leave_edge
 
    !> The maximum that is not known well enough and may be the highest, relative to what is known of
    !> its quantity.

@@ -29,6 +29,8 @@ module fw_peak_rules
    !> parabola, of third order in the distance, is below the gain there. And the same of a peak that
    !> may be the highest: three points of two peaks side by side look like one.
    real(wp), parameter :: near = 0.9_wp, nearest = 0.97_wp
+   !> The same of a peak that is cut off: it is no parabola towards that side.
+   real(wp), parameter :: nearest_cut = 0.995_wp
    !> A fall to this part of the height, over a way so many times as long as what is known of the
    !> peak, may hide more of it.
    real(wp), parameter :: deep = 0.5_wp, far_beyond = 8.0_wp
@@ -39,23 +41,46 @@ module fw_peak_rules
 
 contains
 
-   !> Whether sample k is a maximum of quantity i among its neighbours.
+   !> Whether sample k is a maximum of quantity i: the first of the highest among neighbours that
+   !> differ by round-off, above what lies next to these.
    pure logical function is_maximum(samples, k, i)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
-      real(wp) :: a, rise
+      real(wp) :: rise
+      integer :: below(2)
 
       is_maximum = .false.
       if (k <= 1 .or. k >= samples%n) return
-      associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
-                 right => samples%item(k + 1)%at)
-         a = middle%amplitude(i)
+      associate (middle => samples%item(k)%at)
          rise = max(round_off*swing_of(middle, i, middle%mean(i)), &
                     negligible*maxval(middle%amplitude))
-         is_maximum = a >= left%amplitude(i) .and. a > right%amplitude(i) + rise .or. &
-                      a > left%amplitude(i) + rise .and. a >= right%amplitude(i)
       end associate
+      below = [place_below(samples, k, i, -1, rise), place_below(samples, k, i, 1, rise)]
+      is_maximum = all(below >= 0) .and. any(below > 0)
    end function is_maximum
+
+   !> The first sample from k on in a direction that is lower by more than the rise: 0 where there
+   !> is none, below 0 where a higher one comes first.
+   pure integer function place_below(samples, k, i, direction, rise) result(place)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i, direction
+      real(wp), intent(in) :: rise
+      real(wp) :: a, other
+
+      a = samples%item(k)%at%amplitude(i)
+      place = k + direction
+      do while (place >= 1 .and. place <= samples%n)
+         other = samples%item(place)%at%amplitude(i)
+         if (other < a - rise) return
+         ! Of equal ones the first counts.
+         if (other > a .or. other >= a .and. direction < 0) then
+            place = -1
+            return
+         end if
+         place = place + direction
+      end do
+      place = 0
+   end function place_below
 
    !> Where to solve next for the maximum of quantity i at sample k; `done` where it is known.
    pure subroutine find_next(samples, k, i, omega, promise, done)
@@ -75,8 +100,12 @@ contains
                  right => samples%item(k + 1)%at)
          call vertex_of(left, middle, right, i, vertex, promise, curvature)
          mean = position_of(left, middle, right, i)
+         if (is_cut_off(samples, k, i, mean)) share = nearest_cut
          left_is_known = side_is_known(left, middle, right, i, mean, share)
          right_is_known = side_is_known(right, middle, left, i, mean, share)
+         if (left_is_known .neqv. right_is_known) then
+            vertex = further(samples, k, i, merge(1, -1, left_is_known), vertex)
+         end if
          omega = within(vertex, left%omega, middle%omega, right%omega)
          done = promise <= (1.0_wp + small_gain)*swing_of(middle, i, mean)
          if (.not. done) then
@@ -94,6 +123,29 @@ contains
          done = abs(omega - middle%omega) <= same_frequency*middle%omega
       end associate
    end subroutine find_next
+
+   !> Whether the response falls behind a neighbour of the peak faster than any resonance does: it
+   !> jumps there.
+   pure logical function is_cut_off(samples, k, i, mean)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      real(wp), intent(in) :: mean
+      real(wp), parameter :: as_long = 2.0_wp
+      integer :: direction
+
+      is_cut_off = .false.
+      do direction = -1, 1, 2
+         if (k + 2*direction < 1 .or. k + 2*direction > samples%n) cycle
+         associate (middle => samples%item(k)%at, side => samples%item(k + direction)%at, &
+                    behind => samples%item(k + 2*direction)%at)
+            if (swing_of(side, i, mean) < near*swing_of(middle, i, mean)) cycle
+            is_cut_off = is_cut_off .or. &
+                         swing_of(behind, i, mean) < deep*swing_of(middle, i, mean) .and. &
+                         abs(behind%omega - side%omega) <= &
+                         as_long*abs(side%omega - middle%omega)
+         end associate
+      end do
+   end function is_cut_off
 
    !> Whether nothing higher can lie between the middle and a neighbour: it belongs to the peak, or
    !> what rises towards the middle from the other side cannot gain more on the way.
@@ -137,6 +189,37 @@ contains
       distance = min(max(distance, 2.0_wp*margin*half), half)
       omega = middle%omega + sign(distance, side%omega - middle%omega)
    end function beside
+
+   !> The vertex, or where the near side of the peak leads if that is further: behind an edge where
+   !> the response jumps, the far side stands on another branch and tells nothing of the peak.
+   pure real(wp) function further(samples, k, i, direction, vertex) result(omega)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      !> Of the side that is not known: 1 above, -1 below.
+      integer, intent(in) :: direction
+      real(wp), intent(in) :: vertex
+      !> Longest step over what is known, so as to stay on the branch.
+      real(wp), parameter :: onwards = 1.5_wp
+      real(wp) :: step(2), slope(2), way
+
+      omega = vertex
+      if (k - 2*direction < 1 .or. k - 2*direction > samples%n) return
+      associate (middle => samples%item(k)%at, last => samples%item(k - direction)%at, &
+                 before => samples%item(k - 2*direction)%at, &
+                 beyond => samples%item(k + direction)%at)
+         step = abs([middle%omega - last%omega, last%omega - before%omega])
+         if (.not. all(step > 0.0_wp)) return
+         slope = [middle%amplitude(i) - last%amplitude(i), &
+                  last%amplitude(i) - before%amplitude(i)]/step
+         if (.not. slope(1) > 0.0_wp) return
+         ! Where the slope, which falls from one step to the next, comes to nothing.
+         way = min(0.5_wp*abs(beyond%omega - middle%omega), onwards*step(1))
+         if (slope(2) > slope(1)) then
+            way = min(way, 0.5_wp*sum(step)*slope(1)/(slope(2) - slope(1)) - 0.5_wp*step(1))
+         end if
+         if (way > direction*(vertex - middle%omega)) omega = middle%omega + direction*way
+      end associate
+   end function further
 
    !> Keep a frequency off the samples.
    pure real(wp) function within(omega, left, middle, right) result(inside)

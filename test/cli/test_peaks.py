@@ -27,7 +27,28 @@ def test_a_nonlinear_peak_is_that_of_a_fine_sweep_or_has_a_remark(tmp_path, seed
     run(tmp_path, groups, status=(0, 4))
     peak, remark = peak_family.reported(tmp_path / "case.h5")
     true = peak_family.fine_peak(tmp_path, groups, ratio)
-    assert remark or true is None or peak == pytest.approx(true, rel=peak_family.RIGHT)
+    if true is None or peak_family.stands_elsewhere(tmp_path / "case.h5", true):
+        return
+    assert remark or peak == pytest.approx(true, rel=peak_family.RIGHT)
+
+
+@pytest.mark.parametrize(("gap", "load", "n_points"), [(0.5, 0.1, 21), (1.0, 0.05, 21),
+                                                       (1.0, 0.2, 11), (2.0, 0.4, 15)])
+def test_the_peak_of_an_oscillator_before_a_stop_is_climbed(tmp_path, gap, load, n_points):
+    """Contact moves the mean of the vibration, the response jumps behind its peak, and with a gap
+    of 1 a row of the sweep stands on the lower branch below it."""
+    case = {"model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.02},
+            "contact": {"n_pairs": 1, "law": "penalty", "side_1": [0, 0, -1], "gap": gap,
+                        "normal_stiffness": 1.0},
+            "load": {"cosine": load}, "harmonics": {"n_harmonics": 5},
+            "sweep": {"start": 0.5, "end": 2.0, "n_points": n_points}}
+    run(tmp_path, case)
+    peak, remark = peak_family.reported(tmp_path / "case.h5")
+    # Its branch, whose corners and turns are followed.
+    run(tmp_path, merged(case, {"sweep": {"continuation": "arclength", "n_points": 401}}))
+    with h5py.File(tmp_path / "case.h5") as file:
+        true = file["peak/amplitude"][:].max()
+    assert not remark and peak == pytest.approx(true, rel=peak_family.RIGHT)
 
 
 def test_a_peak_whose_contact_moves_the_mean_is_resolved_by_a_few_rows(tmp_path):

@@ -125,3 +125,13 @@ def reported(path):
     known = [words[code] for code in codes]
     return (float(amplitude.max()),
             "not resolved" in known or known[int(amplitude.argmax())] in REMARKS)
+
+
+def stands_elsewhere(path, true):
+    """Whether a solution is reported, row or peak, above the highest of the fine sweep: one that
+    this does not reach, because it jumps off its branch sooner or runs on another one."""
+    with h5py.File(path) as file:
+        highest = file["amplitude"][:, 0].max()
+        if "peak" in file:  # not where nothing moves
+            highest = max(highest, file["peak/amplitude"][:].max())
+    return bool(highest > true * (1.0 + RIGHT))
