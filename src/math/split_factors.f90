@@ -156,8 +156,8 @@ contains
       end do
    end subroutine solve
 
-   !> P_0^-1 (`is_constant`) or P_1^-1 of many right-hand sides of the order of one, in place; for rank
-   !> 0 alone. Those of P_0 are real.
+   !> P_0^-1 (`is_constant`) or P_1^-1 of many right-hand sides of the order of one, in place; for
+   !> rank 0 alone. Those of P_0 are real.
    subroutine solve_alike(self, is_constant, b)
       class(split_factors), intent(inout) :: self
       logical, intent(in) :: is_constant

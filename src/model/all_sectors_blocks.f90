@@ -5,6 +5,7 @@ submodule(fw_all_sectors) fw_all_sectors_blocks
 
 contains
 
+   !> Between all coordinates: the waves of harmonic h, transformed back to sectors.
    module procedure block_of_all
       integer :: j
 
@@ -15,6 +16,7 @@ contains
       end select
    end procedure block_of_all
 
+   !> The same between the coordinates that are active, condensed ones behind them.
    module procedure block_in_use
 
       select type (state)
@@ -24,6 +26,7 @@ contains
       end select
    end procedure block_in_use
 
+   !> The mean over the waves, each with its own reduction: what one sector has of itself alone.
    module procedure mass
       integer :: j, k
 
@@ -37,6 +40,8 @@ contains
       end do
    end procedure mass
 
+   !> Stiffness, mass and damping of waves one by one; those above half of the sectors run the
+   !> other way and are the conjugates of their mirror images.
    module procedure parts
       complex(wp), allocatable :: wave(:, :, :, :), rows(:, :, :), between(:, :, :)
       integer :: every(self%n_coordinates), j, k, m, n, n_rows

@@ -90,6 +90,7 @@ contains
       end associate
    end function static_stiffness
 
+   !> Mass, damping and stiffness of one coordinate alone.
    pure subroutine split(self, coordinate, limit, m, c, k)
       class(condensed_structure), intent(in) :: self
       integer, intent(in) :: coordinate
@@ -99,6 +100,7 @@ contains
       call split_coordinate(self%basis, coordinate, limit, m, c, k)
    end subroutine split
 
+   !> Mass between the coordinates, as the reduction has it.
    pure subroutine mass(self, matrix)
       class(condensed_structure), intent(in) :: self
       real(wp), intent(out) :: matrix(:, :)
@@ -135,6 +137,7 @@ contains
       end associate
    end subroutine held_modes
 
+   !> Sizes of the terms that an entry sums up: round-off of a residual is measured by them.
    pure subroutine magnitudes(self, state, h, amplitude, sums)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -155,12 +158,14 @@ contains
       end do
    end subroutine magnitudes
 
+   !> Degrees of freedom before condensation.
    pure integer function whole_size(self)
       class(condensed_structure), intent(in) :: self
 
       whole_size = self%n_coordinates + self%basis%n_internal
    end function whole_size
 
+   !> Forces on all degrees of freedom, as loads on the coordinates.
    subroutine condense_field(self, state, field, load)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -177,6 +182,7 @@ contains
       end select
    end subroutine condense_field
 
+   !> The motion of all degrees of freedom that belongs to coordinates and loads.
    subroutine complete_field(self, state, q, load, field)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -203,6 +209,7 @@ contains
       end select
    end subroutine complete_field
 
+   !> Observed quantities of a motion of all degrees of freedom.
    pure subroutine observe_field(self, field, observed)
       class(condensed_structure), intent(in) :: self
       complex(wp), intent(in) :: field(:, :)
@@ -213,6 +220,7 @@ contains
       end associate
    end subroutine observe_field
 
+   !> Transposed: a motion whose product with any other is that of what is observed.
    pure subroutine observe_back(self, observed, field)
       class(condensed_structure), intent(in) :: self
       complex(wp), intent(in) :: observed(:, :)
@@ -224,6 +232,7 @@ contains
       end associate
    end subroutine observe_back
 
+   !> What moves when an entry of the matrices changes: forces on all degrees of freedom.
    pure subroutine change_field(self, state, number, field, slope)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -245,6 +254,7 @@ contains
       end associate
    end subroutine change_field
 
+   !> Static loads and vibratory ones by a factor each.
    pure subroutine scale_loads(self, static, vibration)
       class(condensed_structure), intent(inout) :: self
       real(wp), intent(in) :: static, vibration
@@ -258,6 +268,7 @@ contains
       end associate
    end subroutine scale_loads
 
+   !> Derivative of what is observed by the frequency, at held coordinates.
    subroutine observed_slope(self, state, q, slope)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -275,6 +286,7 @@ contains
       end do
    end subroutine observed_slope
 
+   !> Work of the loads in harmonic h, with its derivatives by frequency and coordinates.
    subroutine load_work(self, state, h, q, work, slope, row)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -286,6 +298,7 @@ contains
       call work_of_load(self%basis, self%harmonic(h), state%omega, q, work, slope, row)
    end subroutine load_work
 
+   !> Work of the loads on a motion of all degrees of freedom.
    pure complex(wp) function field_work(self, state, field) result(work)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
