@@ -335,7 +335,8 @@ def test_one_sector_is_a_plain_structure(tmp_path):
 
 @pytest.mark.parametrize(("spoil", "words"), [
     (lambda case: case["coriolis"].__setitem__((0, 1), 9.0), ["coriolis", "skew"]),
-    (lambda case: case["air"].__setitem__("by", "blade"), ["/aero/blade", "sector, nodal_diameter"]),
+    (lambda case: case["air"].__setitem__("by", "blade"),
+     ["/aero/blade", "sector, nodal_diameter"]),
     (lambda case: case["air"].__setitem__("modes", np.zeros((3, 2))), ["/aero/modes", "shape"]),
     (lambda case: case["air"]["matrix"].__setitem__(1, np.zeros((2, 3))), ["square"]),
     (lambda case: case["air"]["matrix"].__setitem__(case["n_sectors"] - 1, np.eye(2)),
