@@ -150,8 +150,8 @@ contains
          self%high = onset
          call bisect_solutions(self, path, rough, error)
          if (allocated(error)) return
-         ! A position that is not known there yet, or does not tell.
-         if (departure(self, path%system, self%high, position(self, self%high)) <= 0.0_wp) then
+         ! One row tells nothing of how the position moves.
+         if (self%n_low < 2) then
             call bisect_solutions(self, path, coarse, error)
             if (allocated(error)) return
          end if
