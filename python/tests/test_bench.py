@@ -170,7 +170,7 @@ def measured(pairs: int, n_harmonics: int, seconds: float, memory: float = 100.0
 
 @pytest.mark.parametrize(("power", "word"), [(1.9, "met"), (2.3, "missed by 0.30")])
 def test_exponents_judge_the_targets(power: float, word: str) -> None:
-    from bench.speed.scaling import exponents
+    from bench.speed.scaling_report import exponents
 
     rows = [measured(pairs, n, pairs**power * n) for pairs in (16, 48, 768) for n in (1, 31)]
     lines = exponents(rows)
@@ -181,7 +181,7 @@ def test_exponents_judge_the_targets(power: float, word: str) -> None:
 
 
 def test_memory_tells_whether_there_is_a_matrix_of_the_order_of_the_unknowns() -> None:
-    from bench.speed.scaling import largest_matrix
+    from bench.speed.scaling_report import largest_matrix
 
     small, large = measured(16, 3, 1.0), measured(96, 31, 1.0)
     assert small.full_matrix == pytest.approx(8e-6 * 336**2)
@@ -212,7 +212,8 @@ def test_a_peer_that_did_not_end_has_no_ratio() -> None:
 
 def test_scaling_asks_for_the_coarse_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from bench.common import sector
-    from bench.speed.scaling import COARSE, coarse_options
+    from bench.speed.scaling import COARSE
+    from bench.speed.scaling_report import coarse_options
 
     asked: list[list[str]] = []
     monkeypatch.setattr(sector.subprocess, "run", lambda command, **_: asked.append(command))
