@@ -18,8 +18,8 @@ PYTHON := build/venv/bin/python
 EXAMPLE := example/blade_sector
 # Options for CMake, such as CMAKE_OPTIONS=-DCMAKE_PREFIX_PATH=/some/where
 CMAKE_OPTIONS ?=
-# auto, system, or scipy: the OpenBLAS of the Python package scipy-openblas32
-BLAS ?= auto
+# system, scipy (the OpenBLAS of the Python package scipy-openblas32), or auto: the faster one
+BLAS ?= system
 export BLAS
 
 help: ## this list

@@ -4,8 +4,8 @@
 #
 #     tools/deps.sh VENV_DIRECTORY
 #
-# With BLAS=scipy, or where the system's OpenBLAS does not know this processor, the newer one of the
-# Python package scipy-openblas32 goes into the environment too.
+# With BLAS=scipy, or BLAS=auto where the system's OpenBLAS does not know this processor, the newer
+# one of the Python package scipy-openblas32 goes into the environment too.
 set -euo pipefail
 venv=$1
 python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
@@ -136,7 +136,7 @@ install_blas() {
       scipy-openblas32
 }
 
-blas=${BLAS:-auto}
+blas=${BLAS:-system}
 if [ "$blas" = scipy ] || { [ "$blas" = auto ] && has_slow_blas; }; then
    if ! "$venv/bin/python" -c 'import scipy_openblas32' 2>/dev/null; then
       echo "deps: scipy-openblas32 into $venv" >&2
