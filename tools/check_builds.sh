@@ -28,14 +28,6 @@ cmake --build "$work/cmake" >>"$work/log" || { tail -n 30 "$work/log"; exit 1; }
 finds_the_peak "$work/cmake/fw_run"
 echo "CMake: $((SECONDS - started)) s"
 
-# The same objects with the OpenBLAS of a Python package, where it is installed.
-if "$python" -c 'import scipy_openblas32' 2>/dev/null; then
-   cmake -S . -B "$work/cmake" -DFRETWEAR_BLAS=scipy "-DPython3_EXECUTABLE=$python" >"$work/log"
-   cmake --build "$work/cmake" --target fw_run >>"$work/log" || { tail -n 30 "$work/log"; exit 1; }
-   finds_the_peak "$work/cmake/fw_run"
-   ldd "$work/cmake/fw_run" | grep -q scipy_openblas
-fi
-
 started=$SECONDS
 tools/check_install.sh "$work/wheel" "$work/cmake"
 echo "pip: $((SECONDS - started)) s"
