@@ -103,7 +103,9 @@ contains
          if (is_cut_off(samples, k, i, mean)) share = nearest_cut
          left_is_known = side_is_known(left, middle, right, i, mean, share)
          right_is_known = side_is_known(right, middle, left, i, mean, share)
-         if (left_is_known .neqv. right_is_known) then
+         ! A side that is not far below is one of the parabola.
+         if (min(swing_of(left, i, mean), swing_of(right, i, mean)) < &
+             near*swing_of(middle, i, mean) .and. (left_is_known .neqv. right_is_known)) then
             vertex = further(samples, k, i, merge(1, -1, left_is_known), vertex)
          end if
          omega = within(vertex, left%omega, middle%omega, right%omega)

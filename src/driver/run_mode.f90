@@ -341,6 +341,8 @@ contains
             call system%remember(y)
             call curve%path%solve(log(system%amplitude), y, again, error)
             if (allocated(error)) return
+            report%converged = again%converged
+            if (.not. again%converged) return
          end if
          call curve%path%remember(log(system%amplitude), y)
       end associate
