@@ -79,6 +79,12 @@ def run_study(plan: Plan, progress: Progress | None = None, *,
         if not table_only:
             _run_all(jobs, plan.scheduler, workers, keep)
     finally:
+        # What came to its end while Ctrl-C was on its way left its record, and is not in the list.
+        for job in jobs:
+            ended = recorded(job) if records[points[job.name][0]] is None else None
+            if ended is not None:
+                for k in points[job.name]:
+                    records[k] = replace(ended, values=plan.points[k])
         write_table(build_table(plan, records), plan.table, plan.path.stem)
     return records
 
