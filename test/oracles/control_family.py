@@ -115,9 +115,11 @@ def point_errors(groups, matrices, omega, row, force, scale):
         return error, float("nan")
     if law == "dlft":
         held = list(rows)
-        if "spring" in groups:
+        spring = groups.get("spring", {"side_1": [0]})["side_1"][0]
+        if spring and not np.any(np.abs(side) == spring):
             # The elongation of a spring is a coordinate too: it rests where others are moved.
-            held.append(pair_rows((groups["spring"]["side_1"][0], 0, 0), (0, 0, 0), n))
+            # Where a pair moves that dof, the two are one coordinate.
+            held.append(pair_rows((spring, 0, 0), (0, 0, 0), n))
         stiffnesses = automatic_penalty(matrices[2], np.concatenate(held)).reshape(-1, 3)
     else:
         stiffnesses = np.zeros((len(side), 3))
