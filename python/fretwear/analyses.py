@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union, cast
+from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ._native import NOT_CONVERGED, STOPPED, Session, namelist_values, raise_status
-from ._progress import CONTROL, Bar, State, read_state
+from ._native import NOT_CONVERGED, STOPPED, raise_status
+from ._watching import Progress, Stop, run_watched, stop_function, teller
 from .case import Case, ModelLike
 from .errors import ConvergenceError, InputError, RunInterrupted
 from .result import Result
@@ -32,20 +28,11 @@ if TYPE_CHECKING:
 
 __all__ = ["frf", "mode", "resonance", "run", "wear"]
 
-#: Called with the number of points done and of points to come (0: not known); True for a bar on
-#: the standard error, or in a notebook.
-Progress = Union[bool, Callable[[int, int], object]]
-
-#: What is asked whether to stop.
-Stop = Union[threading.Event, Callable[[], object]]
-
-#: Time between two calls of a progress function [s].
-_BETWEEN_CALLS = 0.1
-
 
 def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool = True,
         progress: Progress | None = None, stop: Stop | None = None,
-        max_seconds: float | None = None, in_memory: bool = False) -> Result:
+        max_seconds: float | None = None, in_memory: bool = False,
+        workers: int | None = None, scheduler: str = "threads") -> Result:
     """Run a case and open its result.
 
     The library computes in this process with the interpreter lock released; the numbers are those
@@ -72,6 +59,12 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         Stop the run after this time; the key `max_seconds` of `case` (default: no limit).
     in_memory : bool, optional
         Keep the result in memory and touch no file, whatever the case says.
+    workers : int, optional
+        Cut a natural sweep into as many overlapping pieces, which are solved at once and joined:
+        the same rows to the tolerance, checked where pieces overlap (0: one for each core).
+    scheduler : str, optional
+        Who solves them: 'threads' of this process (default), 'dask' for a cluster on this machine,
+        or the address of a Dask scheduler, with one piece for each of its threads by default.
 
     Returns
     -------
@@ -89,7 +82,7 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     RunInterrupted
         The run was stopped (a KeyboardInterrupt); its `result` holds the points up to there.
     """
-    is_stopped = _stop_function(stop)
+    is_stopped = stop_function(stop)
     if progress is not None and not isinstance(progress, bool) and not callable(progress):
         raise InputError(f"progress: is a {type(progress).__name__}, must be True or a function of "
                          "the points done and the points to come")
@@ -102,14 +95,20 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
     if in_memory and file is not None:
         raise InputError(f"file: is '{file}', but in_memory is set; one of the two")
     in_memory = in_memory or not case.names_output
+    if workers is not None or scheduler != "threads":
+        from .pieces import run_in_pieces
+
+        result, report = run_in_pieces(case, workers or 0, scheduler, progress, is_stopped,
+                                       in_memory=in_memory)
+        return _judged(result, report, check=check)
     return _run(case, progress, is_stopped, check=check, in_memory=in_memory)
 
 
 def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object] | None, *,
          check: bool, in_memory: bool) -> Result:
     with case.open() as session:
-        with _teller(progress, session) as tell:
-            status, interrupted = _watched(session, tell, is_stopped, in_memory=in_memory)
+        with teller(progress, session) as tell:
+            status, interrupted = run_watched(session, tell, is_stopped, in_memory=in_memory)
         report = (session.text("remarks") + session.text("summary")).splitlines()
         message, path, image = session.text("message"), session.text("output"), session.image()
     if status not in (NOT_CONVERGED, STOPPED):
@@ -117,7 +116,12 @@ def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object]
     result = Result.from_bytes(image, case) if in_memory else Result(path, case)
     if status == STOPPED or interrupted:
         raise RunInterrupted(result)
-    if status == NOT_CONVERGED and check:
+    return _judged(result, report, check=check)
+
+
+def _judged(result: Result, report: list[str], *, check: bool) -> Result:
+    """The result, unless points have not converged and that is to be raised."""
+    if check and result.status == "not converged":
         raise ConvergenceError(_failure(result, report), result, report)
     return result
 
@@ -334,106 +338,6 @@ def _refuse_twice(group: str, own: Mapping[str, object], given: Mapping[str, obj
     for key in own.keys() & given.keys():
         raise InputError(f"{group}[{key!r}]: is set by an argument of the function already; leave "
                          "it out, or make a Case and run it")
-
-
-def _stop_function(stop: object) -> Callable[[], object] | None:
-    """What tells whether to stop: an event is asked whether it is set."""
-    if stop is None:
-        return None
-    asked = getattr(stop, "is_set", stop)
-    if not callable(asked):
-        raise InputError(f"stop: is a {type(stop).__name__}, must be a threading.Event or a "
-                         "function without arguments")
-    return asked
-
-
-#: What is told how far the run is.
-_Tell = Callable[[State], object]
-
-
-@contextmanager
-def _teller(progress: Progress | None, session: Session) -> Iterator[_Tell | None]:
-    """What is told of a run: a bar, the function of the caller, or nothing."""
-    if callable(progress):
-        told = progress
-        yield lambda state: told(state.done, state.total)
-    elif progress:
-        unit = namelist_values(session.text("namelist")).get("sweep%unit", ["rad/s"])
-        bar = Bar(in_hertz=unit[0].lower() == "hz")
-        try:
-            yield bar.show
-        finally:
-            bar.end()
-    else:
-        yield None
-
-
-def _watched(session: Session, progress: _Tell | None, stop: Callable[[], object] | None, *,
-             in_memory: bool) -> tuple[int, bool]:
-    """Run a session so that it can be interrupted; its status, and whether it was.
-
-    The main thread alone gets signals, and only while it runs Python: the library works in another
-    thread, while this one waits.
-    """
-    control = np.zeros(CONTROL, dtype=np.int64)
-    in_main = threading.current_thread() is threading.main_thread()
-    if not in_main and progress is None and stop is None:
-        return session.run(control, in_memory=in_memory), False
-    status: list[int] = []
-    worker = threading.Thread(
-        target=lambda: status.append(session.run(control, in_memory=in_memory)), name="fretwear")
-    with _stops_on_interrupt(control, in_main) as interrupted:
-        worker.start()
-        try:
-            _wait(worker, control, progress, stop)
-        except BaseException:
-            control[0] = 1
-            worker.join()
-            raise
-    return status[0], bool(interrupted)
-
-
-def _wait(worker: threading.Thread, control: NDArray[np.int64], progress: _Tell | None,
-          stop: Callable[[], object] | None) -> None:
-    if progress is None and stop is None:
-        worker.join()
-        return
-    told = -1
-    while True:
-        worker.join(_BETWEEN_CALLS)
-        at_work = worker.is_alive()
-        if stop is not None and stop():
-            control[0] = 1
-        if progress is not None and told != control[1]:
-            told = int(control[1])
-            progress(read_state(control))
-        if not at_work:
-            return
-
-
-@contextmanager
-def _stops_on_interrupt(control: NDArray[np.int64], in_main: bool) -> Iterator[list[int]]:
-    """Let Ctrl-C set the stop flag instead of raising; yields the list of signals received.
-
-    A handler of the calling program gets its signal afterwards.
-    """
-    received: list[int] = []
-
-    def stop(number: int, _frame: object) -> None:
-        received.append(number)
-        control[0] = 1
-
-    before = signal.getsignal(signal.SIGINT)
-    if not in_main or before is None or before == signal.SIG_IGN:  # not ours to handle
-        yield received
-        return
-    signal.signal(signal.SIGINT, stop)
-    try:
-        yield received
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if received and callable(before) and before is not signal.default_int_handler:
-        before(received[-1], None)
 
 
 def _failure(result: Result, report: list[str]) -> str:

@@ -293,6 +293,15 @@ class Sweep(_Sweep, total=False):
     #: points that are solved to find maxima become rows, in order; only: analysis = 'frf',
     #: continuation = 'natural' (default: .false.)
     refine: bool
+    #: the first of its points that is a row: a piece of a sweep, of which others solve the rest;
+    #: only: analysis = 'frf', continuation = 'natural' (default: 1)
+    first_point: int
+    #: the last of its points that is a row; 0: the last; only: analysis = 'frf', continuation =
+    #: 'natural' (default: 0)
+    last_point: int
+    #: points on the way from the start to first_point that are solved and are no rows; only:
+    #: first_point above 1 (default: 0)
+    lead_points: int
     #: a list of values in any order, in place of start, end and n_points; only: analysis = 'frf',
     #: 'time', continuation = 'natural' (default: none)
     values: ArrayLike

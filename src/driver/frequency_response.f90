@@ -34,6 +34,7 @@ module fw_frequency_response
    use fw_stability_verdict, only: verdict_undecided
    use fw_strategy, only: point_strategy
    use fw_summary, only: summary_type
+   use fw_sweep, only: lead_places
    use fw_sweep, only: list_source
    use fw_sweep, only: point_source
    use fw_sweep, only: run_sweep
@@ -295,6 +296,7 @@ contains
          call move_alloc(branch, source)
       else
          list%place = sweep_places(case)
+         if (case%sweep%lead_points > 0) list%lead = lead_places(case)
          if (case%control%is_wanted()) call repeat_places(case%control%amplitude, list)
          list%strategy => strategy
          n_points = size(list%place)

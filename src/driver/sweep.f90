@@ -18,7 +18,8 @@ module fw_sweep
    implicit none (type, external)
    private
 
-   public :: point_source, list_source, run_sweep, sweep_frequency, sweep_places, path_ends
+   public :: point_source, list_source, run_sweep, sweep_frequency, sweep_places, lead_places
+   public :: path_ends
 
    !> Where points come from: given frequencies, or a branch that chooses its own.
    type, abstract :: point_source
@@ -57,6 +58,8 @@ module fw_sweep
       real(wp), allocatable :: place(:)
       !> Amplitude that each is to have, where the load is found; else not allocated.
       real(wp), allocatable :: amplitude(:)
+      !> On the way to the first of them, solved and not given (n_lead).
+      real(wp), allocatable :: lead(:)
       !> Points given so far.
       integer :: n_given = 0
       !> How each of them is solved.
@@ -136,6 +139,10 @@ contains
 
       more = self%n_given < size(self%place)
       if (.not. more) return
+      if (self%n_given == 0 .and. allocated(self%lead)) then
+         call come_to_first(self, case, observer, error)
+         if (allocated(error)) return
+      end if
       request = new_request(case, self%place(self%n_given + 1), observer)
       if (allocated(self%amplitude)) request%amplitude = self%amplitude(self%n_given + 1)
       call self%strategy%solve_in_time(case, request, point, error)
@@ -145,6 +152,30 @@ contains
       self%n_given = self%n_given + 1
    end subroutine next_of_list
 
+   !> Solve on the way to the first row; what fails there is of no account.
+   subroutine come_to_first(self, case, observer, error)
+      class(list_source), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      class(observer_type), intent(inout), target :: observer
+      type(error_type), allocatable, intent(out) :: error
+      type(point_request) :: request
+      type(point_type) :: point
+      integer :: k
+
+      do k = 1, size(self%lead)
+         request = new_request(case, self%lead(k), observer)
+         ! Nothing but its solution is wanted.
+         request%fallback = .false.
+         request%stability = .false.
+         request%contact = .false.
+         request%histories = .false.
+         request%sensitivity = .false.
+         call self%strategy%solve_in_time(case, request, point, error)
+         if (allocated(error)) return
+      end do
+      deallocate (self%lead)
+   end subroutine come_to_first
+
    !> A run that was stopped or failed has not given all.
    pure logical function all_given(self)
       class(list_source), intent(in) :: self
@@ -152,8 +183,33 @@ contains
       all_given = self%n_given == size(self%place)
    end function all_given
 
-   !> The frequencies that a case asks for [rad/s], or the values of its parameter.
+   !> The frequencies that a case asks for [rad/s], or the values of its parameter: those of the
+   !> rows, of a piece of a sweep too.
    pure function sweep_places(case) result(places)
+      type(case_type), intent(in) :: case
+      real(wp), allocatable :: places(:)
+
+      places = all_places(case)
+      associate (piece => case%sweep)
+         if (.not. piece%is_piece()) return
+         places = places(piece%first_point:merge(piece%last_point, size(places), &
+                                                 piece%last_point > 0))
+      end associate
+   end function sweep_places
+
+   !> Those on the way to a piece, in even steps from the start of the sweep.
+   pure function lead_places(case) result(places)
+      type(case_type), intent(in) :: case
+      real(wp), allocatable :: places(:)
+      integer :: k, n
+
+      n = min(case%sweep%lead_points, case%sweep%first_point - 1)
+      places = all_places(case)
+      places = places([(1 + ((k - 1)*(case%sweep%first_point - 1))/n, k=1, n)])
+   end function lead_places
+
+   !> Those of the whole sweep.
+   pure function all_places(case) result(places)
       type(case_type), intent(in) :: case
       real(wp), allocatable :: places(:)
       integer :: k, n_points
@@ -168,7 +224,7 @@ contains
       else
          places = [(sweep_frequency(case%sweep, k, n_points), k=1, n_points)]
       end if
-   end function sweep_places
+   end function all_places
 
    !> Where a sweep begins and where it ends.
    pure function path_ends(case) result(ends)

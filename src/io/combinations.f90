@@ -49,6 +49,7 @@ contains
       if (.not. allocated(error)) call check_jacobian(case, error)
       if (.not. allocated(error)) call check_memory(case, error)
       if (.not. allocated(error)) call check_refine(case, error)
+      if (.not. allocated(error)) call check_piece(case, error)
       if (.not. allocated(error)) call check_parameter_sweep(case, error)
       if (.not. allocated(error)) call check_control(case, error)
       if (.not. allocated(error)) call check_adaptive(case, error)
@@ -351,6 +352,35 @@ contains
                           status_input)
       end if
    end subroutine check_refine
+
+   !> A piece of a sweep lies within it, and does not depend on the points before.
+   subroutine check_piece(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n_points
+
+      if (.not. case%sweep%is_piece()) return
+      n_points = case%sweep%n_points
+      if (case%analysis /= analysis_frf .or. case%sweep%continuation /= continuation_natural .or. &
+          case%control%is_wanted()) then
+         call fatal_error(error, 'sweep%first_point, last_point and lead_points are of natural '// &
+                          "sweeps of analysis = 'frf' without &control: leave them out", &
+                          status_input)
+      else if (case%contact%memory == memory_carried) then
+         call fatal_error(error, "sweep%first_point, last_point and lead_points do not go with "// &
+                          "contact%memory = 'carried', where a point depends on all those "// &
+                          "before: leave them out", status_input)
+      else if (case%sweep%first_point > n_points) then
+         call fatal_error(error, 'sweep%first_point = '//to_text(case%sweep%first_point)// &
+                          ': must be one of the '//to_text(n_points)//' points', status_input)
+      else if (case%sweep%last_point > n_points .or. &
+               (case%sweep%last_point > 0 .and. &
+                case%sweep%last_point < case%sweep%first_point)) then
+         call fatal_error(error, 'sweep%last_point = '//to_text(case%sweep%last_point)// &
+                          ': must be from first_point = '//to_text(case%sweep%first_point)// &
+                          ' to '//to_text(n_points)//', or 0', status_input)
+      end if
+   end subroutine check_piece
 
    !> Harmonics change from point to point of a natural sweep; a history has one length.
    subroutine check_adaptive(case, error)

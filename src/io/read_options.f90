@@ -175,7 +175,8 @@ contains
       character(*), parameter :: keys(*) = [character(12) :: 'parameter', 'frequencies', &
                                             'values', 'start', 'end', 'unit', 'continuation', &
                                             'n_points', 'max_points', &
-                                            'stability', 'refine']
+                                            'stability', 'refine', 'first_point', &
+                                            'last_point', 'lead_points']
       integer :: i
 
       do i = 1, size(keys)

@@ -101,8 +101,12 @@ module fw_solver_options
       logical :: stability = .false.
       !> Points that are solved to find maxima become rows of the result.
       logical :: refine = .false.
+      !> A piece of the sweep: its rows (0: up to the last), and how many points on the way from the
+      !> start lead to the first of them.
+      integer :: first_point = 1, last_point = 0, lead_points = 0
    contains
       procedure :: bind_keys => bind_sweep_keys
+      procedure :: is_piece
       procedure :: range => sweep_range
    end type sweep_options
 
@@ -203,7 +207,23 @@ contains
                          only="springs and law = 'penalty'"), self%stability)
       call keys%bind(key('refine', 'points that are solved to find maxima become rows, in order', &
                          only="analysis = 'frf', continuation = 'natural'"), self%refine)
+      call keys%bind(key('first_point', 'the first of its points that is a row: a piece of a '// &
+                         'sweep, of which others solve the rest', at_least(1), &
+                         only="analysis = 'frf', continuation = 'natural'"), self%first_point)
+      call keys%bind(key('last_point', 'the last of its points that is a row; 0: the last', &
+                         at_least(0), only="analysis = 'frf', continuation = 'natural'"), &
+                     self%last_point)
+      call keys%bind(key('lead_points', 'points on the way from the start to first_point that '// &
+                         'are solved and are no rows', at_least(0), &
+                         only="first_point above 1"), self%lead_points)
    end subroutine bind_sweep_keys
+
+   !> Whether only some of the points are wanted.
+   pure logical function is_piece(self)
+      class(sweep_options), intent(in) :: self
+
+      is_piece = self%first_point /= 1 .or. self%last_point /= 0 .or. self%lead_points /= 0
+   end function is_piece
 
    !> The lowest and the highest frequency.
    pure function sweep_range(self) result(range)

@@ -1,0 +1,197 @@
+"""Pieces of a sweep solved at once, compared where they overlap, and joined."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._native import NOT_CONVERGED, STOPPED, namelist_values, raise_status
+from .._pool import Pool, open_pool
+from .._progress import CONTROL, State
+from .._watching import Progress, Tell, run_watched, stops_on_interrupt, teller
+from ..case import Case
+from ..errors import InputError, RunInterrupted
+from ..result import Result
+from .cutting import Piece, cut
+from .joining import join
+from .overlap import Part, agree, tolerance_of
+
+__all__ = ["run_in_pieces"]
+
+
+def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress | None,
+                  is_stopped: Callable[[], object] | None, *,
+                  in_memory: bool) -> tuple[Result, list[str]]:
+    """Run a natural sweep in pieces, and join them.
+
+    Where two pieces do not agree in the rows that both have solved, there are several solutions;
+    both are then solved again as one, so that the rows are those of a sweep.
+
+    Parameters
+    ----------
+    case : Case
+        A natural sweep.
+    workers : int
+        Pieces at once (0: as many as the pool has).
+    scheduler : str
+        See `fretwear.run`.
+    progress, is_stopped
+        As in `fretwear.run`.
+    in_memory : bool
+        Write no file.
+
+    Returns
+    -------
+    Result, list of str
+        The result, and what is to be told of it.
+    """
+    if workers < 0:
+        raise InputError(f"workers = {workers}: must be at least 0 (0: one for each core)")
+    started = time.monotonic()
+    with case.open() as session:
+        session.check()
+        plan = _plan(namelist_values(session.text("namelist")), session.frequencies())
+        text, path = session.text("namelist"), session.text("output")
+        with teller(progress, session) as tell:
+            control = np.zeros(CONTROL, dtype=np.int64)
+            in_main = threading.current_thread() is threading.main_thread()
+            watch = _Watch(tell, is_stopped, control, len(plan.places))
+            with stops_on_interrupt(control, in_main), open_pool(scheduler, workers) as pool:
+                parts, remarks = _solve(case, plan, pool, watch)
+    if not parts:
+        raise RunInterrupted(None)
+    image = join(parts, plan.places, text, time.monotonic() - started, remarks,
+                 was_stopped=watch.ended)
+    result = Result.from_bytes(image, case)
+    if not in_memory:
+        result = result.save(path)
+    if watch.ended:
+        raise RunInterrupted(result)
+    return result, list(result.remarks)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Places of all rows (n_points), frequencies [rad/s] or values of the parameter, and how far
+    two solutions of one may differ."""
+
+    places: NDArray[np.float64]
+    tolerance: float
+
+
+def _plan(values: dict[str, list[str]], frequencies: NDArray[np.float64]) -> _Plan:
+    """Refuse what does not go in pieces."""
+    analysis, continuation = _word(values, "case%analysis"), _word(values, "sweep%continuation")
+    if analysis != "frf" or continuation != "natural":
+        raise InputError("workers: a sweep in pieces is a natural one of analysis = 'frf'; this "
+                         f"is analysis = '{analysis}', continuation = '{continuation}': run it "
+                         "without workers")
+    if any(_word(values, f"sweep%{key}") not in ("", usual) for key, usual in (
+            ("first_point", "1"), ("last_point", "0"), ("lead_points", "0"))):
+        raise InputError("workers: the case is a piece of a sweep already (sweep%first_point, "
+                         "last_point, lead_points): leave these out")
+    places = frequencies
+    if _word(values, "sweep%parameter") not in ("", "frequency"):
+        listed = values.get("sweep%values", [])
+        places = np.array([_real(word) for word in listed]) if listed else np.linspace(
+            _real(_word(values, "sweep%start")), _real(_word(values, "sweep%end")),
+            int(_word(values, "sweep%n_points")))
+    steps = np.diff(places)
+    if not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise InputError("workers: a sweep in pieces goes up or down all the way; this one does "
+                         "neither (sweep%frequencies, sweep%values): sort them, or run it "
+                         "without workers")
+    return _Plan(places, tolerance_of(values))
+
+
+def _word(values: dict[str, list[str]], key: str) -> str:
+    return next(iter(values.get(key, [])), "").strip("'\"").lower()
+
+
+def _real(word: str) -> float:
+    return float(word.lower().replace("d", "e"))
+
+
+@dataclass
+class _Watch:
+    """Tells of all pieces together, and whether they shall end."""
+
+    tell: Tell | None
+    is_stopped: Callable[[], object] | None
+    control: NDArray[np.int64]
+    total: int
+    ended: bool = False
+    states: dict[Piece, State] = field(default_factory=dict)
+
+    def tick(self) -> bool:
+        """Whether to end."""
+        if self.tell is not None and self.states:
+            states = list(self.states.values())
+            newest = max(states, key=lambda state: state.done)
+            self.tell(State(min(sum(state.done for state in states), self.total), self.total,
+                            newest.omega, newest.amplitude, newest.cycles, newest.depth))
+        if self.control[0] or (self.is_stopped is not None and self.is_stopped()):
+            self.ended = True
+        return self.ended
+
+
+def _solve(case: Case, plan: _Plan, pool: Pool, watch: _Watch) -> tuple[list[Part], list[str]]:
+    """Parts in the order of the sweep that agree with each other, and where they did not."""
+    wanted = cut(len(plan.places), pool.workers)
+    parts: dict[Piece, Part] = {}
+    remarks: list[str] = []
+    while wanted and not watch.ended:
+        local = type(pool) is Pool
+        work = _Work(case, watch.states if local and watch.tell is not None else None)
+        for part in pool.run(work, wanted, tick=watch.tick):
+            watch.ended = watch.ended or part.was_stopped
+            if part.image:
+                parts[part.piece] = part
+        if watch.ended:
+            break
+        in_order = sorted(parts.values(), key=lambda part: part.piece.first)
+        groups: list[list[Part]] = []
+        for part in in_order:
+            difference = agree(groups[-1][-1], part) if groups else np.inf
+            if groups and difference > plan.tolerance:
+                remarks.append(_told(plan, part.piece, difference))
+                groups[-1].append(part)
+            else:
+                groups.append([part])
+        wanted = [group[0].piece.with_next(group[-1].piece) for group in groups if len(group) > 1]
+        parts = {group[0].piece: group[0] for group in groups if len(group) == 1}
+    return sorted(parts.values(), key=lambda part: part.piece.first), remarks
+
+
+def _told(plan: _Plan, piece: Piece, difference: float) -> str:
+    by_how_much = "one of them did not converge" if np.isinf(difference) else (
+        f"they differ by {difference:.2g} of their size")
+    return (f"at {plan.places[piece.first - 1]:.7g} pieces of the sweep found different solutions "
+            f"({by_how_much}): there are several; those of a sweep from the start were taken")
+
+
+class _Work:
+    """Solves one piece; travels to other processes."""
+
+    def __init__(self, case: Case, states: dict[Piece, State] | None) -> None:
+        self._case, self._states = case, states
+
+    def __call__(self, piece: Piece, stop: threading.Event | None = None) -> Part:
+        first, last = piece.solved
+        sweep: Any = {"first_point": first, "last_point": last, "lead_points": piece.lead}
+        case = self._case.replace(sweep=sweep, case={"threads": 1})
+        states = self._states
+        tell = None if states is None else lambda state: states.__setitem__(piece, state)
+        with case.open() as session:
+            status, _ = run_watched(session, tell, None if stop is None else stop.is_set,
+                                    in_memory=True)
+            if status not in (NOT_CONVERGED, STOPPED):
+                raise_status(status, session.text("message"))
+            return Part(piece, session.image(), status == STOPPED)
+

@@ -1,0 +1,65 @@
+"""`fretwear run CASE.nml`: a run, of a sweep by many workers if wanted."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .analyses import run
+from .case import Case
+from .errors import AbsentError, RunInterrupted
+from .result import Result
+
+__all__ = ["add_arguments", "main"]
+
+_NOT_CONVERGED = 4
+#: Observed quantities whose peaks are printed.
+_LISTED = 6
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the subcommand."""
+    parser.add_argument("case", type=Path, metavar="CASE.nml", help="namelist")
+    parser.add_argument("--set", action="append", default=[], metavar="GROUP%KEY=VALUE",
+                        dest="settings", help="change one value for this run; may be repeated")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="result file")
+    parser.add_argument("--workers", type=int, metavar="N",
+                        help="cut a natural sweep into N pieces that are solved at once "
+                             "(0: one for each core)")
+    parser.add_argument("--scheduler", default="threads", metavar="WHERE",
+                        help="who solves them: 'threads' (default), 'dask', or the address of a "
+                             "Dask scheduler")
+    parser.add_argument("-q", "--quiet", action="store_true", help="errors only")
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run the case; returns the exit status: 4 where points have not converged."""
+    case = Case.from_file(options.case).overridden(options.settings)
+    try:
+        result = run(case, options.output, check=False, progress=not options.quiet,
+                     workers=options.workers, scheduler=options.scheduler)
+    except RunInterrupted as interrupted:
+        if interrupted.result is not None and not options.quiet:
+            _print_summary(interrupted.result)
+        raise
+    if not options.quiet:
+        _print_summary(result)
+    return _NOT_CONVERGED if result.status == "not converged" else 0
+
+
+def _print_summary(result: Result) -> None:
+    """As fw_run has it, in short."""
+    if "converged" in result:
+        print(f"{'converged':17} {int(result.converged.sum())} of {result.n_points} points")
+    if "peak/omega" in result:
+        for name in result.observed[:_LISTED]:
+            try:
+                omega, amplitude = result.maximum(name)
+            except AbsentError:
+                continue
+            print(f"{'peak ' + name:17} {amplitude:.6E} at {omega:.6E} rad/s "
+                  f"({omega / 6.283185307179586:.6E} Hz)")
+    for remark in result.remarks:
+        print(f"{'remark':17} {remark}")
+    print(f"{'time':17} {result.elapsed:.3f} s")
+    print(f"{'result':17} {result.path}")

@@ -1,0 +1,180 @@
+"""Sweeps in pieces: joined they are the sweep of one process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from project import EXAMPLE
+from rubbing import RUBBING
+
+import fretwear as fw
+from fretwear.cli import main
+from fretwear.pieces import cutting
+from fretwear.pieces.cutting import OVERLAP, cut
+from fretwear.settings import Groups
+
+#: Two solutions to 1e-8 of the load each, near a resonance of 1e-3 of critical damping.
+SAME = 1e-6
+#: The search for a maximum ends at 1e-4 of its height; widths are read between other samples then.
+SAME_WIDTH = 1e-3
+#: Of iterations and residuals, which depend on the way, nothing is asked.
+OF_THE_WAY = ("iterations", "residual", "seconds", "served_by", "peak/bandwidth")
+
+SECTOR = fw.Case.from_file(EXAMPLE / "blade_sector" / "frf.nml", harmonics={"n_time": 64},
+                           output={"observe": ["tip", "tip_x"]})
+HARDENING = fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[0.25],
+                     springs=[fw.Spring(side_1=1, coefficient=0.5, power=3)])
+DUFFING = fw.Case(HARDENING, harmonics={"n_harmonics": 5},
+                  sweep={"start": 0.3, "end": 1.8, "n_points": 101})
+PENALTY: Groups = {"contact": {"law": "penalty"}}
+SLIDING = fw.Case(RUBBING, **PENALTY, harmonics={"n_harmonics": 3, "n_time": 64},
+                  sweep={"start": 0.4, "end": 2.0, "n_points": 65})
+
+
+def assert_same_result(one: fw.Result, other: fw.Result) -> None:
+    """Names, declarations and numbers."""
+    assert list(one) == list(other)
+    for name in one:
+        assert one.declared(name) == other.declared(name)
+        if one[name].dtype.kind == "U":
+            assert list(one[name]) == list(other[name])
+        elif name not in OF_THE_WAY:
+            size = np.nanmax(np.abs(one[name]), initial=0.0)
+            assert np.allclose(one[name], other[name], rtol=0.0, atol=SAME * size,
+                               equal_nan=True), name
+    widths = "peak/bandwidth"
+    if widths in one:
+        assert np.allclose(one[widths], other[widths], rtol=SAME_WIDTH, equal_nan=True)
+    assert set(one.attributes) == set(other.attributes)
+    for name in ("namelist", "status", "title", "sampling"):
+        assert one.attributes.get(name) == other.attributes.get(name)
+
+
+def test_pieces_share_the_points_and_the_cost() -> None:
+    for n_points in (1, 40, 101, 401, 1000):
+        for n_pieces in (1, 2, 3, 8, 64):
+            pieces = cut(n_points, n_pieces)
+            rows = [k for piece in pieces for k in range(piece.first, piece.last + 1)]
+            assert rows == list(range(1, n_points + 1))
+            assert len(pieces) <= n_pieces
+            if n_points >= 100 and len(pieces) > 1:
+                # To the rounding of cuts and of leads.
+                cost = [piece.last - piece.first + 2.0 * piece.lead for piece in pieces]
+                assert max(cost) - min(cost) < 2.0 * OVERLAP
+
+
+@pytest.mark.parametrize(("case", "workers"), [
+    (SECTOR, 2),
+    (SECTOR.replace(sweep={"start": 1029, "end": 1017}, output={"observe": ["tip"]}), 3),
+    (DUFFING.replace(sweep={"stability": True}), 3),
+    (SLIDING.replace(sweep={"refine": True}), 2),
+    (SLIDING.replace(sweep={"parameter": "contact%mu", "frequency": 1.1, "start": 0.1}), 2),
+    (fw.Case(RUBBING, **PENALTY, sweep={"values": np.geomspace(0.4, 2.0, 40)},
+             harmonics={"accuracy": 1e-3}), 2),
+], ids=["sector", "downwards", "stability", "refine", "parameter", "list"])
+def test_the_result_is_that_of_one_process(case: fw.Case, workers: int) -> None:
+    one, pieces = fw.run(case, in_memory=True), fw.run(case, workers=workers, in_memory=True)
+    if "harmonics" in one:  # they depend on the points before: so do rows, within the accuracy
+        assert np.allclose(one.coefficients, pieces.coefficients, rtol=0.0,
+                           atol=2e-3 * np.abs(one.coefficients).max())
+        return
+    assert_same_result(one, pieces)
+
+
+def test_pieces_on_different_branches_are_found_and_solved_as_one(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without points that lead to it, the second piece begins on the lower branch."""
+    case = DUFFING.replace(sweep={"end": 2.4})
+    one = fw.run(case)
+    monkeypatch.setattr(cutting, "_LEADS", 1e-6)
+    monkeypatch.setattr(cutting.Piece, "lead", 0)
+    pieces = fw.run(case, workers=2)
+    assert any("pieces of the sweep found different solutions" in remark
+               for remark in pieces.remarks)
+    assert "several solutions" in list(pieces["remarks/name"])
+    assert np.allclose(one.coefficients, pieces.coefficients, rtol=0.0, atol=SAME)
+    assert (pieces["peak/found_by"] == one["peak/found_by"]).all()
+
+
+def test_workers_of_a_cluster(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False,
+                                  dashboard_address=None) as cluster:
+        pieces = fw.run(SLIDING, tmp_path / "pieces.h5", scheduler=cluster.scheduler_address)
+    assert pieces.path == tmp_path / "pieces.h5"
+    case = SLIDING.replace(output={"file": str(tmp_path / "pieces.h5")})
+    assert_same_result(fw.run(case, in_memory=True), pieces)
+
+
+def test_rows_before_a_stop_are_kept() -> None:
+    asked: list[int] = []
+
+    def stop() -> bool:
+        asked.append(1)
+        return len(asked) > 2
+
+    case = SLIDING.replace(sweep={"n_points": 200000})
+    with pytest.raises(fw.RunInterrupted) as interrupted:
+        fw.run(case, workers=2, stop=stop)
+    result = interrupted.value.result
+    assert result is not None and result.status == "stopped"
+    # Of both pieces.
+    assert 0 < result.n_points < 200000 and result.omega[0] < 1.0 < result.omega[-1]
+    assert (np.diff(result.omega) > 0.0).all()
+
+
+def test_progress_counts_all_pieces() -> None:
+    told: list[tuple[int, int]] = []
+    fw.run(SECTOR, workers=2, in_memory=True, progress=lambda done, total: told.append(
+        (done, total)))
+    assert all(0 <= done <= total == 121 for done, total in told)
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"sweep": {"continuation": "arclength"}}, "natural"),
+    ({"case": {"analysis": "point"}}, "analysis = 'point'"),
+    ({"contact": {"memory": "carried"}}, "contact%memory"),
+    ({"sweep": {"first_point": 3}}, "already"),
+    ({"control": {"amplitude": [0.5]}}, "&control"),
+]
+
+
+@pytest.mark.parametrize(("change", "told"), REFUSED)
+def test_what_does_not_go_in_pieces_is_refused(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(fw.InputError, match=told):
+        fw.run(SLIDING.replace(**change), workers=2)
+
+
+def test_lists_in_no_order_and_negative_numbers_are_refused() -> None:
+    case = fw.Case(RUBBING, **PENALTY, sweep={"frequencies": [0.5, 0.9, 0.7]})
+    with pytest.raises(fw.InputError, match="sort them"):
+        fw.run(case, workers=2)
+    with pytest.raises(fw.InputError, match="workers = -1"):
+        fw.run(SLIDING, workers=-1)
+
+
+def test_a_piece_has_the_rows_of_its_sweep() -> None:
+    whole = fw.run(SLIDING)
+    piece = fw.run(SLIDING.replace(sweep={"first_point": 20, "last_point": 30, "lead_points": 4}))
+    assert piece.omega.tobytes() == whole.omega[19:30].tobytes()
+    assert np.allclose(piece.coefficients, whole.coefficients[19:30], rtol=0.0, atol=SAME)
+    for sweep, told in (({"first_point": 66}, "first_point = 66: must be one of the 65"),
+                        ({"first_point": 9, "last_point": 8}, "from first_point = 9 to 65")):
+        with pytest.raises(fw.InputError, match=told):
+            SLIDING.replace(sweep=sweep).check()  # type: ignore[typeddict-item]
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "duffing.h5"
+    words = ["run", str(EXAMPLE / "duffing" / "duffing.nml"), "-o", str(target), "--workers", "2"]
+    assert main([*words, "--set", "sweep%n_points=40"]) == 0
+    out = capsys.readouterr().out
+    assert "converged         40 of 40 points" in out and "peak u1" in out
+    assert fw.Result(target).n_points == 40
+    assert main([*words, "-q", "--set", "solver%max_iterations=1", "--set",
+                 "solver%fallback=.false."]) == 4
+    assert main(["run", *words[1:4], "-q", "--set", "sweep%n_points=3"]) == 0
+    assert fw.Result(target).n_points == 3
