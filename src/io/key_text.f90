@@ -58,7 +58,7 @@ contains
       integer :: k
 
       write (unit, '(a)') '&'//keys%groups(g)%text//'   '//keys%purposes(g)%text
-      do k = 1, size(keys%records)
+      do k = 1, keys%n
          associate (entry => keys%records(k))
             if (entry%group /= keys%groups(g)%text) cycle
             write (unit, '(a)') '   '//trim(entry%key%name)//' = '//entry%accepts// &
@@ -116,7 +116,7 @@ contains
       write (unit, '(a)') ' "'//keys%groups(g)%text//'": {"help": '// &
          json_text(keys%purposes(g)%text)//', "keys": {'
       is_first = .true.
-      do k = 1, size(keys%records)
+      do k = 1, keys%n
          if (keys%records(k)%group /= keys%groups(g)%text) cycle
          ! The comma comes before each but the first: which key is the last of a group is not known.
          if (.not. is_first) write (unit, '(a)') ','

@@ -9,7 +9,7 @@ module fw_paths
    private
 
    public :: read_text_file, resolve_path, directory_of, stem_of, check_writable
-   public :: real_path, follow_links, is_directory, is_locked, machine_name
+   public :: real_path, follow_links, is_directory, is_locked, is_there, machine_name
 
    !> The longest path that the system takes.
    integer, parameter :: longest = 4096
@@ -242,6 +242,14 @@ contains
 
       is_directory = c_access(path//'/.'//c_null_char, exists) == 0
    end function is_directory
+
+   !> Whether there is a file of a name: what an `inquire` tells, in a tenth of its time.
+   logical function is_there(path)
+      character(*), intent(in) :: path
+      integer(c_int), parameter :: exists = 0
+
+      is_there = c_access(path//c_null_char, exists) == 0
+   end function is_there
 
    !> What stands before the null.
    pure function from_buffer(buffer) result(text)

@@ -133,13 +133,17 @@ contains
    !> The table. Rows of a file are created and appended in its order.
    subroutine point_quantities(list)
       type(quantity_type), allocatable, intent(out) :: list(:)
+      ! More lines than the table has, so that it need not be moved while it grows.
+      integer, parameter :: room = 200
       integer, parameter :: r = growing_real, i = growing_integer, l = growing_logical
+      integer :: n
 
-      allocate (list(0))
+      allocate (list(room))
+      n = 0
       call add('omega', r, 'rad/s', 'point', 'angular frequency of the excitation', omega, always)
       call add('parameter', r, '', 'point', 'value of the parameter that the sweep goes over', &
                place, goes_over)
-      list(size(list))%names_parameter = .true.
+      list(n)%names_parameter = .true.
       call add('load/scale', r, '1', 'point', 'factor of the vibratory loads of the model', &
                load_scale, scales_load)
       call add('control/amplitude', r, '<length>', 'point', &
@@ -155,7 +159,7 @@ contains
       call add('served_by', i, '', 'point', 'what gave the solution, an index into names', &
                served_by, is_response)
       ! What does not fit a line of the table is set behind it.
-      list(size(list))%is_served_by = .true.
+      list(n)%is_served_by = .true.
       call add('fold', l, '', 'point', 'whether the branch turns here', fold, follows_branch)
       call add('tangent/omega', r, 'rad/s', 'point', 'direction of the branch, frequency', &
                tangent_omega, follows_frequency)
@@ -169,7 +173,7 @@ contains
                error_estimate, is_accurate)
       call add('floquet/stable', i, '', 'point', &
                '1 stable, 0 unstable, -1 undecided or not known', stable, asks_stability)
-      list(size(list))%missing = -1
+      list(n)%missing = -1
       call add('floquet/multipliers', r, '1', 'point multiplier part', &
                'Floquet multipliers, real and imaginary part', multipliers, asks_stability)
       call add('floquet/error', r, '1', 'point multiplier', &
@@ -202,6 +206,7 @@ contains
       call add('wear/volume', r, '<volume>', 'step patch', 'worn volume of the patch', &
                wear_volume, wears)
       call add_sensitivities()
+      list = list(:n)
 
    contains
 
@@ -218,21 +223,21 @@ contains
                call add('sensitivity/'//trim(value_words(q))//'/'//trim(name), r, '', &
                         'point'//trim(of)//trim(elements_of(p)), 'derivative of '// &
                         trim(value_words(q))//' by '//trim(parameter_words(p)), nothing, always)
-               list(size(list))%sensitivity = [q, p]
+               list(n)%sensitivity = [q, p]
             end do
             call add('sensitivity/deviation/'//trim(value_words(q)), r, '', &
                      'point'//trim(of), 'standard deviation of '//trim(value_words(q)), &
                      nothing, always)
-            list(size(list))%sensitivity = [q, 0]
+            list(n)%sensitivity = [q, 0]
             call add('sensitivity/value/'//trim(value_words(q)), r, '', 'point'//trim(of), &
                      trim(value_words(q)), nothing, always)
-            list(size(list))%sensitivity = [q, of_itself]
+            list(n)%sensitivity = [q, of_itself]
          end do
          do p = 1, n_parameter_words
             call parameter_dataset(p, name)
             call add('sensitivity/value/'//trim(name), r, '', 'point'//trim(elements_of(p)), &
                      trim(parameter_words(p)), nothing, always)
-            list(size(list))%sensitivity = [of_itself, p]
+            list(n)%sensitivity = [of_itself, p]
          end do
       end subroutine add_sensitivities
 
@@ -253,7 +258,14 @@ contains
          procedure(get_values) :: get
          procedure(is_wanted) :: exists
          type(quantity_type) :: quantity
+         type(quantity_type), allocatable :: longer(:)
 
+         if (n == size(list)) then
+            allocate (longer(2*n))
+            longer(:n) = list
+            call move_alloc(longer, list)
+         end if
+         n = n + 1
          quantity%name = name
          quantity%kind_of = kind_of
          quantity%unit = unit
@@ -261,7 +273,7 @@ contains
          quantity%long_name = long_name
          quantity%get => get
          quantity%exists => exists
-         list = [list, quantity]
+         list(n) = quantity
       end subroutine add
 
    end subroutine point_quantities

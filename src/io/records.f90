@@ -10,6 +10,8 @@ module fw_records
 
    type :: record_type
       character(:), allocatable :: group
+      !> Its place in the list of groups, which finds a record faster than its name.
+      integer :: group_number = 0
       type(key_type) :: key
       !> real, integer, logical, text, word or list.
       character(7) :: kind = ''
@@ -24,7 +26,9 @@ module fw_records
    end type record_type
 
    type :: record_list
+      !> The first `n` are registered; the rest is room for more.
       type(record_type), allocatable :: records(:)
+      integer :: n = 0
       !> Groups in the order of their first keys, and what they are for.
       type(string_type), allocatable :: groups(:), purposes(:)
    contains
@@ -36,7 +40,11 @@ module fw_records
       procedure :: keys
       procedure :: to_namelist
       procedure, private :: find
+      procedure, private :: group_number
    end type record_list
+
+   !> Room for the keys of all groups, so that the list is hardly ever moved.
+   integer, parameter :: usual_records = 320
 
 contains
 
@@ -46,7 +54,7 @@ contains
       character(*), intent(in) :: group, purpose
 
       if (.not. allocated(self%records)) then
-         allocate (self%records(0), self%groups(0), self%purposes(0))
+         allocate (self%records(usual_records), self%groups(0), self%purposes(0))
       end if
       if (self%has_group(group)) return
       call append(self%groups, group)
@@ -57,9 +65,17 @@ contains
    pure subroutine add(self, record)
       class(record_list), intent(inout) :: self
       type(record_type), intent(in) :: record
+      type(record_type), allocatable :: longer(:)
 
       if (self%has(record%group, record%key%name)) return
-      self%records = [self%records, record]
+      if (self%n == size(self%records)) then
+         allocate (longer(2*self%n))
+         longer(:self%n) = self%records
+         call move_alloc(longer, self%records)
+      end if
+      self%n = self%n + 1
+      self%records(self%n) = record
+      self%records(self%n)%group_number = self%group_number(record%group)
    end subroutine add
 
    !> Set the effective value of a registered key; an empty one is none.
@@ -88,13 +104,20 @@ contains
    pure logical function has_group(self, group)
       class(record_list), intent(in) :: self
       character(*), intent(in) :: group
-      integer :: i
 
-      has_group = .false.
-      do i = 1, size(self%groups)
-         has_group = has_group .or. self%groups(i)%text == group
-      end do
+      has_group = self%group_number(group) > 0
    end function has_group
+
+   !> Place of a group in the list, 0 where it is not there; the last ones are asked for most.
+   pure integer function group_number(self, group) result(g)
+      class(record_list), intent(in) :: self
+      character(*), intent(in) :: group
+
+      do g = size(self%groups), 1, -1
+         if (self%groups(g)%text == group) return
+      end do
+      g = 0
+   end function group_number
 
    !> The keys of a group.
    pure function keys(self, group) result(names)
@@ -104,7 +127,7 @@ contains
       integer :: i
 
       allocate (names(0))
-      do i = 1, size(self%records)
+      do i = 1, self%n
          if (self%records(i)%group /= group) cycle
          call append(names, trim(self%records(i)%key%name))
       end do
@@ -119,8 +142,8 @@ contains
       text = ''
       do g = 1, size(self%groups)
          text = text//'&'//self%groups(g)%text//new_line('a')
-         do i = 1, size(self%records)
-            if (self%records(i)%group /= self%groups(g)%text) cycle
+         do i = 1, self%n
+            if (self%records(i)%group_number /= g) cycle
             if (allocated(self%records(i)%value)) text = text//record_text(self%records(i))
          end do
          text = text//'/'//new_line('a')
@@ -140,13 +163,16 @@ contains
       text = text//new_line('a')
    end function record_text
 
-   !> In the order of the records: some hundred, each asked for a few times.
+   !> From the last one on: what was registered last is set next.
    pure integer function find(self, group, key) result(i)
       class(record_list), intent(in) :: self
       character(*), intent(in) :: group, key
+      integer :: g
 
-      do i = 1, size(self%records)
-         if (self%records(i)%group == group .and. self%records(i)%key%name == key) return
+      g = self%group_number(group)
+      do i = self%n, 1, -1
+         if (self%records(i)%group_number /= g) cycle
+         if (self%records(i)%key%name == key) return
       end do
       i = 0
    end function find

@@ -18,6 +18,7 @@ module fw_result_part
    use fw_hdf5, only: read_attribute
    use fw_hdf5, only: write_attribute
    use fw_paths, only: is_locked
+   use fw_paths, only: is_there
    use fw_paths, only: machine_name
    use fw_result_target, only: check_replaceable
    use fw_result_target, only: find_target
@@ -109,13 +110,11 @@ contains
    subroutine delete_remains(path)
       character(*), intent(in) :: path
       character(:), allocatable :: part
-      logical :: occupied
       integer :: i
 
       do i = 1, most_parts
          part = part_name(path, i)
-         inquire (file=part, exist=occupied)
-         if (.not. occupied) cycle
+         if (.not. is_there(part)) cycle
          if (is_locked(part)) cycle
          if (was_locked_here(part)) call delete_part(part)
       end do

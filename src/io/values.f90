@@ -115,6 +115,7 @@ contains
       character(:), allocatable :: text
       ! Digits: six where they are enough, then up to the 17 that always are.
       integer, parameter :: trials(*) = [6, 15, 16, 17]
+      real(wp), parameter :: whole_up_to = 1.0e6_wp
       character(40) :: buffer, form
       real(wp) :: back
       logical :: ok
@@ -124,6 +125,12 @@ contains
       if (.not. ieee_is_finite(number)) then
          write (buffer, *) number
          text = trim(adjustl(buffer))
+         return
+      end if
+      ! Most numbers are small and whole, and need no trial; the sign of a zero is to be kept.
+      if (abs(number) < whole_up_to .and. abs(number - anint(number)) <= 0.0_wp .and. &
+          (abs(number) >= 1.0_wp .or. sign(1.0_wp, number) > 0.0_wp)) then
+         text = to_text(nint(number))
          return
       end if
       do i = 1, size(trials)
