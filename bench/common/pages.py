@@ -38,6 +38,7 @@ COMMANDS = """## Measure
 | `make bench-peers` | peers |
 | `python -m bench.speed.sectors` | sectors |
 | `python -m bench.speed.sector_modes` | modes |
+| `python -m bench.speed.imports` | imports |
 | `make bench-full` | all others |
 | `make compare OTHER=fw_run TIMES=9` | two builds side by side, on the screen |"""
 

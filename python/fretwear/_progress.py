@@ -1,16 +1,17 @@
-"""How far a run is: by tqdm in a terminal or a notebook, in one line without it."""
+"""How far a run or a reduction is: by tqdm in a terminal or a notebook, in one line without it."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CONTROL", "Bar", "State", "read_state"]
+__all__ = ["CONTROL", "Bar", "State", "read_state", "stages"]
 
 #: Numbers that a run and this package share: stop, points done, points to come, and of the last
 #: point omega [rad/s], largest amplitude, cycles and depth of wear.
@@ -91,6 +92,29 @@ class Bar:
             print(file=sys.stderr, flush=True)
         else:
             self._bar.close()
+
+
+def stages(*, quiet: bool) -> Callable[[str, int, int], None] | None:
+    """What tells how far each stage of some work is: None where nobody looks."""
+    if quiet or not sys.stderr.isatty():
+        return None
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return lambda name, done, total: print(
+            f"\r{name} {done} of {total}".ljust(40), file=sys.stderr,
+            end="\n" if done == total else "", flush=True)
+    bar = tqdm(dynamic_ncols=True, leave=False,
+               bar_format="{desc}: {n_fmt} of {total_fmt} |{bar}| {elapsed}<{remaining}")
+
+    def show(name: str, done: int, total: int) -> None:
+        if name != bar.desc.removesuffix(": "):
+            bar.reset(total)
+            bar.set_description(name, refresh=False)
+        bar.update(done - bar.n)
+        bar.refresh()
+
+    return show
 
 
 class _Line:

@@ -19,7 +19,9 @@ those of the model and must be consistent: [F/L] stiffness, [M] mass.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -31,14 +33,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
 
-__all__ = ["Bonded", "Reduction", "bonded_basis", "reduce"]
+__all__ = ["Bonded", "Progress", "Reduction", "bonded_basis", "reduce"]
 
 #: Real, or complex where one of the matrices is.
 Floats = NDArray[Any]
 Matrix = Union[sp.sparray, sp.spmatrix, Floats]
 
+#: Called with what is being done, and how much of how much of it is done.
+Progress = Callable[[str, int, int], None]
+
 # Right-hand sides treated at once: fine flanks have thousands, each as long as the full model.
-_BLOCK = 256
+_BLOCK = 64
 # A pivot that elimination leaves at this share of its diagonal entry is round-off.
 _SINGULAR = 1e-12
 # Relative displacements of which so little is their own are combinations of the others.
@@ -67,41 +72,59 @@ class Bonded:
     kappa : float
         Stiffness put between the sides of every pair [F/L]; of the order of the contact
         stiffness itself, or digits are lost in S^-1 - kappa I.
+    progress : callable, optional
+        Told how far the work is.
+
+    Attributes
+    ----------
+    constraint_modes : (n, n_r)
+        Static shapes Psi of unit contact coordinates.
 
     Raises
     ------
     InputError
-        Motions remain that neither the contact nor the supports hold, or contact coordinates
-        depend on one another.
+        Motions remain that neither the contact nor the supports hold, contact coordinates
+        depend on one another, or the shapes do not fit into the memory of the machine.
     """
 
-    def __init__(self, stiffness: sp.csr_array, contact: sp.csr_array, kappa: float) -> None:
+    def __init__(self, stiffness: sp.csr_array, contact: sp.csr_array, kappa: float,
+                 progress: Progress | None = None) -> None:
         self.stiffness, self.contact, self.kappa = stiffness, contact, kappa
         augmented = sp.csc_matrix(stiffness + kappa * (contact.conj().T @ contact))
+        _check_memory(len(augmented.indptr) - 1, contact.shape[0], augmented.dtype.itemsize)
+        if progress:
+            progress("factors", 0, 1)
         self._factors = _factor(augmented)
-        self._flexible = np.empty(contact.shape[::-1], dtype=augmented.dtype, order="F")
-        for block in _blocks(contact.shape[0]):
-            self._flexible[:, block] = self._solve(contact[block].toarray().conj().T)
-        compliance = contact @ self._flexible
-        compliance = 0.5 * (compliance + compliance.conj().T)
-        _check_independent(compliance)
-        self._compliance = la.cho_factor(compliance)
+        flexible = np.empty(contact.shape[::-1], dtype=augmented.dtype, order="F")
+        blocks = _blocks(contact.shape[0])
 
-    def constraint_modes(self) -> Floats:
-        """Static shapes Psi of unit contact coordinates, (n, n_r)."""
-        return la.cho_solve(self._compliance, self._flexible.conj().T).conj().T
+        def answer(block: slice) -> None:
+            flexible[:, block] = self._solve(contact[block].toarray().conj().T)
+
+        # SuperLU works outside Python's lock: blocks are solved side by side.
+        with ThreadPoolExecutor(os.cpu_count()) as workers:
+            for done, _ in enumerate(workers.map(answer, blocks), 1):
+                if progress:
+                    progress("contact shapes", done, len(blocks))
+        compliance = contact @ flexible
+        self._compliance = 0.5 * (compliance + compliance.conj().T)
+        _check_independent(self._compliance)
+        self._inverse = la.cho_factor(self._compliance)
+        # In place: two arrays of this size would be most of the memory.
+        for rows in _blocks(len(flexible)):
+            flexible[rows] = la.cho_solve(self._inverse, flexible[rows].conj().T).conj().T
+        self.constraint_modes: Floats = flexible
 
     def contact_stiffness(self) -> Floats:
         """K_rr [F/L], (n_r, n_r): zero for motions that the contact alone holds."""
         n = self.contact.shape[0]
-        inverse = la.cho_solve(self._compliance, np.eye(n))
+        inverse = la.cho_solve(self._inverse, np.eye(n))
         return 0.5 * (inverse + inverse.conj().T) - self.kappa * np.eye(n)
 
     def solve(self, load: Floats) -> Floats:
         """Static displacement of the bonded structure under loads (n,) or (n, k)."""
-        free = self._solve(load)
-        return free - self._flexible @ la.cho_solve(self._compliance,
-                                                    self._flexible.conj().T @ load)
+        modes = self.constraint_modes
+        return self._solve(load) - modes @ (self._compliance @ (modes.conj().T @ load))
 
     def _solve(self, load: Floats) -> Floats:
         """With nothing stuck; factors and right-hand sides are of one type."""
@@ -127,7 +150,7 @@ class Bonded:
         n = mass.shape[0]
         # A fixed start without any symmetry: the same modes, with the same signs, every time.
         start = 1.0 + np.cos(np.arange(n) ** 1.1)
-        kind = self._flexible.dtype
+        kind = self.constraint_modes.dtype
         flexibility = spl.LinearOperator((n, n), matvec=self.solve, dtype=kind)
         # With sigma and OPinv the first argument only gives shape and type; it is never applied.
         values, shapes = spl.eigsh(mass.astype(kind), k=n_modes, M=mass, sigma=0.0,
@@ -223,13 +246,13 @@ def bonded_basis(bonded: Bonded, mass: sp.csr_array, loads: Floats, n_modes: int
     rest, diagonal = _attachments(bonded, mass, loads, shapes)
     stiffness = la.block_diag(bonded.contact_stiffness(),
                               np.diag(np.concatenate((omega**2, diagonal))))
-    return Reduction(np.hstack((bonded.constraint_modes(), shapes, rest)), stiffness, omega)
+    return Reduction(np.hstack((bonded.constraint_modes, shapes, rest)), stiffness, omega)
 
 
 def reduce(mass: Matrix, stiffness: Matrix, contact: Matrix, *, damping: Matrix | None = None,
            loads: ArrayLike | None = None, n_modes: int = 20,
            attachments: ArrayLike | None = None, kappa: float | None = None,
-           bonded: Bonded | None = None) -> ReducedSystem:
+           bonded: Bonded | None = None, progress: Progress | None = None) -> ReducedSystem:
     """Reduce a large sparse model to relative displacements, bonded modes and attachments.
 
     Exact in the reduced model: the stuck (bonded) natural frequencies kept, the static contact
@@ -255,6 +278,8 @@ def reduce(mass: Matrix, stiffness: Matrix, contact: Matrix, *, damping: Matrix 
         order of the contact stiffness. The result does not depend on it but by round-off.
     bonded : Bonded, optional
         The factored structure, where the caller has it; `stiffness` and `contact` must be its.
+    progress : callable, optional
+        Told what is being done, and how much of how much of it is done.
 
     Returns
     -------
@@ -273,7 +298,7 @@ def reduce(mass: Matrix, stiffness: Matrix, contact: Matrix, *, damping: Matrix 
     forces = _columns(loads, n, "loads")
     attached = forces if attachments is None else _columns(attachments, n, "attachments")
     if bonded is None:
-        bonded = _bonded(stiff, rows, kappa)
+        bonded = _bonded(stiff, rows, kappa, progress)
     reduction = bonded_basis(bonded, masses, attached, n_modes)
     return ReducedSystem(
         reduction.matrix(masses), reduction.stiffness,
@@ -317,20 +342,39 @@ def _gram(vectors: Floats, matrix: sp.csr_array) -> Floats:
     return 0.5 * (product + product.conj().T)
 
 
-def _bonded(stiffness: sp.csr_array, contact: sp.csr_array, kappa: float | None) -> Bonded:
+def _bonded(stiffness: sp.csr_array, contact: sp.csr_array, kappa: float | None,
+            progress: Progress | None) -> Bonded:
     """Factored structure; kappa is improved once where the guess costs digits."""
     if kappa is not None:
-        return Bonded(stiffness, contact, kappa)
+        return Bonded(stiffness, contact, kappa, progress)
     # Stiffness that the rows meet when nothing else moves: of the order of the contact stiffness,
     # and above it.
     size, met = (np.asarray(contact.conj().multiply(rows).sum(axis=1)).ravel().real
                  for rows in (contact, contact @ stiffness))
     guess = float(np.median(met / size**2))
-    bonded = Bonded(stiffness, contact, guess)
+    bonded = Bonded(stiffness, contact, guess, progress)
     found = float(np.median(np.diag(bonded.contact_stiffness()).real))
     if 0.0 < found < guess / _KAPPA_RATIO:
-        return Bonded(stiffness, contact, found)
+        return Bonded(stiffness, contact, found, progress)
     return bonded
+
+
+def _check_memory(n: int, n_contact: int, size: int) -> None:
+    """Refuse what cannot be held: the shapes once, and the basis that they are copied into."""
+    needed, there = 2.0 * n * n_contact * size, _memory()
+    if needed > there:
+        raise InputError(f"{n_contact} contact coordinates of {n} degrees of freedom need "
+                         f"{needed / 1e9:.1f} GB, and this machine has {there / 1e9:.1f} GB; take "
+                         "patches of several nodes as pairs, or a coarser mesh away from the "
+                         "contact")
+
+
+def _memory() -> float:
+    """Memory of the machine [bytes]; infinite where it does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
 
 
 def _factor(matrix: sp.csc_matrix) -> Any:

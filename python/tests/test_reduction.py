@@ -162,3 +162,17 @@ def test_wrong_arguments(change: dict[str, object], message: str) -> None:
     k, m, rows = two_bodies()
     with pytest.raises(InputError, match=message):
         reduce(**{"mass": m, "stiffness": k, "contact": rows, **change})  # type: ignore[arg-type]
+
+
+def test_progress_of_the_stages_ends_where_it_should(loads: np.ndarray) -> None:
+    told: list[tuple[str, int, int]] = []
+    reduced(loads, progress=lambda *stage: told.append(stage))
+    assert told[0][0] == "factors"
+    assert told[-1] == ("contact shapes", 1, 1)
+
+
+def test_shapes_beyond_the_memory_are_refused_before_the_work(
+        loads: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fretwear.reduction._memory", lambda: 1e3)
+    with pytest.raises(InputError, match=r"3 contact coordinates of 60 degrees .* patches"):
+        reduced(loads)

@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from .._progress import stages
 from ..errors import InputError, OutputError
 from .build import ROLES, FullModel, Source, drop, gather, model_datasets, read_rows, save
 from .checks import check_model
@@ -103,7 +104,8 @@ def main(options: argparse.Namespace) -> int:
         print(f"no errors in {model.dofs.n} degrees of freedom, "
               f"{0 if model.pairs is None else len(model.pairs)} pairs")
         return 0
-    for finding in save(model, options.output, options.reduce, options.by_diameter):
+    for finding in save(model, options.output, options.reduce, options.by_diameter,
+                        stages(quiet=options.quiet)):
         if finding.kind == "warning" or not options.quiet:
             print(finding, file=sys.stderr)
     return 0

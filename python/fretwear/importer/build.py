@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..mesh import mesh_datasets
 from ..model_file import strings, write_model_file
-from ..reduction import reduce
+from ..reduction import Progress, reduce
 from .diameters import reduce_diameters
 from .finding import Finding
 from .labels import Dofs
@@ -223,8 +223,8 @@ def drop(model: FullModel, *, empty: bool) -> FullModel:
                f"degrees of freedom are left out; {len(kept)} remain"])
 
 
-def model_datasets(model: FullModel, n_modes: int | None,
-                   by_diameter: bool = False) -> dict[str, NDArray[Any]]:
+def model_datasets(model: FullModel, n_modes: int | None, by_diameter: bool = False,
+                   progress: Progress | None = None) -> dict[str, NDArray[Any]]:
     """Datasets of the model file by name.
 
     Parameters
@@ -236,6 +236,8 @@ def model_datasets(model: FullModel, n_modes: int | None,
         the loads; None: leave the degrees of freedom as they are.
     by_diameter : bool
         Reduce a sector on its own in every nodal diameter.
+    progress : callable, optional
+        Told how far a reduction is.
     """
     symmetric = {role: (matrix + matrix.T) * 0.5 for role, matrix in model.matrices.items()}
     observed = _observed(model)
@@ -258,7 +260,7 @@ def model_datasets(model: FullModel, n_modes: int | None,
         if model.interfaces is not None:
             data |= {"cyclic/left": model.interfaces.left, "cyclic/right": model.interfaces.right}
     else:
-        data = (_reduced_sector if cyclic else _reduced)(model, symmetric, n_modes)
+        data = (_reduced_sector if cyclic else _reduced)(model, symmetric, n_modes, progress)
         basis = data.pop("basis")
         observed = np.asarray(observed @ basis)
     if model.mesh is not None:
@@ -271,8 +273,8 @@ def model_datasets(model: FullModel, n_modes: int | None,
     return data
 
 
-def _reduced(model: FullModel, matrices: dict[str, sp.csr_array],
-             n_modes: int) -> dict[str, NDArray[Any]]:
+def _reduced(model: FullModel, matrices: dict[str, sp.csr_array], n_modes: int,
+             progress: Progress | None) -> dict[str, NDArray[Any]]:
     if model.pairs is None:
         raise InputError("--reduce needs contact pairs (--pairs): the reduction keeps their "
                          "relative displacements")
@@ -281,7 +283,7 @@ def _reduced(model: FullModel, matrices: dict[str, sp.csr_array],
                             [np.zeros(model.dofs.n)])
     attached = np.column_stack((loads, _observed(model).toarray().T))
     system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
-                    damping=matrices.get("damping"), attachments=attached)
+                    damping=matrices.get("damping"), attachments=attached, progress=progress)
     data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
     if system.damping is not None:
         data["damping"] = system.damping
@@ -294,8 +296,8 @@ def _reduced(model: FullModel, matrices: dict[str, sp.csr_array],
     return data
 
 
-def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array],
-                    n_modes: int) -> dict[str, NDArray[Any]]:
+def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array], n_modes: int,
+                    progress: Progress | None) -> dict[str, NDArray[Any]]:
     """Interfaces and both sides of the pairs as they are, and modes with all of them held."""
     assert model.interfaces is not None
     sides = np.zeros((2, 0, 3), dtype=np.int32) if model.pairs is None else np.stack(
@@ -311,7 +313,8 @@ def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array],
                             [np.zeros(model.dofs.n)])
     system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
                     damping=matrices.get("damping"),
-                    attachments=np.column_stack((loads, _observed(model).toarray().T)))
+                    attachments=np.column_stack((loads, _observed(model).toarray().T)),
+                    progress=progress)
     data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
     if system.damping is not None:
         data["damping"] = system.damping
@@ -362,9 +365,9 @@ def _pair_values(pairs: Pairs) -> dict[str, NDArray[Any]]:
 
 
 def save(model: FullModel, path: str | Path, n_modes: int | None = None,
-         by_diameter: bool = False) -> list[Finding]:
+         by_diameter: bool = False, progress: Progress | None = None) -> list[Finding]:
     """Write the model file of a checked model; returns what is to be known about it."""
-    data = model_datasets(model, n_modes, by_diameter)
+    data = model_datasets(model, n_modes, by_diameter, progress)
     groups = {} if model.interfaces is None else {
         "cyclic": {"n_sectors": model.interfaces.n_sectors}}
     if by_diameter:

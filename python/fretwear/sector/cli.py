@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from .. import __version__
+from .._progress import stages
 from .model import FullModel, ReducedModel, build_full, reduce_model
 from .model_file import write_model
 from .parameters import (
@@ -68,7 +69,7 @@ def _run(options: argparse.Namespace) -> int:
         if not Path(target).absolute().parent.is_dir():
             raise FileNotFoundError(f"no folder to write {target} into")
     started = time.perf_counter()
-    full = build_full(parameters)
+    full = build_full(parameters, stages(quiet=options.quiet))
     reduced = reduce_model(full)
     mesh = recovery_mesh(full)[0] if options.mesh else None
     write_model(reduced, options.output, options.title, mesh)

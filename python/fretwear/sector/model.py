@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..reduction import Bonded, ReducedSystem, reduce
+from ..reduction import Bonded, Progress, ReducedSystem, reduce
 from .assembly import Assembly
 from .contact import ContactRows, Tip, contact_rows, held_nodes, retention_row, tip_rows
 from .mesh import SectorMesh, build_mesh
@@ -129,8 +129,8 @@ class ReducedModel:
         return np.sign(squares) * np.sqrt(np.abs(squares)) / (2.0 * np.pi)
 
 
-def build_full(parameters: SectorParameters) -> FullModel:
-    """Mesh, assemble and factor the sector."""
+def build_full(parameters: SectorParameters, progress: Progress | None = None) -> FullModel:
+    """Mesh, assemble and factor the sector; `progress` is told how far that is."""
     sector = build_mesh(parameters)
     assembly = Assembly(sector.mesh, parameters.material)
     rows, tip = contact_rows(sector, parameters), tip_rows(sector, parameters.geometry)
@@ -147,7 +147,7 @@ def build_full(parameters: SectorParameters) -> FullModel:
         stiffness = sp.csr_array(stiffness + parameters.retention.retention * (lock.T @ lock))
     # The stiffness of an elastic half-space under a patch is of this order.
     kappa = parameters.material.young * np.sqrt(rows.area.mean())
-    bonded = Bonded(stiffness, contact, kappa)
+    bonded = Bonded(stiffness, contact, kappa, progress)
     in_plane = np.array([1.0, 1.0, 0.0])
     centrifugal = ((scalar_mass @ assembly.nodes.T) * in_plane).ravel()[free]
     static = np.zeros(3 * assembly.n_nodes)
