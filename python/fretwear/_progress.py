@@ -105,7 +105,7 @@ def stages(*, quiet: bool) -> Callable[[str, int, int], None] | None:
             f"\r{name} {done} of {total}".ljust(40), file=sys.stderr,
             end="\n" if done == total else "", flush=True)
     bar = tqdm(dynamic_ncols=True, leave=False,
-               bar_format="{desc}: {n_fmt} of {total_fmt} |{bar}| {elapsed}<{remaining}")
+               bar_format="{desc}{n_fmt} of {total_fmt} |{bar}| {elapsed}<{remaining}")
 
     def show(name: str, done: int, total: int) -> None:
         if name != bar.desc.removesuffix(": "):
