@@ -12,6 +12,7 @@ import argparse
 import sys
 import tempfile
 from collections import Counter
+from itertools import product
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
@@ -30,8 +31,10 @@ SAME, PLACE, SLOPE = 1e-5, 1e-2, 1e-5
 STEP, SMOOTH = 2e-3, 2e-6
 #: Frequencies around the resonance, over the width of the peak, and the degree through them.
 PLACES, DEGREE = np.linspace(-0.03, 0.03, 9), 5
-#: Points of the fine sweep, and on the way to the resonance.
-FINE, WAY = 600, 60
+#: Shares of that window, and how far responses with a fold between them are from the polynomial.
+SCALES, ROUGH = (1.0, 0.1, 0.01), 1e-6
+#: Points of the fine sweep, and on the ways to the resonance.
+FINE, WAYS = 600, (60, 8)
 
 
 def track_case(seed):
@@ -63,6 +66,35 @@ def respond(folder, groups, omegas):
         return np.where(file["converged"][()], values, np.nan)
 
 
+def top_near(folder, groups, value, omega, width):
+    """Place [widths] and value of the maximum about omega, and whether a fold is beside it.
+
+    Where the response has several branches at omega, the way to it decides which one is met, so
+    both ends of the sweep lead there, in small steps and in large ones: the nearest to `value`
+    counts. A branch that folds beside its maximum ends within the window, which then narrows;
+    where it stays so, the largest response is compared. None where no response was found.
+    """
+    best = None
+    for scale, side, way in product(SCALES, ("start", "end"), WAYS):
+        places = scale * (PLACES if side == "start" else PLACES[::-1])
+        path = np.linspace(groups["sweep"][side], omega + width * places[0], way)
+        around = respond(folder, groups, np.append(path[:-1], omega + width * places))[way - 1:]
+        if not np.isfinite(around).all():
+            continue
+        fit = np.polynomial.Polynomial.fit(places, around, DEGREE)
+        folded = bool(np.abs(fit(places) - around).max() > ROUGH * value)
+        if folded:
+            place, top = places[around.argmax()], around.max()
+        else:
+            place = min(fit.deriv().roots(), key=abs).real
+            top = fit(place)
+        if best is None or abs(top - value) < abs(best[1] - value):
+            best = place, top, folded
+        if not folded and abs(top - value) <= SAME * value:
+            break
+    return best
+
+
 def judge(folder, seed):
     """Counts of words, and the worst errors of amplitude and derivative."""
     groups, parameter = track_case(seed)
@@ -82,16 +114,14 @@ def judge(folder, seed):
         groups["sweep"]["start"], groups["sweep"]["end"], FINE))
     if np.nanmax(sweep) > value[0] * (1.0 + SAME):
         found["smaller"] += 1
-    # Up to there from below, so as to stay on the branch that the resonance is on.
-    way = np.linspace(groups["sweep"]["start"], omega[2] + width * PLACES[0], WAY)
-    around = respond(folder, groups, np.append(way[:-1], omega[2] + width * PLACES))[WAY - 1:]
     error = [0.0, 0.0]
-    if np.isfinite(around).all():
-        fit = np.polynomial.Polynomial.fit(PLACES, around, DEGREE)
-        top = min(fit.deriv().roots(), key=lambda x: abs(x - 0.0)).real
-        error[0] = abs(fit(top) / value[2] - 1.0)
+    near = top_near(folder, groups, value[2], omega[2], width)
+    if near:
+        place, top, folded = near
+        error[0] = abs(top / value[2] - 1.0)
         found["amplitudes"] += 1
-        found["off"] += int(error[0] > SAME or abs(top) > PLACE)
+        found["folded"] += int(folded)
+        found["off"] += int(error[0] > SAME or abs(place) > PLACE)
     # Two slopes of the track, of second order with one and two steps, and of fourth order.
     rows = np.array([value, omega])
     near, far = (rows[:, 3] - rows[:, 1]) / (2 * STEP), (rows[:, 4] - rows[:, 0]) / (4 * STEP)
