@@ -165,7 +165,7 @@ calibration: build ## parameters of 100 noisy measurements found again, in docs/
 sensitivities: build ## derivatives of 200 random cases against differences, in docs/robustness.md
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/sensitivity_family.py -o docs/robustness.md
 
-resonances: build ## resonances of 60 random cases over a parameter against sweeps, in docs/robustness.md
+resonances: build ## 200 random resonances over a parameter against sweeps, in docs/robustness.md
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/resonance/resonance_family.py \
 	   -o docs/robustness.md
 

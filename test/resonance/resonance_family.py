@@ -1,6 +1,6 @@
 """Resonances of random cases followed over a random parameter, into docs/robustness.md.
 
-    python test/resonance/resonance_family.py [--count 60] [--seed 0] [-o docs/robustness.md]
+    python test/resonance/resonance_family.py [--count 200] [--seed 0] [-o docs/robustness.md]
 
 Three judges: a fine sweep at the first value has no larger point than the first resonance; the
 maximum of responses that are solved one by one around the middle resonance, by the polynomial
@@ -148,7 +148,7 @@ def shifted(groups, parameter, factor):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", dest="document", type=Path)
     options = parser.parse_args()
