@@ -8,6 +8,7 @@
 !> fw_near_response). Only steps that are next to nothing may turn sharply: those of a corner
 !> (fw_branch_turn).
 module fw_continuation
+   use fw_branch_crossing, only: goes_through
    use fw_branch_mark, only: find_fold
    use fw_branch_mark, only: land
    use fw_branch_point, only: branch_point
@@ -449,8 +450,12 @@ contains
          call look_at_corner(self, system, ahead, done, error)
          if (done) shortening = 1.0_wp
       else
-         if (.not. bends_little(self, ahead) .or. differ(ahead, self%here)) return
+         if (.not. bends_little(self, ahead)) return
          if (turns_between(self%corrector%metric, self%here, ahead)) return
+         if (differ(ahead, self%here)) then
+            call goes_through(self%corrector, system, self%here, ahead, done, error)
+            if (allocated(error) .or. .not. done) return
+         end if
          call measure(self, system, ahead, shortening, error)
       end if
    end subroutine attempt

@@ -23,6 +23,7 @@ class Sample:
     oscillator: Oscillator
     start: float
     finish: float
+    stability: bool = True
 
     def branch(self):
         return Branch(self.oscillator, self.start, self.finish)
@@ -46,7 +47,8 @@ class Sample:
                         f"{stiffness!r}, tangential_stiffness = 1 /")
         text += [f"&harmonics n_harmonics = {HARMONICS[self.family]} /",
                  f"&sweep start = {self.start!r}, end = {self.finish!r}, n_points = 41",
-                 "   continuation = 'arclength', max_points = 3000, stability = .true. /",
+                 "   continuation = 'arclength', max_points = 3000, "
+                 f"stability = .{str(self.stability).lower()}. /",
                  "&output observe = 1 /", ""]
         return "\n".join(text)
 

@@ -25,6 +25,22 @@ def test_kinds_and_places(family, seed):
         assert [kind for kind, *_ in true].count(orbit_judge.TORUS) >= 2 and not verdict.undecided
 
 
+@pytest.mark.parametrize("stability", [False, True])
+def test_a_branch_goes_straight_through_where_another_crosses_it(stability):
+    """Two masses whose common motion others branch off at 1.37739 and 1.39135, with one fold
+    between (all by shooting): the program turned aside there and named two folds more."""
+    sample = random_sample("parametric", 12)
+    sample.start, sample.stability = 1.45, stability
+    status, found = bifurcations.named(bifurcations.PROGRAM, sample)
+    # It comes back to where it started: the end lies on another branch.
+    assert status == 4
+    true = [("symmetry breaking", 1.3773866), ("fold", 1.3570404), ("symmetry breaking", 1.3913505)]
+    expected = true if stability else true[1:2]
+    assert [kind for kind, *_ in found] == [kind for kind, _ in expected]
+    assert [omega for _, omega, _ in found] == pytest.approx([omega for _, omega in expected],
+                                                             rel=1e-6)
+
+
 def test_the_comparison_sees_what_is_wrong():
     true = [("fold", 1.0, 2.0), ("period doubling", 1.5, 1.0)]
     assert bifurcations.compare("folds", true, list(true)).worst == 0.0
