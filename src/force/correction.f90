@@ -17,10 +17,14 @@ module fw_correction
 
    public :: march_turn_1d, march_turn_2d, project_turn
 
+   !> Pairs that are marched one by one: below, vectors of pairs are too short to pay.
+   integer, parameter :: few_pairs = 3
+
 contains
 
    !> One turn for pairs first..last with one tangential direction.
-   pure subroutine march_turn_1d(n_pairs, n_time, first, last, mu, y, x, lambda, margin, pressure)
+   pure subroutine march_turn_1d(n_pairs, n_time, first, last, mu, y, x, lambda, margin, pressure, &
+                                 again)
       integer, intent(in) :: n_pairs, n_time, first, last
       real(wp), intent(in) :: mu(n_pairs), y(n_pairs, 3, n_time)
       !> Corrected position at the start, then at the end of the turn.
@@ -28,9 +32,21 @@ contains
       real(wp), intent(inout) :: lambda(n_pairs, 3, n_time)
       !> Smallest mu p - |d| and smallest p so far: negative margin means that the pair slipped.
       real(wp), intent(inout) :: margin(n_pairs), pressure(n_pairs)
+      !> lambda holds the turn that ended at x (default: no): what repeats it need not be marched.
+      logical, intent(in), optional :: again
       integer :: i, k
       real(wp) :: p, d, limit, force
+      logical :: is_again
 
+      if (last - first < few_pairs) then
+         is_again = .false.
+         if (present(again)) is_again = again
+         do i = first, last
+            call march_one(n_pairs, n_time, i, mu(i), y, is_again, x(i, 1), lambda, margin(i), &
+                           pressure(i))
+         end do
+         return
+      end if
       do k = 1, n_time
          !$omp simd private(p, d, limit, force)
          do i = first, last
@@ -49,6 +65,37 @@ contains
          end do
       end do
    end subroutine march_turn_1d
+
+   !> The same turn of one pair. Stick and slip last for many instants, so that a processor foresees
+   !> which of them comes: in slip it need not wait for the position before, as the clamp has to.
+   !> Where a pair slips as it did in the turn before, the rest of the turn is the same too.
+   pure subroutine march_one(n_pairs, n_time, i, mu, y, again, x, lambda, margin, pressure)
+      integer, intent(in) :: n_pairs, n_time, i
+      real(wp), intent(in) :: mu, y(n_pairs, 3, n_time)
+      logical, intent(in) :: again
+      real(wp), intent(inout) :: x, lambda(n_pairs, 3, n_time), margin, pressure
+      integer :: k
+      real(wp) :: p, d, limit, start
+
+      start = x
+      do k = 1, n_time
+         p = max(-y(i, 3, k), 0.0_wp)
+         limit = mu*p
+         d = y(i, 1, k) - x
+         margin = min(margin, limit - abs(d))
+         pressure = min(pressure, p)
+         if (abs(d) > limit) then
+            d = sign(limit, d)
+            x = y(i, 1, k) - d
+            if (again .and. abs(lambda(i, 1, k) - d) <= 0.0_wp) then
+               x = start
+               return
+            end if
+         end if
+         lambda(i, 1, k) = d
+         lambda(i, 3, k) = -p
+      end do
+   end subroutine march_one
 
    !> One turn for pairs first..last with two tangential directions.
    pure subroutine march_turn_2d(n_pairs, n_time, first, last, mu, y, x, lambda, margin, pressure)

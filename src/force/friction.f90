@@ -319,8 +319,10 @@ contains
          call march_turn_2d(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
                             work%x, work%force_time, room%margin, work%pressure)
       else
+         ! A limit that was looked for is not where the last turn ended.
          call march_turn_1d(self%n_elements, n_time, first, last, self%mu, work%prediction_time, &
-                            work%x, work%force_time, room%margin, work%pressure)
+                            work%x, work%force_time, room%margin, work%pressure, &
+                            again=turn > 1 .and. turn <= plain_turns)
       end if
       do i = first, last
          work%drift(i) = maxval(abs(work%x(i, :) - start(i - first + 1, :)))
