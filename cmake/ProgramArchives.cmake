@@ -59,14 +59,20 @@ if(FRETWEAR_ARCHIVES_LINK)
       list(APPEND _asked "LINKER:-u,openblas_${_name}")
     endforeach()
     find_package(Threads REQUIRED)
+    # Its threads heed app/idle_threads.c only where it starts after that.
+    execute_process(COMMAND "${CMAKE_Fortran_COMPILER}" -print-file-name=libgomp.a
+      OUTPUT_VARIABLE _gomp OUTPUT_STRIP_TRAILING_WHITESPACE)
+    if(IS_ABSOLUTE "${_gomp}")
+      list(PREPEND _archive "${_gomp}")
+    endif()
     if(NOT DEFINED FRETWEAR_BLAS_ARCHIVE_LINK)
       try_compile(FRETWEAR_BLAS_ARCHIVE_LINK "${PROJECT_BINARY_DIR}/archives"
         SOURCES "${CMAKE_CURRENT_LIST_DIR}/blas_archive.f90"
         LINK_OPTIONS ${_asked} -static-libgfortran -static-libgcc
-        LINK_LIBRARIES "${_archive}" Threads::Threads)
+        LINK_LIBRARIES ${_archive} Threads::Threads ${CMAKE_DL_LIBS})
     endif()
     if(FRETWEAR_BLAS_ARCHIVE_LINK)
-      set(fretwear_blas_archive "${_archive}" Threads::Threads)
+      set(fretwear_blas_archive ${_archive} Threads::Threads ${CMAKE_DL_LIBS})
       set(fretwear_archive_options ${_asked} -static-libgfortran -static-libgcc)
     endif()
   endif()

@@ -156,10 +156,11 @@ def threads_part(rows: list[ThreadCost]) -> str:
     verdict = "met" if worst <= THREAD_TARGET else "missed"
     return "\n".join([
         "### A second thread", "",
-        "Threads that wait spin. Joints of fewer than 64 pairs therefore stay in one thread, "
-        "however many are allowed. Processor time of a whole run:", "",
+        "Threads that wait spin for a moment. Joints of fewer than 64 pairs therefore stay in one "
+        "thread, however many are allowed. Processor time of a whole run:", "",
         *table(["pairs", "H", "1 thread [ms]", "2 threads [ms]", "ratio",
                 "2 threads, 2 of OpenBLAS [ms]"], lines), "",
         f"Target: at most {THREAD_TARGET:g}; {verdict} ({worst:.2f} at worst). The threads that "
-        "OpenBLAS starts by itself get no work from the library, but wait actively for a moment "
-        "as a program begins: `OPENBLAS_NUM_THREADS=1` in the environment saves that."])
+        "OpenBLAS starts by itself in other programs get no work from the library, but wait "
+        "actively for a moment as a program begins: `OPENBLAS_NUM_THREADS=1` in the environment "
+        "saves that, and `fw_run` sets it for itself."])

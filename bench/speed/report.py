@@ -89,9 +89,9 @@ def threads_part(rows: list[ThreadTimes]) -> str:
     return "\n".join([
         "### Threads", "",
         f"{THREADED} pairs, 9 points within 2 Hz of the peak, on the coarser mesh of "
-        "[scaling](#scaling): joints of fewer than 64 pairs stay in one thread. By default idle "
-        "threads spin; where other programs use the processor this can cost far more than a second "
-        "thread gains, and `OMP_WAIT_POLICY=passive` lets them sleep instead.", "",
+        "[scaling](#scaling): joints of fewer than 64 pairs stay in one thread. Idle threads of "
+        "`fw_run` spin for a fraction of a millisecond, then sleep; `OMP_WAIT_POLICY=passive` lets "
+        "them sleep at once.", "",
         *table(["H", "1 thread [ms/point]", "2 threads [ms/point]", "speed-up",
                 "2 threads, passive [ms/point]", "speed-up"], lines)])
 

@@ -10,8 +10,8 @@ module fw_threads
    public :: thread_scope, pairs_for_threads, coordinates_for_threads
 
    !> Contact pairs, and coordinates of a joint, from which parallel regions pay. One rule for all
-   !> of them, because threads that wait for the next region spin, some milliseconds long: below, a
-   !> run stays in one thread altogether (docs/benchmarks/limit.md).
+   !> of them, because threads that wait for the next region spin for a while (app/idle_threads.c):
+   !> below, a run stays in one thread altogether (docs/benchmarks/limit.md).
    integer, parameter :: pairs_for_threads = 64
    integer, parameter :: coordinates_for_threads = 3*pairs_for_threads
 

@@ -1,9 +1,11 @@
 """Options, exit statuses and what goes to which stream."""
 import json
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
+from project import PROGRAM
 
 
 def test_version(fw_run):
@@ -13,6 +15,19 @@ def test_version(fw_run):
     assert first.startswith("fw_run ") and first.count(".") == 2
     # Which kernel runs decides on speed by three: whoever reports a time can see it.
     assert second.startswith("BLAS: ")
+
+
+def test_idle_threads_soon_sleep(fw_run, monkeypatch):
+    """Where OpenMP is linked in, threads that wait spin for less than a millisecond."""
+    libraries = subprocess.run(["ldd", PROGRAM], capture_output=True, text=True, check=False)
+    if libraries.returncode != 0 or "libgomp" in libraries.stdout:
+        pytest.skip("OpenMP is a shared library, which has read the environment before")
+    monkeypatch.setenv("OMP_DISPLAY_ENV", "verbose")
+    for name in ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY"):
+        monkeypatch.delenv(name, raising=False)
+    assert "GOMP_SPINCOUNT = '10000'" in fw_run("--version").stderr
+    monkeypatch.setenv("OMP_WAIT_POLICY", "active")
+    assert "GOMP_SPINCOUNT = '10000'" not in fw_run("--version").stderr
 
 
 def test_the_blas_is_named(fw_run, monkeypatch):
