@@ -92,6 +92,9 @@ module fw_wear_bdf
    integer(c_int), parameter :: krylov_length = 5
    !> Relative residual of the linear solutions.
    real(wp), parameter :: linear_tolerance = 1.0e-3_wp
+   !> Vibration that lags behind wears what is never given back: however much of the depth may be in
+   !> error, the vibration is at least this accurate, as a part of the depth.
+   real(wp), parameter :: loosest = 1.0e-2_wp
 
    !> The Fortran interface of this function cannot say that there is no matrix: it takes an
    !> object where C takes a null pointer. This is the function behind that interface.
@@ -250,14 +253,20 @@ contains
       type(c_ptr), value :: data
       type(bdf_state), pointer :: state
       real(wp), pointer, contiguous :: x(:), w(:)
+      real(wp) :: depth, largest, mean
       integer :: n
 
       call c_f_pointer(data, state)
       n = state%system%n_vibration()
       x => values(y, state%system%n)
       w => values(weight, state%system%n)
-      w(:n) = 1.0_wp/(state%tolerance*max(maxval(abs(x(:n))), tiny(1.0_wp)))
-      w(n + 1:) = 1.0_wp/(state%tolerance*max(maxval(abs(x(n + 1:))), state%least_depth))
+      depth = max(maxval(abs(x(n + 1:))), state%least_depth)
+      largest = max(maxval(abs(x(:n))), tiny(1.0_wp))
+      ! IDA takes the mean over all unknowns: its norm is made that of the vector itself, which
+      ! bounds the error of each pair.
+      mean = sqrt(real(size(x), wp))
+      w(:n) = mean/(min(state%tolerance, loosest)*min(depth, largest))
+      w(n + 1:) = mean/(state%tolerance*depth)
       status = callback_ok
    end function weigh
 

@@ -52,6 +52,8 @@ module fw_wear_march
    !> of the largest depth, that counts as none; and halvings after which the step is taken so.
    real(wp), parameter :: same_depth = 1.0e-3_wp
    integer, parameter :: max_onset_halvings = 12
+   !> Wear that the integrator of 'bdf' may take back, as a part of its tolerance.
+   real(wp), parameter :: trifle = 1.0e-2_wp
    !> Change of the rates, as a part of the largest, that counts as none; a pair bears and wears
    !> above these parts of the largest pressure and rate.
    real(wp), parameter :: unchanged = 1.0e-2_wp, bears = 1.0e-6_wp, wears = 1.0e-3_wp
@@ -420,7 +422,8 @@ contains
       type(wear_state), intent(out) :: after
       integer, intent(out) :: iterations
       type(wear_step_report) :: report
-      real(wp) :: scale, largest
+      type(solver_report) :: solution
+      real(wp) :: scale, largest, taken_back
       integer :: n
 
       report%converged = .true.
@@ -442,11 +445,20 @@ contains
          call self%bdf%advance(after%x, after%cycles, iterations, report%converged)
       end if
       if (report%converged) then
-         ! Within its tolerance the integrator may take a little wear back; a joint does not.
+         ! Within its tolerance the integrator may take a little wear back; a joint does not. Where
+         ! it is more than a trifle the integrator begins anew from what is left.
          n = system%n_vibration()
+         taken_back = maxval(state%x(n + 1:) - after%x(n + 1:))
          after%x(n + 1:) = max(after%x(n + 1:), state%x(n + 1:))
-         call self%stepper%evaluate(system, after)
-         call confirm(self, system, after, report, iterations)
+         if (taken_back > trifle*self%options%tolerance()*maxval(after%x(n + 1:))) then
+            call self%bdf%finish()
+            call self%stepper%settle(system, after, solution)
+            iterations = iterations + solution%iterations
+            report%converged = solution%converged
+         else
+            call self%stepper%evaluate(system, after)
+         end if
+         if (report%converged) call confirm(self, system, after, report, iterations)
       end if
       self%gave_up = .not. report%converged
       if (self%gave_up) self%ending = 'no step from cycle '//to_text(state%cycles)// &
