@@ -100,7 +100,9 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
 
         result, report = run_in_pieces(case, workers or 0, scheduler, progress, is_stopped,
                                        in_memory=in_memory)
-        return _judged(result, report, check=check)
+        if check and result.status == "not converged":
+            raise ConvergenceError(_failure(result, report), result, report)
+        return result
     return _run(case, progress, is_stopped, check=check, in_memory=in_memory)
 
 
@@ -110,18 +112,14 @@ def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object]
         with teller(progress, session) as tell:
             status, interrupted = run_watched(session, tell, is_stopped, in_memory=in_memory)
         report = (session.text("remarks") + session.text("summary")).splitlines()
-        message, path, image = session.text("message"), session.text("output"), session.image()
+        message, path = session.text("message"), session.text("output")
+        image = session.image() if in_memory else None
     if status not in (NOT_CONVERGED, STOPPED):
         raise_status(status, message)
-    result = Result.from_bytes(image, case) if in_memory else Result(path, case)
+    result = Result.of_run(case, path, image)
     if status == STOPPED or interrupted:
         raise RunInterrupted(result)
-    return _judged(result, report, check=check)
-
-
-def _judged(result: Result, report: list[str], *, check: bool) -> Result:
-    """The result, unless points have not converged and that is to be raised."""
-    if check and result.status == "not converged":
+    if status == NOT_CONVERGED and check:
         raise ConvergenceError(_failure(result, report), result, report)
     return result
 

@@ -86,10 +86,18 @@ class Result(ResultFile):
         result._begin(None, image, case)
         return result
 
-    def _begin(self, path: Path | None, image: bytes | None, case: Case | None = None) -> None:
+    @classmethod
+    def of_run(cls, case: Case, path: str, image: bytes | None) -> Result:
+        """The result that the library has just made of a case, in a file or in memory."""
+        result = cls.__new__(cls)
+        result._begin(Path(path) if image is None else None, image, case, is_ours=True)
+        return result
+
+    def _begin(self, path: Path | None, image: bytes | None, case: Case | None = None, *,
+               is_ours: bool = False) -> None:
         self._case = case
         self._cycles: dict[int, Cycle] = {}
-        super()._begin(path, image)
+        super()._begin(path, image, is_ours=is_ours)
 
     # ------------------------------------------------------------------ the case
 
@@ -372,7 +380,9 @@ class Result(ResultFile):
     @property
     def n_pairs(self) -> int:
         """Contact pairs of the case."""
-        for quantity in self._declared.values():
+        # Most files have the first, which spares going through all.
+        for quantity in ([self.declared("contact/dissipation")] if "contact/dissipation" in self
+                         else self._declared.values()):
             if "pair" in quantity.dimensions:
                 return quantity.shape[quantity.dimensions.index("pair")]
         return int(namelist_values(self.namelist).get("contact%n_pairs", ["0"])[0])

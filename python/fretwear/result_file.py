@@ -82,10 +82,14 @@ class ResultFile:
     open only while it is read.
     """
 
-    def _begin(self, path: Path | None, image: bytes | None) -> None:
-        """Take a file or its bytes; refuse what is no result."""
+    def _begin(self, path: Path | None, image: bytes | None, *, is_ours: bool = False) -> None:
+        """Take a file or its bytes; refuse what is no result, unless the library has just made it.
+        """
         self._path, self._image = path, image
         self._arrays: dict[str, NDArray[Any]] = {}
+        self._held: h5py.File | None = None
+        if is_ours:
+            return
         with self.open() as file:
             kind = plain_text(file.attrs.get("format", ""))
             if kind != FORMAT:
@@ -123,11 +127,7 @@ class ResultFile:
 
         def note(name: str, item: object) -> None:
             if isinstance(item, h5py.Dataset):
-                words = item.attrs.get("DIMENSION_LABELS", ())
-                found[name] = Quantity(
-                    name, tuple(item.shape), tuple(plain_text(word) for word in words),
-                    plain_text(item.attrs.get("units", "")),
-                    plain_text(item.attrs.get("long_name", "")))
+                found[name] = _declare(name, item)
 
         with self.open() as file:
             file.visititems(note)
@@ -147,6 +147,9 @@ class ResultFile:
         h5py.File
             Closed at the end of the `with` block.
         """
+        if self._held is not None:
+            yield self._held
+            return
         try:
             if self._image is not None:
                 file = h5py.File(h5py.h5f.open_file_image(self._image))
@@ -159,18 +162,35 @@ class ResultFile:
         with file:
             yield file
 
+    @contextmanager
+    def kept_open(self) -> Iterator[None]:
+        """Keep the file open in a `with` block, for many small readings."""
+        with self.open() as file:
+            before, self._held = self._held, file
+            try:
+                yield
+            finally:
+                self._held = before
+
     # ------------------------------------------------------------------ any dataset
 
     def __contains__(self, name: str) -> bool:
-        return isinstance(name, str) and name.strip("/") in self._declared
+        if not isinstance(name, str) or not name.strip("/"):
+            return False
+        if name.strip("/") in self._arrays:
+            return True
+        with self.open() as file:
+            return isinstance(file.get(name.strip("/")), h5py.Dataset)
 
     def __iter__(self) -> Iterator[str]:
         return iter(sorted(self._declared))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Read a dataset by its name in the file, such as "contact/force"."""
-        name = self.declared(name).name
+        name = text("name", name).strip("/")
         if name not in self._arrays:
+            if name not in self:
+                raise self._absent(name)
             with self.open() as file:
                 array: NDArray[Any] = np.asarray(file[name][()])
             if array.dtype.kind in "SO":
@@ -188,9 +208,10 @@ class ResultFile:
             The file does not hold it; the message says what would.
         """
         name = text("name", name).strip("/")
-        if name not in self._declared:
+        if name not in self:
             raise self._absent(name)
-        return self._declared[name]
+        with self.open() as file:
+            return _declare(name, file[name])
 
     def _absent(self, name: str) -> AbsentError:
         for start, how in _REMEDIES.items():
@@ -211,10 +232,11 @@ class ResultFile:
     # ------------------------------------------------------------------ the run
 
     def _attribute(self, name: str) -> Any:
-        if name not in self._attributes:
-            raise AbsentError(f"{self.name}: has no attribute {name}; a run of this version of "
-                              "fretwear writes it")
-        return self._attributes[name]
+        with self.open() as file:
+            if name in file.attrs:
+                return _plain(file.attrs[name])
+        raise AbsentError(f"{self.name}: has no attribute {name}; a run of this version of "
+                          "fretwear writes it")
 
     @property
     def title(self) -> str:
@@ -244,6 +266,13 @@ class ResultFile:
         """What the program remarked on the input and the answer; empty where nothing."""
         name = next((name for name in ("remarks/text", "remarks") if name in self), None)
         return [] if name is None else [str(remark) for remark in self[name]]
+
+
+def _declare(name: str, item: h5py.Dataset) -> Quantity:
+    return Quantity(
+        name, tuple(item.shape),
+        tuple(plain_text(word) for word in item.attrs.get("DIMENSION_LABELS", ())),
+        plain_text(item.attrs.get("units", "")), plain_text(item.attrs.get("long_name", "")))
 
 
 def plain_text(value: object) -> str:

@@ -22,7 +22,7 @@ METHODS: dict[str, tuple[Any, ...]] = {
     "sector": (1,),
     "declared": ("omega",), "units": ("omega",), "to_xarray": ()}
 #: Asked for no data, or only for what is drawn of it.
-OTHERS = {"open", "save", "from_bytes", "to_pyvista", "animate", "plot"}
+OTHERS = {"kept_open", "of_run", "open", "save", "from_bytes", "to_pyvista", "animate", "plot"}
 
 
 @pytest.fixture

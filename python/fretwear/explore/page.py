@@ -69,6 +69,7 @@ class Page:
         self._document, self._sliders = document, list(sliders)
         self._result: Result | None = None
         self._point: int | None = None
+        self._places: tuple[NDArray[np.float64], ...] | None = None
         self._curve = ColumnDataSource({"x": [], "y": []})
         self._first = ColumnDataSource({"x": [], "y": []})
         self._missing = ColumnDataSource({"x": [], "y": []})
@@ -141,16 +142,28 @@ class Page:
         if answer.result is None:
             self._say(answer.words, "#c0392b")
             return
-        self._result = answer.result
+        with answer.result.kept_open():
+            self._show_curve(answer, answer.result)
+
+        def contact() -> None:
+            """Behind the curve, which nobody shall wait longer for; and of the newest alone."""
+            if self._result is answer.result and answer.result is not None:
+                with answer.result.kept_open():
+                    self._draw_point()
+
+        self._document.add_next_tick_callback(contact)
+
+    def _show_curve(self, answer: Answer, result: Result) -> None:
+        self._result = result
         if not self._observed.options:
-            self._observed.options = choices(answer.result.observed)
-            self._observed.value = answer.result.observed[0]
-            self._observed.visible = len(answer.result.observed) > 1
-        self._draw()
+            self._observed.options = choices(result.observed)
+            self._observed.value = result.observed[0]
+            self._observed.visible = len(result.observed) > 1
+        self._draw_curve()
         if not self._first.data["x"] and answer.is_final:
             self._first.data = dict(self._curve.data)
         place, height = self._highest()
-        text = f"highest {height:.4g} {units_of(answer.result, 'amplitude')} at {place:.5g} Hz"
+        text = f"highest {height:.4g} {units_of(result, 'amplitude')} at {place:.5g} Hz"
         if not answer.is_final:
             text += " (few points; more follow)"
         self._say(f"{text}; {answer.seconds:.2f} s" + (f". {answer.words}" if answer.words else ""))
@@ -178,6 +191,10 @@ class Page:
         return omega / (2.0 * np.pi), height
 
     def _draw(self) -> None:
+        self._draw_curve()
+        self._draw_point()
+
+    def _draw_curve(self) -> None:
         result = self._result
         if result is None:
             return
@@ -190,7 +207,6 @@ class Page:
         self._response.yaxis.axis_label = label(f"amplitude of {self._observed.value}",
                                                 units_of(result, "amplitude"))
         self._point = None
-        self._draw_point()
 
     def _draw_point(self) -> None:
         """The chosen point, or the highest row, with its loops and its map."""
@@ -234,7 +250,9 @@ class Page:
         if result is None or point is None or "contact/fraction" not in result:
             return
         share = result.fraction[point, :, STATES.index(self._state.value)]
-        x, y, width, height = places_of_pairs(result)
+        if self._places is None:
+            self._places = places_of_pairs(result)  # those of the model, whatever is turned
+        x, y, width, height = self._places
         self._cells.data = {"x": x.tolist(), "y": y.tolist(), "w": width.tolist(),
                             "h": height.tolist(), "share": share.tolist(),
                             "name": [str(pair + 1) for pair in range(result.n_pairs)]}

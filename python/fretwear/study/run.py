@@ -10,13 +10,14 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .._namelist import literal
-from .._native import Session, library_version, namelist_values
+from .._native import Session, library_version
 from ..errors import FretwearError
 from .plan import Setting, override
 
@@ -26,6 +27,8 @@ __all__ = ["STATUS", "Job", "Record", "RunStopped", "identify", "keep", "recorde
 STATUS = {0: "ok", 3: "bad input", 4: "not converged"}
 #: Runs that ended so would end so again.
 _FINAL = ("ok", "not converged")
+#: How a key begins in the effective input.
+_BEGINNING = re.compile(r"   (\w+) = ")
 #: What does not change the numbers of a run, or counts by its content.
 _INDIFFERENT = ("case%threads", "case%title", "output%file", "model%file", "contact%worn")
 
@@ -110,17 +113,31 @@ def identify(program: str, case: Path, folder: Path, values: Mapping[str, Settin
             session.read(text, str(case), [(key, literal(value, key))
                                            for key, value in settings.items()])
             session.check()
-            effective = namelist_values(session.text("namelist"))
+            effective = _effective(session.text("namelist"))
             inputs = session.text("inputs").splitlines()
     except FretwearError as error:
         given = (override(key, value) for key, value in settings.items())
         return Record(_digest([text, *given]), dict(values), error.exit_status,
                       STATUS.get(error.exit_status, "failed"), str(error), 0.0, "")
-    kept = {key: value for key, value in effective.items() if key not in _INDIFFERENT}
     # Of the namelist its effect counts, of every other file that is read what it holds.
     contents = [_content(Path(path)) for path in inputs if Path(path) != case]
-    name = _digest([library_version(), json.dumps(kept, sort_keys=True), *contents])
+    name = _digest([library_version(), effective, *contents])
     return Job(name, program, str(case), str(folder), dict(values), settings, timeout)
+
+
+def _effective(namelist: str) -> str:
+    """The effective input without what does not change the numbers of a run."""
+    kept, group, skips = [], "", False
+    for line in namelist.splitlines():
+        if line.startswith("&"):
+            group = line[1:].strip()
+        found = _BEGINNING.match(line)
+        # Long values go on in lines of their own.
+        if found or line.startswith(("&", "/")):
+            skips = found is not None and f"{group}%{found[1]}" in _INDIFFERENT
+        if not skips:
+            kept.append(line)
+    return "\n".join(kept)
 
 
 def recorded(job: Job) -> Record | None:

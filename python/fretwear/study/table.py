@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,12 +69,13 @@ def _quantities(plan: Plan, record: Record | None) -> tuple[list[Value], str]:
         except FretwearError as error:
             problems.append(str(error))
     values: list[Value] = []
-    for text in plan.quantities:
-        try:
-            values.append(evaluate(text, result))
-        except FretwearError as error:
-            problems.append(f"{text}: {error}")
-            values.append(evaluate(text.partition("[")[0], None))
+    with nullcontext() if result is None else result.kept_open():
+        for text in plan.quantities:
+            try:
+                values.append(evaluate(text, result))
+            except FretwearError as error:
+                problems.append(f"{text}: {error}")
+                values.append(evaluate(text.partition("[")[0], None))
     return values, "; ".join(problems)
 
 
