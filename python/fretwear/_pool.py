@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any, Callable, TypeVar
 
+from ._watching import StopFlag
 from .errors import InputError
 
 __all__ = ["Pool", "Tick", "core_count", "open_pool"]
@@ -61,7 +62,7 @@ class Pool:
             Asked now and then whether to end the work: what has begun then ends in its own way, and
             is given.
         """
-        stop = threading.Event()
+        stop = StopFlag()
         with ThreadPoolExecutor(self.workers) as pool:
             futures = [pool.submit(work, item, stop) for item in items]
             waiting: set[Any] = set(futures)

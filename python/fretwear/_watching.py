@@ -15,8 +15,8 @@ from ._native import Session, namelist_values
 from ._progress import CONTROL, Bar, State, read_state
 from .errors import InputError
 
-__all__ = ["Progress", "Stop", "Tell", "run_watched", "stop_function", "stops_on_interrupt",
-           "teller"]
+__all__ = ["Progress", "Stop", "StopFlag", "Tell", "run_watched", "stop_function",
+           "stops_on_interrupt", "teller"]
 
 #: Called with the number of points done and of points to come (0: not known); True for a bar on
 #: the standard error, or in a notebook.
@@ -30,6 +30,35 @@ Tell = Callable[[State], object]
 
 #: Time between two calls of a progress function [s].
 _BETWEEN_CALLS = 0.1
+
+
+class StopFlag(threading.Event):
+    """An event that reaches runs at work by itself: none of them has to ask for it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lock = threading.Lock()
+        self._controls: list[NDArray[np.int64]] = []
+
+    def set(self) -> None:
+        """Stop the runs at work, and those to come."""
+        with self._lock:
+            super().set()
+            for control in self._controls:
+                control[0] = 1
+
+    @contextmanager
+    def reaching(self, control: NDArray[np.int64]) -> Iterator[None]:
+        """Stop the run with this control, when the flag is set in the `with` block or was before.
+        """
+        with self._lock:
+            self._controls.append(control)
+            control[0] = int(self.is_set())
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._controls = [other for other in self._controls if other is not control]
 
 
 def stop_function(stop: object) -> Callable[[], object] | None:
@@ -71,6 +100,10 @@ def run_watched(session: Session, progress: Tell | None, stop: Callable[[], obje
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main and progress is None and stop is None:
         return session.run(control, in_memory=in_memory), False
+    flag = getattr(stop, "__self__", None)
+    if not in_main and progress is None and isinstance(flag, StopFlag):
+        with flag.reaching(control):
+            return session.run(control, in_memory=in_memory), False
     status: list[int] = []
     worker = threading.Thread(
         target=lambda: status.append(session.run(control, in_memory=in_memory)), name="fretwear")

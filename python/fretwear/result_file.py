@@ -189,10 +189,11 @@ class ResultFile:
         """Read a dataset by its name in the file, such as "contact/force"."""
         name = text("name", name).strip("/")
         if name not in self._arrays:
-            if name not in self:
-                raise self._absent(name)
             with self.open() as file:
-                array: NDArray[Any] = np.asarray(file[name][()])
+                item = file.get(name) if name else None
+                if not isinstance(item, h5py.Dataset):
+                    raise self._absent(name)
+                array: NDArray[Any] = np.asarray(item[()])
             if array.dtype.kind in "SO":
                 array = np.array([plain_text(word) for word in array.ravel()]).reshape(array.shape)
             array.flags.writeable = False
