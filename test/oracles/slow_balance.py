@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-# Turns of the march; a friction element settles within a few.
+# Turns of the march at most; a friction element settles within a few.
 TURNS = 20
+# What is left of the change from turn to turn where it has settled: round-off.
+SETTLED = 1e-15
 
 
 def synthesis(n_harmonics, n_time):
@@ -54,6 +56,7 @@ def march(prediction, mu):
     """Contact forces (instant, component) of one pair from the predicted ones."""
     force, x = np.zeros_like(prediction), np.zeros(2)
     for _ in range(TURNS):
+        before = force.copy()
         for k, predicted in enumerate(prediction):
             pressure, trial = max(-predicted[2], 0.0), predicted[:2] - x
             size = np.hypot(*trial)
@@ -61,6 +64,8 @@ def march(prediction, mu):
                 trial = mu * pressure * trial / size
                 x = predicted[:2] - trial
             force[k] = [*trial, -pressure]
+        if np.abs(force - before).max() <= SETTLED * np.abs(force).max():
+            break
     return force
 
 
