@@ -76,6 +76,7 @@ module fw_balance_state
       procedure :: set_frequency
       procedure :: set_load_factors
       procedure :: vibratory_factor
+      procedure :: take_loads
       procedure :: parameter
       procedure :: follow
       procedure :: set_point
@@ -334,6 +335,15 @@ contains
       h = findloc(self%problem%fourier%harmonic > 0, .true., dim=1)
       if (h > 0) factor = self%structure_state%load_factor(h)
    end function vibratory_factor
+
+   !> The factors of the loads of another state of the problem.
+   subroutine take_loads(self, other)
+      class(balance_state), intent(inout) :: self
+      class(balance_state), intent(in) :: other
+
+      self%structure_state%load_factor = other%structure_state%load_factor
+      call self%structure_state%scale_loads()
+   end subroutine take_loads
 
    !> Whether the derivatives of all laws are alike in all harmonics: functions of displacements.
    pure logical function all_are_static(problem)

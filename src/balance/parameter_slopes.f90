@@ -149,15 +149,13 @@ contains
    subroutine find_work_at_rest(self, state)
       class(slope_finder), intent(inout) :: self
       type(balance_state), intent(in) :: state
-      complex(wp), dimension(state%problem%structure%n_coordinates) :: rest, row
-      complex(wp) :: unused
+      complex(wp) :: rest(state%problem%structure%n_coordinates)
       integer :: h
 
       h = findloc(state%problem%fourier%harmonic, 1, dim=1)
       if (h == 0) return
       rest = (0.0_wp, 0.0_wp)
-      call state%problem%structure%load_work(state%structure_state, h, rest, self%work_at_rest, &
-                                             unused, row)
+      call state%problem%structure%load_work(state%structure_state, h, rest, self%work_at_rest)
    end subroutine find_work_at_rest
 
    !> The slope by one parameter.

@@ -123,6 +123,7 @@ contains
          call self%slopes%start(self%state)
       end if
       self%state%interrupt => system%interrupt
+      call self%state%take_loads(system)
       call self%state%set_frequency(system%frequency(), error)
       if (allocated(error)) return
       self%state%depth = system%depth

@@ -1,5 +1,5 @@
-!> A problem that follows a parameter of its case: loads are multiplied and laws made anew in place,
-!> and only what changes matrices condenses the structure again.
+!> A problem that follows a parameter of its case: states multiply loads, laws are made anew in
+!> place, and only what changes matrices condenses the structure again.
 module fw_parameter_problem
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
@@ -27,8 +27,9 @@ module fw_parameter_problem
       logical :: by_factor = .false.
       !> Of the case as it was read.
       real(wp), allocatable :: base(:)
-      !> Present value or factor.
+      !> Present value or factor, and the numbers that the problem was built with.
       real(wp) :: value = 0.0_wp
+      real(wp), allocatable, private :: built(:)
       !> Counts changes: what was made of an earlier problem has to be made anew.
       integer :: version = 0
    contains
@@ -51,6 +52,7 @@ contains
       self%number = number
       self%by_factor = by_factor
       call get_parameter(case, number, self%base)
+      self%built = self%base
       self%value = 1.0_wp
       if (.not. by_factor) self%value = self%base(1)
    end subroutine start
@@ -62,7 +64,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call put_parameter(self%case, self%number, self%values_at(value), error)
-      if (.not. allocated(error)) self%value = value
+      if (allocated(error)) return
+      self%value = value
+      self%built = self%values_at(value)
    end subroutine begin
 
    !> What the parameter is at a value or factor, each pair or spring its own.
@@ -85,19 +89,18 @@ contains
       type(balance_state), intent(inout) :: system
       type(error_type), allocatable, intent(out) :: error
       type(balance_state), allocatable :: unused
-      real(wp), allocatable :: before(:), now(:)
+      real(wp), allocatable :: now(:)
 
       if (abs(value - self%value) <= 0.0_wp) return
-      call get_parameter(self%case, self%number, before)
       now = self%values_at(value)
       call put_parameter(self%case, self%number, now, error)
       if (allocated(error)) return
       self%value = value
       self%version = self%version + 1
       if (self%number == harmonic_scale) then
-         call problem%structure%scale_loads(1.0_wp, now(1)/before(1))
+         call system%set_load_factors(1.0_wp, now(1)/self%built(1))
       else if (self%number == static_scale) then
-         call problem%structure%scale_loads(now(1)/before(1), 1.0_wp)
+         call system%set_load_factors(now(1)/self%built(1), 1.0_wp)
       else if (is_of_matrices(self%number)) then
          allocate (unused)
          call build_system(self%case, problem, unused, error)
@@ -119,6 +122,7 @@ contains
       new%interrupt => state%interrupt
       new%reduced = state%reduced
       new%load_share = state%load_share
+      call new%take_loads(state)
       state = new
    end subroutine renew_state
 

@@ -78,14 +78,14 @@ contains
       class(phase_system), intent(inout) :: self
       !> q, then omega [rad/s].
       real(wp), intent(in) :: x(:)
-      complex(wp) :: work, slope, row(self%problem%structure%n_coordinates)
+      complex(wp) :: work
       integer :: n
 
       n = size(x) - 1
       self%omega_unit = x(n + 1)
       ! Of the size of the others, where these are not all at rest.
       if (norm2(x(:n)) > 0.0_wp) self%omega_unit = x(n + 1)/norm2(x(:n))
-      call work_at(self, x(:n), work, slope, row)
+      call work_at(self, x(:n), work)
       self%work_unit = 1.0_wp
       if (abs(work) > 0.0_wp) self%work_unit = self%state%reference/abs(work)
    end subroutine scale
@@ -111,10 +111,13 @@ contains
    subroutine work_at(self, q, work, slope, row)
       class(phase_system), intent(in) :: self
       real(wp), intent(in), contiguous :: q(:)
-      complex(wp), intent(out) :: work, slope, row(:)
-      complex(wp) :: amplitude(size(row), self%problem%fourier%n_retained)
+      complex(wp), intent(out) :: work
+      !> Only the linear problem asks for these: they take solutions with the condensed part.
+      complex(wp), intent(out), optional :: slope, row(:)
+      complex(wp) :: amplitude(self%problem%structure%n_coordinates, &
+                               self%problem%fourier%n_retained)
 
-      call to_complex(self%problem%fourier, size(row), q, amplitude)
+      call to_complex(self%problem%fourier, size(amplitude, 1), q, amplitude)
       call self%problem%structure%load_work(self%state%structure_state, self%first, &
                                             amplitude(:, self%first), work, slope, row)
    end subroutine work_at
@@ -144,11 +147,11 @@ contains
       real(wp), intent(out), contiguous :: dr(:)
       type(slope_finder) :: finder
       type(parameter_slope) :: slope
-      complex(wp) :: work, unused, row(self%problem%structure%n_coordinates)
+      complex(wp) :: work
       integer :: n
 
       n = self%state%n
-      call work_at(self, x(:n), work, unused, row)
+      call work_at(self, x(:n), work)
       call find_varied_slope(self%mover, finder, self%state, x(:n), slope, work)
       dr(:n) = reshape(slope%residual, [n])
       dr(n + 1) = self%work_unit*real(slope%work, wp)
@@ -168,7 +171,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(slope_finder) :: finder
       type(parameter_slope) :: slope
-      complex(wp) :: work, unused, row(self%problem%structure%n_coordinates)
+      complex(wp) :: work
       real(wp) :: r(size(x)), step(size(x)), y(size(x))
       integer :: n, p
 
@@ -181,7 +184,7 @@ contains
       call self%residual(y, r)
       call linear%prepare(self, done)
       if (.not. done) return
-      call work_at(self, x(:n), work, unused, row)
+      call work_at(self, x(:n), work)
       call finder%start(self%state)
       call finder%prepare(self%state, x(:n))
       do p = 1, size(parameters)
@@ -215,12 +218,12 @@ contains
       class(phase_system), intent(inout) :: self
       real(wp), intent(in) :: q(:), z(:)
       real(wp), intent(out) :: g(:)
-      complex(wp) :: work, slope, row(self%problem%structure%n_coordinates)
+      complex(wp) :: work
 
       associate (unused => z)
       end associate
       self%x = q
-      call work_at(self, self%x, work, slope, row)
+      call work_at(self, self%x, work)
       g = self%work_unit*real(work, wp)
    end subroutine conditions
 

@@ -90,7 +90,7 @@ contains
    subroutine start(self, problem, system, options)
       class(response_curve), intent(inout) :: self
       type(balance_problem), intent(in), target :: problem
-      !> Whose interrupt is listened to.
+      !> Whose loads act, and whose interrupt is listened to.
       type(balance_state), intent(in) :: system
       type(solver_options), intent(in) :: options
 
@@ -108,6 +108,8 @@ contains
 
       call new_balance_state(self%problem, self%state)
       call new_balance_state(self%problem, self%shifted)
+      call self%state%take_loads(system)
+      call self%shifted%take_loads(system)
       self%state%reduced = .false.
       self%shifted%reduced = .false.
       self%state%interrupt => system%interrupt

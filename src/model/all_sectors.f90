@@ -64,7 +64,6 @@ module fw_all_sectors
       procedure :: parts
       procedure :: held_modes
       procedure :: magnitudes
-      procedure :: scale_loads
       procedure :: observed_slope
       procedure :: load_work
       procedure :: wave_block
@@ -153,8 +152,8 @@ module fw_all_sectors
          class(structure_state), intent(in) :: state
          integer, intent(in) :: h
          complex(wp), intent(in) :: q(:)
-         complex(wp), intent(out) :: work, slope
-         complex(wp), intent(out) :: row(:)
+         complex(wp), intent(out) :: work
+         complex(wp), intent(out), optional :: slope, row(:)
       end subroutine load_work
    end interface
 
@@ -499,20 +498,5 @@ contains
          sums(self%coordinate(:, j)) = matmul(largest, amplitude(self%coordinate(:, j)))
       end do
    end subroutine magnitudes
-
-   pure subroutine scale_loads(self, static, vibration)
-      class(all_sectors), intent(inout) :: self
-      real(wp), intent(in) :: static, vibration
-      integer :: k
-
-      do k = 1, size(self%basis)
-         associate (b => self%basis(k))
-            b%load_q(:, 1) = static*b%load_q(:, 1)
-            b%load_i(:, 1) = static*b%load_i(:, 1)
-            b%load_q(:, 2:) = vibration*b%load_q(:, 2:)
-            b%load_i(:, 2:) = vibration*b%load_i(:, 2:)
-         end associate
-      end do
-   end subroutine scale_loads
 
 end module fw_all_sectors

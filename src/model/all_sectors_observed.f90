@@ -45,7 +45,8 @@ contains
                associate (point => state%point(k + 1, h))
                   call observed_sector_slope(self%basis(basis_of(self, k)), point, &
                                              slopes_of(point, 0.0_wp, by_frequency), &
-                                             waves(:, k + 1), found(:, k + 1))
+                                             state%load_factor(h), waves(:, k + 1), &
+                                             found(:, k + 1))
                end associate
             end do
             call self%observed_ring%add_waves(found, sectors)
@@ -56,7 +57,7 @@ contains
 
    module procedure load_work
       complex(wp), allocatable :: waves(:, :)
-      complex(wp) :: own(self%n_slots)
+      complex(wp) :: own(self%n_slots), own_slope
       integer :: j, k
 
       allocate (waves(self%n_slots, self%n_alike))
@@ -66,12 +67,13 @@ contains
       type is (all_sectors_state)
          associate (point => state%point(k + 1, h))
             call work_of_sector(self%basis(basis_of(self, k)), point, &
-                                slopes_of(point, 0.0_wp, by_frequency), waves(:, k + 1), work, &
-                                slope, own)
+                                slopes_of(point, 0.0_wp, by_frequency), state%load_factor(h), &
+                                waves(:, k + 1), work, own_slope, own)
          end associate
       end select
       work = self%n_alike*work
-      slope = self%n_alike*slope
+      if (present(slope)) slope = self%n_alike*own_slope
+      if (.not. present(row)) return
       do j = 1, self%n_alike
          row(self%coordinate(:, j)) = conjg(self%cyclic%factor(k, j - 1))*own
       end do

@@ -30,7 +30,6 @@ module fw_condensed_structure
       procedure :: parts
       procedure :: held_modes
       procedure :: magnitudes
-      procedure :: scale_loads
       procedure :: observed_slope
       procedure :: load_work
       procedure :: whole_size
@@ -245,7 +244,7 @@ contains
          slope = matmul(b%change_k(:, :, number), field)
          do h = 1, size(self%harmonic)
             if (self%harmonic(h) == 0) then
-               slope(:, h) = slope(:, h) - b%change_load(:, number)
+               slope(:, h) = slope(:, h) - state%load_factor(h)*b%change_load(:, number)
             else
                slope(:, h) = slope(:, h) + cmplx(0.0_wp, self%harmonic(h)*state%omega, wp)* &
                              matmul(b%change_c(:, :, number), field(:, h))
@@ -253,20 +252,6 @@ contains
          end do
       end associate
    end subroutine change_field
-
-   !> Static loads and vibratory ones by a factor each.
-   pure subroutine scale_loads(self, static, vibration)
-      class(condensed_structure), intent(inout) :: self
-      real(wp), intent(in) :: static, vibration
-
-      associate (b => self%basis)
-         b%load_q(:, 1) = static*b%load_q(:, 1)
-         b%load_i(:, 1) = static*b%load_i(:, 1)
-         b%load_q(:, 2:) = vibration*b%load_q(:, 2:)
-         b%load_i(:, 2:) = vibration*b%load_i(:, 2:)
-         if (allocated(b%change_load)) b%change_load = static*b%change_load
-      end associate
-   end subroutine scale_loads
 
    !> Derivative of what is observed by the frequency, at held coordinates.
    subroutine observed_slope(self, state, q, slope)
@@ -281,7 +266,8 @@ contains
       if (self%basis%n_internal == 0) return
       do h = 1, size(self%harmonic)
          if (self%harmonic(h) == 0) cycle
-         call follow_frequency(self%basis, self%harmonic(h), state%omega, q(:, h), x, x_slope)
+         call follow_frequency(self%basis, self%harmonic(h), state%omega, &
+                               state%load_factor(h), q(:, h), x, x_slope)
          slope(:, h) = matmul(self%basis%observe_i, x_slope)
       end do
    end subroutine observed_slope
@@ -292,10 +278,11 @@ contains
       class(structure_state), intent(in) :: state
       integer, intent(in) :: h
       complex(wp), intent(in) :: q(:)
-      complex(wp), intent(out) :: work, slope
-      complex(wp), intent(out) :: row(:)
+      complex(wp), intent(out) :: work
+      complex(wp), intent(out), optional :: slope, row(:)
 
-      call work_of_load(self%basis, self%harmonic(h), state%omega, q, work, slope, row)
+      call work_of_load(self%basis, self%harmonic(h), state%omega, state%load_factor(h), q, work, &
+                        slope, row)
    end subroutine load_work
 
    !> Work of the loads on a motion of all degrees of freedom.
@@ -311,6 +298,7 @@ contains
       associate (b => self%basis, m => self%n_coordinates)
          work = sum(conjg(harmonic_load(b%load_q, b%waves, 1, state%omega))*field(:m, h)) + &
                 sum(conjg(harmonic_load(b%load_i, b%waves, 1, state%omega))*field(m + 1:, h))
+         work = state%load_factor(h)*work
       end associate
    end function field_work
 

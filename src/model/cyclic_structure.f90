@@ -64,7 +64,6 @@ module fw_cyclic_structure
       procedure :: parts
       procedure :: held_modes
       procedure :: magnitudes
-      procedure :: scale_loads
       procedure :: observed_slope
       procedure :: load_work
    end type cyclic_structure
@@ -508,21 +507,6 @@ contains
       end associate
    end subroutine magnitudes
 
-   pure subroutine scale_loads(self, static, vibration)
-      class(cyclic_structure), intent(inout) :: self
-      real(wp), intent(in) :: static, vibration
-      integer :: k
-
-      do k = 1, size(self%basis)
-         associate (b => self%basis(k))
-            b%load_q(:, 1) = static*b%load_q(:, 1)
-            b%load_i(:, 1) = static*b%load_i(:, 1)
-            b%load_q(:, 2:) = vibration*b%load_q(:, 2:)
-            b%load_i(:, 2:) = vibration*b%load_i(:, 2:)
-         end associate
-      end do
-   end subroutine scale_loads
-
    subroutine observed_slope(self, state, q, slope)
       class(cyclic_structure), intent(in) :: self
       class(structure_state), intent(in) :: state
@@ -536,8 +520,8 @@ contains
          do h = 1, size(self%harmonic)
             if (self%harmonic(h) == 0) cycle
             call observed_sector_slope(self%basis(self%basis_of(h)), state%point(h), &
-                                       slopes_of(state%point(h), 0.0_wp, by_frequency), q(:, h), &
-                                       slope(:, h))
+                                       slopes_of(state%point(h), 0.0_wp, by_frequency), &
+                                       state%load_factor(h), q(:, h), slope(:, h))
          end do
       end select
    end subroutine observed_slope
@@ -547,13 +531,14 @@ contains
       class(structure_state), intent(in) :: state
       integer, intent(in) :: h
       complex(wp), intent(in) :: q(:)
-      complex(wp), intent(out) :: work, slope
-      complex(wp), intent(out) :: row(:)
+      complex(wp), intent(out) :: work
+      complex(wp), intent(out), optional :: slope, row(:)
 
       select type (state)
       type is (cyclic_state)
          call work_of_sector(self%basis(self%basis_of(h)), state%point(h), &
-                             slopes_of(state%point(h), 0.0_wp, by_frequency), q, work, slope, row)
+                             slopes_of(state%point(h), 0.0_wp, by_frequency), &
+                             state%load_factor(h), q, work, slope, row)
       end select
    end subroutine load_work
 

@@ -17,11 +17,11 @@ module fw_field_slopes
 contains
 
    !> x and dx/d omega (n_internal) of a harmonic above 0.
-   subroutine follow_frequency(basis, harmonic, omega, q, x, slope)
+   subroutine follow_frequency(basis, harmonic, omega, load_factor, q, x, slope)
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: harmonic
-      !> [rad/s]
-      real(wp), intent(in) :: omega
+      !> [rad/s], and what the loads of the model are multiplied by.
+      real(wp), intent(in) :: omega, load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: x(:), slope(:)
       type(internal_block) :: internal
@@ -34,11 +34,11 @@ contains
       s = n*omega
       ! The same factors were made when the structure went to its frequency: they do not fail.
       call internal%factor(basis, cmplx(s**2, kind=wp), s, unused)
-      column(:, 1) = harmonic_load(basis%load_i, basis%waves, harmonic, s) - &
+      column(:, 1) = load_factor*harmonic_load(basis%load_i, basis%waves, harmonic, s) - &
                      matmul(coupling(basis, 1.0_wp, s**2, s), q)
       call internal%solve(1, column)
       x = column(:, 1)
-      column(:, 1) = load_slope(basis%load_i, basis%waves, harmonic, s, n) - &
+      column(:, 1) = load_factor*load_slope(basis%load_i, basis%waves, harmonic, s, n) - &
                      matmul(coupling(basis, 0.0_wp, 2.0_wp*n*s, n), q) + &
                      2.0_wp*n*s*basis%m_i*x
       if (allocated(basis%c_ii)) then
@@ -65,31 +65,35 @@ contains
    end function coupling
 
    !> F^H u, its derivative by the frequency at held coordinates, and its row by them.
-   subroutine work_of_load(basis, harmonic, omega, q, work, slope, row)
+   subroutine work_of_load(basis, harmonic, omega, load_factor, q, work, slope, row)
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: harmonic
-      real(wp), intent(in) :: omega
+      real(wp), intent(in) :: omega, load_factor
       complex(wp), intent(in) :: q(:)
-      complex(wp), intent(out) :: work, slope
+      complex(wp), intent(out) :: work
+      complex(wp), intent(out), optional :: slope
       !> (n_coordinates)
-      complex(wp), intent(out) :: row(:)
+      complex(wp), intent(out), optional :: row(:)
       type(internal_block) :: internal
       complex(wp) :: x(basis%n_internal), x_slope(basis%n_internal)
-      complex(wp) :: f_i(basis%n_internal, 1)
+      complex(wp) :: f_i(basis%n_internal, 1), f_q(basis%n_coordinates)
       real(wp) :: n, s
       logical :: unused
 
       n = real(harmonic, wp)
       s = n*omega
-      row = conjg(harmonic_load(basis%load_q, basis%waves, harmonic, s))
-      work = sum(row*q)
-      slope = sum(conjg(load_slope(basis%load_q, basis%waves, harmonic, s, n))*q)
+      f_q = load_factor*conjg(harmonic_load(basis%load_q, basis%waves, harmonic, s))
+      work = sum(f_q*q)
+      if (present(slope)) slope = load_factor* &
+         sum(conjg(load_slope(basis%load_q, basis%waves, harmonic, s, n))*q)
+      if (present(row)) row = f_q
       if (basis%n_internal == 0) return
-      call follow_frequency(basis, harmonic, omega, q, x, x_slope)
-      f_i(:, 1) = conjg(harmonic_load(basis%load_i, basis%waves, harmonic, s))
+      call follow_frequency(basis, harmonic, omega, load_factor, q, x, x_slope)
+      f_i(:, 1) = load_factor*conjg(harmonic_load(basis%load_i, basis%waves, harmonic, s))
       work = work + sum(f_i(:, 1)*x)
-      slope = slope + sum(f_i(:, 1)*x_slope) + &
-              sum(conjg(load_slope(basis%load_i, basis%waves, harmonic, s, n))*x)
+      if (present(slope)) slope = slope + sum(f_i(:, 1)*x_slope) + load_factor* &
+         sum(conjg(load_slope(basis%load_i, basis%waves, harmonic, s, n))*x)
+      if (.not. present(row)) return
       ! D is symmetric.
       call internal%factor(basis, cmplx(s**2, kind=wp), s, unused)
       call internal%solve(1, f_i)

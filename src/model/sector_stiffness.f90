@@ -153,24 +153,26 @@ contains
    end subroutine recover_sector
 
    !> Observed quantities by the frequency at held coordinates: the internal modes follow.
-   subroutine observed_sector_slope(basis, point, slopes, q, slope)
+   subroutine observed_sector_slope(basis, point, slopes, load_factor, q, slope)
       type(sector_reduction), intent(in) :: basis
       !> `slopes` holds the derivatives of the factors.
       type(harmonic_point), intent(in) :: point, slopes
+      real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: slope(:)
       complex(wp) :: x(basis%n_internal), x_slope(basis%n_internal)
 
       slope = (0.0_wp, 0.0_wp)
       if (basis%n_internal == 0) return
-      call follow_frequency(basis, point, slopes, q, x, x_slope)
+      call follow_frequency(basis, point, slopes, load_factor, q, x, x_slope)
       slope = matmul(turned(basis%observe_i, point), x_slope)
    end subroutine observed_sector_slope
 
    !> x = D^-1 (F_i - Z_iq q) and x' = D^-1 (F_i' - Z_iq' q - D' x).
-   subroutine follow_frequency(basis, point, slopes, q, x, x_slope)
+   subroutine follow_frequency(basis, point, slopes, load_factor, q, x, x_slope)
       type(sector_reduction), intent(in) :: basis
       type(harmonic_point), intent(in) :: point, slopes
+      real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: x(:), x_slope(:)
       type(internal_type) :: internal
@@ -178,39 +180,44 @@ contains
       logical :: failed
 
       call factor_internal(basis, point, internal, failed)
-      ! Resonances, which ask for this, scale the loads of the structure itself.
-      x = modes_of(basis, point, internal, 1.0_wp, q)
+      x = modes_of(basis, point, internal, load_factor, q)
       associate (m => basis%n_coordinates, n => basis%n_internal)
          call combine_rows(basis, slopes, m + 1, m + n, .false., block)
          call add_whirl(basis, slopes, m, 0, block)
       end associate
-      column(:, 1) = slope_of(basis, basis%load_i, point, slopes) - matmul(block, q) - &
-                     internal_slope(basis, slopes, x)
+      column(:, 1) = load_factor*slope_of(basis, basis%load_i, point, slopes) - &
+                     matmul(block, q) - internal_slope(basis, slopes, x)
       call solve_internal(internal, 1, column)
       x_slope = column(:, 1)
    end subroutine follow_frequency
 
    !> F^H u, its derivative by the frequency at held coordinates, and its row by them.
-   subroutine work_of_sector(basis, point, slopes, q, work, slope, row)
+   subroutine work_of_sector(basis, point, slopes, load_factor, q, work, slope, row)
       type(sector_reduction), intent(in) :: basis
       type(harmonic_point), intent(in) :: point, slopes
+      !> What the loads of the model are multiplied by.
+      real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
-      complex(wp), intent(out) :: work, slope
-      complex(wp), intent(out) :: row(:)
+      complex(wp), intent(out) :: work
+      complex(wp), intent(out), optional :: slope, row(:)
       type(internal_type) :: internal
       complex(wp) :: x(basis%n_internal), x_slope(basis%n_internal), f_i(basis%n_internal)
+      complex(wp) :: f_q(basis%n_coordinates)
       complex(wp), allocatable :: z_iq(:, :)
       logical :: failed
 
-      row = conjg(load_of(basis, basis%load_q, point))
-      work = sum(row*q)
-      slope = sum(conjg(slope_of(basis, basis%load_q, point, slopes))*q)
+      f_q = load_factor*conjg(load_of(basis, basis%load_q, point))
+      work = sum(f_q*q)
+      if (present(slope)) slope = load_factor* &
+         sum(conjg(slope_of(basis, basis%load_q, point, slopes))*q)
+      if (present(row)) row = f_q
       if (basis%n_internal == 0) return
-      call follow_frequency(basis, point, slopes, q, x, x_slope)
-      f_i = conjg(load_of(basis, basis%load_i, point))
+      call follow_frequency(basis, point, slopes, load_factor, q, x, x_slope)
+      f_i = load_factor*conjg(load_of(basis, basis%load_i, point))
       work = work + sum(f_i*x)
-      slope = slope + sum(f_i*x_slope) + &
-              sum(conjg(slope_of(basis, basis%load_i, point, slopes))*x)
+      if (present(slope)) slope = slope + sum(f_i*x_slope) + load_factor* &
+         sum(conjg(slope_of(basis, basis%load_i, point, slopes))*x)
+      if (.not. present(row)) return
       associate (m => basis%n_coordinates, n => basis%n_internal)
          allocate (z_iq(n, m))
          call combine_rows(basis, point, m + 1, m + n, .false., z_iq)

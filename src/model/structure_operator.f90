@@ -73,7 +73,6 @@ module fw_structure_operator
       procedure(read_parts), deferred :: parts
       procedure(list_modes), deferred :: held_modes
       procedure(sum_magnitudes), deferred :: magnitudes
-      procedure(multiply_loads), deferred :: scale_loads
       procedure(derive_observed), deferred :: observed_slope
       procedure(find_load_work), deferred :: load_work
       procedure :: whole_size
@@ -232,14 +231,6 @@ module fw_structure_operator
          real(wp), intent(out) :: sums(:)
       end subroutine sum_magnitudes
 
-      !> Multiply the loads of harmonic 0, and those above. States go to their frequency again
-      !> afterwards, from nowhere.
-      pure subroutine multiply_loads(self, static, vibration)
-         import :: structure_operator, wp
-         class(structure_operator), intent(inout) :: self
-         real(wp), intent(in) :: static, vibration
-      end subroutine multiply_loads
-
       !> Derivative of the observed quantities by omega at held coordinates: what the condensed part
       !> makes of it (n_observed, n_retained).
       subroutine derive_observed(self, state, q, slope)
@@ -258,8 +249,8 @@ module fw_structure_operator
          class(structure_state), intent(in) :: state
          integer, intent(in) :: h
          complex(wp), intent(in) :: q(:)
-         complex(wp), intent(out) :: work, slope
-         complex(wp), intent(out) :: row(:)
+         complex(wp), intent(out) :: work
+         complex(wp), intent(out), optional :: slope, row(:)
       end subroutine find_load_work
    end interface
 
