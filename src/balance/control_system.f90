@@ -7,9 +7,11 @@
 !> g times the norm of the load, so that one tolerance serves both. U = T q + s U_F is the observed
 !> quantity with what the load moves where the coordinates rest. As a curve in s cut by a plane that
 !> turns with the point: the border is dg, at the instant of the largest |u| for the latter.
-!> Single valued in the frequency where the response to a given load has folds.
+!> Single valued in the frequency where the response to a given load has folds; where it folds all
+!> the same, at internal resonances, it can be followed: its own parameter is the frequency.
 module fw_control_system
    use fw_balance_state, only: balance_state
+   use fw_complex_form, only: amplitudes_of
    use fw_complex_form, only: coefficients_of
    use fw_control_options, only: of_first_harmonic
    use fw_error, only: error_type
@@ -18,6 +20,7 @@ module fw_control_system
    use fw_recovery, only: largest_magnitude
    use fw_recovery, only: observe
    use fw_recovery, only: peak_angles
+   use fw_structure_operator, only: by_frequency
    implicit none (type, external)
    private
 
@@ -30,13 +33,22 @@ module fw_control_system
       integer :: observed = 1, of = of_first_harmonic
       !> a [length]
       real(wp) :: amplitude = 1.0_wp
+      !> Unit of s among the unknowns, which a branch takes to make it as large as the others.
+      real(wp) :: load_unit = 1.0_wp
+      !> The least norm that residuals are compared to, where that follows the load; 0: it is held.
+      real(wp) :: least_reference = 0.0_wp
       !> T (n_coordinates, n_retained), U_F and the static part (n_retained).
       complex(wp), allocatable, private :: row(:, :), by_load(:), constant(:)
       !> U at the last point (n_retained), and the frequency that T is of [rad/s].
       complex(wp), allocatable :: motion(:)
       real(wp), private :: omega = -1.0_wp
+      !> dg = sum of Re(weight dU) at the last linearized point (n_retained).
+      complex(wp), allocatable, private :: weight(:)
    contains
       procedure :: stand
+      procedure :: take
+      procedure :: set_parameter
+      procedure :: parameter_derivative
       procedure :: move
       procedure :: size_of_motion
       procedure :: conditions
@@ -61,7 +73,7 @@ contains
       self%holds_reference = .true.
       associate (s => state%problem%structure, n => state%problem%fourier%n_retained)
          allocate (self%row(s%n_coordinates, n), self%by_load(n), self%constant(n), &
-                   self%motion(n), source=(0.0_wp, 0.0_wp))
+                   self%motion(n), self%weight(n), source=(0.0_wp, 0.0_wp))
       end associate
    end subroutine new_control_system
 
@@ -98,6 +110,46 @@ contains
       end associate
       self%omega = omega
    end subroutine stand
+
+   !> The further unknown is the load, in its unit.
+   subroutine take(self, z, error)
+      class(control_system), intent(inout) :: self
+      real(wp), intent(in) :: z(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%plane_system%take(self%load_unit*z, error)
+      if (self%least_reference > 0.0_wp) self%reference = max(self%state%reference, &
+                                                              self%least_reference)
+   end subroutine take
+
+   !> As a curve of its own: over the frequency.
+   subroutine set_parameter(self, parameter, error)
+      class(control_system), intent(inout) :: self
+      real(wp), intent(in) :: parameter
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%stand(parameter, error)
+   end subroutine set_parameter
+
+   !> By the frequency: dR/domega, and that of what is observed while the coordinates stay. The
+   !> load is that where the state stands.
+   subroutine parameter_derivative(self, x, dr)
+      class(control_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: dr(:)
+      complex(wp), allocatable :: q(:, :), slope(:, :)
+      integer :: m, n
+
+      n = self%state%n
+      call self%state%derivative_by(by_frequency, x(:n), dr(:n))
+      associate (s => self%state%problem%structure, f => self%state%problem%fourier)
+         m = s%n_coordinates
+         allocate (q(m, f%n_retained), slope(s%n_observed, f%n_retained))
+         call amplitudes_of(f%harmonic, f%column, m, x(:n), m, q)
+         call s%observed_slope(self%state%structure_state, q, slope)
+      end associate
+      dr(n + 1) = sum(real(self%weight*slope(self%observed, :), wp))
+   end subroutine parameter_derivative
 
    !> T by the transpose of the condensation, which is symmetric.
    subroutine find_row(self)
@@ -194,7 +246,7 @@ contains
       real(wp), intent(out) :: g(:)
 
       self%x = q
-      call self%move(q, z(1))
+      call self%move(q, self%load_unit*z(1))
       if (self%of == of_first_harmonic) then
          g = 0.5_wp*self%reference*((abs(first_of(self))/self%amplitude)**2 - 1.0_wp)
       else
@@ -205,13 +257,13 @@ contains
    !> The plane of the present point.
    subroutine choose(self)
       class(control_system), intent(inout) :: self
-      complex(wp) :: weight(size(self%motion)), slope(size(self%row, 1), size(self%row, 2))
+      complex(wp) :: slope(size(self%row, 1), size(self%row, 2))
       real(wp) :: angle(2), side(2), largest
       integer :: h, k, n_peaks
 
-      weight = (0.0_wp, 0.0_wp)
-      associate (fourier => self%state%problem%fourier, m => size(self%row, 1))
-         ! dg = sum of Re(weight dU).
+      self%weight = (0.0_wp, 0.0_wp)
+      associate (weight => self%weight, fourier => self%state%problem%fourier, &
+                 m => size(self%row, 1))
          if (self%of == of_first_harmonic) then
             h = findloc(fourier%harmonic, 1, dim=1)
             if (h > 0) weight(h) = self%reference/self%amplitude**2*conjg(self%motion(h))
@@ -227,8 +279,12 @@ contains
          end do
          call coefficients_of(fourier%harmonic, fourier%column, m, m, slope, self%border)
       end associate
-      self%border_p = sum(real(weight*self%by_load, wp))
+      self%border_p = sum(real(self%weight*self%by_load, wp))
       call self%plane_system%choose()
+      if (abs(self%load_unit - 1.0_wp) <= 0.0_wp) return
+      self%slope = self%load_unit*self%slope
+      self%column = self%load_unit*self%column
+      self%corner_p = self%load_unit*self%corner_p
    end subroutine choose
 
 end module fw_control_system

@@ -24,6 +24,7 @@ module fw_controlled_response
    use fw_point, only: served_by_raised_load
    use fw_point, only: served_by_smaller_steps
    use fw_problem, only: build_system
+   use fw_remarks, only: remark_list
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_run_state, only: run_state
@@ -37,6 +38,8 @@ module fw_controlled_response
    private
 
    public :: controlled_response
+   ! For its submodule alone.
+   public :: attempt, ends, from_guesses, make_guess, remember
 
    !> A solution to go on from.
    type :: known_point
@@ -64,16 +67,57 @@ module fw_controlled_response
       !> What of the amplitude stands still in the linear solution, under static loads.
       real(wp) :: rest = 0.0_wp
       real(wp), allocatable :: y(:), r(:)
+      !> Which of the guesses led to the last solution.
+      integer :: guess = 0
+      !> Points where other loads gave the same amplitude, and the first of them with two loads.
+      integer :: n_others = 0
+      type(point_request) :: other_at
+      real(wp) :: other_loads(2) = 0.0_wp
    contains
       procedure :: start
       procedure :: solve
       procedure :: describe
+      procedure :: describe_point
+      procedure :: remark
+      procedure :: turn_to_positive
    end type controlled_response
 
-   !> Halvings of the way from the last point; smallest amplitude that one is raised from, and the
-   !> smallest step up, over the amplitude.
-   integer, parameter :: max_halvings = 6
-   real(wp), parameter :: smallest_start = 1.0e-3_wp, smallest_step = 1.0_wp/512.0_wp
+   ! Ways to a point that its guesses do not reach (fw_control_ways).
+   interface
+      !> First half of the way from the last point, which may take halves of its own, then the rest.
+      recursive module subroutine approach(self, omega, amplitude, depth, report, error)
+         class(controlled_response), intent(inout) :: self
+         real(wp), intent(in) :: omega, amplitude
+         integer, intent(in) :: depth
+         type(solver_report), intent(out) :: report
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine approach
+
+      !> From a small amplitude up, by steps that adapt.
+      module subroutine raise_amplitude(self, omega, amplitude, report, error)
+         class(controlled_response), intent(inout) :: self
+         real(wp), intent(in) :: omega, amplitude
+         type(solver_report), intent(out) :: report
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine raise_amplitude
+
+      !> The largest of a period has corners where another instant takes over, which the first
+      !> harmonic has not: to where the one has the amplitude along the other, by secants.
+      module subroutine by_first_harmonic(self, omega, amplitude, report, error)
+         class(controlled_response), intent(inout) :: self
+         real(wp), intent(in) :: omega, amplitude
+         type(solver_report), intent(out) :: report
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine by_first_harmonic
+
+      !> Whether other guesses lead to another load of the same amplitude; the solution stays.
+      module subroutine look_for_others(self, omega, amplitude, error)
+         class(controlled_response), intent(inout) :: self
+         real(wp), intent(in) :: omega, amplitude
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine look_for_others
+   end interface
+
    !> An observed quantity below this part of all others rests.
    real(wp), parameter :: at_rest = 1.0e-10_wp
    !> Rounds in which the norm that residuals are compared to follows the load.
@@ -107,7 +151,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
       integer(int64) :: clock, clock_end, rate
-      integer :: n
 
       call system_clock(clock, rate)
       if (allocated(self%note)) deallocate (self%note)
@@ -118,28 +161,14 @@ contains
       call reach(self, request%omega, request%amplitude, request%fallback, report, error)
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return
-      n = self%system%n
-      call self%control%residual(self%y, self%r)
-      point%omega = request%omega
-      point%place = request%place()
-      point%load_scale = self%y(n + 1)
-      point%control = request%amplitude
-      point%converged = report%converged
-      point%residual = report%residual
-      point%iterations = self%iterations
-      if (report%converged) point%served_by = self%served_by
-      call recover_point(self%system, self%y(:n), case%harmonics%n_harmonics, request%contact, &
-                         point)
-      point%n_harmonics = case%harmonics%n_harmonics
-      point%n_time = self%problem%fourier%n_time
-      if (request%histories) then
-         call recover_histories(self%system, size(self%system%balance, 1), self%y(:n), &
-                                case%harmonics%n_harmonics, point)
-      end if
-      if (report%converged .and. request%stability) then
-         call self%stability%find(case, self%system, self%y(:n), point, error)
+      if (report%converged .and. request%fallback .and. may_have_others(self)) then
+         call look_for_others(self, request%omega, request%amplitude, error)
          if (allocated(error)) return
       end if
+      call self%describe_point(case, request, report, point, error)
+      if (allocated(error)) return
+      point%iterations = self%iterations
+      if (report%converged) point%served_by = self%served_by
       if (.not. report%converged .and. self%rest >= request%amplitude) then
          point%note = 'control: at omega = '//to_text(request%omega)//' rad/s static loads '// &
                       'alone move '//case%model%observe_name(case%control%observed)%text//' by '// &
@@ -154,6 +183,50 @@ contains
       call system_clock(clock_end)
       point%seconds = real(clock_end - clock, wp)/real(rate, wp)
    end subroutine solve
+
+   !> What is known of the solution in y, at the frequency and the amplitude where it was found.
+   subroutine describe_point(self, case, request, report, point, error)
+      class(controlled_response), intent(inout), target :: self
+      type(case_type), intent(in) :: case
+      type(point_request), intent(in) :: request
+      type(solver_report), intent(in) :: report
+      type(point_type), intent(inout) :: point
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n
+
+      n = self%system%n
+      call self%control%residual(self%y, self%r)
+      point%omega = request%omega
+      point%place = request%place()
+      point%load_scale = self%y(n + 1)
+      point%control = request%amplitude
+      point%converged = report%converged
+      point%residual = report%residual
+      point%iterations = report%iterations
+      call recover_point(self%system, self%y(:n), case%harmonics%n_harmonics, request%contact, &
+                         point)
+      point%n_harmonics = case%harmonics%n_harmonics
+      point%n_time = self%problem%fourier%n_time
+      if (request%histories) then
+         call recover_histories(self%system, size(self%system%balance, 1), self%y(:n), &
+                                case%harmonics%n_harmonics, point)
+      end if
+      if (report%converged .and. request%stability) then
+         call self%stability%find(case, self%system, self%y(:n), point, error)
+      end if
+   end subroutine describe_point
+
+   !> Where friction sticks or slips several loads may give one amplitude. A point that goes on from
+   !> two of its amplitude is one of the same curve: nothing is learned there.
+   pure logical function may_have_others(self)
+      class(controlled_response), intent(in) :: self
+
+      associate (forces => self%problem%forces)
+         may_have_others = forces%entry(forces%pairs)%law%facts%remembers .and. &
+                           self%problem%n_pairs > 0 .and. &
+                           .not. (self%guess == 1 .and. self%served_by == served_by_newton)
+      end associate
+   end function may_have_others
 
    !> From what is known of the points before, then from linear solutions, then along a path.
    subroutine reach(self, omega, amplitude, tries_all, report, error)
@@ -215,6 +288,7 @@ contains
       end do
       if (.not. report%converged) return
       call remember(self, omega, amplitude)
+      self%guess = guess
       self%served_by = served_by_newton
       if (guess == 3 .and. self%before%is_known) self%served_by = served_by_other_guess
       if (guess == 4) self%served_by = served_by_free_guess
@@ -372,105 +446,23 @@ contains
       self%y(n + 1) = -self%y(n + 1)
    end subroutine turn
 
-   !> First half of the way from the last point, which may take halves of its own, then the rest.
-   recursive subroutine approach(self, omega, amplitude, depth, report, error)
+   !> Of a solution in y whose load is negative the same half a period later; `report` says whether
+   !> there is one.
+   subroutine turn_to_positive(self, report, error)
       class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: omega, amplitude
-      integer, intent(in) :: depth
-      type(solver_report), intent(out) :: report
+      type(solver_report), intent(inout) :: report
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: middle(2)
+      type(solver_report) :: again
 
-      ! Amplitudes by their ratio.
-      middle = [0.5_wp*(self%last%omega + omega), sqrt(self%last%amplitude*amplitude)]
-      call from_guesses(self, middle(1), middle(2), report, error)
-      if (allocated(error) .or. report%interrupted) return
-      if (.not. report%converged .and. depth < max_halvings) then
-         call approach(self, middle(1), middle(2), depth + 1, report, error)
-         if (allocated(error) .or. report%interrupted) return
-      end if
-      if (.not. report%converged) return
-      call from_guesses(self, omega, amplitude, report, error)
-      if (allocated(error) .or. ends(report) .or. depth >= max_halvings) return
-      call approach(self, omega, amplitude, depth + 1, report, error)
-   end subroutine approach
-
-   !> From a small amplitude up, by steps that adapt.
-   subroutine raise_amplitude(self, omega, amplitude, report, error)
-      class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: omega, amplitude
-      type(solver_report), intent(out) :: report
-      type(error_type), allocatable, intent(out) :: error
-      type(known_point) :: last
-      real(wp) :: share, step
-
-      if (self%rest >= amplitude) return
-      ! What is known of other frequencies is no guess here, and comes back where this fails.
-      last = self%last
-      self%last%is_known = .false.
-      self%before%is_known = .false.
-      share = 0.0_wp
-      step = smallest_start
-      do
-         call from_guesses(self, omega, self%rest + min(1.0_wp, share + step)* &
-                           (amplitude - self%rest), report, error)
-         if (allocated(error) .or. report%interrupted) exit
-         if (report%converged) then
-            share = min(1.0_wp, share + step)
-            if (share >= 1.0_wp) exit
-            step = merge(2.0_wp, 1.5_wp, share < 0.1_wp)*step
-         else
-            step = 0.5_wp*step
-            if (share <= 0.0_wp .or. step < smallest_step*min(1.0_wp, 10.0_wp*share)) exit
-         end if
-      end do
-      if (.not. report%converged) self%last = last
-   end subroutine raise_amplitude
-
-   !> The largest of a period has corners where another instant takes over, which the first harmonic
-   !> has not: to where the one has the amplitude along the other, by secants.
-   subroutine by_first_harmonic(self, omega, amplitude, report, error)
-      class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: omega, amplitude
-      type(solver_report), intent(out) :: report
-      type(error_type), allocatable, intent(out) :: error
-      integer, parameter :: most_secants = 20
-      type(known_point) :: kept(3)
-      real(wp) :: first(2), largest(2), next
-      integer :: k, of
-      logical :: is_there
-
-      is_there = .false.
-      kept = [self%last, self%before, self%head]
-      self%last%is_known = .false.
-      self%before%is_known = .false.
-      of = self%control%of
-      next = max(amplitude - self%rest, smallest_start*amplitude)
-      first = 0.0_wp
-      largest = 0.0_wp
-      do k = 1, most_secants
-         self%control%of = of_first_harmonic
-         call from_guesses(self, omega, next, report, error)
-         self%control%of = of
-         if (allocated(error) .or. .not. report%converged) exit
-         first = [first(2), next]
-         largest = [largest(2), self%control%size_of_motion()]
-         is_there = abs(largest(2) - amplitude) <= self%method%newton%options%tolerance*amplitude
-         if (is_there) exit
-         next = first(2)*amplitude/largest(2)
-         if (k == 1 .or. .not. abs(largest(2) - largest(1)) > 0.0_wp) cycle
-         next = first(2) + (amplitude - largest(2))*(first(2) - first(1))/(largest(2) - largest(1))
-         next = min(max(next, 0.3_wp*first(2)), 3.0_wp*first(2))
-      end do
-      self%last = kept(1)
-      self%before = kept(2)
-      self%head = kept(3)
-      if (allocated(error) .or. .not. report%converged) return
-      self%control%amplitude = amplitude
-      if (.not. is_there) call attempt(self, report, error)
-      if (allocated(error)) return
-      if (report%converged) call remember(self, omega, amplitude)
-   end subroutine by_first_harmonic
+      if (self%y(self%system%n + 1) >= 0.0_wp) return
+      report%converged = self%can_turn
+      if (.not. self%can_turn) return
+      call turn(self)
+      call attempt(self, again, error)
+      report%converged = again%converged
+      report%residual = again%residual
+      report%iterations = report%iterations + again%iterations
+   end subroutine turn_to_positive
 
    !> A solution for the guesses of the next points.
    subroutine remember(self, omega, amplitude)
@@ -502,11 +494,28 @@ contains
       message = ''
       call summary%describe_work(self%system, self%method%newton%linear, case%solver%kind, &
                                  state%all_converged())
+      call self%remark(state%n_points, summary%remarks)
       if (state%was_stopped .or. state%all_converged()) return
       message = 'not converged: try smaller steps of frequency or amplitude, or more '// &
                 'harmonics%n_harmonics, for the points above'
       if (self%method%rippled) message = message//'; some were solved with friction that is '// &
          "ripple, not slip: take contact%law = 'rigid' where friction acts on mass"
    end subroutine describe
+
+   !> That other loads were seen.
+   subroutine remark(self, n_points, remarks)
+      class(controlled_response), intent(in) :: self
+      integer, intent(in) :: n_points
+      type(remark_list), intent(inout) :: remarks
+
+      if (self%n_others == 0) return
+      call remarks%add('several loads', 'at '//to_text(self%n_others)//' of '// &
+                       to_text(n_points)//' points another load gives the same amplitude, as '// &
+                       'pairs stick or slip: at omega = '//to_text(self%other_at%omega)// &
+                       ' rad/s, amplitude '//to_text(self%other_at%amplitude)//', both '// &
+                       to_text(self%other_loads(1))//' and '//to_text(self%other_loads(2))// &
+                       "; follow the response over the load (sweep%parameter = "// &
+                       "'load%harmonic_scale', continuation = 'arclength') to see which is meant")
+   end subroutine remark
 
 end module fw_controlled_response

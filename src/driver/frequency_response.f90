@@ -8,6 +8,7 @@ module fw_frequency_response
    use fw_case, only: analysis_frf
    use fw_case, only: analysis_time
    use fw_case, only: case_type
+   use fw_control_branch, only: control_branch
    use fw_controlled_response, only: controlled_response
    use fw_error, only: error_type
    use fw_error, only: status_stopped
@@ -153,6 +154,8 @@ contains
       select type (source)
       type is (branch_source)
          call keep(source%branch%bifurcations, source%branch%n_solved, source%branch%iterations)
+      type is (control_branch)
+         call keep(source%folds, 0, 0)
       class default
          call keep(changes%found, changes%n_solved, changes%iterations)
       end select
@@ -276,10 +279,18 @@ contains
       integer, intent(out) :: n_points
       type(branch_source), allocatable :: branch
       type(list_source) :: list
+      type(control_branch) :: controlled
       logical :: along_branch
 
       along_branch = .false.
+      n_points = 0
       select type (strategy)
+      type is (controlled_response)
+         if (case%sweep%continuation == continuation_arclength) then
+            call controlled%begin(case, strategy)
+            source = controlled
+            return
+         end if
       type is (one_level)
          ! A linear structure leaves no unknowns, and no branch that could turn back; nor does a
          ! structure at rest.
@@ -292,7 +303,6 @@ contains
          end if
       end select
       if (along_branch) then
-         n_points = 0
          call move_alloc(branch, source)
       else
          list%place = sweep_places(case)

@@ -13,7 +13,6 @@ module fw_path_checks
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, normal_load, &
                             normal_stiffness, parameter_words, spring_coefficient, static_scale, &
                             tangential_stiffness
-   use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: jacobian_analytic
    use fw_solver_options, only: solver_newton
    use fw_values, only: number_text
@@ -133,9 +132,6 @@ contains
          with = "case%analysis: use 'frf' or 'point'"
       else if (case%over%is_wanted()) then
          with = 'sweep%parameter: the load is found for each amplitude; sweep frequencies'
-      else if (case%sweep%continuation == continuation_arclength) then
-         with = "sweep%continuation = 'arclength': at a given amplitude folds of the frequency "// &
-                "response are none; use 'natural'"
       else if (case%solver%kind /= solver_newton) then
          with = "solver%kind: use 'newton'"
       else if (case%solver%jacobian /= jacobian_analytic) then

@@ -77,6 +77,7 @@ module fw_continuation
    contains
       procedure :: begin
       procedure :: next
+      procedure :: end_early => end_branch
    end type arclength_type
 
    !> Corrector iterations from which on steps get shorter.

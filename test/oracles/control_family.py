@@ -30,7 +30,7 @@ TOLERANCE = 1e-9
 #: Instants that both follow, where the law is one of instants.
 INSTANTS = 256
 #: Turns of the march of that code: slip that turns in two directions settles slowly.
-slow_balance.TURNS = 80
+slow_balance.TURNS = 1000
 
 
 def controlled_case(seed):
@@ -138,11 +138,17 @@ def point_errors(groups, matrices, omega, row, force, scale):
     return error, max(defects)
 
 
-def judged(folder, seed):
-    """What became of a case: counts by word, and the worst error."""
+def judged(folder, seed, *, along=None):
+    """What became of a case: counts by word, and the worst error; `along` up to a frequency that is
+    so many times the first, by arc length."""
     groups = controlled_case(seed)
     a = linear_amplitude(groups) * groups["load"]["harmonic_scale"]
     groups = merged(groups, {"control": {"amplitude": [0.1 * a, a, 10.0 * a]}})
+    if along is not None:
+        start = groups["sweep"]["values"][0]
+        groups = merged(groups, {"control": {"amplitude": [0.3 * a, 2.0 * a]}, "sweep": {
+            "values": None, "start": start, "end": along * start, "n_points": 9,
+            "continuation": "arclength", "max_points": 100}})
     found = Counter(cases=1)
     done = run(folder, groups, status=(0, 4), seconds=300)
     n = groups["model"]["n_dof"]

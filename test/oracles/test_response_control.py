@@ -1,12 +1,13 @@
 """Responses of given amplitude: against an integration in time, against runs at the load that was
 found, and against equations of a code of its own."""
 import json
+import re
 import subprocess
 
 import numpy as np
 import pytest
 from cases import merged, read, run, write_namelist
-from control_family import judged
+from control_family import controlled_case, judged, linear_amplitude
 from limits import limit
 from project import PATIENT, PROGRAM, ROOT
 from sensitivity_family import random_case
@@ -60,6 +61,99 @@ def test_single_valued_past_the_fold(tmp_path):
         f = a * np.hypot(1.0 - omega**2 + 0.375 * a**2, 0.05 * omega)
         assert found["load/scale"][33 * k:33 * (k + 1)] == pytest.approx(f, rel=1e-9)
     assert np.median(found["iterations"]) <= 5
+
+
+def test_branches_of_given_amplitudes(tmp_path):
+    """By arc length: the closed form at every point, and steps that resolve the smallest load."""
+    amplitudes = [0.3, 1.0, 2.0]
+    run(tmp_path, merged(DUFFING, {
+        "harmonics": {"n_harmonics": 1}, "control": {"amplitude": amplitudes}, "model": {
+            "damping": [0.002]}, "solver": {"tolerance": 1e-12},
+        "sweep": {"values": None, "start": 0.6, "end": 2.2, "n_points": 33,
+                  "continuation": "arclength"}}))
+    found = read(tmp_path / "case.h5")
+    omega, a = found["omega"], found["control/amplitude"]
+    assert found["converged"].all()
+    assert not found["fold"].any()
+    assert found["load/scale"] == pytest.approx(a * np.hypot(1.0 - omega**2 + 0.375 * a**2,
+                                                             0.002 * omega), rel=1e-9)
+    for one in amplitudes:
+        own = a == one
+        assert omega[own][[0, -1]] == pytest.approx([0.6, 2.2])
+        assert own.sum() < 60
+        resonance = np.sqrt(1.0 + 0.375 * one**2)
+        assert found["load/scale"][own].min() < 1.2 * one * 0.002 * resonance
+    # The direction of the branch: U = a conj(D)/|D| of the dynamic stiffness D.
+    def cosine(w):
+        d = 1.0 - w**2 + 0.375 * a**2
+        return a * d / np.hypot(d, 0.002 * w)
+
+    slope = (cosine(omega + 1e-6) - cosine(omega - 1e-6)) / 2e-6
+    assert found["coefficients"][:, 1, 0] == pytest.approx(cosine(omega), abs=1e-7)
+    assert (found["tangent/coefficients"][:, 1, 0] / found["tangent/omega"]
+            == pytest.approx(slope, abs=1e-4 * np.abs(slope).max()))
+
+
+def test_a_branch_through_folds_of_an_internal_resonance(tmp_path):
+    """Where the third harmonic meets another mode a given amplitude has three loads: natural steps
+    jump there. Their points are those of the branch, and of runs under the loads found."""
+    groups = merged(DUFFING, {
+        "model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 1.0], "damping": [0.01, 0.0, 0.0, 0.02],
+                  "stiffness": [1.2, -0.2, -0.2, 10.6]},
+        "load": {"cosine": [1.0, 0.0]}, "harmonics": {"n_harmonics": 5},
+        "spring": {"side_1": 1, "side_2": 2}, "control": {"amplitude": [0.8]},
+        "solver": {"tolerance": 1e-10}})
+    run(tmp_path, merged(groups, {"sweep": {"values": None, "start": 0.9, "end": 1.5,
+                                            "n_points": 61, "continuation": "arclength"}}))
+    found = read(tmp_path / "case.h5")
+    omega, folds = found["omega"], np.flatnonzero(found["fold"])
+    assert len(folds) == 2
+    assert found["bifurcation/omega"] == pytest.approx(omega[folds])
+    assert omega[folds[0]] > omega[folds[1]]
+    assert (np.diff(omega[:folds[0] + 1]) > 0.0).all()
+    assert (np.diff(omega[folds[0]:folds[1] + 1]) < 0.0).all()
+    assert first(found) == pytest.approx(np.full(len(omega), 0.8), rel=1e-8)
+    outside = (omega < omega[folds[1]]) | (omega > omega[folds[0]])
+    run(tmp_path, merged(groups, {"sweep": {"values": omega[outside].tolist()}}), name="own")
+    alone = read(tmp_path / "own.h5")
+    assert np.abs(alone["coefficients"] - found["coefficients"][outside]).max() < 1e-8
+    assert alone["load/scale"] == pytest.approx(found["load/scale"][outside], rel=1e-8)
+    # Loads of one frequency within the folds.
+    at = 0.5 * (omega[folds[0]] + omega[folds[1]])
+    crossed = np.flatnonzero(np.diff(np.sign(omega - at)))
+    assert len(crossed) == 3
+    assert np.ptp(found["load/scale"][crossed]) > 0.01 * found["load/scale"][crossed].max()
+
+
+@pytest.mark.parametrize("seed", [8, 19, 24])
+def test_random_branches_satisfy_their_equations(tmp_path, seed):
+    words, error = judged(tmp_path, seed, along=1.2)
+    assert words["off"] == 0, error
+    assert words["judged"] > 20
+
+
+def test_another_load_of_the_same_amplitude_is_told(tmp_path):
+    """Where pairs slip under one load and stick under another: runs under both confirm it."""
+    groups = controlled_case(69)
+    a = linear_amplitude(groups) * groups["load"]["harmonic_scale"]
+    groups = merged(groups, {"control": {"amplitude": [0.1 * a, a, 10.0 * a]}})
+    write_namelist(tmp_path / "case.nml", groups)
+    result = fw.run(tmp_path / "case.nml", in_memory=True)
+    told = [text for text in result.remarks if "another load" in text]
+    assert len(told) == 1
+    assert "at 1 of 6 points" in told[0]
+    omega, wanted, *loads = (float(x) for x in re.findall(r"\d\.\d+E[+-]\d+", told[0]))
+    column = groups["control"]["observed"] - 1
+    for load in loads:
+        run(tmp_path, merged(groups, {"control": dict.fromkeys(groups["control"]), "load": {
+            "harmonic_scale": load}, "sweep": {"values": [omega]}}), name="given")
+        given = read(tmp_path / "given.h5")
+        reached = (first(given, column)[0] if groups["control"]["of"] == "first_harmonic"
+                   else given["amplitude"][0, column])
+        assert reached == pytest.approx(wanted, rel=1e-8)
+    # A linear structure has one.
+    run(tmp_path, merged(DUFFING, {"spring": {"coefficient": 0.0}}), name="given")
+    assert "remarks/name" not in read(tmp_path / "given.h5")
 
 
 @pytest.mark.parametrize("of", ["first_harmonic", "largest"])
@@ -147,8 +241,6 @@ def test_half_the_load_and_its_sign(tmp_path):
     ({"load": {"harmonic_scale": 0.0}}, "load%harmonic_scale is 0"),
     ({"load": {"cosine": [0.0], "n_terms": 1, "term_dof": [1], "term_harmonic": [2],
                "term_amplitude": [0.4]}}, "use 'largest'"),
-    ({"sweep": {"values": None, "start": 0.5, "end": 1.0, "continuation": "arclength"}},
-     "use 'natural'"),
     ({"sweep": {"parameter": "load%harmonic_scale", "frequency": 1.0}}, "sweep frequencies"),
     ({"case": {"analysis": "wear"}, "sweep": {"values": None, "start": 1.0},
       "wear": {"coefficient": 1.0}}, "use 'frf' or 'point'"),
