@@ -11,7 +11,7 @@ venv=$1
 python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
                 selenium pytest xdist gcovr nbclient ipykernel mypy ruff fortitude ford sphinx
                 numpydoc myst_parser fpm)
-python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
+python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm pint
                  selenium pytest pytest-xdist gcovr nbclient ipykernel mypy ruff fortitude-lint
                  ford sphinx numpydoc myst-parser fpm)
 

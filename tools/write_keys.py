@@ -177,7 +177,7 @@ def settings(groups: Keys) -> str:
     """The module of the package."""
     names = {group: CLASSES.get(group, "".join(part.title() for part in group.split("_")))
              for group in groups}
-    public = sorted([*names.values(), "Groups"])
+    public = ["UNITS", *sorted([*names.values(), "Groups"])]
     lines, line = [], '__all__ = ["' + public[0] + '"'
     for name in public[1:]:
         if len(line) + len(name) + 5 > WIDTH:
@@ -186,6 +186,11 @@ def settings(groups: Keys) -> str:
         else:
             line += f', "{name}"'
     text = [SETTINGS_HEAD, *lines, line + "]"]
+    text += ["", "#: Units of the keys that have one: length L, mass M, time s and force F of the model,",
+             "#: or `unit` where another key says it.", "UNITS: dict[str, str] = {"]
+    text += [f'    "{group}%{name}": "{key["unit"]}",' for group, content in groups.items()
+             for name, key in content["keys"].items() if key.get("unit")]
+    text += ["}"]
     for group, content in groups.items():
         # Keys that are words of Python need the other form of declaration.
         reserved = {name: key for name, key in content["keys"].items() if iskeyword(name)}

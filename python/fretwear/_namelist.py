@@ -35,6 +35,9 @@ def literal(value: object, name: str = "value") -> str:
         return "'" + os.fspath(value).replace("'", "''") + "'"
     if isinstance(value, (int, float)):
         return repr(value)
+    if hasattr(value, "magnitude") and hasattr(value, "units"):  # a quantity of pint
+        magnitude = np.ravel(value.magnitude).tolist()
+        return literal([f"{number!r} {value.units}" for number in magnitude], name)
     if isinstance(value, np.ndarray):
         if value.dtype.kind not in "iufb":
             raise InputError(f"{name}: its elements are of type {value.dtype}, must be numbers")

@@ -7,10 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
+import h5py
+
 from ._namelist import literal
-from ._native import Session
+from ._native import Session, namelist_values
 from .errors import InputError, OutputError
 from .model import Model
+from .units import converted, has_units
 
 if TYPE_CHECKING:
     import sys
@@ -161,11 +164,29 @@ class Case:
         session = Session()
         try:
             settings = () if self._model is None else self._model.give_to(session)
-            session.read(self._text, os.fspath(self._path), (*settings, *self._overrides))
+            settings = (*settings, *self._overrides)
+            if has_units(self._text, self._overrides):
+                settings = (*settings, *self._without_units())
+            session.read(self._text, os.fspath(self._path), settings)
         except BaseException:
             session.close()
             raise
         return session
+
+    def _without_units(self) -> list[tuple[str, str]]:
+        """Settings that replace values with units by numbers in those of the model."""
+        values = namelist_values(self._text) if self._text else {}
+        system = "" if self._model is None else self._model.unit_system
+        named = [*values.get("model%file", []), *(value.strip("'") for key, value in
+                                                  self._overrides if key == "model%file")]
+        if self._model is None and named:
+            try:
+                with h5py.File(self._path.parent / named[-1], "r") as file:
+                    said = file.attrs.get("unit_system", "")
+                    system = said.decode() if isinstance(said, bytes) else str(said)
+            except OSError:  # matrices, or what the library will complain of
+                system = ""
+        return converted(values, self._overrides, system)
 
     def namelist(self) -> str:
         """The effective input: every key with its value and what it accepts.

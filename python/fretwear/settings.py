@@ -12,9 +12,45 @@ from typing import Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
-__all__ = ["CaseGroup", "Contact", "Control", "Cyclic", "Groups", "Harmonics", "Load", "Mode",
-           "Output", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring", "Structure",
-           "Sweep", "Time", "Wear"]
+__all__ = ["UNITS", "CaseGroup", "Contact", "Control", "Cyclic", "Groups", "Harmonics", "Load",
+           "Mode", "Output", "PseudoTime", "Resonance", "Sensitivity", "Solver", "Spring",
+           "Structure", "Sweep", "Time", "Wear"]
+
+#: Units of the keys that have one: length L, mass M, time s and force F of the model,
+#: or `unit` where another key says it.
+UNITS: dict[str, str] = {
+    "case%max_seconds": "s",
+    "model%mass": "M",
+    "model%stiffness": "F/L",
+    "model%damping": "F s/L",
+    "model%rayleigh_mass": "1/s",
+    "model%rayleigh_stiffness": "s",
+    "model%rotation_speed": "rad/s",
+    "contact%gap": "L",
+    "contact%area": "L^2",
+    "contact%normal_load": "F",
+    "contact%tangential_stiffness": "F/L",
+    "contact%normal_stiffness": "F/L",
+    "contact%slip_speed": "L/s",
+    "spring%coefficient": "F/L^power",
+    "load%static": "F",
+    "load%cosine": "F",
+    "load%sine": "F",
+    "load%term_amplitude": "F",
+    "load%term_phase": "degrees",
+    "sweep%frequencies": "unit",
+    "sweep%start": "unit",
+    "sweep%end": "unit",
+    "sweep%frequency": "unit",
+    "solver%max_seconds": "s",
+    "wear%coefficient": "L^2/F",
+    "wear%max_depth_step": "L",
+    "mode%near": "unit",
+    "mode%amplitudes": "L",
+    "mode%start": "L",
+    "mode%end": "L",
+    "control%amplitude": "L",
+}
 
 
 class CaseGroup(TypedDict, total=False):

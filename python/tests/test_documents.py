@@ -43,7 +43,7 @@ def test_the_ten_lines_of_the_readme_draw_a_response(here: Path) -> None:
 @pytest.mark.usefixtures("here")
 def test_the_page_on_python_runs_from_top_to_bottom(capsys: pytest.CaptureFixture[str]) -> None:
     code = blocks(ROOT / "docs" / "python.md")
-    assert len(code) == 6
+    assert len(code) == 7
     scope: dict[str, Any] = {}
     for block in code:
         exec(block, scope)

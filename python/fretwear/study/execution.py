@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from .._native import library_version
 from ..analyses import run
@@ -71,17 +70,13 @@ def run_job(job: Job, stop: threading.Event | None = None) -> Record:
 
 def _run_here(job: Job, stop: threading.Event | None) -> Record:
     """Run a job in this process; the interpreter lock is free while it computes."""
-    groups: dict[str, Any] = {"case": {"threads": 1}}
-    for name, value in job.settings.items():
-        group, _, key = name.lower().partition("%")
-        # The group &model is `structure` in Python, where `model` is another argument.
-        groups.setdefault("structure" if group == "model" else group, {})[key] = value
     text = Path(job.case).read_bytes().decode(errors="surrogateescape")
     started = time.perf_counter()
     status, message = 0, ""
     try:
-        run(Case.from_text(text, job.case, **groups), job.result, stop=stop,
-            max_seconds=job.timeout or None)
+        case = Case.from_text(text, job.case).overridden(
+            [*(override(key, value) for key, value in job.settings.items()), "case%threads=1"])
+        run(case, job.result, stop=stop, max_seconds=job.timeout or None)
     except RunInterrupted:
         with contextlib.suppress(OSError):
             job.result.unlink()

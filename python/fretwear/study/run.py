@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from .._namelist import literal
-from .._native import Session, library_version
+from .._native import library_version
+from ..case import Case
 from ..errors import FretwearError
 from .plan import Setting, override
 
@@ -109,9 +109,9 @@ def identify(program: str, case: Path, folder: Path, values: Mapping[str, Settin
     settings = {**fixed, **values}
     text = case.read_bytes().decode(errors="surrogateescape")
     try:
-        with Session() as session:
-            session.read(text, str(case), [(key, literal(value, key))
-                                           for key, value in settings.items()])
+        whole = Case.from_text(text, case).overridden(
+            override(key, value) for key, value in settings.items())
+        with whole.open() as session:
             session.check()
             effective = _effective(session.text("namelist"))
             inputs = session.text("inputs").splitlines()

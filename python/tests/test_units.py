@@ -1,0 +1,96 @@
+"""Values with units: the same case as with the numbers that they stand for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from project import EXAMPLE
+
+import fretwear as fw
+from fretwear.cli import main
+
+pint = pytest.importorskip("pint")
+
+SECTOR = EXAMPLE / "blade_sector" / "sector_16.h5"  # mm-tonne-s-N
+OSCILLATOR = """&model n_dof = 1 mass = 1 stiffness = 1 damping = 0.04 /
+&load cosine = 1 /
+&sweep start = '0.1 Hz' end = "6 rpm" n_points = 3 /
+"""
+
+
+def effective(**groups: Any) -> dict[str, list[str]]:
+    """What the library makes of a sweep of the sector, by key."""
+    from fretwear._native import namelist_values
+
+    case = fw.Case(SECTOR, sweep={"start": 1017, "end": 1029, "n_points": 3, "unit": "Hz"})
+    return namelist_values(case.replace(**groups).namelist())
+
+
+@pytest.mark.parametrize(("groups", "key", "number"), [
+    ({"sweep": {"start": "1.02 kHz"}}, "sweep%start", 1020.0),
+    ({"sweep": {"start": "6283.185307179586 rad/s"}}, "sweep%start", 1000.0),
+    ({"structure": {"rotation_speed": "4400 rpm"}}, "model%rotation_speed",
+     4400.0 * np.pi / 30.0),
+    ({"contact": {"gap": "5 um", "law": "penalty", "normal_stiffness": "1e3 N/mm",
+                  "tangential_stiffness": 1.0}}, "contact%gap", 0.005),
+    ({"contact": {"law": "penalty", "tangential_stiffness": "2 kN/um", "normal_stiffness": 1.0}},
+     "contact%tangential_stiffness", 2e6),
+    ({"contact": {"area": "1 cm^2"}}, "contact%area", 100.0),
+    ({"case": {"max_seconds": "2 min"}}, "case%max_seconds", 120.0),
+    ({"structure": {"rotation_speed": "1e3 rad/s"}, "contact": {"gap": 1e-09}}, "contact%gap",
+     1e-9),
+    ({"structure": {"rotation_speed": pint.Quantity(10.0, "rad/s")}}, "model%rotation_speed", 10.0),
+])
+def test_the_numbers_are_those_of_the_model(groups: dict[str, Any], key: str,
+                                            number: float) -> None:
+    values = effective(**groups)
+    assert float(values[key][0]) == pytest.approx(number, rel=1e-14)
+
+
+def test_a_namelist_with_units(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Frequencies that were typed in hertz stay so, and the program reads the effective case."""
+    path = tmp_path / "case.nml"
+    path.write_text(OSCILLATOR)
+    case = fw.Case.from_file(path)
+    result = fw.run(case, in_memory=True)
+    assert result.omega == pytest.approx(2.0 * np.pi * np.array([0.1, 0.1, 0.1]))
+    assert "unit = 'Hz'" in result.namelist
+    assert main(["run", "-q", str(path), "--set", "sweep%end=300 mHz"]) == 0
+    assert fw.Result(path.with_suffix(".h5")).frequency == pytest.approx([0.1, 0.2, 0.3])
+    (tmp_path / "effective.nml").write_text(result.namelist)
+    assert fw.Case.from_file(tmp_path / "effective.nml").namelist()
+
+
+def test_a_list_takes_a_unit_for_each() -> None:
+    case = fw.Case(SECTOR, sweep={"frequencies": ["1.01 kHz", "61500 rpm", "6500 rad/s"]})
+    with fw.Steps(case.replace(harmonics={"n_harmonics": 1})) as steps:
+        assert steps.frequencies / (2.0 * np.pi) == pytest.approx(
+            [1010.0, 1025.0, 6500.0 / (2.0 * np.pi)])
+
+
+def test_a_sweep_over_a_parameter_has_its_unit() -> None:
+    values = effective(sweep={"parameter": "contact%gap", "frequency": "1.02 kHz",
+                              "start": "1 um", "end": "0.01 mm"})
+    assert [float(values[f"sweep%{key}"][0]) for key in ("start", "end")] == [0.001, 0.01]
+    assert float(values["sweep%frequency"][0]) == 1020.0
+
+
+@pytest.mark.parametrize(("groups", "told"), [
+    ({"contact": {"gap": "5 N"}}, r"contact%gap = '5 N': is in N, must be in a unit of L"),
+    ({"contact": {"gap": "5 mmm"}}, r"contact%gap = '5 mmm'.*mmm"),
+    ({"sweep": {"start": "3 mm"}}, r"sweep%start = '3 mm': is in mm, must be in a unit of Hz"),
+    ({"solver": {"tolerance": "1 mm"}}, r"solver%tolerance"),
+])
+def test_what_is_no_such_quantity_is_refused(groups: dict[str, Any], told: str) -> None:
+    with pytest.raises(fw.InputError, match=told):
+        effective(**groups)
+
+
+def test_a_model_without_units_takes_numbers() -> None:
+    model = fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0])
+    case = fw.Case(model, sweep={"start": 0.5, "end": 1.0, "n_points": 2}, load={"cosine": "1 N"})
+    with pytest.raises(fw.InputError, match="give it a unit_system, such as 'mm-tonne-s-N'"):
+        case.check()
