@@ -10,9 +10,10 @@ import pytest
 
 import fretwear as fw
 from fretwear.cli import main
-from fretwear.design import ModeData, ResponseData, calibrate
+from fretwear.design import ControlData, ModeData, ResponseData, calibrate
 from fretwear.design.parameters import Unknowns
 from fretwear.errors import ConvergenceError, InputError
+from fretwear.plot.found import plot_calibration
 
 TRUTH = (0.6, 1.2)
 OVER = ["contact%normal_load", "contact%tangential_stiffness"]
@@ -112,6 +113,26 @@ def test_recovers_noisy_data() -> None:
         off.append(np.abs(found.values - TRUTH) / found.errors)
     # Of 16 numbers 0.7 are further off than two errors; 4 or more are once in 200 times.
     assert (np.array(off) > 2.0).sum() <= 3 and (np.array(off) < 1.0).sum() >= 5
+
+
+def test_loads_of_given_amplitudes() -> None:
+    """Controlled tests: the load over the frequency at amplitudes beyond the onset of slip (0.5),
+    in any order."""
+    frequency, amplitude = np.tile([0.22, 0.16, 0.19], 2), np.repeat([2.0, 0.9], 3)
+    truth = np.concatenate([fw.run(oscillator(TRUTH, control={"amplitude": [a]}, sweep={
+        "values": [0.22, 0.16, 0.19], "unit": "Hz"})).load_scale for a in (2.0, 0.9)])
+    case, data = oscillator(sweep={"values": [1.0]}), ControlData(frequency, amplitude, truth)
+    found = calibrate(case, data, over=OVER, bounds=BOUNDS)
+    assert found.converged and not found.is_exact
+    np.testing.assert_allclose(found.values, TRUTH, rtol=1e-5)
+    axes = plot_calibration(found, data).axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("frequency [Hz]", "load factor")
+    # One by one, where the case has no list of frequencies.
+    alone = data.predict(Unknowns(response_case(), OVER, BOUNDS), np.array(TRUTH), response_case(),
+                         slopes=False)
+    np.testing.assert_allclose(alone.values, truth, rtol=1e-9)
+    with pytest.raises(InputError, match="must be positive"):
+        ControlData([0.2], -1.0, [0.3])
 
 
 def test_bounds_and_blind_data_are_told() -> None:

@@ -13,7 +13,7 @@ from ..case import Case
 from ..errors import InputError, OutputError
 from ..plot.found import plot_calibration
 from .calibration import calibrate
-from .measured import Measured, ModeData, ResponseData
+from .measured import ControlData, Measured, ModeData, ResponseData
 from .optimise_command import add_parameters, read_case, write_case, write_picture
 
 __all__ = ["add_arguments", "main", "read_table"]
@@ -24,7 +24,7 @@ _NOT_CONVERGED = 4
 _COLUMNS = {
     "mode": (("amplitude",), ("frequency", "damping_ratio", "frequency_deviation",
                               "damping_deviation")),
-    "frf": (("frequency", "amplitude"), ("deviation",)),
+    "frf": (("frequency", "amplitude"), ("load", "deviation")),
 }
 
 
@@ -35,7 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="measured numbers, a line of column names and rows of numbers, "
                              "separated by commas or blanks: amplitude, frequency [Hz], "
                              "damping_ratio, frequency_deviation, damping_deviation of "
-                             "case%%analysis = 'mode'; frequency, amplitude, deviation of 'frf'")
+                             "case%%analysis = 'mode'; frequency, amplitude, deviation of 'frf', "
+                             "and load, where it is the amplitude that was held")
     parser.add_argument("--observe", metavar="NAME",
                         help="observed quantity of responses (default: the first)")
     parser.add_argument("--max-evaluations", type=int, default=200, metavar="N",
@@ -73,6 +74,8 @@ def read_table(path: str | Path, case: Case, observe: str | None = None) -> Meas
     columns = _read_columns(path, *_COLUMNS[analysis])
     if analysis == "mode":
         return ModeData(**columns)  # type: ignore[arg-type]
+    if "load" in columns:
+        return ControlData(**columns, observe=observe)  # type: ignore[arg-type]
     return ResponseData(**columns, observe=observe)  # type: ignore[arg-type]
 
 

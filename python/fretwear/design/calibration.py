@@ -161,7 +161,7 @@ def calibrate(case: Case | str, data: Measured | Sequence[Measured], *,
     ----------
     case : Case or path
         The case that data without one of their own are of.
-    data : ModeData, ResponseData, or sequence of these
+    data : ModeData, ResponseData, ControlData, or sequence of these
         What was measured.
     over : str or sequence of str
         Parameters, see `optimise`.
@@ -204,7 +204,8 @@ class _Search:
     def __init__(self, unknowns: Unknowns, case: Case, data: list[Measured], most: int,
                  tell: Callable[[Fit], object] | None) -> None:
         if not data or not all(isinstance(one, Measured) for one in data):
-            raise InputError("data: must be ModeData, ResponseData, or a list of these")
+            raise InputError("data: must be ModeData, ResponseData, ControlData, or a list of "
+                             "these")
         if len({one.is_known for one in data}) > 1:
             raise InputError("data: deviations are given for some and not for others; give all or "
                              "none")

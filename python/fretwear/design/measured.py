@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arguments import array
+from .._native import namelist_values
 from ..analyses import run
 from ..case import Case
 from ..errors import ConvergenceError, InputError
 from ..steps import Steps
 from .parameters import Unknowns, differentiated, has_parts
 
-__all__ = ["Measured", "ModeData", "Predicted", "ResponseData"]
+__all__ = ["ControlData", "Measured", "ModeData", "Predicted", "ResponseData"]
 
 Floats = NDArray[np.float64]
 Deviation = Union[float, ArrayLike, None]
@@ -148,14 +149,9 @@ class ModeData(Measured):
         found, jacobian = self._at(unknowns, values, case, slopes=slopes and self.is_exact)
         if not slopes or self.is_exact:
             return Predicted(found, jacobian, 1)
-        columns = []
-        for k, value in enumerate(values):
-            step = np.zeros(len(values))
-            step[k] = _STEP * (abs(value) or unknowns.high[k] - unknowns.low[k])
-            above = self._at(unknowns, values + step, case, slopes=False)[0]
-            below = self._at(unknowns, values - step, case, slopes=False)[0]
-            columns.append((above - below) / (2.0 * step[k]))
-        return Predicted(found, np.stack(columns, axis=1), 1 + 2 * len(values))
+        jacobian = _differences(unknowns, values,
+                                lambda at: self._at(unknowns, at, case, slopes=False)[0])
+        return Predicted(found, jacobian, 1 + 2 * len(values))
 
     def _curve(self, case: Case) -> Case:
         """Rows at the measured amplitudes; of one alone a second one beside it."""
@@ -258,6 +254,90 @@ class ResponseData(Measured):
             row = numbers.reshape(n, -1)[column]
             by_key[key] = row if has_parts(key) else row[0]
         return float(value), unknowns.chain(by_key)
+
+
+class ControlData(Measured):
+    """Loads that a response of given amplitude takes, over the frequency.
+
+    Parameters
+    ----------
+    frequency : (n,)
+        [Hz]
+    amplitude : float or (n,)
+        That the response was held at.
+    load : (n,)
+        Factor of the vibratory loads of the case, as `load%harmonic_scale`.
+    deviation : float or (n,), optional
+        Standard deviation of the loads.
+    observe : str, optional
+        Observed quantity that was held; the first without it.
+    of : {'first_harmonic', 'largest'}
+        What is an amplitude.
+    case : Case, optional
+        With `analysis = 'frf'`; frequencies and `&control` are set here. A case whose sweep has
+        `values` is led from frequency to frequency, another one is solved at each by itself.
+    """
+
+    is_exact = False
+
+    def __init__(self, frequency: ArrayLike, amplitude: ArrayLike, load: ArrayLike, *,
+                 deviation: Deviation = None, observe: str | None = None,
+                 of: str = "first_harmonic", case: Case | None = None) -> None:
+        self.frequency: Floats = array("frequency", frequency, (None,))
+        n = len(self.frequency)
+        if not n or (self.frequency <= 0.0).any():
+            raise InputError("frequency: must be positive numbers")
+        self.amplitude: Floats = array("amplitude", amplitude, (n,))
+        if (self.amplitude <= 0.0).any():
+            raise InputError("amplitude: must be positive numbers")
+        if of not in ("first_harmonic", "largest"):
+            raise InputError(f"of = {of!r}: must be 'first_harmonic' or 'largest'")
+        self._control: dict[str, Any] = {"of": of}
+        if observe is not None:
+            self._control["observed"] = observe
+        self._take(case, [("load", array("load", load, (n,)), deviation)])
+
+    def predict(self, unknowns: Unknowns, values: Floats, case: Case, *, slopes: bool
+                ) -> Predicted:
+        found = self._loads(unknowns.case_at(values, case))
+        if not slopes:
+            return Predicted(found, None, len(found))
+        jacobian = _differences(unknowns, values,
+                                lambda at: self._loads(unknowns.case_at(at, case)))
+        return Predicted(found, jacobian, (1 + 2 * len(values)) * len(found))
+
+    def _loads(self, case: Case) -> Floats:
+        """One amplitude after the other."""
+        leads = "sweep%values" in namelist_values(case.namelist())
+        found = np.empty(len(self.frequency))
+        for amplitude in np.unique(self.amplitude).tolist():
+            own = np.flatnonzero(self.amplitude == amplitude)
+            places, rows = np.unique(self.frequency[own], return_inverse=True)
+            control: Any = self._control | {"amplitude": [amplitude]}
+            held = case.replace(control=control, sweep={"unit": "Hz"})
+            if leads:
+                loads = _loads_of(held.replace(sweep={"values": places.tolist()}))
+            else:
+                loads = np.concatenate([_loads_of(held.replace(
+                    case={"analysis": "point"}, sweep={"start": place}))
+                    for place in places.tolist()])
+            found[own] = loads[rows]
+        return found
+
+
+def _loads_of(case: Case) -> Floats:
+    """Of a case of given amplitude."""
+    return run(case, in_memory=True).load_scale
+
+
+def _differences(unknowns: Unknowns, values: Floats, at: Callable[[Floats], Floats]) -> Floats:
+    """Derivatives of what a case says by central differences (n, n_parameters)."""
+    columns = []
+    for k, value in enumerate(values):
+        step = np.zeros(len(values))
+        step[k] = _STEP * (abs(value) or unknowns.high[k] - unknowns.low[k])
+        columns.append((at(values + step) - at(values - step)) / (2.0 * step[k]))
+    return np.stack(columns, axis=1)
 
 
 def _has_derivatives(case: Case, keys: Sequence[str]) -> bool:

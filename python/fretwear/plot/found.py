@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..design import Calibration, Measured, ModeData, Optimum, ResponseData
+from ..design import Calibration, ControlData, Measured, ModeData, Optimum, ResponseData
 from ..errors import InputError
 from .style import CURVE, FAILED, PALETTE, Floats, label_y, new_figure, tidy
 
@@ -18,7 +18,7 @@ __all__ = ["plot_calibration", "plot_optimum"]
 #: Half length of a tangent, as a part of the range of the parameter (or of its logarithm).
 _TANGENT = 0.06
 _NAMES = {"frequency": "frequency [Hz]", "damping_ratio": "damping ratio",
-          "amplitude": "amplitude"}
+          "amplitude": "amplitude", "load": "load factor"}
 
 
 def plot_optimum(found: Optimum) -> Figure:
@@ -79,7 +79,7 @@ def plot_calibration(found: Calibration, data: Measured | Sequence[Measured]) ->
     ----------
     found : Calibration
         Of `fretwear.calibrate`.
-    data : ModeData, ResponseData, or sequence of these
+    data : ModeData, ResponseData, ControlData, or sequence of these
         What it was found from.
     """
     sets = [data] if isinstance(data, Measured) else list(data)
@@ -96,6 +96,7 @@ def plot_calibration(found: Calibration, data: Measured | Sequence[Measured]) ->
         axes.set_ylabel(_NAMES[name])
         if name == "amplitude":
             label_y(axes, "amplitude", "")
+        if name in ("amplitude", "load"):
             axes.set_xlabel("frequency [Hz]")
         axes.ticklabel_format(axis="y", useOffset=False)
         tidy(axes)
@@ -111,7 +112,7 @@ def _draw(axes: Axes, one: Measured, rows: NDArray[np.bool_], predicted: Floats,
           colour: str) -> None:
     """One kind of numbers of one set."""
     x = one.amplitude if isinstance(one, ModeData) else None
-    if isinstance(one, ResponseData):
+    if isinstance(one, (ResponseData, ControlData)):
         x = one.frequency
     assert x is not None  # there are no other kinds
     order = np.argsort(x)
