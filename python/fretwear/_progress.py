@@ -40,7 +40,7 @@ class State:
     def text(self, *, in_hertz: bool) -> str:
         """Frequency in the unit that was typed, and amplitude; of wear cycles and depth."""
         words = []
-        if self.depth >= 0.0:
+        if self.depth >= 0.0 and (self.done or self.cycles > 0.0):
             words = [f"{self.cycles:.4g} cycles", f"depth {self.depth:.4g}"]
         elif self.done:
             words = [f"{self.omega / (2.0 * np.pi):.6g} Hz" if in_hertz
