@@ -26,6 +26,7 @@ module fw_continuation
    use fw_branch_turn, only: leap
    use fw_branch_turn, only: only_ahead
    use fw_branch_turn, only: turn_at_corner
+   use fw_branch_way, only: branch_way
    use fw_corrector, only: corrector_type
    use fw_corrector, only: differ
    use fw_error, only: error_type
@@ -73,6 +74,7 @@ module fw_continuation
       integer :: n_points = 0, n_constant = 0, n_failed = 0
       ! The last points, and how far p has been.
       type(branch_trail) :: trail
+      type(branch_way), private :: way
       real(wp) :: furthest = 0.0_wp
    contains
       procedure :: begin
@@ -167,6 +169,8 @@ contains
       self%here = towards_finish
       call self%corrector%find_tangent(system, towards_finish, self%here, done)
       self%first = self%here
+      call self%way%forget()
+      call self%way%add(self%here)
       if (.not. done) then
          call end_branch(self, 'the derivative at its first point is singular')
          return
@@ -367,7 +371,7 @@ contains
          call shorten_until_taken(self, system, turning, 0.5_wp, ahead, done, error)
          if (allocated(error) .or. done) return
          call leap(self%corrector, system, self%here, far_ahead, ahead, error)
-         done = ahead%report%converged
+         if (.not. allocated(error)) call leads_on(self, system, ahead, done, error)
          if (allocated(error) .or. done) return
       end if
       call shorten_until_taken(self, system, shortest, 0.5_wp, ahead, done, error)
@@ -379,11 +383,33 @@ contains
       if (allocated(error) .or. done) return
       self%corrector%careful = .false.
       call leap(self%corrector, system, self%here, all_around, ahead, error)
-      done = ahead%report%converged
+      if (.not. allocated(error)) call leads_on(self, system, ahead, done, error)
       if (allocated(error) .or. done) return
       call self%trail%keep(self%corrector%metric, self%here)
       call pass_over(self, system, ahead, done, error)
+      if (done) call leads_on(self, system, ahead, done, error)
    end subroutine advance
+
+   !> Whether a leap has found something, and not the way that the branch has come.
+   subroutine leads_on(self, system, ahead, answer, error)
+      class(arclength_type), intent(inout) :: self
+      class(parameter_system), intent(inout) :: system
+      type(branch_point), intent(in) :: ahead
+      logical, intent(out) :: answer
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: r(system%n)
+      logical :: is_old
+
+      answer = .false.
+      if (.not. ahead%report%converged) return
+      call self%way%holds(self%corrector, system, ahead, is_old, error)
+      if (allocated(error) .or. is_old) return
+      ! What follows takes the system and its factors at the point.
+      call system%set_parameter(ahead%p, error)
+      if (allocated(error)) return
+      call system%residual(ahead%x, r)
+      call self%corrector%linear%prepare(system, answer)
+   end subroutine leads_on
 
    !> Attempts from the present step on, each shorter than the one before.
    subroutine shorten_until_taken(self, system, least, factor, ahead, done, error)
@@ -632,6 +658,7 @@ contains
          self%ds = metric%chord(self%history%before, self%here)
          call scale_metric(self, ahead)
          call metric%normalize(self%here)
+         call self%way%add(self%here)
          self%ds = max(growth*self%ds, min(corner, largest_growth*self%ds))
       end associate
       if (self%knows_ahead) then
