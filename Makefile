@@ -131,8 +131,10 @@ bench-limit: build ## where the time goes against its floor, and what is skipped
 
 # Another environment's Python where pyharm-os is installed: make bench-peers PEER_PYTHON=...
 PEER_PYTHON ?= $(PYTHON)
-bench-peers: build ## pyHarm on the same problems, where it is installed
-	PYTHONPATH=python $(PYTHON) -m bench.run peers --peer-python $(PEER_PYTHON)
+# Branches of NLvib's examples too, beside BEFORE=fw_run; NLVIB=FOLDER counts its points (Octave).
+bench-peers: build ## pyHarm on the same problems, where it is installed, and NLvib's branches
+	PYTHONPATH=python $(PYTHON) -m bench.run peers --peer-python $(PEER_PYTHON) \
+	   $(if $(BEFORE),--before $(BEFORE)) $(if $(NLVIB),--nlvib $(NLVIB))
 
 bench-full: build ## every part of docs/benchmarks.md
 	PYTHONPATH=python $(PYTHON) -m bench.run all --peer-python $(PEER_PYTHON)

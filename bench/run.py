@@ -28,6 +28,7 @@ from bench.common.sector import measure_crossing, measure_points, measure_sweeps
 from bench.paper.aliasing import measure_aliasing, write_aliasing
 from bench.paper.filtering import measure_filtering, write_filtering
 from bench.paper.methods import measure_methods, write_methods
+from bench.peers.branches import BRANCHES, count_again, measure_branches, write_branches
 from bench.peers.sector_and_chain import measure_peers, write_peers
 from bench.precision.events import measure_events, write_events
 from bench.precision.integration import measure_integration, write_integration
@@ -57,6 +58,7 @@ class Job:
     step : says what is being measured
     peer_python : interpreter that may have pyHarm
     before : another fw_run that is measured beside it, or None
+    nlvib : folder of NLvib, whose points are counted again, or None
     """
 
     bench: Bench
@@ -66,6 +68,7 @@ class Job:
     step: Callable[[str], None]
     peer_python: Path = Path(sys.executable)
     before: Path | None = None
+    nlvib: Path | None = None
 
     def program(self, name: str) -> Path:
         """A measuring program, built if need be."""
@@ -127,8 +130,14 @@ def integration(job: Job) -> str:
 
 
 def peers(job: Job) -> str:
-    """Another program on the same problems."""
-    return write_peers(measure_peers(job.bench, job.peer_python))
+    """Other programs on the same problems."""
+    points = write_peers(measure_peers(job.bench, job.peer_python))
+    job.step("branches")
+    other = Bench(job.before, job.work / "before", job.bench.quick) if job.before else None
+    branches = BRANCHES
+    if job.nlvib:
+        branches = tuple(count_again(branch, job.nlvib) for branch in branches)
+    return points + "\n\n" + write_branches(measure_branches(job.bench, other, branches))
 
 
 def scaling(job: Job) -> str:
@@ -165,7 +174,10 @@ def main() -> None:
     parser.add_argument("--peer-python", type=Path, default=Path(sys.executable),
                         help="Python with pyharm-os, for the part peers")
     parser.add_argument("--before", type=Path,
-                        help="another fw_run, for the part scaling: measured beside this one")
+                        help="another fw_run, for the parts scaling and peers: measured beside "
+                        "this one")
+    parser.add_argument("--nlvib", type=Path,
+                        help="folder of NLvib, for the part peers: counts its points (Octave)")
     parser.add_argument("-o", "--output", type=Path, help="folder of the report (default: docs)")
     options = parser.parse_args()
     parts = list(ORDER) if "all" in options.parts else options.parts
@@ -182,7 +194,8 @@ def main() -> None:
         print(f"{time.perf_counter() - start:6.1f} s  {title}", flush=True)
 
     job = Job(Bench(build / "fw_run", work, options.quick), build, work, images, step,
-              options.peer_python, options.before.absolute() if options.before else None)
+              options.peer_python, options.before.absolute() if options.before else None,
+              options.nlvib.absolute() if options.nlvib else None)
     for part in parts:
         step(part)
         machine = describe_machine(build)

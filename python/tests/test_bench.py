@@ -210,6 +210,14 @@ def test_a_peer_that_did_not_end_has_no_ratio() -> None:
     assert "limit" in str(row[3]) and "not known" in str(row[5]) and len(row) == len(row_of(done))
 
 
+def test_branches_of_the_peer_read_as_cases() -> None:
+    from bench.peers.branches import BRANCHES, BranchRow, chain, write_branches
+
+    assert chain(2, [0.0, 1.0, 1.0], 0.03)["stiffness"] == [1.0, -1.0, -1.0, 2.0]
+    text = write_branches([BranchRow(BRANCHES[0], "chosen", 81, 0.02, True, 113, 0.025)])
+    assert "| Duffing | chosen | 192 | 1.618 | 81 | 113 | 20 | 25 | yes |" in text
+
+
 def test_scaling_asks_for_the_coarse_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from bench.common import sector
     from bench.speed.scaling import COARSE
