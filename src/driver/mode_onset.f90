@@ -13,6 +13,7 @@ module fw_mode_onset
    use fw_mode_path, only: mode_path
    use fw_mode_system, only: mode_system
    use fw_newton, only: solver_report
+   use fw_onset_bracket, only: onset_bracket
    implicit none (type, external)
    private
 
@@ -181,16 +182,17 @@ contains
       type(mode_system), intent(inout) :: system
       real(wp), intent(in) :: ratio
       real(wp), intent(inout) :: low, high
+      type(onset_bracket) :: bracket
       real(wp) :: middle
 
-      do while (high > ratio*low)
-         middle = sqrt(low*high)
-         if (departure(self, system, middle, position(self, middle)) > 0.0_wp) then
-            high = middle
-         else
-            low = middle
-         end if
+      bracket%low = low
+      bracket%high = high
+      do while (bracket%high > ratio*bracket%low)
+         middle = bracket%next()
+         call bracket%narrow(middle, departure(self, system, middle, position(self, middle)))
       end do
+      low = bracket%low
+      high = bracket%high
    end subroutine bisect
 
    !> The same by a solution at each amplitude, where positions follow no straight line but very
@@ -201,19 +203,22 @@ contains
       real(wp), intent(in) :: ratio
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      real(wp) :: middle, y(size(self%y, 1))
+      type(onset_bracket) :: bracket
+      real(wp) :: departed, middle, y(size(self%y, 1))
 
-      do while (self%high > ratio*self%low(1))
-         middle = sqrt(self%low(1)*self%high)
+      bracket%low = self%low(1)
+      bracket%high = self%high
+      do while (bracket%high > ratio*bracket%low)
+         middle = bracket%next()
          y = position(self, middle)
          call path%solve(log(middle), y, report, error)
          if (allocated(error)) return
-         if (report%converged .and. is_stuck(self, path%system)) then
-            call take(self, middle, y)
-         else
-            self%high = middle
-         end if
+         departed = departed_by(self, path%system)
+         if (.not. report%converged) departed = 1.0_wp
+         if (departed <= 0.0_wp) call take(self, middle, y)
+         call bracket%narrow(middle, departed)
       end do
+      self%high = bracket%high
    end subroutine bisect_solutions
 
    !> That of a motion.

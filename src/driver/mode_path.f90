@@ -2,6 +2,7 @@
 !> fail, from the points before.
 module fw_mode_path
    use fw_error, only: error_type
+   use fw_extrapolation, only: extrapolate
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_mode_system, only: mode_system
@@ -135,23 +136,6 @@ contains
       call extrapolate(exp(self%p(:self%order(1) + 1) - p), self%y(:n, :), 1.0_wp, y(:n))
       call extrapolate(self%p(:self%order(2) + 1), self%y(n + 1:, :), p, y(n + 1:))
    end subroutine predict
-
-   !> The polynomial through the first columns of y, which are values at x, at another place.
-   pure subroutine extrapolate(x, y, at, value)
-      real(wp), intent(in) :: x(:), y(:, :), at
-      real(wp), intent(out) :: value(:)
-      real(wp) :: weight
-      integer :: i, j
-
-      value = 0.0_wp
-      do i = 1, size(x)
-         weight = 1.0_wp
-         do j = 1, size(x)
-            if (j /= i) weight = weight*(at - x(j))/(x(i) - x(j))
-         end do
-         value = value + weight*y(:, i)
-      end do
-   end subroutine extrapolate
 
    !> A point for the guesses of the next ones; the same amplitude again replaces it.
    subroutine remember(self, p, y)

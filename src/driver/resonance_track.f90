@@ -3,6 +3,7 @@
 module fw_resonance_track
    use fw_case, only: case_type
    use fw_error, only: error_type
+   use fw_extrapolation, only: extrapolate
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_newton, only: newton_solver
@@ -240,7 +241,7 @@ contains
             if (abs(p - next) < 0.1_wp*self%step) next = p
             call self%bring(merge(value, r%value_at(next), abs(next - p) <= 0.0_wp), error)
             if (allocated(error)) return
-            call predict(self, next, guess)
+            call extrapolate(self%p(:self%kept), self%y, next, guess)
             call solve(self, guess, error)
             if (allocated(error)) return
             self%iterations = self%iterations + self%outcome%iterations
@@ -261,24 +262,6 @@ contains
          end do
       end associate
    end subroutine reach
-
-   !> The polynomial through the last points.
-   subroutine predict(self, p, y)
-      class(resonance_track), intent(in) :: self
-      real(wp), intent(in) :: p
-      real(wp), intent(out) :: y(:)
-      real(wp) :: weight
-      integer :: i, j
-
-      y = 0.0_wp
-      do i = 1, self%kept
-         weight = 1.0_wp
-         do j = 1, self%kept
-            if (j /= i) weight = weight*(p - self%p(j))/(self%p(i) - self%p(j))
-         end do
-         y = y + weight*self%y(:, i)
-      end do
-   end subroutine predict
 
    subroutine remember(self, p)
       class(resonance_track), intent(inout) :: self

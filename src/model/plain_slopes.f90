@@ -206,9 +206,11 @@ contains
       integer :: h, m
 
       m = b%n_coordinates
+      allocate (x(b%n_internal, size(factors%harmonic)))
+      ! The products below would be for nothing.
+      if (b%n_internal == 0) return
       call work%multiply_blocks(b, factors, q)
       call take_rows(m, b%n_internal, work%n_coefficients, work%products, unused, work%modes)
-      allocate (x(b%n_internal, size(factors%harmonic)))
       call amplitudes_of(factors%harmonic, factors%column, b%n_internal, work%modes, &
                          b%n_internal, x)
       do h = 1, size(factors%harmonic)
