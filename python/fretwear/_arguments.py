@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy.sparse
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from .errors import InputError
@@ -34,7 +34,9 @@ def array(name: str, value: ArrayLike, shape: Sequence[int | None], *,
         float64 or complex128.
     """
     plain: Any = value
-    given = np.asarray(plain.toarray() if scipy.sparse.issparse(plain) else plain)
+    # Who gives a sparse matrix has loaded scipy already, which nobody else shall wait for.
+    sparse: Any = sys.modules.get("scipy.sparse")
+    given = np.asarray(plain.toarray() if sparse is not None and sparse.issparse(plain) else plain)
     wanted = np.dtype(dtype)
     if given.dtype.kind not in ("iufc" if wanted.kind == "c" else "iuf"):
         raise InputError(f"{name}: its elements are of type {given.dtype}, must be "

@@ -23,6 +23,8 @@ SMALL = DiskParameters(n_sectors=12, blade_angle=8.0, disk_rows=1, blade_rows=1,
 SAME = 1e-7
 #: Modes of the same tied matrices by two solvers (measured 1.4e-12).
 EXACT = 1e-9
+#: The mesh is kept in single precision; motions of size one.
+SINGLE = 1e-5
 #: A pair that holds, and one of the elastic law.
 STUCK = "'dlft'"
 ELASTIC = "'penalty' tangential_stiffness = 2e4 normal_stiffness = 3e4"
@@ -242,3 +244,52 @@ def refused_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     assert main(["import", str(folder / "mass.mtx"), str(folder / "stiffness.mtx"), "--check",
                  "--left", str(folder / "left.csv")]) == 3
     return capsys.readouterr().err
+
+
+def test_mesh_of_cylindrical_and_cartesian_nodes(full: FullDisk, folder: Path,
+                                                 tmp_path: Path) -> None:
+    """The same sector in nodal systems that turn with it and in global ones: one structure, and a
+    motion of its nodes is shown as it is by both."""
+    meshio = pytest.importorskip("meshio")
+    assembly = Assembly(full.sector.mesh, full.parameters.material)
+    nodes = assembly.nodes
+    meshio.Mesh(nodes.T, [("hexahedron", full.sector.mesh.t[[0, 3, 6, 2, 1, 5, 7, 4]].T)],
+                point_data={"node": np.arange(assembly.n_nodes) + 1}).write(tmp_path / "sector.vtu")
+    free = full.free.reshape(-1, 3)
+    at = free[:, 0] // 3
+    assert (free == 3 * at[:, None] + np.arange(3)).all()
+    cosine, sine = nodes[:2, at] / np.hypot(*nodes[:2, at])
+    zero, one = np.zeros(len(at)), np.ones(len(at))
+    turned = sp.block_diag(np.array([[cosine, sine, zero], [-sine, cosine, zero],
+                                     [zero, zero, one]]).transpose(2, 0, 1), format="csr")
+    for name, matrix in (("mass", full.mass), ("stiffness", full.stiffness)):
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", sp.coo_array(turned @ matrix @ turned.T),
+                         symmetry="symmetric")
+    for name in ("labels.txt", "left.csv", "right.csv"):
+        (tmp_path / name).write_text((folder / name).read_text())
+    motion = np.random.default_rng(3).standard_normal(len(full.free))
+    expected = np.zeros((assembly.n_nodes, 3))
+    expected[at] = motion.reshape(-1, 3)
+    found = {}
+    for frames, source in (("cylindrical", tmp_path), ("cartesian", folder)):
+        target = tmp_path / f"{frames}.h5"
+        assert main(command(source, "-q", "--frames", frames, "--mesh",
+                            str(tmp_path / "sector.vtu"), "-o", str(target))) == 0
+        found[frames] = frequencies(tmp_path, target)
+        q = turned @ motion if frames == "cylindrical" else motion.copy()
+        with h5py.File(target) as file:
+            if frames == "cartesian":
+                # Components of the right interface are those of the next sector.
+                right = np.abs(file["cyclic/right"][()]).astype(int) - 1
+                step = 2.0 * np.pi / 12
+                frame = np.array([[np.cos(step), -np.sin(step), 0.0],
+                                  [np.sin(step), np.cos(step), 0.0], [0.0, 0.0, 1.0]])
+                own = np.isin(np.arange(len(q)), right).reshape(-1, 3).all(axis=1)
+                q = q.reshape(-1, 3)
+                q[own] = q[own] @ frame
+                q = q.ravel()
+            shown = (file["mesh/basis"][()] @ q).reshape(-1, 3)
+            points = file["mesh/points"][()]
+        order = [int(np.argmin(np.linalg.norm(nodes.T - point, axis=1))) for point in points]
+        assert np.abs(shown - expected[order]).max() < SINGLE
+    assert found["cylindrical"] == pytest.approx(found["cartesian"], rel=SAME)
