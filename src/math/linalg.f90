@@ -218,6 +218,8 @@ contains
       n = size(matrix, 1)
       ! Workspace as the manual of dsyevd asks for with vectors: no call is needed to ask.
       allocate (values(n), work(1 + 6*n + 2*n**2), iwork(3 + 5*n))
+      ! LAPACK refuses an empty matrix, aloud: structures without mass have no modes.
+      if (n == 0) return
       call dsyevd('V', 'U', n, matrix, n, values, work, size(work), iwork, size(iwork), info)
       if (info == 0) return
       call fatal_error(error, 'the eigenvalues for '//purpose//' could not be computed: check '// &

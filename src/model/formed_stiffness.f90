@@ -70,16 +70,16 @@ contains
             call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), &
                                load(:, h), n_failed)
          end do
-         call find_static(self)
-         return
+      else
+         !$omp parallel do default(none) shared(self, basis, harmonic, theta, s, load) &
+         !$omp private(h) reduction(+:n_failed) schedule(dynamic)
+         do h = 1, size(harmonic)
+            call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), &
+                               load(:, h), n_failed)
+         end do
+         !$omp end parallel do
       end if
-      !$omp parallel do default(none) shared(self, basis, harmonic, theta, s, load) private(h) &
-      !$omp reduction(+:n_failed) schedule(dynamic)
-      do h = 1, size(harmonic)
-         call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), load(:, h), &
-                            n_failed)
-      end do
-      !$omp end parallel do
+      call find_static(self)
    end subroutine form
 
    !> Whether Z_r is one real matrix in all harmonics, to the last bit.

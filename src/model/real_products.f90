@@ -36,6 +36,8 @@ module fw_real_products
 
    type :: real_products
       integer :: n_coefficients = 0
+      !> Leading blocks of K, M, C up to the last that is not zero: K alone without mass and damping.
+      integer, private :: n_acting = 0
       !> D of each harmonic.
       type(internal_block), allocatable :: internal(:)
       !> Rows and columns in use, where these are not all: their numbers, and K, M and C as the
@@ -87,12 +89,27 @@ contains
       logical :: failed
       integer :: h
 
+      ! Here and not in `reserve`: a parameter may have moved what was zero.
+      self%n_acting = last_block(basis)
       n_failed = 0
       do h = 1, size(self%internal)
          call self%internal(h)%factor(basis, factors%theta(h), factors%s(h), failed)
          if (failed) n_failed = n_failed + 1
       end do
    end subroutine factor
+
+   !> Of a structure with mass the first column tells.
+   pure integer function last_block(basis) result(b)
+      type(reduction_type), intent(in) :: basis
+      integer :: j
+
+      do b = basis%n_blocks, 2, -1
+         do j = 1, size(basis%blocks, 2)
+            if (any(abs(basis%blocks(:, j, b)) > 0.0_wp)) return
+         end do
+      end do
+      b = 1
+   end function last_block
 
    !> Copy rows and columns in use, and the internal modes below the columns.
    pure subroutine gather_active(self, basis, n_active, n_used, used)
@@ -105,23 +122,24 @@ contains
 
       self%n_active = n_active
       self%n_used = n_used
-      n = (n_active + basis%n_internal)*n_used*basis%n_blocks
+      n = (n_active + basis%n_internal)*n_used*self%n_acting
       ! Room that grows by need, with a tenth to spare, and stays.
       if (allocated(self%active)) then
          if (size(self%active) < n) deallocate (self%active)
       end if
       if (.not. allocated(self%active)) allocate (self%active(n + n/10))
-      call fill_active(basis, n_active, n_used, used, n_active + basis%n_internal, self%active)
+      call fill_active(basis, self%n_acting, n_active, n_used, used, n_active + basis%n_internal, &
+                       self%active)
    end subroutine gather_active
 
-   pure subroutine fill_active(basis, n_active, n_used, used, n_inner, active)
+   pure subroutine fill_active(basis, n_blocks, n_active, n_used, used, n_inner, active)
       type(reduction_type), intent(in) :: basis
-      integer, intent(in) :: n_active, n_used, n_inner
+      integer, intent(in) :: n_blocks, n_active, n_used, n_inner
       integer, intent(in) :: used(:)
       real(wp), intent(inout) :: active(n_inner, n_used, *)
       integer :: b, i
 
-      do b = 1, basis%n_blocks
+      do b = 1, n_blocks
          do i = 1, n_used
             active(:n_active, i, b) = basis%blocks(used(:n_active), used(i), b)
             active(n_active + 1:, i, b) = basis%blocks(basis%n_coordinates + 1:, used(i), b)
@@ -162,22 +180,22 @@ contains
       type(reduction_type), intent(in) :: basis
       type(harmonic_factors), intent(in) :: factors
       integer, intent(in) :: n_active, n_used, n_stored
-      real(wp), intent(in) :: columns(n_active + basis%n_internal, n_used, basis%n_blocks)
+      real(wp), intent(in) :: columns(n_active + basis%n_internal, n_used, self%n_acting)
       real(wp), intent(in) :: v(*)
       real(wp), intent(inout) :: product(n_stored, *)
       integer :: n_inner
 
       n_inner = n_active + basis%n_internal
-      call place_multiples(factors, n_active, basis%n_blocks, 1.0_wp, v, 0, n_inner, &
+      call place_multiples(factors, n_active, self%n_acting, 1.0_wp, v, 0, n_inner, &
                            self%multiples)
       if (basis%n_internal > 0) then
          call multiply_modes(self, basis, n_active, n_used, columns, self%multiples)
          call self%solve_internal(factors)
          ! Below the multiples of v those of -y: one product gives both terms.
-         call place_multiples(factors, basis%n_internal, basis%n_blocks, -1.0_wp, self%modes, &
+         call place_multiples(factors, basis%n_internal, self%n_acting, -1.0_wp, self%modes, &
                               n_active, n_inner, self%multiples)
       end if
-      call multiply_columns(n_used, n_inner, basis%n_blocks, self%n_coefficients, columns, &
+      call multiply_columns(n_used, n_inner, self%n_acting, self%n_coefficients, columns, &
                             self%multiples, n_used >= coordinates_for_threads, n_stored, product)
    end subroutine multiply_by
 
@@ -186,17 +204,17 @@ contains
       class(real_products), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n_active, n_used
-      real(wp), intent(in) :: columns(n_active + basis%n_internal, n_used, basis%n_blocks)
-      real(wp), intent(in) :: multiples(n_active + basis%n_internal, basis%n_blocks, *)
+      real(wp), intent(in) :: columns(n_active + basis%n_internal, n_used, self%n_acting)
+      real(wp), intent(in) :: multiples(n_active + basis%n_internal, self%n_acting, *)
       integer :: b, n_inner
 
       n_inner = n_active + basis%n_internal
       self%modes = 0.0_wp
-      do b = 1, basis%n_blocks
+      do b = 1, self%n_acting
          ! The rows of the modes stand below those of the columns.
          call dgemm('N', 'N', basis%n_internal, self%n_coefficients, n_active, 1.0_wp, &
                     columns(n_active + 1, 1, b), n_inner, multiples(1, b, 1), &
-                    n_inner*basis%n_blocks, 1.0_wp, self%modes, basis%n_internal)
+                    n_inner*self%n_acting, 1.0_wp, self%modes, basis%n_internal)
       end do
    end subroutine multiply_modes
 
@@ -238,7 +256,7 @@ contains
       real(wp), intent(inout) :: column(n_inner, n_blocks)
 
       column(first + 1:first + n, 1) = sign*(k*a)
-      column(first + 1:first + n, 2) = sign*(re*a + im*b)
+      if (n_blocks >= 2) column(first + 1:first + n, 2) = sign*(re*a + im*b)
       if (n_blocks == 3) column(first + 1:first + n, 3) = sign*(s*b)
    end subroutine fill_column
 
@@ -253,8 +271,8 @@ contains
       integer :: n_rows, n_inner
 
       n_rows = basis%n_coordinates + basis%n_internal
-      n_inner = basis%n_coordinates*basis%n_blocks
-      call place_multiples(factors, basis%n_coordinates, basis%n_blocks, 1.0_wp, v, 0, &
+      n_inner = basis%n_coordinates*self%n_acting
+      call place_multiples(factors, basis%n_coordinates, self%n_acting, 1.0_wp, v, 0, &
                            basis%n_coordinates, self%multiples)
       call dgemm('N', 'N', n_rows, self%n_coefficients, n_inner, 1.0_wp, basis%blocks, n_rows, &
                  self%multiples, n_inner, 0.0_wp, self%products, n_rows)
