@@ -36,7 +36,7 @@ module fw_real_products
 
    type :: real_products
       integer :: n_coefficients = 0
-      !> Leading blocks of K, M, C up to the last that is not zero: K alone without mass and damping.
+      !> Leading blocks of K, M, C up to the last that is not zero: without mass and damping, K.
       integer, private :: n_acting = 0
       !> D of each harmonic.
       type(internal_block), allocatable :: internal(:)
