@@ -26,6 +26,9 @@ module fw_mode_onset
       real(wp), allocatable, private :: y(:, :)
       integer, private :: n_low = 0
       logical, private :: departed = .false.
+      !> What departs in rows and solutions above the onset, to begin a search with, and the rows.
+      type(onset_bracket), private :: known
+      integer, private :: n_above = 0
       !> Shares of stick, slip and separation at rest (3, n_pairs).
       real(wp), allocatable, private :: rest(:, :)
    contains
@@ -104,12 +107,17 @@ contains
       type(mode_system), intent(in) :: system
       real(wp), intent(in) :: y(:)
 
-      if (self%departed .or. size(self%rest) == 0) return
-      if (is_stuck(self, system)) then
+      if (self%n_above == 2 .or. size(self%rest) == 0) return
+      if (self%departed) then
+         call self%known%take_above(system%amplitude, departed_by(self, system))
+         self%n_above = 2
+      else if (is_stuck(self, system)) then
          if (system%amplitude > self%low(1)) call take(self, system%amplitude, y)
       else
          self%departed = .true.
          self%high = system%amplitude
+         call self%known%take_above(system%amplitude, departed_by(self, system))
+         self%n_above = 1
       end if
    end subroutine note
 
@@ -185,6 +193,8 @@ contains
       type(onset_bracket) :: bracket
       real(wp) :: middle
 
+      bracket = self%known
+      call bracket%forget_zero()
       bracket%low = low
       bracket%high = high
       do while (bracket%high > ratio*bracket%low)
@@ -203,22 +213,22 @@ contains
       real(wp), intent(in) :: ratio
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      type(onset_bracket) :: bracket
       real(wp) :: departed, middle, y(size(self%y, 1))
 
-      bracket%low = self%low(1)
-      bracket%high = self%high
-      do while (bracket%high > ratio*bracket%low)
-         middle = bracket%next()
+      ! By halves: solutions that lie together tell little of how the position moves.
+      do while (self%high > ratio*self%low(1))
+         middle = sqrt(self%low(1)*self%high)
          y = position(self, middle)
          call path%solve(log(middle), y, report, error)
          if (allocated(error)) return
          departed = departed_by(self, path%system)
-         if (.not. report%converged) departed = 1.0_wp
-         if (departed <= 0.0_wp) call take(self, middle, y)
-         call bracket%narrow(middle, departed)
+         if (report%converged .and. departed <= 0.0_wp) then
+            call take(self, middle, y)
+         else
+            self%high = middle
+            if (report%converged) call self%known%take_above(middle, departed)
+         end if
       end do
-      self%high = bracket%high
    end subroutine bisect_solutions
 
    !> That of a motion.

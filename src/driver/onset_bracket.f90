@@ -23,6 +23,8 @@ module fw_onset_bracket
    contains
       procedure :: next
       procedure :: narrow
+      procedure :: take_above
+      procedure :: forget_zero
    end type onset_bracket
 
    !> Parts of the zero of a line below which another one is the same.
@@ -66,9 +68,30 @@ contains
          return
       end if
       self%high = amplitude
-      self%above = [amplitude, self%above(1)]
-      self%square = [departure**2, self%square(1)]
-      self%n_above = self%n_above + 1
+      call self%take_above(amplitude, departure)
    end subroutine narrow
+
+   !> What departs at an amplitude above the onset; the two lowest amplitudes are kept.
+   subroutine take_above(self, amplitude, departure)
+      class(onset_bracket), intent(inout) :: self
+      real(wp), intent(in) :: amplitude, departure
+
+      if (self%n_above == 0 .or. amplitude < self%above(1)) then
+         self%above = [amplitude, self%above(1)]
+         self%square = [departure**2, self%square(1)]
+      else
+         self%above(2) = amplitude
+         self%square(2) = departure**2
+      end if
+      self%n_above = self%n_above + 1
+   end subroutine take_above
+
+   !> Other ends: the line is drawn anew.
+   subroutine forget_zero(self)
+      class(onset_bracket), intent(inout) :: self
+
+      self%zero = -1.0_wp
+      self%width = huge(1.0_wp)
+   end subroutine forget_zero
 
 end module fw_onset_bracket
