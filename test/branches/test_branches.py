@@ -1,16 +1,18 @@
 """Some of the branches of each family, and proof that the judges see what is wrong."""
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import branch_chains
+import branch_cusps
 import branch_joints
 import branches
 import numpy as np
 import pytest
 
 # First seeds of each family: some seconds.
-CHAINS, JOINTS = range(16), range(9)
+CHAINS, JOINTS, CUSPS = range(16), range(9), (0, 3, 5, 7)
 SECTOR = Path(__file__).resolve().parents[2] / "example" / "blade_sector"
 # Rows that branches of the sector took when their steps heeded the slip of every pair.
 SECTOR_CASES = (("frf.nml", ("harmonics%n_harmonics=3",), 105), ("frf_48.nml", (), 62))
@@ -29,6 +31,13 @@ def test_a_linear_branch_goes_over_every_resonance(n_points):
 def test_a_branch_holds_what_fine_sweeps_find(seed):
     kind, verdict = branches.judge_joint(branches.PROGRAM, seed)
     assert not (verdict.incomplete or verdict.off or verdict.missed), (kind, verdict)
+
+
+@pytest.mark.parametrize("seed", CUSPS)
+def test_folds_that_are_about_to_merge_are_there(seed):
+    kind, verdict = branches.judge_cusp(branches.PROGRAM, seed)
+    assert not (verdict.incomplete or verdict.missed or verdict.wrong), (kind, verdict)
+    assert verdict.there == 2
 
 
 @pytest.mark.parametrize(("name", "settings", "before"), SECTOR_CASES)
@@ -84,6 +93,20 @@ def test_the_judge_of_chains_sees_what_is_wrong():
     assert branch_chains.judge(chain, omega[:-1], rows[:-1], 0).incomplete
     assert branch_chains.judge(chain, omega, 1.001 * rows, 0).off
     assert branch_chains.judge(chain, omega[::400], rows[::400], 0).interpolation > branches.TRUE
+
+
+def test_the_judge_of_cusps_sees_what_is_wrong():
+    cusp = branch_cusps.random_cusp(3)
+    folds, omega = cusp.folds(), np.array([0.5, cusp.end])
+    assert len(folds) == 2
+    right = [("fold", w) for w in folds]
+    good = branch_cusps.judge(cusp, 0, omega, right)
+    assert not (good.missed or good.wrong or good.open or good.incomplete)
+    assert branch_cusps.judge(cusp, 0, omega, right[:1]).missed == 1
+    assert branch_cusps.judge(cusp, 0, omega, [*right, ("fold", 0.9)]).wrong == 1
+    assert branch_cusps.judge(cusp, 0, omega, [("undecided", w) for w in folds]).open == 2
+    # Below the load of the cusp there are none.
+    assert not replace(cusp, load=0.9 * cusp.load).folds()
 
 
 def test_the_judge_of_joints_sees_what_is_wrong():
