@@ -28,8 +28,6 @@ Complexes = NDArray[np.complex128]
 #: Largest difference between recovered and stored observed quantities, over the largest of them,
 #: and in multiples of the tolerance of the solver; the greater one holds.
 CONSISTENCY, CONSISTENCY_OF_SOLVER = 1e-6, 100.0
-#: Eigenvalues below this share of the largest count as zero, as in the solver.
-_RANK = 1e-12
 
 
 @dataclass(frozen=True)

@@ -279,20 +279,9 @@ def _reduced(model: FullModel, matrices: dict[str, sp.csr_array], n_modes: int,
         raise InputError("--reduce needs contact pairs (--pairs): the reduction keeps their "
                          "relative displacements")
     rows, number = contact_rows(model.pairs, model.dofs.n)
-    loads = np.column_stack([model.loads[name] for name in model.loads] or
-                            [np.zeros(model.dofs.n)])
-    attached = np.column_stack((loads, _observed(model).toarray().T))
-    system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
-                    damping=matrices.get("damping"), attachments=attached, progress=progress)
-    data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
-    if system.damping is not None:
-        data["damping"] = system.damping
-    if "stiffness_rotation" in matrices:
-        data["stiffness_rotation"] = system.reduction.matrix(matrices["stiffness_rotation"])
-    data.update({f"load/{name}": system.loads[:, k] for k, name in enumerate(model.loads)})
+    data = _condensed(model, matrices, rows, n_modes, progress)
     data["contact/side_1"] = number.astype(np.int32)
     data["contact/side_2"] = np.zeros_like(data["contact/side_1"])
-    data["basis"] = system.reduction.basis
     return data
 
 
@@ -309,24 +298,30 @@ def _reduced_sector(model: FullModel, matrices: dict[str, sp.csr_array], n_modes
                         (len(kept), model.dofs.n))
     place = np.zeros(model.dofs.n + 1, dtype=np.int32)
     place[kept + 1] = np.arange(1, len(kept) + 1)
-    loads = np.column_stack([model.loads[name] for name in model.loads] or
-                            [np.zeros(model.dofs.n)])
-    system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
-                    damping=matrices.get("damping"),
-                    attachments=np.column_stack((loads, _observed(model).toarray().T)),
-                    progress=progress)
-    data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
-    if system.damping is not None:
-        data["damping"] = system.damping
-    if "stiffness_rotation" in matrices:
-        data["stiffness_rotation"] = system.reduction.matrix(matrices["stiffness_rotation"])
-    data.update({f"load/{name}": system.loads[:, k] for k, name in enumerate(model.loads)})
+    data = _condensed(model, matrices, rows, n_modes, progress)
     n = len(model.interfaces.left)
     data["cyclic/left"] = np.arange(1, n + 1, dtype=np.int32)
     data["cyclic/right"] = np.arange(n + 1, 2 * n + 1, dtype=np.int32)
     if model.pairs is not None:
         for name, side in zip(("contact/side_1", "contact/side_2"), sides):
             data[name] = np.sign(side) * place[np.abs(side)]
+    return data
+
+
+def _condensed(model: FullModel, matrices: dict[str, sp.csr_array], rows: sp.csr_array,
+               n_modes: int, progress: Progress | None) -> dict[str, NDArray[Any]]:
+    """Matrices, loads and the basis of the reduction that keeps the given rows."""
+    loads = np.column_stack([model.loads[name] for name in model.loads] or
+                            [np.zeros(model.dofs.n)])
+    attached = np.column_stack((loads, _observed(model).toarray().T))
+    system = reduce(matrices["mass"], matrices["stiffness"], rows, n_modes=n_modes, loads=loads,
+                    damping=matrices.get("damping"), attachments=attached, progress=progress)
+    data: dict[str, NDArray[Any]] = {"mass": system.mass, "stiffness": system.stiffness}
+    if system.damping is not None:
+        data["damping"] = system.damping
+    if "stiffness_rotation" in matrices:
+        data["stiffness_rotation"] = system.reduction.matrix(matrices["stiffness_rotation"])
+    data.update({f"load/{name}": system.loads[:, k] for k, name in enumerate(model.loads)})
     data["basis"] = system.reduction.basis
     return data
 
