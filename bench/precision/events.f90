@@ -1,8 +1,11 @@
 !> Time of the contact forces and their derivative for each pair, with events and with uniform
-!> sampling, in one and in two tangential directions. Writes comma-separated lines; the error is
-!> the largest one of a coefficient against events on 2048 angles.
+!> sampling, in one and in two tangential directions, the amplitudes falling as a power of the
+!> harmonic. Forces are evaluated from rest, and again from where that ended. Writes comma-separated
+!> lines; errors are the largest and the median one of the pairs, each in its worst coefficient,
+!> against events in the period started elsewhere: that moves all steps of slip. Pairs that end
+!> where their start leads them, with next to no slip, count as exact.
 program events
-   use, intrinsic :: iso_fortran_env, only: int64, output_unit
+   use, intrinsic :: iso_fortran_env, only: output_unit
    use fw_force_law, only: force_workspace
    use fw_fourier, only: fourier_type
    use fw_fourier, only: new_fourier
@@ -12,60 +15,80 @@ program events
    use fw_pair_law, only: pair_law
    implicit none (type, external)
 
-   integer, parameter :: n_pairs = 24, n_samples = 7
-   integer, parameter :: harmonics(*) = [3, 7, 15]
+   integer, parameter :: n_pairs = 96, n_samples = 21
+   integer, parameter :: harmonics(*) = [1, 3, 7, 15]
+   !> Where the period of the reference starts.
+   real(wp), parameter :: delay = 0.37_wp
    real(wp) :: numbers(n_pairs, 3, 2*maxval(harmonics) + 1)
-   integer :: h, d
+   logical :: slips(n_pairs)
+   integer :: h, d, p
 
    call random_init(.true., .true.)
    call random_number(numbers)
    numbers = 2.0_wp*numbers - 1.0_wp
-   write (output_unit, '(a)') 'directions,n_harmonics,sampling,n_time,'// &
-      'evaluate_us,linearize_us,error'
+   write (output_unit, '(a)') 'directions,power,n_harmonics,sampling,n_time,'// &
+      'from_rest_us,again_us,linearize_us,error,median_error'
    do d = 1, 2
-      do h = 1, size(harmonics)
-         call compare(d, harmonics(h))
+      do p = 1, 2
+         do h = 1, size(harmonics)
+            call compare(d, p, harmonics(h))
+         end do
       end do
    end do
 
 contains
 
-   subroutine compare(directions, n_harmonics)
-      integer, intent(in) :: directions, n_harmonics
+   subroutine compare(directions, power, n_harmonics)
+      integer, intent(in) :: directions, power, n_harmonics
       type(force_workspace) :: exact
-      real(wp) :: unused(2)
+      real(wp) :: unused(3)
 
-      call measure(directions, n_harmonics, .true., 2048, exact, unused)
-      call report(directions, n_harmonics, .true., merge(4, 8, directions == 1)*n_harmonics, exact)
-      call report(directions, n_harmonics, .false., 64, exact)
-      call report(directions, n_harmonics, .false., 1024, exact)
+      call measure(directions, power, n_harmonics, .true., instants(n_harmonics), delay, exact, &
+                   unused)
+      call report(directions, power, n_harmonics, .true., instants(n_harmonics), exact)
+      call report(directions, power, n_harmonics, .false., 16*n_harmonics, exact)
+      call report(directions, power, n_harmonics, .false., 1024, exact)
    end subroutine compare
 
-   subroutine report(directions, n_harmonics, by_events, n_time, exact)
-      integer, intent(in) :: directions, n_harmonics, n_time
+   !> Those that isolate events.
+   pure integer function instants(n_harmonics)
+      integer, intent(in) :: n_harmonics
+
+      instants = max(8, 4*n_harmonics + 2)
+   end function instants
+
+   subroutine report(directions, power, n_harmonics, by_events, n_time, exact)
+      integer, intent(in) :: directions, power, n_harmonics, n_time
       logical, intent(in) :: by_events
       type(force_workspace), intent(in) :: exact
       type(force_workspace) :: forces
-      real(wp) :: seconds(2)
+      real(wp) :: seconds(3), error(n_pairs)
+      integer :: i
 
-      call measure(directions, n_harmonics, by_events, n_time, forces, seconds)
-      write (output_unit, '(2(i0, ","), a, ",", i0, 3(",", es10.3))') directions, n_harmonics, &
-         trim(merge('events ', 'uniform', by_events)), n_time, 1.0e6_wp*seconds/n_pairs, &
-         maxval(abs(forces%force - exact%force))
+      call measure(directions, power, n_harmonics, by_events, n_time, 0.0_wp, forces, seconds)
+      error = 0.0_wp
+      do i = 1, n_pairs
+         if (.not. slips(i)) cycle
+         error(i) = maxval(abs(forces%force(i, :, :) - exact%force(i, :, :)))
+      end do
+      write (output_unit, '(3(i0, ","), a, ",", i0, 5(",", es10.3))') directions, &
+         power, n_harmonics, trim(merge('events ', 'uniform', by_events)), n_time, &
+         1.0e6_wp*seconds/n_pairs, maxval(error), median(error)
    end subroutine report
 
-   !> Medians of the times of evaluate and linearize [s].
-   subroutine measure(directions, n_harmonics, by_events, n_time, forces, seconds)
-      integer, intent(in) :: directions, n_harmonics, n_time
+   !> Medians of the processor times of evaluate, from rest and again, and linearize [s].
+   subroutine measure(directions, power, n_harmonics, by_events, n_time, start, forces, seconds)
+      integer, intent(in) :: directions, power, n_harmonics, n_time
       logical, intent(in) :: by_events
+      !> Angle at which the period starts; the forces are turned back.
+      real(wp), intent(in) :: start
       type(force_workspace), intent(out) :: forces
-      real(wp), intent(out) :: seconds(2)
+      real(wp), intent(out) :: seconds(3)
       type(fourier_type) :: fourier
       type(friction_law) :: at_instants
       class(pair_law), allocatable :: law
       logical :: present(3, n_pairs)
-      real(wp) :: samples(2, n_samples)
-      integer(int64) :: clock(3), rate
+      real(wp) :: samples(3, n_samples), clock(4), share(3, n_pairs)
       integer :: i, k
 
       fourier = new_fourier(n_harmonics, n_time)
@@ -80,24 +103,54 @@ contains
       end if
       call law%reserve(fourier, forces)
       do k = 1, fourier%n_coefficients
-         forces%prediction(:, :, k) = numbers(:, :, k)/(1 + k/2)
+         forces%prediction(:, :, k) = numbers(:, :, k)/real(max(1, k/2), wp)**power
       end do
       if (directions == 1) forces%prediction(:, 2, :) = 0.0_wp
-      forces%offset = -1.0_wp
+      call turn(forces%prediction, start)
+      forces%offset = -1.6_wp
       do i = 1, n_samples
-         call system_clock(clock(1), rate)
+         forces%x_start = 0.0_wp
+         call cpu_time(clock(1))
          call law%evaluate(fourier, forces)
-         call system_clock(clock(2))
+         call cpu_time(clock(2))
+         forces%x_start = forces%x
+         call law%evaluate(fourier, forces)
+         call cpu_time(clock(3))
          call law%linearize(fourier, forces)
-         call system_clock(clock(3))
-         samples(:, i) = real(clock(2:3) - clock(1:2), wp)/real(rate, wp)
+         call cpu_time(clock(4))
+         samples(:, i) = clock(2:4) - clock(1:3)
       end do
-      do k = 1, 2
+      call turn(forces%force, -start)
+      if (abs(start) > 0.0_wp) then
+         call law%fractions(forces, share)
+         slips = share(2, :) > 0.01_wp .or. share(3, :) > 0.0_wp
+      end if
+      do k = 1, 3
          seconds(k) = median(samples(k, :))
       end do
    end subroutine measure
 
-   !> The middle of an odd number of values.
+   !> Coefficients of a period that starts at another angle.
+   pure subroutine turn(coefficient, angle)
+      real(wp), intent(inout) :: coefficient(:, :, :)
+      real(wp), intent(in) :: angle
+      real(wp) :: c, s, old(2)
+      integer :: i, j, k
+
+      do k = 2, size(coefficient, 3), 2
+         c = cos(angle*(k/2))
+         s = sin(angle*(k/2))
+         do j = 1, size(coefficient, 2)
+            do i = 1, size(coefficient, 1)
+               old = coefficient(i, j, k:k + 1)
+               coefficient(i, j, k) = c*old(1) + s*old(2)
+               coefficient(i, j, k + 1) = c*old(2) - s*old(1)
+            end do
+         end do
+      end do
+   end subroutine turn
+
+   !> The middle value.
    pure real(wp) function median(values)
       real(wp), intent(in) :: values(:)
       integer :: i

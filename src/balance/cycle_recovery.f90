@@ -37,8 +37,8 @@ contains
                  row => system%problem%joint%row, fourier => system%problem%fourier, &
                  law => system%problem%forces%entry(system%problem%forces%pairs)%law)
          n = fourier%n_time
-         ! Between events forces are known at any instant, but for two tangential directions.
-         if (law%facts%follows_events .and. .not. any(all(row(1:2, :) > 0, dim=1))) then
+         ! Between events forces are known at any instant.
+         if (law%facts%follows_events) then
             n = max(n, fine)
             call move_alloc(work%force_time, own)
             allocate (work%force_time(size(own, 1), size(own, 2), n))

@@ -63,9 +63,9 @@ module fw_accuracy
    !> fewest that a solution is compared with where friction acts on mass.
    integer, parameter :: few_for_order = 5, fewest_on_mass = 3
    real(wp), parameter :: least_factor = 1.0_wp/3.0_wp, least_factor_of_few = 1.0_wp
-   !> What half of the instants changes is multiplied by this: first order, and fluctuating, where
-   !> they decide, and below the fourth order of slip in two directions between events.
-   real(wp), parameter :: factor_instants = 2.0_wp, factor_planar = 1.0_wp/3.0_wp
+   !> What half of the instants changes is multiplied by this where they decide: first order, and
+   !> fluctuating. Located events leave no error of theirs.
+   real(wp), parameter :: factor_instants = 2.0_wp
    !> How much more instants may leave out at one point than at others.
    real(wp), parameter :: safety = 8.0_wp
    !> Halvings and doublings of the instants that are tried.
@@ -131,7 +131,7 @@ contains
             self%planar = any(row(1, :) > 0 .and. row(2, :) > 0)
          end associate
          if (system%problem%forces%entry(system%problem%forces%pairs)%law%facts%follows_events) then
-            self%factor_time = merge(factor_planar, 0.0_wp, self%planar)
+            self%factor_time = 0.0_wp
          end if
       end associate
    end subroutine start
@@ -220,8 +220,7 @@ contains
       call bound_by_instants(self, point, errors(2), iterations, error)
    end subroutine estimate
 
-   !> How far the solution with half of the instants is, times a factor. Between events this is of
-   !> fourth order: where it was nothing at points before, it is not looked at again.
+   !> How far the solution with half of the instants is, times a factor.
    subroutine bound_by_instants(self, point, bound, iterations, error)
       class(accuracy_solver), intent(inout) :: self
       type(point_type), intent(in) :: point
@@ -230,9 +229,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       associate (known => self%by_instants(self%current, self%doublings))
-         bound = safety*known
-         if (self%factor_time < 1.0_wp .and. &
-             bound <= with_margin*self%case%harmonics%accuracy) return
          call check(self, self%current, self%doublings - 1, iterations, error)
          if (allocated(error)) return
          bound = unknown

@@ -59,7 +59,7 @@ module fw_problem
    public :: build_system, renew_forces
 
    !> Instants at least where the events decide and instants only isolate them.
-   integer, parameter :: fewest_for_events = 8, fewest_for_planar = 32
+   integer, parameter :: fewest_for_events = 8
    !> Pairs up to which events serve an accuracy in two tangential directions.
    integer, parameter :: few_pairs = 16
 
@@ -328,7 +328,7 @@ contains
       if (harmonics%method == method_hdhb) return
       n_time = max(2*h + 2, forces%least_instants(h, separates=any(joint%row(3, :) > 0)))
       if (forces%entry(forces%pairs)%law%facts%follows_events) then
-         n_time = max(n_time, least_events(harmonics, is_planar(joint)))
+         n_time = max(n_time, least_events(harmonics))
       end if
       n_time = nint(n_time*2.0_wp**harmonics%doublings)
       n_time = n_time + modulo(n_time, 2)
@@ -368,16 +368,12 @@ contains
       is_planar = any(all(joint%row(1:2, :) > 0, dim=1))
    end function is_planar
 
-   !> Instants that isolate the events, twice the 2H+1 of a collocation, which then lie evenly; or
-   !> cells of the quadrature over slip in two directions, four times as many.
-   pure integer function least_events(harmonics, planar) result(n_time)
+   !> Instants that isolate the events, twice the 2H+1 of a collocation, which then lie evenly.
+   pure integer function least_events(harmonics) result(n_time)
       type(harmonics_options), intent(in) :: harmonics
-      !> Whether a pair has two tangential directions.
-      logical, intent(in) :: planar
       integer :: n_points
 
       n_time = max(fewest_for_events, 2*(2*harmonics%n_harmonics + 1))
-      if (planar) n_time = max(fewest_for_planar, 4*(2*harmonics%n_harmonics + 1))
       n_points = harmonics%n_collocation
       if (harmonics%method /= method_tcm_least_squares .or. n_points == 0) return
       n_time = n_points*((n_time + n_points - 1)/n_points)

@@ -1,7 +1,8 @@
 !> Event-resolved contact forces of all pairs: from the coefficients of the predicted forces to
 !> those of the contact forces, and their derivative. With one tangential direction there is no
 !> sampling error: the instants of the transform only isolate the events, for which four for each
-!> wave of the highest harmonic are enough. With two they are the steps of slip.
+!> wave of the highest harmonic are enough. With two, steps of slip are as wide as their tolerance
+!> allows.
 module fw_event_contact
    use fw_event_cells, only: cells_type
    use fw_event_cells, only: new_cells

@@ -1,23 +1,27 @@
 !> Where a pair with two tangential directions leaves the cone of friction: roots of the excess
 !> |P - z|**2 - R**2, z being the position that it sticks at.
 module fw_event_exit
+   use fw_event_cells, only: cells_type
    use fw_event_motion, only: instant_type
    use fw_event_motion, only: motion_type
    use fw_event_motion, only: on_cone
+   use fw_event_motion, only: point_of
+   use fw_event_motion, only: stretch_type
    use fw_event_segment, only: new_segment
    use fw_event_segment, only: segment_type
    use fw_event_slide, only: first_guess
    use fw_event_slide, only: summit
+   use fw_event_stages, only: n_points
    use fw_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: is_pushed, sticks_on, find_exit
+   public :: is_pushed, find_exit
 
    !> Trials for the angle where slip begins, and its accuracy.
    !> Halvings alone take a cell to round-off in some fifty. The rough tolerance is that on the
    !> quintic, whose own error is larger.
-   integer, parameter :: max_trials = 80
+   integer, parameter :: max_trials = 80, max_climbs = 12, max_halvings = 26
    real(wp), parameter :: angle_tolerance = 1.0e-15_wp, rough_tolerance = 1.0e-9_wp
 
 contains
@@ -36,56 +40,92 @@ contains
                   (f > -noise_of(motion) .and. excess_slope(at, z) > 0.0_wp)
    end function is_pushed
 
-   !> Whether a pair that sticks keeps within the cone from one node to another (fw_event_motion):
-   !> inside at the end, and no summit between.
-   pure logical function sticks_on(motion, z, from, to)
-      ! Entries as `node` of motion_type: P, P', P'', N, N', N''.
+   !> First angle after which the pair leaves the cone in a stretch that starts with stick.
+   !> Two exits between two points that both return inside are seen as none: one summit is looked
+   !> for.
+   pure subroutine find_exit(motion, cells, z, stretch, at, found)
       type(motion_type), intent(in) :: motion
-      real(wp), intent(in) :: z(2), from(9), to(9)
-      real(wp) :: d(2), slope
-
-      d = to(1:2) - z
-      sticks_on = d(1)**2 + d(2)**2 - (motion%mu*to(7))**2 <= noise_of(motion)
-      if (.not. sticks_on) return
-      ! Half the slope of the excess. Inside at both ends, it can only pass the cone in between if
-      ! it rises at the start and falls at the end.
-      slope = d(1)*to(3) + d(2)*to(4) - motion%mu**2*to(7)*to(8)
-      if (slope >= 0.0_wp) return
-      d = from(1:2) - z
-      slope = d(1)*from(3) + d(2)*from(4) - motion%mu**2*from(7)*from(8)
-      sticks_on = slope <= 0.0_wp
-   end function sticks_on
-
-   !> First angle after which the pair leaves the cone, if it does before `to`.
-   !> Two exits within one stretch that both return inside before `to` are seen as none: the cubic
-   !> has one summit.
-   pure subroutine find_exit(motion, z, to, at, found)
-      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
       real(wp), intent(in) :: z(2)
-      type(instant_type), intent(in) :: to
-      !> Where stick has begun, then where it ends.
+      type(stretch_type), intent(in) :: stretch
+      !> Where stick ends.
       type(instant_type), intent(inout) :: at
       logical, intent(out) :: found
       type(instant_type) :: last
-      real(wp) :: f(2), df(2)
+      real(wp), dimension(n_points) :: x, y, f, df
+      real(wp) :: noise
+      integer :: i
 
+      ! Of differences, not of expanded squares, as in `excess`.
+      x = stretch%p(:, 1) - z(1)
+      y = stretch%p(:, 2) - z(2)
+      f = x**2 + y**2 - stretch%radius**2
+      df = 2.0_wp*(x*stretch%dp(:, 1) + y*stretch%dp(:, 2) - stretch%radius*stretch%dradius)
+      noise = noise_of(motion)
       found = .false.
-      if (to%angle <= at%angle) return
-      last = to
-      f(2) = excess(to, z)
-      if (f(2) <= noise_of(motion)) then
-         ! Perhaps between: at the largest value of the cubic through both ends.
-         df(2) = excess_slope(to, z)
-         if (df(2) >= 0.0_wp) return
-         f(1) = excess(at, z)
-         df(1) = excess_slope(at, z)
-         if (df(1) <= 0.0_wp) return
-         last = motion%look(at%angle + summit(f, df, to%angle - at%angle))
-         if (excess(last, z) <= noise_of(motion)) return
-      end if
-      found = .true.
-      call find_crossing(motion, z, last, at)
+      do i = 1, n_points - 1
+         if (f(i + 1) <= noise .and. (df(i) <= 0.0_wp .or. df(i + 1) >= 0.0_wp)) cycle
+         last = point_of(cells, stretch, i + 1)
+         at = point_of(cells, stretch, i)
+         if (f(i + 1) <= noise) then
+            call climb(motion, z, f(i:i + 1), df(i:i + 1), at%angle, last)
+            if (excess(last, z) <= noise) cycle
+         end if
+         found = .true.
+         ! Round-off there would be taken for a root.
+         if (i == 1) call leave_start(motion, z, at, last)
+         call find_crossing(motion, z, last, at)
+         return
+      end do
    end subroutine find_exit
+
+   !> A start within the cone: where stick begins the excess and its slope vanish to round-off.
+   pure subroutine leave_start(motion, z, at, last)
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: z(2)
+      !> The start, and an instant outside of the cone.
+      type(instant_type), intent(inout) :: at, last
+      type(instant_type) :: trial
+      integer :: k
+
+      do k = 1, max_halvings
+         trial = motion%look(0.5_wp*(at%angle + last%angle))
+         if (excess(trial, z) < 0.0_wp) then
+            at = trial
+            return
+         end if
+         last = trial
+      end do
+   end subroutine leave_start
+
+   !> To the summit of the excess between two angles, or to anywhere above zero.
+   pure subroutine climb(motion, z, f, df, from, last)
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: z(2)
+      !> Excess and slope at both ends, rising and then falling.
+      real(wp), intent(in) :: f(2), df(2), from
+      !> The upper end, then the summit.
+      type(instant_type), intent(inout) :: last
+      real(wp) :: angle(2), value(2), slope(2), noise
+      integer :: end, k
+
+      angle = [from, last%angle]
+      value = f
+      slope = df
+      noise = noise_of(motion)
+      do k = 1, max_climbs
+         last = motion%look(angle(1) + summit(value, slope, angle(2) - angle(1)))
+         end = merge(1, 2, excess_slope(last, z) > 0.0_wp)
+         angle(end) = last%angle
+         value(end) = excess(last, z)
+         slope(end) = excess_slope(last, z)
+         ! Outside of the cone: an exit, wherever the summit is.
+         if (value(end) > noise) return
+         ! No higher than the lines through both ends meet; most summits are far below zero.
+         if (min(value(1) + slope(1)*(angle(2) - angle(1)), &
+                 value(2) - slope(2)*(angle(2) - angle(1))) <= noise) return
+      end do
+   end subroutine climb
 
    !> Root of the excess between two angles: first on the quintic through both, then on the series.
    pure subroutine find_crossing(motion, z, last, at)

@@ -1,18 +1,16 @@
 !> The predicted forces of one pair with two tangential directions as trigonometric polynomials: P
-!> (2) and N = -y_n with two derivatives, R = mu N, on the cells of a grid and at any angle; and the
-!> rotations of slip over every half of a cell, each made when it is first asked for.
+!> (2) and N = -y_n with two derivatives, R = mu N, at the points of the cells and at any angle.
 module fw_event_motion
    use fw_event_cells, only: cells_type
-   use fw_event_rotation, only: gauss_point
-   use fw_event_rotation, only: new_rotation
-   use fw_event_rotation, only: rotation_type
+   use fw_event_stages, only: cosine_and_sine
+   use fw_event_stages, only: n_points
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    implicit none (type, external)
    private
 
-   public :: motion_type, instant_type, gauss_type
-   public :: on_cone
+   public :: motion_type, instant_type, stretch_type
+   public :: on_cone, point_of
 
    !> Violation of the cone that is round-off, relative to the square of the size of P; and of R,
    !> relative to that size.
@@ -25,14 +23,15 @@ module fw_event_motion
       real(wp) :: radius = 0.0_wp, dradius = 0.0_wp, ddradius = 0.0_wp
    end type instant_type
 
-   !> P' and R at the two Gauss points of a step, R kept above round-off where N ends; R' and P''
-   !> too where a pair lands.
-   !> The floor keeps a = P'/R finite; behind a landing, where a is truly infinite, the arc of
-   !> fw_event_rotation takes over and the floor is never felt.
-   type :: gauss_type
-      real(wp) :: dp(2, 2) = 0.0_wp, radius(2) = 0.0_wp
-      real(wp) :: ddp(2, 2) = 0.0_wp, dradius(2) = 0.0_wp
-   end type gauss_type
+   !> The same at the points of a stretch from one angle to another (point, direction).
+   type :: stretch_type
+      !> The cell that it covers; 0 where it does not cover one.
+      integer :: cell = 0
+      real(wp) :: from = 0.0_wp, to = 0.0_wp
+      real(wp), dimension(n_points, 2) :: p = 0.0_wp, dp = 0.0_wp, ddp = 0.0_wp
+      real(wp), dimension(n_points) :: normal = 0.0_wp
+      real(wp), dimension(n_points) :: radius = 0.0_wp, dradius = 0.0_wp, ddradius = 0.0_wp
+   end type stretch_type
 
    type :: motion_type
       integer :: degree = 0
@@ -41,30 +40,24 @@ module fw_event_motion
       logical :: remembers = .true.
       !> P (0:degree, cosine and sine, direction) and N (0:degree, cosine and sine).
       real(wp), allocatable :: tangential(:, :, :), normal(:, :)
-      !> Sum of the amplitudes of P, and N is constant.
-      real(wp) :: scale = 0.0_wp
+      !> Sum of the amplitudes of P, and of those of R; and N is constant.
+      real(wp) :: scale = 0.0_wp, largest_radius = 0.0_wp
       logical :: steady = .false.
-      !> P_x, P_y, P_x', P_y', P_x'', P_y'', N, N', N'' at the nodes of the cells (9, 2 n_cells).
-      real(wp), allocatable :: node(:, :)
-      !> P_x', P_y', N at the Gauss points (3, point, 2 n_cells).
-      real(wp), allocatable, private :: gauss(:, :, :)
+      !> N and N' at the instants (n_time).
+      real(wp), allocatable :: values(:), slopes(:)
+      !> P_x, P_y, P_x', P_y', P_x'', P_y'', N, N', N'' at the points of the cells
+      !> (n_points, n_cells, 9).
+      real(wp), allocatable :: point(:, :, :)
       !> P_x, P_y, N of a harmonic (3 and room for one, cosine and sine, 0:degree).
       real(wp), allocatable, private :: packed(:, :, :)
-      !> Coefficients of what `node` holds (n_coefficients, 9), and of P_x', P_y', N.
-      real(wp), allocatable, private :: series(:, :), gauss_series(:, :)
-      !> Exponentials of the halves of the cells (2 n_cells), and which of them are made since
-      !> `fill`.
-      type(rotation_type), allocatable, private :: rotation(:)
-      logical, allocatable, private :: known(:)
+      !> Coefficients of what `point` holds (n_coefficients, 9).
+      real(wp), allocatable, private :: series(:, :)
    contains
       procedure :: reserve
       procedure :: fill
       procedure :: can_rest
-      procedure :: at_node
       procedure :: look
-      procedure :: half_cell
-      procedure :: look_gauss
-      procedure :: rotation_of
+      procedure :: stretch
    end type motion_type
 
 contains
@@ -73,21 +66,16 @@ contains
    pure subroutine reserve(self, cells)
       class(motion_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
-      integer :: n
 
       self%degree = cells%degree
-      n = 2*cells%n_cells
       allocate (self%tangential(0:self%degree, 2, 2), self%normal(0:self%degree, 2), source=0.0_wp)
       allocate (self%packed(4, 2, 0:self%degree), source=0.0_wp)
-      allocate (self%node(9, n), self%gauss(3, 2, n), source=0.0_wp)
+      allocate (self%point(n_points, cells%n_cells, 9), source=0.0_wp)
+      allocate (self%values(cells%n_time), self%slopes(cells%n_time), source=0.0_wp)
       allocate (self%series(cells%n_coefficients, 9), source=0.0_wp)
-      allocate (self%gauss_series(cells%n_coefficients, 3), source=0.0_wp)
-      allocate (self%rotation(n), self%known(n))
    end subroutine reserve
 
    !> State the predicted forces.
-   !> Costs two products for all nodes; the rotations follow on demand, because pairs that stick
-   !> need none.
    subroutine fill(self, cells, prediction, offset, mean)
       class(motion_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
@@ -128,9 +116,8 @@ contains
       ! Parity carries no constant; the offset is all that there is then.
       if (cells%harmonic(1) > 0) self%normal(0, 1) = 0.0_wp
       self%normal(0, 1) = self%normal(0, 1) - offset
-      self%gauss_series(:, 1:2) = self%series(:, 3:4)
-      self%gauss_series(:, 3) = self%series(:, 7)
       self%scale = sum(abs(self%tangential))
+      self%largest_radius = self%mu*sum(abs(self%normal))
       self%steady = .not. any(abs(self%normal(1:, :)) > 0.0_wp)
       do n = 0, self%degree
          do j = 1, 2
@@ -138,56 +125,60 @@ contains
             self%packed(1:3, j, n) = [self%tangential(n, j, :), self%normal(n, j)]
          end do
       end do
-      n = size(self%known)
-      call dgemm('T', 'N', 9, n, nc, 1.0_wp, self%series, nc, cells%node, nc, 0.0_wp, self%node, 9)
-      call dgemm('T', 'N', 3, 2*n, nc, 1.0_wp, self%gauss_series, nc, cells%gauss, nc, 0.0_wp, &
-                 self%gauss, 3)
-      self%node(7, :) = self%node(7, :) - offset
-      self%gauss(3, :, :) = self%gauss(3, :, :) - offset
-      self%known = .false.
+      n = n_points*cells%n_cells
+      call dgemm('N', 'N', n, 9, nc, 1.0_wp, cells%wave, n, self%series, nc, 0.0_wp, self%point, n)
+      self%point(:, :, 7) = self%point(:, :, 7) - offset
+      call fill_instants(self, cells, offset)
    end subroutine fill
 
+   !> N and N' at the instants.
+   pure subroutine fill_instants(self, cells, offset)
+      class(motion_type), intent(inout) :: self
+      type(cells_type), intent(in) :: cells
+      real(wp), intent(in) :: offset
+      real(wp) :: value, slope
+      integer :: i, k
+
+      do k = 1, cells%n_time
+         value = 0.0_wp
+         slope = 0.0_wp
+         !$omp simd reduction(+:value, slope)
+         do i = 1, cells%n_coefficients
+            value = value + cells%instant(i, k)*self%series(i, 7)
+            slope = slope + cells%instant(i, k)*self%series(i, 8)
+         end do
+         self%values(k) = value - offset
+         self%slopes(k) = slope
+      end do
+   end subroutine fill_instants
+
    !> Whether a position may exist that bears all instants without slip: in each of four directions
-   !> the discs at the nodes share a value.
+   !> the discs at the points of the cells share a value.
    pure logical function can_rest(self)
       class(motion_type), intent(in) :: self
       real(wp), parameter :: half = sqrt(0.5_wp)
       real(wp), parameter :: along(2, 4) = reshape([1.0_wp, 0.0_wp, half, half, 0.0_wp, 1.0_wp, &
                                                     -half, half], [2, 4])
       real(wp) :: lower, upper, p, radius
-      integer :: d, k
+      integer :: d, i, k
 
       can_rest = .false.
-      if (any(self%node(7, :) <= 0.0_wp)) return
+      if (any(self%point(:, :, 7) <= 0.0_wp)) return
       do d = 1, size(along, 2)
          lower = -huge(1.0_wp)
          upper = huge(1.0_wp)
-         do k = 1, size(self%node, 2)
-            p = along(1, d)*self%node(1, k) + along(2, d)*self%node(2, k)
-            radius = self%mu*self%node(7, k)
-            lower = max(lower, p - radius)
-            upper = min(upper, p + radius)
+         do k = 1, size(self%point, 2)
+            do i = 1, n_points
+               p = along(1, d)*self%point(i, k, 1) + along(2, d)*self%point(i, k, 2)
+               radius = self%mu*self%point(i, k, 7)
+               lower = max(lower, p - radius)
+               upper = min(upper, p + radius)
+            end do
          end do
          if (lower > upper) return
       end do
       can_rest = .true.
    end function can_rest
-
-   !> A node of the cells; the one behind the last is the first, at 2 pi.
-   pure type(instant_type) function at_node(self, cells, node) result(at)
-      class(motion_type), intent(in) :: self
-      type(cells_type), intent(in) :: cells
-      integer, intent(in) :: node
-      integer :: j
-
-      ! Values of the first node, but the angle 2 pi: pieces of the path keep their order by angle.
-      j = merge(1, node, node > size(self%known))
-      at%angle = cells%node_angle(node)
-      at%p = self%node(1:2, j)
-      at%dp = self%node(3:4, j)
-      at%ddp = self%node(5:6, j)
-      call set_normal(self, self%node(7:9, j), at)
-   end function at_node
 
    !> N and R = mu N with two derivatives each.
    pure subroutine set_normal(self, normal, at)
@@ -204,7 +195,6 @@ contains
    end subroutine set_normal
 
    !> Any angle.
-   !> Costs a sine, a cosine and three recurrences of `degree` steps: nodes are far cheaper.
    pure type(instant_type) function look(self, angle) result(at)
       class(motion_type), intent(in) :: self
       real(wp), intent(in) :: angle
@@ -238,50 +228,82 @@ contains
       call set_normal(self, [value(3), slope(3), curvature(3)], at)
    end function look
 
-   !> The Gauss points of half a cell.
-   pure type(gauss_type) function half_cell(self, half) result(gauss)
+   !> The points of a stretch: a cell's, or those between any two angles.
+   pure subroutine stretch(self, cells, cell, from, to, out)
       class(motion_type), intent(in) :: self
-      integer, intent(in) :: half
-
-      gauss%dp = self%gauss(1:2, :, half)
-      ! Where contact ends N may be round-off of either sign: the floor keeps the direction finite
-      ! where the force vanishes anyway.
-      gauss%radius = max(self%mu*self%gauss(3, :, half), on_cone*self%scale, tiny(1.0_wp))
-   end function half_cell
-
-   !> Those of any step.
-   !> Of a step from the angle `from` over h, off the grid; with R' and P'', for a landing.
-   pure type(gauss_type) function look_gauss(self, from, h) result(gauss)
-      class(motion_type), intent(in) :: self
-      real(wp), intent(in) :: from, h
-      type(instant_type) :: at
-      integer :: i
-
-      do i = 1, 2
-         at = self%look(from + gauss_point(i)*h)
-         gauss%dp(:, i) = at%dp
-         gauss%ddp(:, i) = at%ddp
-         gauss%dradius(i) = at%dradius
-         gauss%radius(i) = max(at%radius, on_cone*self%scale, tiny(1.0_wp))
-      end do
-   end function look_gauss
-
-   !> The rotation of slip over half a cell.
-   pure subroutine rotation_of(self, cells, half, rotation)
-      class(motion_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
-      !> Half of a cell, 1..2 n_cells.
-      integer, intent(in) :: half
-      type(rotation_type), intent(out) :: rotation
-      type(gauss_type) :: gauss
+      !> Cell (0: none).
+      integer, intent(in) :: cell
+      real(wp), intent(in) :: from, to
+      type(stretch_type), intent(out) :: out
+      real(wp), dimension(n_points) :: c, s, c_1, s_1, wave, conjugate
+      real(wp) :: w
+      integer :: i, j, m
 
-      if (.not. self%known(half)) then
-         gauss = self%half_cell(half)
-         self%rotation(half) = new_rotation(cells%half, gauss%dp(:, 1)/gauss%radius(1), &
-                                            gauss%dp(:, 2)/gauss%radius(2))
-         self%known(half) = .true.
+      out%cell = cell
+      out%from = from
+      out%to = to
+      if (cell > 0) then
+         do j = 1, 2
+            out%p(:, j) = self%point(:, cell, j)
+            out%dp(:, j) = self%point(:, cell, j + 2)
+            out%ddp(:, j) = self%point(:, cell, j + 4)
+         end do
+         out%normal = max(self%point(:, cell, 7), 0.0_wp)
+         out%radius = self%mu*out%normal
+         out%dradius = self%mu*self%point(:, cell, 8)
+         out%ddradius = self%mu*self%point(:, cell, 9)
+         return
       end if
-      rotation = self%rotation(half)
-   end subroutine rotation_of
+      call cosine_and_sine(from + (to - from)*cells%rule%place, c_1, s_1)
+      c = c_1
+      s = s_1
+      do j = 1, 2
+         out%p(:, j) = self%packed(j, 1, 0)
+      end do
+      out%normal = self%packed(3, 1, 0)
+      ! All points of a stretch at once: one harmonic after the other, points innermost.
+      do m = 1, self%degree
+         w = real(m, wp)
+         do j = 1, 3
+            do i = 1, n_points
+               wave(i) = self%packed(j, 1, m)*c(i) + self%packed(j, 2, m)*s(i)
+               conjugate(i) = w*(self%packed(j, 2, m)*c(i) - self%packed(j, 1, m)*s(i))
+            end do
+            if (j < 3) then
+               out%p(:, j) = out%p(:, j) + wave
+               out%dp(:, j) = out%dp(:, j) + conjugate
+               out%ddp(:, j) = out%ddp(:, j) - w**2*wave
+            else
+               out%normal = out%normal + wave
+               out%dradius = out%dradius + self%mu*conjugate
+               out%ddradius = out%ddradius - (self%mu*w**2)*wave
+            end if
+         end do
+         wave = c*c_1 - s*s_1
+         s = s*c_1 + c*s_1
+         c = wave
+      end do
+      ! Where contact begins or ends, N is round-off of either sign.
+      out%normal = max(out%normal, 0.0_wp)
+      out%radius = self%mu*out%normal
+   end subroutine stretch
+
+   !> A point of a stretch (N' and N'' are left out).
+   pure type(instant_type) function point_of(cells, stretch, i) result(at)
+      type(cells_type), intent(in) :: cells
+      type(stretch_type), intent(in) :: stretch
+      integer, intent(in) :: i
+
+      at%angle = stretch%from + (stretch%to - stretch%from)*cells%rule%place(i)
+      if (i == n_points) at%angle = stretch%to
+      at%p = stretch%p(i, :)
+      at%dp = stretch%dp(i, :)
+      at%ddp = stretch%ddp(i, :)
+      at%radius = stretch%radius(i)
+      at%dradius = stretch%dradius(i)
+      at%ddradius = stretch%ddradius(i)
+      at%normal = stretch%normal(i)
+   end function point_of
 
 end module fw_event_motion

@@ -221,15 +221,13 @@ contains
                  fourier%n_coefficients, values, 3, 0.0_wp, self%force, fourier%n_coefficients)
    end subroutine fit
 
-   !> Forces at the starts of the cells (3, n_cells).
+   !> Forces at uniform instants (3, number of them).
    subroutine sample(self, cells, values)
       class(planar_pair_type), intent(in) :: self
       type(cells_type), intent(in) :: cells
       real(wp), intent(out) :: values(:, :)
 
-      call self%integral%sample(self%map%path, self%map%motion, cells, values(1:2, :))
-      ! Open where N < 0.
-      values(3, :) = min(-self%map%motion%node(7, ::2), 0.0_wp)
+      call self%integral%sample(self%map%path, self%map%motion, cells, values)
    end subroutine sample
 
    !> Transposed derivative of the forces - (coefficient, component) of the input, then of the
@@ -303,9 +301,9 @@ contains
                                              jacobian(2*nc + 1:, 2*nc + 1:))
          return
       end if
-      do k = 1, cells%n_cells
+      do k = 1, cells%n_time
          ! dy_n at the instants that bear.
-         if (self%map%motion%node(7, 2*k - 1) < 0.0_wp) cycle
+         if (self%map%motion%values(k) < 0.0_wp) cycle
          do c = 1, nc
             jacobian(2*nc + 1:, 2*nc + c) = jacobian(2*nc + 1:, 2*nc + c) + &
                                             fourier%analysis(c, k)*fourier%synthesis(:, k)

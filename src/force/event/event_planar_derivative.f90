@@ -6,23 +6,23 @@
 !>   dtheta = -(t.(dP - dz) - dR)/pull.
 module fw_event_planar_derivative
    use fw_event_cells, only: cells_type
-   use fw_event_cells, only: waves_at
+   use fw_event_cells, only: instant_of
    use fw_event_moments, only: moments_type
    use fw_event_motion, only: instant_type
    use fw_event_motion, only: motion_type
+   use fw_event_motion, only: stretch_type
    use fw_event_planar_force, only: first_instant
-   use fw_event_planar_force, only: simpson
    use fw_event_planar_path, only: phase_slip
    use fw_event_planar_path, only: phase_stick
    use fw_event_planar_path, only: piece_type
    use fw_event_planar_path, only: planar_path_type
-   use fw_event_planar_path, only: slide_of
    use fw_event_planar_tangent, only: new_tangent
    use fw_event_planar_tangent, only: tangent_type
    use fw_event_polynomial, only: fill_waves
-   use fw_event_rotation, only: direction_of
-   use fw_event_slide, only: pull
-   use fw_event_slide, only: slide_type
+   use fw_event_slide, only: pulls
+   use fw_event_stages, only: direction_of
+   use fw_event_stages, only: n_points
+   use fw_event_stages, only: n_stages
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
@@ -43,14 +43,12 @@ module fw_event_planar_derivative
       real(wp), allocatable :: gradient(:, :)
       !> The friction path is wanted.
       logical, private :: measures = .false.
-      !> Inputs and weights of products that add up to the gradient (input, row), (output, row), and
-      !> the weight in the quadrature of the last row.
+      !> Inputs and weights of products that add up to the gradient (input, row), (output, row).
       real(wp), allocatable, private :: row(:, :), projector(:, :)
       integer, private :: n_rows = 0
-      real(wp), private :: last_weight = 0.0_wp
-      !> Directions of slip at the nodes times the weights of the quadrature (2, 2 n_cells), and
-      !> their moments (0:2 degree, direction).
-      real(wp), allocatable, private :: node(:, :), cosine(:, :), sine(:, :)
+      !> Directions of slip at the points of the cells times the weights of the quadrature
+      !> (n_points, n_cells, 2), and their moments (0:2 degree, direction).
+      real(wp), allocatable, private :: node(:, :, :), cosine(:, :), sine(:, :)
    contains
       procedure :: carry
       procedure :: accumulate
@@ -72,7 +70,7 @@ contains
       n = 2*cells%n_coefficients + 1
       allocate (self%gradient(self%tangent%n_inputs, n), source=0.0_wp)
       allocate (self%row(self%tangent%n_inputs, buffer_size), self%projector(n, buffer_size))
-      allocate (self%node(2, 2*cells%n_cells), source=0.0_wp)
+      allocate (self%node(n_points, cells%n_cells, 2), source=0.0_wp)
       allocate (self%cosine(0:2*cells%degree, 2), self%sine(0:2*cells%degree, 2), source=0.0_wp)
    end function new_derivative
 
@@ -80,20 +78,20 @@ contains
    pure subroutine carry(self, path, motion, cells)
       class(planar_derivative_type), intent(inout) :: self
       type(planar_path_type), intent(in) :: path
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      type(slide_type) :: slide
-      integer :: i, k
+      type(stretch_type) :: stretch
+      integer :: i
 
       ! Sticks change nothing along their way: dz holds from their start to their end.
       call self%tangent%start()
       do i = 1, path%n_pieces
          call begin_piece(self, path, motion, cells, i, .false.)
-         if (path%piece(i)%phase == phase_stick) cycle
-         slide = slide_of(path%piece(i), motion, cells)
-         do k = 1, 2
-            call self%tangent%advance(motion, cells, slide, k)
-         end do
+         associate (piece => path%piece(i))
+            if (piece%phase == phase_stick) cycle
+            call motion%stretch(cells, piece%cell, piece%from, piece%to, stretch)
+            call self%tangent%advance(motion, cells, piece, stretch)
+         end associate
       end do
       call end_turn(self, path, motion, cells)
    end subroutine carry
@@ -102,7 +100,7 @@ contains
    subroutine accumulate(self, path, motion, cells, fourier)
       class(planar_derivative_type), intent(inout) :: self
       type(planar_path_type), intent(in) :: path
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       type(fourier_type), intent(in) :: fourier
       integer :: i
@@ -144,7 +142,7 @@ contains
                call tangent%land(cells, at)
             else if (i > 1) then
                ! Stick behind slip: its position is that of the last direction.
-               call tangent%stop_slip(motion, cells, at, path%piece(i - 1)%v(:, 3))
+               call tangent%stop_slip(motion, cells, at, path%piece(i - 1)%phi(n_points))
             else if (.not. motion%remembers) then
                ! At velocity level a stick holds no position that could depend on anything.
                tangent%dz = 0.0_wp
@@ -154,21 +152,21 @@ contains
             call tangent%set_waves(cells, piece%from)
             if (.not. motion%remembers) tangent%dz = 0.0_wp
             call tangent%begin_slip(at, piece%z)
-            if (records .and. motion%remembers) call add_onset(self, motion, at, piece%v(:, 1))
+            if (records .and. motion%remembers) call add_onset(self, motion, at, piece%phi(1))
          end if
       end associate
    end subroutine begin_piece
 
    !> The friction path loses -N pull dtheta = N (t.(dP - dz) - dR), dR = -mu dy_n.
-   pure subroutine add_onset(self, motion, at, v)
+   pure subroutine add_onset(self, motion, at, phi)
       type(planar_derivative_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
       type(instant_type), intent(in) :: at
-      real(wp), intent(in) :: v(2)
+      real(wp), intent(in) :: phi
       real(wp) :: t(2)
       integer :: path, nc
 
-      t = direction_of(v)
+      t = direction_of(phi)
       nc = self%tangent%nc
       path = size(self%gradient, 2)
       associate (to => self%gradient(:, path), wave => self%tangent%wave)
@@ -196,24 +194,23 @@ contains
                tangent%dz((c - 1)*tangent%nc + 1:c*tangent%nc, c) = tangent%wave
             end do
          else if (last%phase == phase_slip) then
-            call tangent%stop_slip(motion, cells, motion%at_node(cells, 1), last%v(:, 3))
+            call tangent%stop_slip(motion, cells, motion%look(0.0_wp), last%phi(n_points))
          end if
       end associate
    end subroutine end_turn
 
    !> A row with its projector; products are made once there is no room for more.
-   subroutine add_row(self, row, projector, weight)
+   subroutine add_row(self, row, projector)
       class(planar_derivative_type), intent(inout) :: self
-      !> Derivative of something by the inputs (n_inputs), what it adds to each coefficient
-      !> (n_output), and its weight in the quadrature (0: of no node).
-      real(wp), intent(in) :: row(:), projector(:), weight
+      !> Derivative of something by the inputs (n_inputs), and what it adds to each coefficient
+      !> (n_output).
+      real(wp), intent(in) :: row(:), projector(:)
 
       if (self%n_rows == buffer_size) call self%flush_rows()
       ! Gathered, since one product of many rows is far faster than as many updates of rank one.
       self%n_rows = self%n_rows + 1
       self%row(:, self%n_rows) = row
       self%projector(:, self%n_rows) = projector
-      self%last_weight = weight
    end subroutine add_row
 
    !> gradient += row projector^T over the rows gathered so far.
@@ -257,147 +254,109 @@ contains
          projector = 0.0_wp
          ! T = P - z; the part of P is in the Gram matrix of the sticks (fw_event_planar).
          projector((c - 1)*nc + 1:c*nc) = -cells%weight*integral
-         call self%add_row(self%tangent%dz(:, c), projector, 0.0_wp)
+         call self%add_row(self%tangent%dz(:, c), projector)
       end do
    end subroutine add_stick
 
-   !> Nodes of one stretch of slip: dT = dR t + R n dphi.
+   !> One step of slip: dT = dR t + R n dphi at its Gauss points.
    subroutine add_slip(self, motion, cells, piece, projects)
       type(planar_derivative_type), intent(inout) :: self
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       type(piece_type), intent(in) :: piece
       logical, intent(in) :: projects
-      type(slide_type) :: slide
-      real(wp) :: weight
-      integer :: k
+      type(stretch_type) :: stretch
+      real(wp) :: t(2), weight, wave(cells%n_coefficients)
+      real(wp) :: projector(2*cells%n_coefficients + 1)
+      integer :: j, nc
 
-      slide = slide_of(piece, motion, cells)
-      do k = 1, 3
-         if (k > 1) call self%tangent%advance(motion, cells, slide, k - 1)
-         ! The quadrature of the force (fw_event_planar_force), so that derivative and force agree.
-         weight = simpson(k)*(piece%to - piece%from)
-         if (self%measures) call add_path_node(self, motion, cells, slide, k, weight)
-         if (motion%mu <= 0.0_wp) cycle
-         if (k == 1 .and. .not. piece%begins .and. self%n_rows > 0 .and. &
-             self%last_weight > 0.0_wp) then
-            ! The end of the stretch before is the same node.
-            associate (last => self%projector(:, self%n_rows))
-               ! Force and dphi are the same on both sides, so that only the weights add.
-               last = (1.0_wp + weight/self%last_weight)*last
-            end associate
-            if (projects) call turn_node(self, cells, slide, k, weight)
-         else
-            call add_node(self, motion, cells, slide, k, weight, projects)
-         end if
-      end do
-   end subroutine add_slip
-
-   !> One node: its rows by dphi, and by dR.
-   subroutine add_node(self, motion, cells, slide, k, weight, projects)
-      type(planar_derivative_type), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
-      type(cells_type), intent(in) :: cells
-      type(slide_type), intent(in) :: slide
-      integer, intent(in) :: k
-      real(wp), intent(in) :: weight
-      logical, intent(in) :: projects
-      real(wp) :: t(2), projector(2*cells%n_coefficients + 1), wave(cells%n_coefficients)
-      real(wp) :: slope(cells%n_coefficients)
-      integer :: nc
-
-      if (.not. (projects .or. self%measures)) return
+      call motion%stretch(cells, piece%cell, piece%from, piece%to, stretch)
+      call self%tangent%advance(motion, cells, piece, stretch)
+      if (self%measures) call add_path(self, motion, cells, piece, stretch)
+      if (motion%mu <= 0.0_wp .or. .not. (projects .or. self%measures)) return
+      if (projects) call turn_step(self, cells, piece)
       nc = cells%n_coefficients
-      projector = 0.0_wp
-      associate (at => slide%at(k))
+      do j = 2, n_stages + 1
+         ! The quadrature of the force (fw_event_planar_force), so that derivative and force agree.
+         weight = cells%rule%weight(j)*(piece%to - piece%from)
+         projector = 0.0_wp
          ! n = (-t_2, t_1).
-         t = direction_of(slide%v(:, k))
+         t = direction_of(piece%phi(j))
          if (projects) then
-            if (slide%cell > 0) then
-               wave = cells%node(:, node_of(self, slide, k))
-            else
-               call waves_at(cells, at%angle, wave, slope)
-            end if
             ! The force turns by R n dphi; its coefficients are the quadrature against the waves.
-            projector(:nc) = (-weight*at%radius*t(2))*cells%weight*wave
-            projector(nc + 1:2*nc) = (weight*at%radius*t(1))*cells%weight*wave
-            call turn_node(self, cells, slide, k, weight)
+            wave = (weight*stretch%radius(j))*cells%weight*self%tangent%waves(j, :)
+            projector(:nc) = -t(2)*wave
+            projector(nc + 1:2*nc) = t(1)*wave
          end if
          if (self%measures .and. motion%remembers) then
             ! d(P'.t) = P'.n dphi.
-            projector(2*nc + 1) = weight*at%normal*(t(1)*at%dp(2) - t(2)*at%dp(1))
+            projector(2*nc + 1) = weight*stretch%normal(j)* &
+                                  (t(1)*stretch%dp(j, 2) - t(2)*stretch%dp(j, 1))
          end if
-      end associate
-      call self%add_row(self%tangent%dphi, projector, weight)
-   end subroutine add_node
+         call self%add_row(self%tangent%dphi_at(:, j), projector)
+      end do
+   end subroutine add_slip
 
-   !> Node on the cells, for a stretch that covers one.
-   pure integer function node_of(self, slide, k)
-      type(planar_derivative_type), intent(in) :: self
-      type(slide_type), intent(in) :: slide
-      integer, intent(in) :: k
-
-      node_of = modulo(2*slide%cell + k - 3, size(self%node, 2)) + 1
-   end function node_of
-
-   !> The direction of slip at a node, for the Gram matrix of dR.
-   pure subroutine turn_node(self, cells, slide, k, weight)
+   !> The directions of slip of a step, for the Gram matrix of dR.
+   pure subroutine turn_step(self, cells, piece)
       type(planar_derivative_type), intent(inout) :: self
       type(cells_type), intent(in) :: cells
-      type(slide_type), intent(in) :: slide
-      integer, intent(in) :: k
-      real(wp), intent(in) :: weight
-      real(wp) :: t(2), cosines(0:2*cells%degree), sines(0:2*cells%degree)
-      integer :: c
+      type(piece_type), intent(in) :: piece
+      real(wp) :: t(2), angle, width, cosines(0:2*cells%degree), sines(0:2*cells%degree)
+      integer :: c, j
 
-      t = weight*direction_of(slide%v(:, k))
-      ! Nodes are collected over the period, and meet their waves in one product at the end.
-      if (slide%cell > 0) then
-         associate (to => self%node(:, node_of(self, slide, k)))
-            to = to + t
-         end associate
-         return
-      end if
-      call fill_waves(2*cells%degree, slide%at(k)%angle, cosines, sines)
-      do c = 1, 2
-         self%cosine(:, c) = self%cosine(:, c) + t(c)*cosines
-         self%sine(:, c) = self%sine(:, c) + t(c)*sines
+      width = piece%to - piece%from
+      do j = 2, n_stages + 1
+         t = (cells%rule%weight(j)*width)*direction_of(piece%phi(j))
+         ! Cells are collected over the period, and meet their waves in one product at the end.
+         if (piece%cell > 0) then
+            self%node(j, piece%cell, :) = self%node(j, piece%cell, :) + t
+            cycle
+         end if
+         angle = piece%from + width*cells%rule%place(j)
+         call fill_waves(2*cells%degree, angle, cosines, sines)
+         do c = 1, 2
+            self%cosine(:, c) = self%cosine(:, c) + t(c)*cosines
+            self%sine(:, c) = self%sine(:, c) + t(c)*sines
+         end do
       end do
-   end subroutine turn_node
+   end subroutine turn_step
 
-   !> What the friction path takes of a node beside dphi: d(N pull), with t fixed.
-   pure subroutine add_path_node(self, motion, cells, slide, k, weight)
+   !> What the friction path takes of a step beside dphi: d(N pull), with t fixed.
+   pure subroutine add_path(self, motion, cells, piece, stretch)
       type(planar_derivative_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      type(slide_type), intent(in) :: slide
-      integer, intent(in) :: k
-      real(wp), intent(in) :: weight
-      real(wp) :: t(2), rate, normal
-      integer :: nc, path
+      type(piece_type), intent(in) :: piece
+      type(stretch_type), intent(in) :: stretch
+      real(wp) :: f(n_points), t(2), rate, normal
+      integer :: j, nc, path
 
-      call self%tangent%set_waves(cells, slide%at(k)%angle)
-      t = direction_of(slide%v(:, k))
-      ! As in the force: a pull just below zero, before a stop, is none.
-      rate = weight*max(pull(motion, slide%at(k), slide%v(:, k)), 0.0_wp)
-      normal = weight*slide%at(k)%normal
       nc = self%tangent%nc
       path = size(self%gradient, 2)
-      associate (to => self%gradient(:, path), wave => self%tangent%wave, &
-                 slope => self%tangent%slope)
-         ! d(N pull) = dN pull + N (t.dP' - dR'), with dN = -dy_n and dR' = -mu dy_n'; at velocity
-         ! level the pull is t.P - R.
-         if (motion%remembers) then
-            to(:nc) = to(:nc) + normal*t(1)*slope
-            to(nc + 1:2*nc) = to(nc + 1:2*nc) + normal*t(2)*slope
-            to(2*nc + 1:3*nc) = to(2*nc + 1:3*nc) + normal*motion%mu*slope - rate*wave
-         else
-            to(:nc) = to(:nc) + normal*t(1)*wave
-            to(nc + 1:2*nc) = to(nc + 1:2*nc) + normal*t(2)*wave
-            to(2*nc + 1:3*nc) = to(2*nc + 1:3*nc) + (normal*motion%mu - rate)*wave
-         end if
-      end associate
-   end subroutine add_path_node
+      call pulls(motion, stretch, piece%phi, f)
+      do j = 2, n_stages + 1
+         t = direction_of(piece%phi(j))
+         normal = cells%rule%weight(j)*(piece%to - piece%from)
+         ! As in the force: a pull just below zero, before a stop, is none.
+         rate = normal*max(f(j), 0.0_wp)
+         normal = normal*stretch%normal(j)
+         associate (to => self%gradient(:, path), wave => self%tangent%waves(j, :), &
+                    slope => self%tangent%slopes(j, :))
+            ! d(N pull) = dN pull + N (t.dP' - dR'), with dN = -dy_n and dR' = -mu dy_n'; at
+            ! velocity level the pull is t.P - R.
+            if (motion%remembers) then
+               to(:nc) = to(:nc) + normal*t(1)*slope
+               to(nc + 1:2*nc) = to(nc + 1:2*nc) + normal*t(2)*slope
+               to(2*nc + 1:3*nc) = to(2*nc + 1:3*nc) + normal*motion%mu*slope - rate*wave
+            else
+               to(:nc) = to(:nc) + normal*t(1)*wave
+               to(nc + 1:2*nc) = to(nc + 1:2*nc) + normal*t(2)*wave
+               to(2*nc + 1:3*nc) = to(2*nc + 1:3*nc) + (normal*motion%mu - rate)*wave
+            end if
+         end associate
+      end do
+   end subroutine add_path
 
    !> dT by dR: the Gram matrix of the waves under t, over the nodes.
    subroutine add_turning(self, motion, cells)
@@ -405,14 +364,13 @@ contains
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       type(moments_type) :: moments
-      integer :: c, n, nc
+      integer :: c, k, n, nc
 
       n = 2*cells%degree + 1
+      k = n_points*cells%n_cells
       nc = cells%n_coefficients
-      call dgemm('N', 'T', n, 2, size(self%node, 2), 1.0_wp, cells%cosine, n, self%node, 2, &
-                 1.0_wp, self%cosine, n)
-      call dgemm('N', 'T', n, 2, size(self%node, 2), 1.0_wp, cells%sine, n, self%node, 2, &
-                 1.0_wp, self%sine, n)
+      call dgemm('N', 'N', n, 2, k, 1.0_wp, cells%cosine, n, self%node, k, 1.0_wp, self%cosine, n)
+      call dgemm('N', 'N', n, 2, k, 1.0_wp, cells%sine, n, self%node, k, 1.0_wp, self%sine, n)
       call moments%reserve(cells%degree)
       do c = 1, 2
          ! Moments of t by quadrature in the place of exact ones: then the Gram matrix is the same
@@ -436,21 +394,20 @@ contains
 
       nc = cells%n_coefficients
       if (motion%mu <= 0.0_wp) return
-      do k = first_instant(cells, piece%from), cells%n_cells
-         if (cells%node_angle(2*k - 1) >= piece%to) exit
+      do k = first_instant(cells%n_time, piece%from), cells%n_time
+         if (instant_of(cells%n_time, k) >= piece%to) exit
          associate (weight => fourier%analysis(:, k))
             ! Collocation may skip instants.
             if (.not. any(abs(weight) > 0.0_wp)) cycle
             if (piece%phase == phase_slip) then
                ! Slip: dT = R n dphi + t dR, with dR = -mu dy_n.
-               at = motion%at_node(cells, 2*k - 1)
-               ! Instants are starts of cells, and a stretch of slip covers no more than a cell: its
-               ! start.
-               t = direction_of(piece%v(:, 1))
+               at = motion%look(instant_of(cells%n_time, k))
+               ! Instants are starts of cells, and a step covers no more than a cell: its start.
+               t = direction_of(piece%phi(1))
                projector(:nc) = -at%radius*t(2)*weight
                projector(nc + 1:2*nc) = at%radius*t(1)*weight
                projector(2*nc + 1) = 0.0_wp
-               call self%add_row(self%tangent%dphi, projector, 0.0_wp)
+               call self%add_row(self%tangent%dphi, projector)
                do c = 1, 2
                   call add_outer(self, 3, c, -motion%mu*t(c), fourier%synthesis(:, k), weight)
                end do
@@ -460,7 +417,7 @@ contains
             do c = 1, 2
                projector = 0.0_wp
                projector((c - 1)*nc + 1:c*nc) = -weight
-               call self%add_row(self%tangent%dz(:, c), projector, 0.0_wp)
+               call self%add_row(self%tangent%dz(:, c), projector)
                call add_outer(self, c, c, 1.0_wp, fourier%synthesis(:, k), weight)
             end do
          end associate

@@ -1,35 +1,34 @@
 !> Integrals along the path of a pair with two tangential directions: the coefficients of its
 !> forces, shares of stick, slip and open, and the path of friction. Stick and contact are
-!> integrated exactly, slip by Simpson's rule over every stretch: an error of fourth order in the
-!> width of the cells.
+!> integrated exactly, slip by the Gauss points of its steps.
 !>
 !> In stick T = P - z, so that with the sets chi the coefficients are G(chi_stick) P less those of z
-!> on the sticks; in slip T = R t at three nodes of each stretch; F_n = -G(chi_contact) N.
+!> on the sticks; in slip T = R t at the Gauss points; F_n = -G(chi_contact) N.
 module fw_event_planar_force
    use fw_event_cells, only: cells_type
-   use fw_event_cells, only: waves_at
+   use fw_event_cells, only: instant_of
+   use fw_event_cells, only: waves_of_step
    use fw_event_moments, only: moments_type
    use fw_event_motion, only: instant_type
    use fw_event_motion, only: motion_type
-   use fw_event_planar_path, only: phase_slip
+   use fw_event_motion, only: stretch_type
    use fw_event_planar_path, only: phase_stick
    use fw_event_planar_path, only: piece_type
    use fw_event_planar_path, only: planar_path_type
-   use fw_event_planar_path, only: slide_of
    use fw_event_polynomial, only: fill_waves
-   use fw_event_rotation, only: direction_of
-   use fw_event_slide, only: pull
-   use fw_event_slide, only: slide_type
+   use fw_event_slide, only: pulls
+   use fw_event_stages, only: angle_at
+   use fw_event_stages, only: cosine_and_sine
+   use fw_event_stages, only: direction_of
+   use fw_event_stages, only: n_points
+   use fw_event_stages, only: n_stages
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    implicit none (type, external)
    private
 
-   public :: planar_force_type, first_instant, simpson
-
-   !> Weights of start, middle and end.
-   real(wp), parameter :: simpson(3) = [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp
+   public :: planar_force_type, first_instant
 
    type :: planar_force_type
       !> Projected coefficients (n_coefficients, 3), and mean of the tangential forces.
@@ -39,10 +38,12 @@ module fw_event_planar_force
       real(wp) :: share(3) = 0.0_wp, friction_path = 0.0_wp
       !> Sets of stick and contact; stick weighted by z.
       type(moments_type) :: stick, contact, held(2)
-      !> Tangential forces at the nodes times the weights of the quadrature (2, 2 n_cells).
-      real(wp), allocatable, private :: node(:, :)
-      !> Workspace: waves up to 2 degree at an angle, and the retained ones with their slopes.
-      real(wp), allocatable, private :: cosines(:), sines(:), wave(:), slope(:)
+      !> Tangential forces at the points of the cells times the weights of the quadrature
+      !> (n_points, n_cells, 2).
+      real(wp), allocatable, private :: node(:, :, :)
+      !> Workspace: waves up to 2 degree at an angle, and the retained ones of a step with their
+      !> slopes.
+      real(wp), allocatable, private :: cosines(:), sines(:), wave(:, :), slope(:, :)
    contains
       procedure :: reserve
       procedure :: integrate
@@ -57,13 +58,14 @@ contains
       type(cells_type), intent(in) :: cells
 
       allocate (self%projected(cells%n_coefficients, 3), source=0.0_wp)
-      allocate (self%node(2, 2*cells%n_cells), source=0.0_wp)
+      allocate (self%node(n_points, cells%n_cells, 2), source=0.0_wp)
       call self%stick%reserve(cells%degree)
       call self%contact%reserve(cells%degree)
       call self%held(1)%reserve(cells%degree)
       call self%held(2)%reserve(cells%degree)
       allocate (self%cosines(0:2*cells%degree), self%sines(0:2*cells%degree))
-      allocate (self%wave(cells%n_coefficients), self%slope(cells%n_coefficients))
+      allocate (self%wave(n_points, cells%n_coefficients))
+      allocate (self%slope, mold=self%wave)
    end subroutine reserve
 
    !> Everything from a path.
@@ -72,9 +74,10 @@ contains
       type(planar_path_type), intent(in) :: path
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      integer :: c, i, nc
+      integer :: c, i, n, nc
 
       nc = cells%n_coefficients
+      n = n_points*cells%n_cells
       self%projected = 0.0_wp
       self%mean = 0.0_wp
       self%share = 0.0_wp
@@ -83,7 +86,7 @@ contains
       call self%stick%clear()
       call self%held(1)%clear()
       call self%held(2)%clear()
-      ! Nodes of whole cells only collect their forces here: one product for all of them below.
+      ! Whole cells only collect their forces here: one product for all of them below.
       do i = 1, path%n_pieces
          associate (piece => path%piece(i))
             if (piece%phase == phase_stick) then
@@ -97,10 +100,10 @@ contains
       end do
       ! Every node meets its waves once, whatever the number of stretches that have added to it.
       call add_contact(self, path)
-      call dgemm('N', 'T', nc, 2, 2*cells%n_cells, 1.0_wp, cells%node, nc, self%node, 2, 1.0_wp, &
+      call dgemm('T', 'N', nc, 2, n, 1.0_wp, cells%wave, n, self%node, n, 1.0_wp, &
                  self%projected, nc)
       do c = 1, 2
-         self%mean(c) = self%mean(c) + 0.5_wp/pi*sum(self%node(c, :))
+         self%mean(c) = self%mean(c) + 0.5_wp/pi*sum(self%node(:, :, c))
          self%projected(:, c) = cells%weight*self%projected(:, c)
       end do
       call add_sets(self, motion, cells)
@@ -120,37 +123,43 @@ contains
       end do
    end subroutine add_stick
 
-   !> Nodes of one stretch of slip.
+   !> One step of slip.
    pure subroutine add_slip(self, motion, cells, piece)
       type(planar_force_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       type(piece_type), intent(in) :: piece
-      type(slide_type) :: slide
-      real(wp) :: force(2), width
+      type(stretch_type) :: stretch
+      real(wp) :: force(n_points, 2), f(n_points), width
       integer :: c, j, k
 
-      ! The integral of N times the speed of z, which is the pull.
       width = piece%to - piece%from
+      if (width <= 0.0_wp) return
       self%share(2) = self%share(2) + 0.5_wp/pi*width
-      slide = slide_of(piece, motion, cells)
-      do k = 1, 3
-         associate (at => slide%at(k), v => slide%v(:, k))
-            self%friction_path = self%friction_path + &
-                                 simpson(k)*width*at%normal*max(pull(motion, at, v), 0.0_wp)
-            force = simpson(k)*width*at%radius*direction_of(v)
-            if (piece%cell > 0) then
-               ! The end of the last cell is the first node.
-               j = modulo(2*piece%cell + k - 3, 2*cells%n_cells) + 1
-               self%node(:, j) = self%node(:, j) + force
-               cycle
-            end if
-            call waves_at(cells, at%angle, self%wave, self%slope)
-            do c = 1, 2
-               self%mean(c) = self%mean(c) + 0.5_wp/pi*force(c)
-               self%projected(:, c) = self%projected(:, c) + force(c)*self%wave
-            end do
-         end associate
+      call motion%stretch(cells, piece%cell, piece%from, piece%to, stretch)
+      call pulls(motion, stretch, piece%phi, f)
+      ! Normal and tangential forces at the points of the step, not those of a grid: the same points
+      ! carry the direction, whose order the integrals then share.
+      do j = 2, n_stages + 1
+         ! The integral of N times the speed of z, which is the pull.
+         self%friction_path = self%friction_path + &
+                              cells%rule%weight(j)*width*stretch%normal(j)*max(f(j), 0.0_wp)
+      end do
+      call cosine_and_sine(piece%phi, force(:, 1), force(:, 2))
+      do c = 1, 2
+         force(:, c) = width*cells%rule%weight*stretch%radius*force(:, c)
+      end do
+      ! A whole cell meets its waves together with the others; the rest of a cell has its own.
+      if (piece%cell > 0) then
+         self%node(:, piece%cell, :) = self%node(:, piece%cell, :) + force
+         return
+      end if
+      call waves_of_step(cells, piece%from, width, self%wave, self%slope)
+      do c = 1, 2
+         self%mean(c) = self%mean(c) + 0.5_wp/pi*sum(force(:, c))
+         do k = 1, size(self%wave, 2)
+            self%projected(k, c) = self%projected(k, c) + dot_product(self%wave(:, k), force(:, c))
+         end do
       end do
    end subroutine add_slip
 
@@ -210,43 +219,58 @@ contains
       end associate
    end subroutine add_sets
 
-   !> Tangential forces at the starts of the cells (2, n_cells), for collocation and histories.
+   !> Forces at uniform instants (3, number of them), for collocation and histories.
    pure subroutine sample(self, path, motion, cells, values)
       class(planar_force_type), intent(in) :: self
       type(planar_path_type), intent(in) :: path
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      real(wp), intent(out) :: values(2, size(self%node, 2)/2)
+      real(wp), intent(out) :: values(:, :)
       type(instant_type) :: at
-      integer :: i, k
+      real(wp) :: width
+      integer :: i, k, n
 
-      values = 0.0_wp
+      n = size(values, 2)
+      values(1:2, :) = 0.0_wp
+      do k = 1, n
+         at = motion%look(instant_of(n, k))
+         ! Open where N < 0.
+         values(3, k) = min(-at%normal, 0.0_wp)
+      end do
+      if (motion%mu <= 0.0_wp .or. .not. allocated(self%projected)) return
       do i = 1, path%n_pieces
          associate (piece => path%piece(i))
-            do k = first_instant(cells, piece%from), cells%n_cells
-               if (cells%node_angle(2*k - 1) >= piece%to) exit
-               at = motion%at_node(cells, 2*k - 1)
-               if (piece%phase == phase_slip) then
-                  ! Starts of cells are starts of stretches of slip.
-                  values(:, k) = at%radius*direction_of(piece%v(:, 1))
-               else
+            width = piece%to - piece%from
+            do k = first_instant(n, piece%from), n
+               if (instant_of(n, k) >= piece%to) exit
+               at = motion%look(instant_of(n, k))
+               if (piece%phase == phase_stick) then
                   ! T = P - z.
-                  values(:, k) = at%p - piece%z
+                  values(1:2, k) = at%p - piece%z
+               else if (motion%remembers) then
+                  ! On the polynomial of the step, which is the direction itself at its start.
+                  values(1:2, k) = at%radius* &
+                     direction_of(angle_at(cells%rule, width, piece%phi(1), piece%slope, &
+                                           (at%angle - piece%from)/width))
+               else
+                  values(1:2, k) = at%radius*at%p/max(norm2(at%p), tiny(1.0_wp))
                end if
             end do
          end associate
       end do
    end subroutine sample
 
-   !> The first start of a cell that is not before an angle.
-   pure integer function first_instant(cells, angle) result(k)
-      type(cells_type), intent(in) :: cells
+   !> The first of n instants that is not before an angle.
+   pure integer function first_instant(n, angle) result(k)
+      integer, intent(in) :: n
       real(wp), intent(in) :: angle
 
       ! By division, then corrected for its rounding, in either direction.
-      k = int(0.5_wp*angle/cells%half) + 1
-      if (cells%node_angle(2*k - 1) < angle) k = k + 1
-      if (k > 1 .and. cells%node_angle(2*k - 3) >= angle) k = k - 1
+      k = int(0.5_wp/pi*angle*real(n, wp)) + 1
+      if (instant_of(n, k) < angle) k = k + 1
+      if (k > 1) then
+         if (instant_of(n, k - 1) >= angle) k = k - 1
+      end if
    end function first_instant
 
 end module fw_event_planar_force

@@ -2,40 +2,40 @@
 !>
 !> Between its knots - the ends of the cells and the roots of N - the pair sticks, slips or is open.
 !> It starts to slip at a root of |P - z|**2 - R**2, z being the corrected position; slipping, it
-!> turns as fw_event_rotation says (fw_event_slide); it stops where its pull falls to zero. Where
-!> contact begins, it sticks if R grows faster than P moves.
+!> turns as fw_event_stages says (fw_event_slide), in steps that are divided where the tolerance
+!> asks for it; it stops where its pull falls to zero. Where contact begins, it sticks if R grows
+!> faster than P moves.
 !>
 !> A turn maps the position z at the start of a period to that at its end; its derivative is carried
 !> along: slip keeps of dz what is normal to the force, a landing nothing.
 !>
-!> States on the way are the phase, z (stick), and the half-angle vector v (slip); with them go the
-!> derivatives of z and of the angle phi by the position at the start of the turn.
+!> States on the way are the phase, z (stick), and the angle phi of the force (slip); with them go
+!> the derivatives of z and phi by the position at the start of the turn.
 module fw_event_planar_path
    use fw_event_cells, only: cells_type
    use fw_event_exit, only: find_exit
    use fw_event_exit, only: is_pushed
-   use fw_event_exit, only: sticks_on
    use fw_event_motion, only: instant_type
    use fw_event_motion, only: motion_type
+   use fw_event_motion, only: stretch_type
    use fw_event_roots, only: find_roots
-   use fw_event_rotation, only: direction_of
-   use fw_event_rotation, only: half_angle
-   use fw_event_slide, only: glide
    use fw_event_slide, only: slide_along
    use fw_event_slide, only: slide_type
+   use fw_event_stages, only: direction_of
+   use fw_event_stages, only: n_points
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: planar_path_type, piece_type, slide_of
+   public :: planar_path_type, piece_type
    public :: phase_open, phase_stick, phase_slip
 
    integer, parameter :: phase_open = 1, phase_stick = 2, phase_slip = 3
    !> Switches in one cell, and spare pieces in a period, after which the pair sticks on: they crowd
    !> at round-off only.
-   integer, parameter :: max_switches = 12, spare_pieces = 64
-   !> A stick, or slip within one cell.
+   integer, parameter :: max_switches = 12, spare_pieces = 96
+   !> A stick, or a step of slip.
    type :: piece_type
       integer :: phase = phase_stick
       !> The phase before it was another one; and that was open.
@@ -44,8 +44,9 @@ module fw_event_planar_path
       real(wp) :: from = 0.0_wp, to = 0.0_wp
       !> Position of a stick, or of that before slip which begins.
       real(wp) :: z(2) = 0.0_wp
-      !> Of slip: half-angle vectors at its start, middle and end, and the cell that it covers.
-      real(wp) :: v(2, 3) = 0.0_wp
+      !> Of slip: phi at the points of the step, phi' there, and the cell that it
+      !> covers (0: none).
+      real(wp) :: phi(n_points) = 0.0_wp, slope(n_points) = 0.0_wp
       integer :: cell = 0
    end type piece_type
 
@@ -62,11 +63,11 @@ module fw_event_planar_path
       logical :: closed = .true., open = .false.
       !> Whether it slipped in the last turn, and whether it landed.
       logical :: slips = .false., lands = .false.
-      !> N and N' at the ends of the cells, and the roots of N.
-      real(wp), allocatable, private :: values(:), slopes(:), lift(:)
+      !> The roots of N.
+      real(wp), allocatable, private :: lift(:)
       !> What the pair does on the way, and derivatives of z and phi by the z of the start.
       integer, private :: phase = phase_stick
-      real(wp), private :: z(2) = 0.0_wp, v(2) = 0.0_wp, by_z(2, 2) = 0.0_wp, by_phi(2) = 0.0_wp
+      real(wp), private :: z(2) = 0.0_wp, phi = 0.0_wp, by_z(2, 2) = 0.0_wp, by_phi(2) = 0.0_wp
       logical, private :: behind_landing = .false., begins = .false.
    contains
       procedure :: reserve
@@ -87,7 +88,6 @@ contains
       n = cells%n_cells + 2*cells%degree + 2
       allocate (self%knot(n), self%lifted(n), self%cell(n), self%lift(2*cells%degree + 1))
       allocate (self%piece(2*n + spare_pieces))
-      allocate (self%values(cells%n_cells), self%slopes(cells%n_cells))
    end subroutine reserve
 
    !> The ends of the cells and the roots of N between them.
@@ -102,11 +102,9 @@ contains
       ! A constant N, which has no roots; 0 counts as open.
       lifted = motion%normal(0, 1) <= 0.0_wp
       if (.not. motion%steady) then
-         self%values = motion%node(7, ::2)
-         self%slopes = motion%node(8, ::2)
-         call find_roots(cells%n_cells, cells%degree, motion%normal, self%values, self%slopes, &
+         call find_roots(cells%n_time, cells%degree, motion%normal, motion%values, motion%slopes, &
                          sum(abs(motion%normal)), n_lifts, self%lift)
-         lifted = self%values(1) < 0.0_wp
+         lifted = motion%values(1) < 0.0_wp
       end if
       self%closed = n_lifts == 0 .and. .not. lifted
       self%open = n_lifts == 0 .and. lifted
@@ -114,14 +112,14 @@ contains
       j = 1
       do k = 1, cells%n_cells + 1
          do while (j <= n_lifts)
-            if (self%lift(j) >= cells%node_angle(2*k - 1)) exit
+            if (self%lift(j) >= cells%start_of(k)) exit
             lifted = .not. lifted
             call add_knot(self, self%lift(j), lifted, 0)
             ! The cell that the root splits is no whole one any more.
             if (self%n_knots > 1) self%cell(self%n_knots - 1) = 0
             j = j + 1
          end do
-         call add_knot(self, cells%node_angle(2*k - 1), lifted, k)
+         call add_knot(self, cells%start_of(k), lifted, k)
       end do
    end subroutine find_knots
 
@@ -138,36 +136,14 @@ contains
       self%cell(self%n_knots) = cell
    end subroutine add_knot
 
-   !> The slip of a piece with its instants.
-   !> Instants are not kept with the pieces: they are many numbers, and wanted for slip alone.
-   pure type(slide_type) function slide_of(piece, motion, cells) result(slide)
-      type(piece_type), intent(in) :: piece
-      type(motion_type), intent(in) :: motion
-      type(cells_type), intent(in) :: cells
-      integer :: k
-
-      slide%cell = piece%cell
-      slide%lands = piece%lands
-      slide%v = piece%v
-      do k = 1, 3
-         if (piece%cell > 0) then
-            slide%at(k) = motion%at_node(cells, 2*piece%cell - 2 + k)
-         else
-            slide%at(k) = motion%look(0.5_wp*((3 - k)*piece%from + (k - 1)*piece%to))
-         end if
-      end do
-   end function slide_of
-
    !> One period from a position, to another one, with the derivative m of that.
    pure subroutine turn(self, motion, cells, z_start, z_end, m)
       class(planar_path_type), intent(inout) :: self
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       real(wp), intent(in) :: z_start(2)
       real(wp), intent(out) :: z_end(2), m(2, 2)
-      type(instant_type) :: at
       integer :: k
-      logical :: passes
 
       self%n_pieces = 0
       self%slips = .false.
@@ -175,8 +151,7 @@ contains
       ! Identity: the position of the start is the input.
       self%by_z = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
       self%by_phi = 0.0_wp
-      at = motion%at_node(cells, 1)
-      call start(self, motion, at, z_start)
+      call start(self, motion, motion%look(0.0_wp), z_start)
       do k = 1, self%n_knots - 1
          ! Open from one knot to the next, since N keeps its sign there.
          if (self%lifted(k)) then
@@ -184,16 +159,12 @@ contains
             self%phase = phase_open
             cycle
          end if
-         ! The cheap way first; most cells hold no switch.
-         call pass_cell(self, motion, cells, self%cell(k), passes)
-         if (passes) cycle
-         at = instant_at(self, motion, cells, k)
          ! Open until here: the knot is a root of N.
-         if (self%phase == phase_open) call land(self, motion, at)
-         call bear(self, motion, cells, k, at)
+         if (self%phase == phase_open) call land(self, motion, motion%look(self%knot(k)))
+         call bear(self, motion, cells, k)
       end do
       if (self%phase == phase_stick) self%piece(self%n_pieces)%to = 2.0_wp*pi
-      call finish(self, motion, motion%at_node(cells, 1), z_end, m)
+      call finish(self, motion, motion%look(0.0_wp), z_end, m)
    end subroutine turn
 
    !> How long the pair slipped in the last turn.
@@ -208,49 +179,6 @@ contains
          end associate
       end do
    end function slip_angle
-
-   !> Most cells: no switch in them, and nothing to look for beside what the nodes hold.
-   pure subroutine pass_cell(self, motion, cells, cell, passes)
-      type(planar_path_type), intent(inout) :: self
-      type(motion_type), intent(inout) :: motion
-      type(cells_type), intent(in) :: cells
-      !> 0 where there is none.
-      integer, intent(in) :: cell
-      logical, intent(out) :: passes
-      real(wp) :: v(2, 3), gain
-      integer :: last
-
-      passes = .false.
-      if (cell == 0 .or. self%phase == phase_open .or. motion%mu <= 0.0_wp) return
-      if (self%phase == phase_stick) then
-         last = 2*cell + 1
-         if (cell == cells%n_cells) last = 1
-         ! Both ends of the cell as columns of `node`: no instant is built.
-         passes = sticks_on(motion, self%z, motion%node(:, 2*cell - 1), motion%node(:, last))
-      else if (motion%remembers) then
-         v(:, 1) = self%v
-         call glide(motion, cells, cell, v, gain, passes)
-         if (.not. passes) return
-         call add_slip(self, cells%node_angle(2*cell - 1), cells%node_angle(2*cell + 1), v, cell)
-         self%v = v(:, 3)
-         ! The rotation of the cell turns neighbours of phi by `gain` times as much.
-         self%by_phi = gain*self%by_phi
-      end if
-   end subroutine pass_cell
-
-   !> A knot: a node where a cell starts or ends there, else anywhere.
-   pure type(instant_type) function instant_at(self, motion, cells, knot) result(at)
-      type(planar_path_type), intent(in) :: self
-      type(motion_type), intent(in) :: motion
-      type(cells_type), intent(in) :: cells
-      integer, intent(in) :: knot
-
-      if (self%cell(knot) > 0) then
-         at = motion%at_node(cells, 2*self%cell(knot) - 1)
-      else
-         at = motion%look(self%knot(knot))
-      end if
-   end function instant_at
 
    !> State at tau = 0 for a given position: one on the cone slips if it is pushed.
    pure subroutine start(self, motion, at, z_start)
@@ -285,17 +213,17 @@ contains
       ! Open, or without friction: z goes with P.
       z_end = at%p
       if (self%phase == phase_open .or. motion%mu <= 0.0_wp) return
-      call position_of_slip(at, self%v, self%by_phi, z_end, m)
+      call position_of_slip(at, self%phi, self%by_phi, z_end, m)
    end subroutine finish
 
    !> z = P - R t, dz = -R n dphi.
-   pure subroutine position_of_slip(at, v, by_phi, z, by_z)
+   pure subroutine position_of_slip(at, phi, by_phi, z, by_z)
       type(instant_type), intent(in) :: at
-      real(wp), intent(in) :: v(2), by_phi(2)
+      real(wp), intent(in) :: phi, by_phi(2)
       real(wp), intent(out) :: z(2), by_z(2, 2)
       real(wp) :: t(2)
 
-      t = direction_of(v)
+      t = direction_of(phi)
       z = at%p - at%radius*t
       by_z(1, :) = at%radius*t(2)*by_phi
       by_z(2, :) = -at%radius*t(1)*by_phi
@@ -321,7 +249,7 @@ contains
       else
          self%phase = phase_slip
          ! Slip in the direction in which P leaves; R = 0 here, so only its limit is known.
-         self%v = half_angle(at%dp)
+         self%phi = atan2(at%dp(2), at%dp(1))
          self%begins = .true.
          self%behind_landing = .true.
          self%slips = .true.
@@ -346,7 +274,7 @@ contains
 
       d = at%p - self%z
       self%phase = phase_slip
-      self%v = half_angle(d)
+      self%phi = atan2(d(2), d(1))
       self%begins = .true.
       self%behind_landing = .false.
       self%slips = .true.
@@ -355,112 +283,140 @@ contains
    end subroutine begin_slip
 
    !> Contact from one knot to the next.
-   pure subroutine bear(self, motion, cells, k, at)
+   pure subroutine bear(self, motion, cells, k)
       type(planar_path_type), intent(inout) :: self
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       integer, intent(in) :: k
-      type(instant_type), intent(inout) :: at
-      type(instant_type) :: to
+      type(slide_type) :: slide
+      type(instant_type) :: at
       logical :: found, stops
-      integer :: cell, i
+      integer :: i
 
-      cell = self%cell(k)
-      if (cell > 0) then
-         to = motion%at_node(cells, 2*cell + 1)
-      else
-         to = instant_at(self, motion, cells, k + 1)
-         ! The last knot is at 2 pi, although its instant is that of 0.
-         to%angle = self%knot(k + 1)
-      end if
-      if (motion%mu <= 0.0_wp) then
-         call slide_freely(self, motion, at, to)
-         return
-      end if
-      ! Stick and slip by turns, until the knot is reached.
-      do i = 1, max_switches
-         if (self%phase == phase_stick) then
-            ! Each knot to come may need two.
-            if (self%n_pieces + 2*(self%n_knots - k + 2) > size(self%piece)) return
-            call find_exit(motion, self%z, to, at, found)
-            if (.not. found) return
-            ! A switch within the cell: what is left of it is no whole cell.
-            cell = 0
-            self%piece(self%n_pieces)%to = at%angle
-            call begin_slip(self, at)
+      associate (to => self%knot(k + 1), stretch => slide%stretch)
+         ! A whole cell has been evaluated with all others; between a root of N and a knot the
+         ! series are summed here.
+         call motion%stretch(cells, self%cell(k), self%knot(k), to, stretch)
+         if (motion%mu <= 0.0_wp) then
+            call slide_freely(self, motion, slide)
+            return
          end if
-         call slip_to(self, motion, cells, cell, to, at, stops)
-         if (.not. stops) return
-      end do
+         ! Stick and slip by turns, until the knot is reached.
+         do i = 1, max_switches
+            if (self%phase == phase_stick) then
+               if (.not. has_room(self, k)) return
+               call find_exit(motion, cells, self%z, stretch, at, found)
+               if (.not. found) return
+               ! What is left of the stretch is looked at anew, at points of its own.
+               self%piece(self%n_pieces)%to = at%angle
+               call begin_slip(self, at)
+               call motion%stretch(cells, 0, at%angle, to, stretch)
+            end if
+            call slip_to(self, motion, cells, k, slide, at, stops)
+            if (.not. stops) return
+            call motion%stretch(cells, 0, at%angle, to, stretch)
+         end do
+      end associate
    end subroutine bear
 
+   !> Whether a stretch from knot k may have more pieces: each knot to come may need two.
+   pure logical function has_room(self, k)
+      type(planar_path_type), intent(in) :: self
+      integer, intent(in) :: k
+
+      has_room = self%n_pieces + 2*(self%n_knots - k + 2) < size(self%piece)
+   end function has_room
+
    !> Slip up to the next knot, or to where it stops.
-   pure subroutine slip_to(self, motion, cells, cell, to, at, stops)
+   pure subroutine slip_to(self, motion, cells, k, slide, at, stops)
       type(planar_path_type), intent(inout) :: self
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      integer, intent(in) :: cell
-      type(instant_type), intent(in) :: to
+      integer, intent(in) :: k
+      !> With the stretch to be taken.
+      type(slide_type), intent(inout) :: slide
+      !> Where slip stops.
       type(instant_type), intent(inout) :: at
       logical, intent(out) :: stops
-      type(slide_type) :: slide
+      real(wp) :: from, width, to
 
-      slide%cell = cell
-      slide%at(1) = at
-      slide%v(:, 1) = self%v
-      slide%lands = self%behind_landing
-      call slide_along(motion, cells, to, slide)
-      call add_slip(self, slide%at(1)%angle, slide%at(3)%angle, slide%v, slide%cell)
-      at = slide%at(3)
-      stops = slide%stops
-      self%v = slide%v(:, 3)
-      ! Two steps, one gain each.
-      self%by_phi = (slide%gain(1)*slide%gain(2))*self%by_phi
+      to = slide%stretch%to
+      do
+         ! Each step starts in the direction in which the one before has ended.
+         slide%stages%phi(1) = self%phi
+         call slide_along(motion, cells, self%behind_landing, has_room(self, k), slide)
+         from = slide%stretch%from
+         width = slide%stretch%to - from
+         ! Half of it, as often as it takes: the direction turns fast only where R is small.
+         if (slide%divides) then
+            call motion%stretch(cells, 0, from, from + 0.5_wp*width, slide%stretch)
+            cycle
+         end if
+         call add_slip(self, slide)
+         ! A step of no width is noted too: the stick behind it takes its direction.
+         self%phi = slide%stages%phi(n_points)
+         self%by_phi = slide%stages%gain*self%by_phi
+         stops = slide%stops
+         if (stops .or. slide%stretch%to >= to) exit
+         ! Twice as wide again, and no rest that is but a small part of a step.
+         from = slide%stretch%to
+         if (to - from > 3.0_wp*width) then
+            call motion%stretch(cells, 0, from, from + 2.0_wp*width, slide%stretch)
+         else
+            call motion%stretch(cells, 0, from, to, slide%stretch)
+         end if
+      end do
       if (.not. stops) return
+      at = motion%look(slide%stretch%to)
       self%z = 0.0_wp
       ! At velocity level there is no position, and T = P where it sticks.
-      if (motion%remembers) call position_of_slip(at, self%v, self%by_phi, self%z, self%by_z)
+      if (motion%remembers) call position_of_slip(at, self%phi, self%by_phi, self%z, self%by_z)
       call begin_stick(self, at%angle)
    end subroutine slip_to
 
    !> Note slip as a piece.
-   pure subroutine add_slip(self, from, to, v, cell)
+   pure subroutine add_slip(self, slide)
       type(planar_path_type), intent(inout) :: self
-      real(wp), intent(in) :: from, to, v(2, 3)
-      integer, intent(in) :: cell
+      type(slide_type), intent(in) :: slide
 
       self%n_pieces = self%n_pieces + 1
       associate (piece => self%piece(self%n_pieces))
          piece%phase = phase_slip
          piece%begins = self%begins
          piece%lands = self%behind_landing
-         piece%from = from
-         piece%to = to
+         piece%from = slide%stretch%from
+         piece%to = slide%stretch%to
          piece%z = self%z
-         piece%v = v
-         piece%cell = cell
+         piece%phi = slide%stages%phi
+         piece%slope = slide%stages%slope
+         piece%cell = slide%stretch%cell
       end associate
       self%begins = .false.
       self%behind_landing = .false.
    end subroutine add_slip
 
    !> Without friction the pair moves at no cost, wherever P goes.
-   pure subroutine slide_freely(self, motion, at, to)
+   pure subroutine slide_freely(self, motion, slide)
       type(planar_path_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
-      type(instant_type), intent(in) :: at, to
-      type(slide_type) :: slide
+      type(slide_type), intent(inout) :: slide
       integer :: k
 
       ! A stick that the start has opened is taken back: nothing sticks without friction.
       if (self%phase == phase_stick) self%n_pieces = self%n_pieces - 1
       self%phase = phase_slip
       self%slips = .true.
-      slide%at = [at, motion%look(0.5_wp*(at%angle + to%angle)), to]
-      do k = 1, 3
-         slide%v(:, k) = half_angle(merge(slide%at(k)%dp, slide%at(k)%p, motion%remembers))
-      end do
-      call add_slip(self, at%angle, to%angle, slide%v, 0)
+      associate (p => slide%stretch%p, dp => slide%stretch%dp)
+         do k = 1, n_points
+            if (motion%remembers) then
+               slide%stages%phi(k) = atan2(dp(k, 2), dp(k, 1))
+            else
+               slide%stages%phi(k) = atan2(p(k, 2), p(k, 1))
+            end if
+         end do
+      end associate
+      slide%stages%slope = 0.0_wp
+      call add_slip(self, slide)
    end subroutine slide_freely
 
 end module fw_event_planar_path

@@ -1,25 +1,31 @@
 !> Derivatives of the position z of a pair with two tangential directions and of its direction of
 !> slip phi, carried along its path: at an onset of slip the tangent projection
-!> dphi = n.(dP - dz)/|P - z|, in a step that of its rotation, at a stop dz = dP - dT, and a landing
-!> moves with the root of N.
+!> dphi = n.(dP - dz)/|P - z|, at a stop dz = dP - dT, and a landing moves with the root of N.
+!>
+!> Over a step of slip at fixed angles, with q = P'.t and the matrix of its collocation,
+!>
+!>   (diag(R) + h diag(q) a) dk = n.dP' - k dR - q dphi_0,   dphi_j = dphi_0 + h sum_i a_ji dk_i.
+!>
+!> Behind a landing R = 0 at the start, where the equation alone says
+!> dphi_0 = (n.dP' - phi' dR)/|P'|, at a fixed angle too: that the landing moves changes nothing
+!> else, since the smooth solution goes on beyond it.
 !>
 !> Inputs are the coefficients of P_x, P_y and y_n = -N, and then the two components of z at the
 !> start of the turn.
 module fw_event_planar_tangent
    use fw_event_cells, only: cells_type
    use fw_event_cells, only: waves_at
-   use fw_event_motion, only: gauss_type
+   use fw_event_cells, only: waves_of_step
    use fw_event_motion, only: instant_type
    use fw_event_motion, only: motion_type
-   use fw_event_rotation, only: arc_type
-   use fw_event_rotation, only: direction_of
-   use fw_event_rotation, only: gauss_point
-   use fw_event_rotation, only: new_rotation
-   use fw_event_rotation, only: rotate
-   use fw_event_rotation, only: rotation_derivative
-   use fw_event_rotation, only: rotation_type
-   use fw_event_slide, only: landing_arc
-   use fw_event_slide, only: slide_type
+   use fw_event_motion, only: stretch_type
+   use fw_event_planar_path, only: piece_type
+   use fw_event_slide, only: landing_slope
+   use fw_event_stages, only: cosine_and_sine
+   use fw_event_stages, only: direction_of
+   use fw_event_stages, only: n_points
+   use fw_event_stages, only: n_stages
+   use fw_event_stages, only: eliminate
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -33,6 +39,9 @@ module fw_event_planar_tangent
       real(wp), allocatable :: dz(:, :), dphi(:)
       !> Waves and their slopes where they were looked at last (n_coefficients).
       real(wp), allocatable :: wave(:), slope(:)
+      !> Those at the points of the step that was advanced over last (n_points, n_coefficients), and
+      !> the derivatives of phi at them (input, point).
+      real(wp), allocatable :: waves(:, :), slopes(:, :), dphi_at(:, :)
    contains
       procedure :: start
       procedure :: land
@@ -52,6 +61,8 @@ contains
       self%n_inputs = 3*nc + 2
       allocate (self%dz(3*nc + 2, 2), self%dphi(3*nc + 2), self%wave(nc), self%slope(nc), &
                 source=0.0_wp)
+      allocate (self%waves(n_points, nc), self%slopes(n_points, nc))
+      allocate (self%dphi_at(3*nc + 2, n_points))
    end function new_tangent
 
    !> A turn starts: its position is an input.
@@ -106,19 +117,19 @@ contains
    end subroutine begin_slip
 
    !> Slip ends in a direction: z = P - T.
-   pure subroutine stop_slip(self, motion, cells, at, v)
+   pure subroutine stop_slip(self, motion, cells, at, phi)
       class(tangent_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
       type(instant_type), intent(in) :: at
-      real(wp), intent(in) :: v(2)
+      real(wp), intent(in) :: phi
       real(wp) :: t(2)
       integer :: c
 
       self%dz = 0.0_wp
       if (.not. motion%remembers) return
       call self%set_waves(cells, at%angle)
-      t = direction_of(v)
+      t = direction_of(phi)
       ! z = P - R t: dz = dP - t dR - R n dphi, with dR = -mu dy_n.
       self%dz(:, 1) = at%radius*t(2)*self%dphi
       self%dz(:, 2) = -at%radius*t(1)*self%dphi
@@ -131,139 +142,119 @@ contains
       end do
    end subroutine stop_slip
 
-   !> Step 1 or 2 of a stretch of slip.
-   pure subroutine advance(self, motion, cells, slide, step)
+   !> A step of slip: dphi at all its points, and at its end.
+   pure subroutine advance(self, motion, cells, piece, stretch)
       class(tangent_type), intent(inout) :: self
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      type(slide_type), intent(in) :: slide
-      !> 1 up to the middle of the stretch, 2 from there to its end.
-      integer, intent(in) :: step
-      type(gauss_type) :: gauss
-      type(rotation_type) :: rotation
-      real(wp) :: h
-      integer :: i, half
+      type(piece_type), intent(in) :: piece
+      !> That of the piece.
+      type(stretch_type), intent(in) :: stretch
+      integer :: j
 
+      ! Those of whole cells are known, the same for all pairs.
+      if (piece%cell > 0) then
+         self%waves = cells%wave(:, piece%cell, :)
+         self%slopes = cells%slope(:, piece%cell, :)
+      else
+         call waves_of_step(cells, piece%from, piece%to - piece%from, self%waves, self%slopes)
+      end if
       if (motion%mu <= 0.0_wp) return
       if (.not. motion%remembers) then
-         ! Velocity level: the force points along P itself, whatever came before.
-         call self%set_waves(cells, slide%at(step + 1)%angle)
-         self%dz = 0.0_wp
-         call self%begin_slip(slide%at(step + 1), [0.0_wp, 0.0_wp])
-      else if (slide%cell > 0) then
-         half = 2*slide%cell + step - 2
-         call motion%rotation_of(cells, half, rotation)
-         call add_rotation(self, motion, rotation, motion%half_cell(half), slide%v(:, step), &
-                           cells%gauss(:, :, half), cells%gauss_slope(:, :, half))
+         do j = 1, n_points
+            call point_along(self, stretch, j)
+         end do
       else
-         h = slide%at(step + 1)%angle - slide%at(step)%angle
-         if (h <= 0.0_wp) return
-         gauss = motion%look_gauss(slide%at(step)%angle, h)
-         if (slide%lands .and. step == 1) then
-            call add_landing(self, motion, cells, slide, gauss)
-            return
+         if (piece%lands) call land_in_slip(self, motion, piece, stretch)
+         if (piece%to > piece%from) then
+            call collocate(self, motion, cells, piece, stretch)
+         else
+            self%dphi_at = spread(self%dphi, 2, n_points)
          end if
-         rotation = new_rotation(h, gauss%dp(:, 1)/gauss%radius(1), gauss%dp(:, 2)/gauss%radius(2))
-         block
-            ! Off the grid: a step that a switch cuts short, rare enough for waves on the stack.
-            real(wp) :: wave(self%nc, 2), slope(self%nc, 2)
-
-            do i = 1, 2
-               call waves_at(cells, slide%at(step)%angle + gauss_point(i)*h, wave(:, i), &
-                             slope(:, i))
-            end do
-            call add_rotation(self, motion, rotation, gauss, slide%v(:, step), wave, slope)
-         end block
       end if
+      self%dphi = self%dphi_at(:, n_points)
    end subroutine advance
 
-   !> dphi after a rotation, by a = P'/R at its Gauss points.
-   pure subroutine add_rotation(self, motion, rotation, gauss, v, wave, slope)
-      type(tangent_type), intent(inout) :: self
+   !> Velocity level: the force points along P itself, whatever came before.
+   pure subroutine point_along(self, stretch, j)
+      class(tangent_type), intent(inout) :: self
+      type(stretch_type), intent(in) :: stretch
+      integer, intent(in) :: j
+      real(wp) :: n(2)
+
+      n = [-stretch%p(j, 2), stretch%p(j, 1)]/max(sum(stretch%p(j, :)**2), tiny(1.0_wp))
+      self%dphi_at(:, j) = 0.0_wp
+      self%dphi_at(:self%nc, j) = n(1)*self%waves(j, :)
+      self%dphi_at(self%nc + 1:2*self%nc, j) = n(2)*self%waves(j, :)
+   end subroutine point_along
+
+   !> dphi at the start of a step behind a landing.
+   pure subroutine land_in_slip(self, motion, piece, stretch)
+      class(tangent_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
-      type(rotation_type), intent(in) :: rotation
-      type(gauss_type), intent(in) :: gauss
-      real(wp), intent(in) :: v(2)
-      !> At the Gauss points (n_coefficients, 2).
-      real(wp), intent(in) :: wave(:, :), slope(:, :)
-      real(wp) :: after(2), gain, by(2, 2), by_radius(2)
-      integer :: i, k
+      type(piece_type), intent(in) :: piece
+      type(stretch_type), intent(in) :: stretch
+      real(wp) :: t(2), length
+      integer :: nc
 
-      call rotate(rotation, v, after, gain)
-      call rotation_derivative(rotation, gauss%dp(:, 1)/gauss%radius(1), &
-                               gauss%dp(:, 2)/gauss%radius(2), v, by(:, 1), by(:, 2))
-      do i = 1, 2
-         by(:, i) = by(:, i)/gauss%radius(i)
-         ! dR = -mu dy_n.
-         by_radius(i) = motion%mu*dot_product(by(:, i), gauss%dp(:, i))/gauss%radius(i)
-      end do
-      associate (nc => self%nc, dphi => self%dphi)
-         do k = 1, nc
-            ! P' at a Gauss point depends on the coefficients by the slopes of the waves, R by the
-            ! waves.
-            dphi(k) = gain*dphi(k) + by(1, 1)*slope(k, 1) + by(1, 2)*slope(k, 2)
-            dphi(nc + k) = gain*dphi(nc + k) + by(2, 1)*slope(k, 1) + by(2, 2)*slope(k, 2)
-            dphi(2*nc + k) = gain*dphi(2*nc + k) + by_radius(1)*wave(k, 1) + &
-                             by_radius(2)*wave(k, 2)
-         end do
-         dphi(3*nc + 1:) = gain*dphi(3*nc + 1:)
-      end associate
-   end subroutine add_rotation
+      nc = self%nc
+      ! R dphi' + dR phi' = n.dP' - |P'| dphi with R = 0.
+      t = direction_of(piece%phi(1))
+      length = max(norm2(stretch%dp(1, :)), tiny(1.0_wp))
+      self%dphi(:nc) = -t(2)/length*self%slopes(1, :)
+      self%dphi(nc + 1:2*nc) = t(1)/length*self%slopes(1, :)
+      ! dR = -mu dy_n.
+      self%dphi(2*nc + 1:3*nc) = landing_slope(stretch)*motion%mu/length*self%waves(1, :)
+      self%dphi(3*nc + 1:) = 0.0_wp
+   end subroutine land_in_slip
 
-   !> dphi at the end of the step behind a landing, whose angle moves by dtheta = wave/N' for each
-   !> input y_n; so do its Gauss points, by the share of the step that is still ahead of them.
-   pure subroutine add_landing(self, motion, cells, slide, gauss)
-      type(tangent_type), intent(inout) :: self
-      !> The stretch whose first step starts at the landing, and P', R, P'', R' at its Gauss points.
+   !> The linear collocation of a step, for all inputs at once.
+   pure subroutine collocate(self, motion, cells, piece, stretch)
+      class(tangent_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      type(slide_type), intent(in) :: slide
-      type(gauss_type), intent(in) :: gauss
-      type(arc_type) :: arc
-      real(wp) :: t(2), n(2), h, s, phi, slope, dtheta(self%nc), first(self%nc, 3)
-      real(wp) :: condition(self%nc, 3), change(self%nc, 3, 2)
-      integer :: i
+      type(piece_type), intent(in) :: piece
+      type(stretch_type), intent(in) :: stretch
+      real(wp) :: a(n_points, 2*n_stages + 1), along(n_points), across(n_points, 2), h, start
+      real(wp) :: factor(3)
+      integer :: i, j, k, nc
+      logical :: regular
 
-      associate (from => slide%at(1), v => slide%v(:, 1))
-         h = slide%at(2)%angle - from%angle
-         arc = landing_arc(from, gauss, v, h)
-         ! phi at the landing is the angle of P'.
-         call self%set_waves(cells, from%angle)
-         dtheta = self%wave/from%dnormal
-         n = [-from%dp(2), from%dp(1)]/dot_product(from%dp, from%dp)
-         first(:, 1) = n(1)*self%slope
-         first(:, 2) = n(2)*self%slope
-         first(:, 3) = dot_product(n, from%ddp)*dtheta
-         ! v is the vector of half the angle.
-         phi = 2.0_wp*atan2(v(2), v(1))
+      nc = self%nc
+      h = piece%to - piece%from
+      call cosine_and_sine(piece%phi, across(:, 2), across(:, 1))
+      across(:, 1) = -across(:, 1)
+      along = across(:, 2)*stretch%dp(:, 1) - across(:, 1)*stretch%dp(:, 2)
+      associate (rule => cells%rule)
+         ! Transposed: its solutions are the rows of h a m^-1, of the points and then of the end.
+         a = 0.0_wp
+         do j = 1, n_stages
+            a(2:n_stages + 1, j) = (h*along(j + 1))*rule%integral(j + 1, :)
+            a(j + 1, j) = a(j + 1, j) + stretch%radius(j + 1)
+         end do
+         do j = 1, n_stages + 1
+            a(2:n_stages + 1, n_stages + j) = h*rule%integral(j + 1, :)
+         end do
       end associate
-      change = 0.0_wp
-      do i = 1, 2
-         s = gauss_point(i)*h
-         slope = arc%slope + 2.0_wp*arc%curvature*s
-         n(1) = phi + s*(arc%slope + s*arc%curvature)
-         t = [cos(n(1)), sin(n(1))]
-         n = [-t(2), t(1)]
-         call self%set_waves(cells, slide%at(1)%angle + s)
-         ! The two conditions R phi' = P'.n of the arc, differentiated; `inverse` solves them for
-         ! the changes of its slope and curvature.
-         condition = dot_product(t, gauss%dp(:, i))*first
-         condition(:, 1) = condition(:, 1) - n(1)*self%slope
-         condition(:, 2) = condition(:, 2) - n(2)*self%slope
-         condition(:, 3) = condition(:, 3) - (slope*motion%mu)*self%wave + dtheta* &
-            ((1.0_wp - gauss_point(i))* &
-             (gauss%dradius(i)*slope - dot_product(n, gauss%ddp(:, i))) - &
-             gauss_point(i)*(2.0_wp*arc%curvature*gauss%radius(i) + &
-                             dot_product(t, gauss%dp(:, i))*slope))
-         change(:, :, 1) = change(:, :, 1) - arc%inverse(1, i)*condition
-         change(:, :, 2) = change(:, :, 2) - arc%inverse(2, i)*condition
+      call eliminate(a, 2*n_stages + 1, regular)
+      ! It is that of the last step of Newton's method, which could be solved.
+      if (.not. regular) a = 0.0_wp
+      self%dphi_at(:, 1) = self%dphi
+      do j = 2, n_points
+         ! Inputs enter at the Gauss points alone, by their waves there: no solution for each input.
+         associate (by => a(:, n_stages + j - 1), to => self%dphi_at(:, j))
+            start = 1.0_wp - dot_product(by(2:n_stages + 1), along(2:n_stages + 1))
+            to = start*self%dphi
+            do i = 2, n_stages + 1
+               factor = by(i)*[across(i, :), motion%mu*piece%slope(i)]
+               do k = 1, nc
+                  to(k) = to(k) + factor(1)*self%slopes(i, k)
+                  to(nc + k) = to(nc + k) + factor(2)*self%slopes(i, k)
+                  to(2*nc + k) = to(2*nc + k) + factor(3)*self%waves(i, k)
+               end do
+            end do
+         end associate
       end do
-      self%dphi(:3*self%nc) = reshape(first + h*change(:, :, 1) + h**2*change(:, :, 2), &
-                                      [3*self%nc])
-      ! The step ends at a fixed angle: it gets shorter as the landing comes later.
-      self%dphi(2*self%nc + 1:3*self%nc) = self%dphi(2*self%nc + 1:3*self%nc) - &
-         (arc%slope + 2.0_wp*arc%curvature*h)*dtheta
-      self%dphi(3*self%nc + 1:) = 0.0_wp
-   end subroutine add_landing
+   end subroutine collocate
 
 end module fw_event_planar_tangent

@@ -1,13 +1,8 @@
 !> The motion of a pair between two instants as the quintic through P, N and their two derivatives
-!> at both: what the steps of a stretch of slip take between, and the first guess of its ends. Its
-!> error is w**6/46080 times a sixth derivative, w the width, which is at most that of half a cell
-!> for steps: below the error of the steps.
+!> at both: the first guess of where stick ends between two points of a stretch.
 module fw_event_segment
-   use fw_event_motion, only: gauss_type
    use fw_event_motion, only: instant_type
    use fw_event_motion, only: motion_type
-   use fw_event_motion, only: on_cone
-   use fw_event_rotation, only: gauss_point
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -15,13 +10,12 @@ module fw_event_segment
    public :: segment_type, new_segment
 
    type :: segment_type
-      !> Angle of its start; friction coefficient; the least R, as gauss_type has it.
-      real(wp), private :: from = 0.0_wp, mu = 0.0_wp, least = 0.0_wp
+      !> Angle of its start; friction coefficient.
+      real(wp), private :: from = 0.0_wp, mu = 0.0_wp
       !> P_x, P_y, N in powers of the angle behind `from`.
       real(wp), private :: c(3, 0:5) = 0.0_wp
    contains
       procedure :: at
-      procedure :: gauss
    end type segment_type
 
 contains
@@ -35,7 +29,6 @@ contains
       w = to%angle - from%angle
       self%from = from%angle
       self%mu = motion%mu
-      self%least = max(on_cone*motion%scale, tiny(1.0_wp))
       self%c(:, 0) = [from%p, from%normal]
       self%c(:, 1) = [from%dp, from%dnormal]
       self%c(:, 2) = 0.5_wp*[from%ddp, from%ddnormal]
@@ -76,24 +69,5 @@ contains
       at%dradius = self%mu*slope(3)
       at%ddradius = self%mu*curvature(3)
    end function at
-
-   !> The Gauss points of a step from its start.
-   pure type(gauss_type) function gauss(self, h)
-      class(segment_type), intent(in) :: self
-      real(wp), intent(in) :: h
-      real(wp) :: s
-      integer :: i
-
-      associate (c => self%c)
-         do i = 1, 2
-            s = gauss_point(i)*h
-            gauss%dp(:, i) = c(1:2, 1) + s*(2.0_wp*c(1:2, 2) + s*(3.0_wp*c(1:2, 3) + &
-                                            s*(4.0_wp*c(1:2, 4) + s*5.0_wp*c(1:2, 5))))
-            gauss%radius(i) = c(3, 0) + s*(c(3, 1) + s*(c(3, 2) + s*(c(3, 3) + &
-                                           s*(c(3, 4) + s*c(3, 5)))))
-            gauss%radius(i) = max(self%mu*gauss%radius(i), self%least)
-         end do
-      end associate
-   end function gauss
 
 end module fw_event_segment

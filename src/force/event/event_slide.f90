@@ -1,323 +1,271 @@
-!> One stretch of slip of a pair with two tangential directions: over a cell of the grid, or what a
-!> switch leaves of it, in two equal steps, to its end or to where slip stops.
+!> One step of slip of a pair with two tangential directions, to the end of a stretch or to where
+!> slip stops.
 !>
 !> Slip stops where its pull P'.t - R' falls to zero, t being its direction: then the position
-!> z = P - R t no longer moves. At velocity level the pull is |P| - R.
+!> z = P - R t no longer moves. At velocity level phi is the angle of P, and the pull |P| - R.
 module fw_event_slide
    use fw_event_cells, only: cells_type
-   use fw_event_motion, only: gauss_type
    use fw_event_motion, only: instant_type
    use fw_event_motion, only: motion_type
-   use fw_event_rotation, only: arc_type
-   use fw_event_rotation, only: direction_of
-   use fw_event_rotation, only: half_angle
-   use fw_event_rotation, only: new_arc
-   use fw_event_rotation, only: new_rotation
-   use fw_event_rotation, only: rotate
-   use fw_event_rotation, only: rotation_type
-   use fw_event_segment, only: new_segment
-   use fw_event_segment, only: segment_type
+   use fw_event_motion, only: point_of
+   use fw_event_motion, only: stretch_type
+   use fw_event_stages, only: angle_at
+   use fw_event_stages, only: cosine_and_sine
+   use fw_event_stages, only: direction_of
+   use fw_event_stages, only: n_points
+   use fw_event_stages, only: solve_step
+   use fw_event_stages, only: stages_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: slide_type, slide_along, glide
-   public :: landing_arc, pull, summit, first_guess
+   public :: slide_type, slide_along
+   public :: landing_slope, summit, first_guess, pulls
 
+   !> Part of the largest force that a step may leave out, by the last coefficient of its direction
+   !> (calibrated: the error of the force is far below that).
+   real(wp), parameter :: step_tolerance = 1.0e-6_wp
+   !> Steps are not divided below this width.
+   real(wp), parameter :: narrowest = 1.0e-6_wp
    !> Trials for the angle of a stop, and the step of Newton's method that is the last one: the
    !> position is stationary at a stop, so that errors count by their square.
-   integer, parameter :: max_trials = 60
-   real(wp), parameter :: angle_tolerance = 1.0e-8_wp
+   integer, parameter :: max_trials = 60, max_shortenings = 6
+   real(wp), parameter :: angle_tolerance = 1.0e-7_wp
 
-   ! State of slip along the stretch; what the path notes of it is in piece_type.
+   !> A step of slip, and how it ends.
    type :: slide_type
-      !> Start, middle and end with the half-angle vectors there.
-      type(instant_type) :: at(3)
-      real(wp) :: v(2, 3) = 0.0_wp
-      !> Derivative of phi at the end of each step by that at its start.
-      real(wp) :: gain(2) = 1.0_wp
-      !> The cell that it covers; 0 where it does not cover one.
-      integer :: cell = 0
-      !> Slip starts here at R = 0; slip stops at the end.
-      logical :: lands = .false., stops = .false.
+      type(stretch_type) :: stretch
+      type(stages_type) :: stages
+      !> The step is too wide for the tolerance; slip stops at its end.
+      logical :: divides = .false., stops = .false.
    end type slide_type
 
 contains
 
-   !> Slip over a whole cell, if it passes without a stop.
-   !> The cheap way through most cells: rotations of the grid only, no series, no instants.
-   pure subroutine glide(motion, cells, cell, v, gain, passes)
-      type(motion_type), intent(inout) :: motion
-      type(cells_type), intent(in) :: cells
-      !> Number of the cell, 1..n_cells.
-      integer, intent(in) :: cell
-      !> Half-angle vectors at the three nodes; the first is given.
-      real(wp), intent(inout) :: v(2, 3)
-      !> Derivative of phi at the end by that at the start.
-      real(wp), intent(out) :: gain
-      logical, intent(out) :: passes
-      type(rotation_type) :: rotation
-      real(wp) :: f, slope, before, part
-      integer :: k, node
-
-      gain = 1.0_wp
-      call pull_at_node(motion, 2*cell - 1, v(:, 1), f, before)
-      passes = f >= 0.0_wp
-      ! The pull must not be negative at a node: without friction enough to stop it, slip goes on.
-      do k = 1, 2
-         if (.not. passes) return
-         call motion%rotation_of(cells, 2*cell + k - 2, rotation)
-         call rotate(rotation, v(:, k), v(:, k + 1), part)
-         gain = gain*part
-         node = 2*cell - 1 + k
-         if (node > 2*cells%n_cells) node = 1
-         call pull_at_node(motion, node, v(:, k + 1), f, slope)
-         ! Falling and then rising, it might dip below zero.
-         passes = f >= 0.0_wp .and. .not. (before < 0.0_wp .and. slope > 0.0_wp)
-         before = slope
-      end do
-   end subroutine glide
-
-   !> Pull and its rate from what a node holds (fw_event_motion).
-   pure subroutine pull_at_node(motion, node, v, f, slope)
+   !> Slip over self%stretch from the direction self%stages%phi(1), unless it stops before.
+   pure subroutine slide_along(motion, cells, lands, may_divide, self)
       type(motion_type), intent(in) :: motion
-      integer, intent(in) :: node
-      real(wp), intent(in) :: v(2)
-      real(wp), intent(out) :: f, slope
-      real(wp) :: t(2), across, radius
-
-      ! across is P'.n, hence the rate of the direction is across/R.
-      t = direction_of(v)
-      associate (at => motion%node(:, node))
-         across = t(1)*at(4) - t(2)*at(3)
-         radius = max(motion%mu*at(7), tiny(1.0_wp))
-         f = t(1)*at(3) + t(2)*at(4) - motion%mu*at(8)
-         slope = t(1)*at(5) + t(2)*at(6) - motion%mu*at(9) + across**2/radius
-      end associate
-   end subroutine pull_at_node
-
-   !> Slip from self%at(1) in the direction self%v(:, 1) to an end, unless it stops before.
-   pure subroutine slide_along(motion, cells, to, self)
-      type(motion_type), intent(inout) :: motion
       type(cells_type), intent(in) :: cells
-      !> The end, on the cell self%cell if that is not 0.
-      type(instant_type), intent(in) :: to
-      !> Start and its direction on entry; `stops` and the end on return.
+      !> R vanishes at the start; whether the caller can take less.
+      logical, intent(in) :: lands, may_divide
+      !> The stretch and the first direction; the stretch ends at the stop on return.
       type(slide_type), intent(inout) :: self
-      type(instant_type) :: last
-      integer :: k
-      logical :: stops
+      real(wp), dimension(n_points) :: f, df
+      real(wp) :: angle, from, step
+      integer :: k, interval
 
-      self%at(3) = to
-      call take_steps(motion, cells, self)
       self%stops = .false.
-      ! The first half that stops ends the stretch; what the second half found is void.
-      do k = 1, 2
-         call find_stop(motion, self, k, last, stops)
-         if (.not. stops) cycle
-         self%stops = .true.
-         self%cell = 0
-         ! Two equal steps again over the shorter stretch, so that the quadrature keeps its form.
-         self%at(3) = last
-         call take_steps(motion, cells, self)
-         return
+      call take_step(motion, cells, lands, self)
+      ! Without room for more pieces the step is taken as it is.
+      self%divides = self%divides .and. may_divide
+      if (self%divides) return
+      call pulls_and_rates(motion, self, f, df)
+      call find_stop(motion, cells, self, f, df, interval, angle)
+      if (interval == 0) return
+      self%stops = .true.
+      ! The step again up to there, where its error is that of the end of a step, until the pull
+      ! vanishes at its end.
+      from = self%stretch%from
+      do k = 1, max_shortenings
+         call motion%stretch(cells, 0, from, angle, self%stretch)
+         if (angle <= from) then
+            self%stages%phi = self%stages%phi(1)
+            self%stages%gain = 1.0_wp
+            return
+         end if
+         call take_step(motion, cells, lands, self)
+         call pulls_and_rates(motion, self, f, df)
+         ! A pull that does not fall there has no root near by: the first one is kept.
+         if (.not. df(n_points) < 0.0_wp) return
+         step = -f(n_points)/df(n_points)
+         if (abs(step) <= angle_tolerance) return
+         angle = max(angle + min(step, 0.5_wp*cells%width), from)
       end do
    end subroutine slide_along
 
-   !> Directions in the middle and at the end.
-   pure subroutine take_steps(motion, cells, self)
-      type(motion_type), intent(inout) :: motion
+   !> Directions at the points of the stretch.
+   pure subroutine take_step(motion, cells, lands, self)
+      type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      type(slide_type), intent(inout) :: self
-      type(rotation_type) :: rotation
-      integer :: k
-
-      if (self%cell == 0) then
-         ! No cell: three instants of the series, and quintics between them.
-         self%at(2) = motion%look(0.5_wp*(self%at(1)%angle + self%at(3)%angle))
-         do k = 1, 2
-            call turned(motion, new_segment(motion, self%at(k), self%at(k + 1)), self%at(k), &
-                        self%at(k + 1), self%v(:, k), self%lands .and. k == 1, &
-                        self%v(:, k + 1), self%gain(k))
-         end do
-         return
-      end if
-      self%at(2) = motion%at_node(cells, 2*self%cell)
-      do k = 1, 2
-         if (motion%remembers) then
-            call motion%rotation_of(cells, 2*self%cell + k - 2, rotation)
-            call rotate(rotation, self%v(:, k), self%v(:, k + 1), self%gain(k))
-         else
-            self%v(:, k + 1) = half_angle(self%at(k + 1)%p)
-         end if
-      end do
-   end subroutine take_steps
-
-   !> Direction of slip after a step of any length on a segment that starts with it.
-   pure subroutine turned(motion, segment, from, to, v, lands, after, gain)
-      !> From `from` to `to`, on the segment between them (or a longer one that starts with it).
-      type(motion_type), intent(in) :: motion
-      type(segment_type), intent(in) :: segment
-      type(instant_type), intent(in) :: from, to
-      real(wp), intent(in) :: v(2)
       logical, intent(in) :: lands
-      real(wp), intent(out) :: after(2), gain
-      type(gauss_type) :: gauss
-      type(arc_type) :: arc
-      real(wp) :: h, phi
+      type(slide_type), intent(inout) :: self
+      real(wp) :: slope, h
+      logical :: done
 
-      after = v
-      gain = 1.0_wp
-      h = to%angle - from%angle
-      if (h <= 0.0_wp) return
-      ! At velocity level the direction is that of P at once.
-      if (.not. motion%remembers) then
-         after = half_angle(to%p)
-         return
-      end if
-      if (lands) then
-         gauss = motion%look_gauss(from%angle, h)
-         arc = landing_arc(from, gauss, v, h)
-         phi = 0.5_wp*h*(arc%slope + arc%curvature*h)
-         after = [v(1)*cos(phi) - v(2)*sin(phi), v(2)*cos(phi) + v(1)*sin(phi)]
-         ! Whatever was before, phi starts at the angle of P'.
-         gain = 0.0_wp
-      else
-         gauss = segment%gauss(h)
-         call rotate(new_rotation(h, gauss%dp(:, 1)/gauss%radius(1), &
-                                  gauss%dp(:, 2)/gauss%radius(2)), v, after, gain)
-      end if
-   end subroutine turned
-
-   !> The quadratic behind a landing.
-   !> phi' at the landing by l'Hospital's rule: R' phi' = P''.n - |P'| phi'.
-   pure type(arc_type) function landing_arc(from, gauss, v, h) result(arc)
-      type(instant_type), intent(in) :: from
-      type(gauss_type), intent(in) :: gauss
-      real(wp), intent(in) :: v(2), h
-      real(wp) :: t(2)
-
-      t = direction_of(v)
-      arc = new_arc(h, v, gauss%dp, gauss%radius, &
-                    (t(1)*from%ddp(2) - t(2)*from%ddp(1))/(from%dradius + norm2(from%dp)))
-   end function landing_arc
-
-   !> What drives slip on.
-   !> P'.t - R': while it is positive, the edge of the cone takes z along.
-   pure real(wp) function pull(motion, at, v)
-      type(motion_type), intent(in) :: motion
-      type(instant_type), intent(in) :: at
-      real(wp), intent(in) :: v(2)
-
-      if (motion%remembers) then
-         pull = dot_product(at%dp, direction_of(v)) - at%dradius
-      else
-         pull = norm2(at%p) - at%radius
-      end if
-   end function pull
-
-   !> Its rate along the path.
-   !> d/dtau (P'.t - R') = P''.t - R'' + P'.n phi', with phi' = P'.n/R.
-   pure real(wp) function pull_slope(motion, at, v) result(slope)
-      type(motion_type), intent(in) :: motion
-      type(instant_type), intent(in) :: at
-      real(wp), intent(in) :: v(2)
-      real(wp) :: t(2)
-
-      slope = 0.0_wp
-      if (at%radius <= 0.0_wp) return
-      if (motion%remembers) then
-         t = direction_of(v)
-         slope = dot_product(at%ddp, t) - at%ddradius + &
-                 (t(1)*at%dp(2) - t(2)*at%dp(1))**2/at%radius
-      else
-         slope = dot_product(at%p, at%dp)/max(norm2(at%p), tiny(1.0_wp)) - at%dradius
-      end if
-   end function pull_slope
-
-   !> Whether and where slip stops in a step: with a negative pull at its end, or between where the
-   !> cubic through both ends dips below zero.
-   !> Rising pulls at both ends, or falling at both, cannot hide a dip that the cubic would show.
-   pure subroutine find_stop(motion, self, step, last, stops)
-      type(motion_type), intent(in) :: motion
-      type(slide_type), intent(in) :: self
-      !> 1 or 2.
-      integer, intent(in) :: step
-      type(instant_type), intent(out) :: last
-      logical, intent(out) :: stops
-      type(segment_type) :: segment
-      real(wp) :: f(2), df(2), v(2), angle, gain
-      logical :: lands
-
-      f(2) = pull(motion, self%at(step + 1), self%v(:, step + 1))
-      df(2) = pull_slope(motion, self%at(step + 1), self%v(:, step + 1))
-      stops = f(2) < 0.0_wp
-      ! A pull that ends rising has not fallen below zero unless it dips.
-      if (.not. stops .and. df(2) <= 0.0_wp) return
-      lands = self%lands .and. step == 1
-      associate (from => self%at(step), from_v => self%v(:, step))
-         last = self%at(step + 1)
-         f(1) = pull(motion, from, from_v)
-         df(1) = pull_slope(motion, from, from_v)
-         if (.not. stops .and. df(1) >= 0.0_wp) return
-         segment = new_segment(motion, from, last)
-         if (.not. stops) then
-            angle = from%angle + summit(-f, -df, last%angle - from%angle)
-            last = segment%at(angle)
-            call turned(motion, segment, from, last, from_v, lands, v, gain)
-            f(2) = pull(motion, last, v)
-            df(2) = pull_slope(motion, last, v)
-            stops = f(2) < 0.0_wp
-         end if
-         if (.not. stops) then
-            last = self%at(step + 1)
-         else if (f(1) <= 0.0_wp) then
-            ! No pull at the start of the step: slip stops there.
-            last = from
+      associate (s => self%stretch, stages => self%stages)
+         h = s%to - s%from
+         if (motion%remembers) then
+            slope = 0.0_wp
+            if (lands) slope = landing_slope(s)
+            ! R at a root of N is round-off, which phi' at the start must not be divided by.
+            if (lands) s%radius(1) = 0.0_wp
+            call solve_step(cells%rule, h, s%dp, s%radius, slope, stages, done)
+            ! Whatever was before, phi starts at the angle of P'.
+            if (lands) stages%gain = 0.0_wp
          else
-            call find_zero(motion, segment, from, from_v, lands, f, df, last)
+            ! Nothing to integrate: the direction is that of P, whatever came before.
+            stages%phi = atan2(s%p(:, 2), s%p(:, 1))
+            stages%slope = (s%p(:, 1)*s%dp(:, 2) - s%p(:, 2)*s%dp(:, 1))/ &
+                           max(s%p(:, 1)**2 + s%p(:, 2)**2, tiny(1.0_wp))
+            stages%gain = 0.0_wp
+            stages%last = h*dot_product(cells%rule%last, stages%slope)
+            done = .true.
+         end if
+         ! The last coefficient weighs more than what the step leaves out, which is of twice its
+         ! order where phi is smooth; where it is not, as before contact ends, it is all there is.
+         self%divides = h > narrowest .and. (.not. done .or. &
+            h*abs(stages%last)*maxval(s%radius) > step_tolerance*motion%largest_radius)
+      end associate
+   end subroutine take_step
+
+   !> phi' at a landing by l'Hospital's rule: R' phi' = P''.n - |P'| phi'.
+   pure real(wp) function landing_slope(stretch) result(slope)
+      type(stretch_type), intent(in) :: stretch
+      real(wp) :: length
+
+      associate (dp => stretch%dp(1, :), ddp => stretch%ddp(1, :))
+         length = max(norm2(dp), tiny(1.0_wp))
+         slope = (dp(1)*ddp(2) - dp(2)*ddp(1))/(length*(stretch%dradius(1) + length))
+      end associate
+   end function landing_slope
+
+   !> What drives slip on, P'.t - R', at the points of a stretch: while it is positive, the edge of
+   !> the cone takes z along.
+   pure subroutine pulls(motion, stretch, phi, f)
+      type(motion_type), intent(in) :: motion
+      type(stretch_type), intent(in) :: stretch
+      real(wp), intent(in) :: phi(n_points)
+      real(wp), intent(out) :: f(n_points)
+      real(wp), dimension(n_points) :: c, d
+
+      associate (s => stretch)
+         if (motion%remembers) then
+            call cosine_and_sine(phi, c, d)
+            f = c*s%dp(:, 1) + d*s%dp(:, 2) - s%dradius
+         else
+            f = sqrt(s%p(:, 1)**2 + s%p(:, 2)**2) - s%radius
          end if
       end associate
+   end subroutine pulls
+
+   !> The same with its rate P''.t - R'' + P'.n phi' (at velocity level P'.t - R').
+   pure subroutine pulls_and_rates(motion, self, f, df)
+      type(motion_type), intent(in) :: motion
+      type(slide_type), intent(in) :: self
+      real(wp), intent(out) :: f(n_points), df(n_points)
+      !> Part of the largest R below which P'.n/R is not taken for phi'.
+      real(wp), parameter :: small = 1.0e-6_wp
+      real(wp), dimension(n_points) :: c, d, across, slope
+      integer :: i
+
+      associate (s => self%stretch, stages => self%stages)
+         call cosine_and_sine(stages%phi, c, d)
+         if (.not. motion%remembers) then
+            f = c*s%p(:, 1) + d*s%p(:, 2) - s%radius
+            df = c*s%dp(:, 1) + d*s%dp(:, 2) - s%dradius
+            return
+         end if
+         across = c*s%dp(:, 2) - d*s%dp(:, 1)
+         slope = stages%slope
+         do i = 1, n_points, n_points - 1
+            ! The ends are no Gauss points: the equation itself says phi' there, unless R vanishes.
+            if (s%radius(i) > small*motion%largest_radius) slope(i) = across(i)/s%radius(i)
+         end do
+         f = c*s%dp(:, 1) + d*s%dp(:, 2) - s%dradius
+         df = c*s%ddp(:, 1) + d*s%ddp(:, 2) - s%ddradius + across*slope
+      end associate
+   end subroutine pulls_and_rates
+
+   !> The first interval between two points in which the pull becomes negative (0: none), and where
+   !> that is on the polynomial of the step.
+   pure subroutine find_stop(motion, cells, self, f, df, interval, angle)
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      type(slide_type), intent(in) :: self
+      !> Pull and its rate at the points.
+      real(wp), intent(in) :: f(n_points), df(n_points)
+      integer, intent(out) :: interval
+      real(wp), intent(out) :: angle
+      type(instant_type) :: ends(2)
+      real(wp) :: g(2), dg(2)
+      integer :: i
+
+      interval = 0
+      angle = self%stretch%to
+      do i = 1, n_points - 1
+         if (f(i + 1) >= 0.0_wp .and. (df(i) >= 0.0_wp .or. df(i + 1) <= 0.0_wp)) cycle
+         ends = [point_of(cells, self%stretch, i), point_of(cells, self%stretch, i + 1)]
+         g = f(i:i + 1)
+         dg = df(i:i + 1)
+         if (g(2) >= 0.0_wp) then
+            ! Falling and then rising: perhaps at the least value of the cubic through both.
+            ends(2)%angle = ends(1)%angle + summit(-g, -dg, ends(2)%angle - ends(1)%angle)
+            call pull_at(motion, cells, self, ends(2)%angle, g(2), dg(2))
+            if (g(2) >= 0.0_wp) cycle
+         end if
+         interval = i
+         ! No pull at the start: slip stops there.
+         angle = ends(1)%angle
+         if (g(1) > 0.0_wp) call find_zero(motion, cells, self, ends%angle, g, dg, angle)
+         return
+      end do
    end subroutine find_stop
 
-   !> Where the pull becomes zero before `last`: Newton's method within the bracket, from the root
-   !> of the cubic through both ends.
-   !> The direction is integrated anew from `from` to every trial: its error is that of one step.
-   pure subroutine find_zero(motion, segment, from, v, lands, f_ends, df_ends, last)
+   !> The pull anywhere in the step, on its polynomial.
+   pure subroutine pull_at(motion, cells, self, angle, f, slope)
       type(motion_type), intent(in) :: motion
-      type(segment_type), intent(in) :: segment
-      type(instant_type), intent(in) :: from
-      real(wp), intent(in) :: v(2)
-      logical, intent(in) :: lands
+      type(cells_type), intent(in) :: cells
+      type(slide_type), intent(in) :: self
+      real(wp), intent(in) :: angle
+      real(wp), intent(out) :: f, slope
+      type(instant_type) :: at
+      real(wp) :: t(2), h, across
+
+      at = motion%look(angle)
+      if (.not. motion%remembers) then
+         f = norm2(at%p) - at%radius
+         slope = dot_product(at%p, at%dp)/max(norm2(at%p), tiny(1.0_wp)) - at%dradius
+         return
+      end if
+      h = self%stretch%to - self%stretch%from
+      t = direction_of(angle_at(cells%rule, h, self%stages%phi(1), self%stages%slope, &
+                                (angle - self%stretch%from)/h))
+      across = t(1)*at%dp(2) - t(2)*at%dp(1)
+      f = dot_product(t, at%dp) - at%dradius
+      slope = dot_product(t, at%ddp) - at%ddradius + across**2/max(at%radius, tiny(1.0_wp))
+   end subroutine pull_at
+
+   !> Where the pull becomes zero between two angles: Newton's method within the bracket, from the
+   !> root of the cubic through both ends.
+   pure subroutine find_zero(motion, cells, self, ends, f_ends, df_ends, angle)
+      type(motion_type), intent(in) :: motion
+      type(cells_type), intent(in) :: cells
+      type(slide_type), intent(in) :: self
       !> Pull and slope at both ends.
-      real(wp), intent(in) :: f_ends(2), df_ends(2)
-      type(instant_type), intent(inout) :: last
-      real(wp) :: low, high, trial, f, slope, after(2), gain
+      real(wp), intent(in) :: ends(2), f_ends(2), df_ends(2)
+      real(wp), intent(out) :: angle
+      real(wp) :: low, high, f, slope, last
       integer :: k
 
-      low = from%angle
-      high = last%angle
-      trial = low + (high - low)*first_guess(f_ends, df_ends*(high - low))
+      low = ends(1)
+      high = ends(2)
+      angle = low + (high - low)*first_guess(f_ends, df_ends*(high - low))
       do k = 1, max_trials
-         last = segment%at(trial)
-         call turned(motion, segment, from, last, v, lands, after, gain)
-         f = pull(motion, last, after)
-         slope = pull_slope(motion, last, after)
+         call pull_at(motion, cells, self, angle, f, slope)
          if (f >= 0.0_wp) then
-            low = trial
+            low = angle
          else
-            high = trial
+            high = angle
          end if
+         last = angle
+         angle = 0.5_wp*(low + high)
+         ! A slope that is not negative points the wrong way: halve.
          if (slope < 0.0_wp) then
-            trial = last%angle - f/slope
-         else
-            ! A slope that is not negative points the wrong way: halve.
-            trial = low
+            if (last - f/slope > low .and. last - f/slope < high) angle = last - f/slope
          end if
-         if (trial <= low .or. trial >= high) trial = 0.5_wp*(low + high)
-         if (abs(trial - last%angle) <= angle_tolerance .or. high - low <= angle_tolerance) exit
+         ! The step is taken again to this angle, which is then corrected.
+         if (abs(angle - last) <= 1.0e-3_wp*(ends(2) - ends(1))) return
       end do
-      last = motion%look(trial)
    end subroutine find_zero
 
    !> Root in 0..1 of the cubic with values f of other signs and slopes df at 0 and 1, nearly.
