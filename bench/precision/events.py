@@ -86,9 +86,9 @@ def write_events(images: Path, limits: list[Limit]) -> str:
         f"Relative distance of the solution with H = {N_HARMONICS} from that of the same H with "
         f"events and n_time = {LIMIT}, and the time of the point [ms]; the truncation of the "
         "series is not part of it. Order is the slope of the last three distances above "
-        f"{ROUND_OFF:.0e}, the round-off of a solution. With one tangential direction events are "
-        "exact from the first column on and both samplings have the same limit; with two they are "
-        "of fourth order, where uniform sampling is of first.", "",
+        f"{ROUND_OFF:.0e}, the round-off of a solution. Events do not depend on n_time, and both "
+        "samplings have the same limit. With two tangential directions slip is integrated in steps "
+        "of its own tolerance, and uniform sampling is of first order.", "",
         "![Distance from the limit against n_time](images/benchmark_events.png)", "",
         *table(["case", "sampling", *(f"n_time = {n}" for n in numbers), "order"], rows)])
 

@@ -358,9 +358,10 @@ contains
          self%by_phi = slide%stages%gain*self%by_phi
          stops = slide%stops
          if (stops .or. slide%stretch%to >= to) exit
-         ! Twice as wide again, and no rest that is but a small part of a step.
+         ! Twice as wide again. What is left is some whole number of widths: the limit lies between
+         ! two, so that round-off does not decide.
          from = slide%stretch%to
-         if (to - from > 3.0_wp*width) then
+         if (to - from > 2.5_wp*width) then
             call motion%stretch(cells, 0, from, from + 2.0_wp*width, slide%stretch)
          else
             call motion%stretch(cells, 0, from, to, slide%stretch)

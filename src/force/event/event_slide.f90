@@ -30,7 +30,7 @@ module fw_event_slide
    !> Trials for the angle of a stop, and the step of Newton's method that is the last one: the
    !> position is stationary at a stop, so that errors count by their square.
    integer, parameter :: max_trials = 60, max_shortenings = 6
-   real(wp), parameter :: angle_tolerance = 1.0e-7_wp
+   real(wp), parameter :: angle_tolerance = 1.0e-8_wp
 
    !> A step of slip, and how it ends.
    type :: slide_type
