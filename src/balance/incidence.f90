@@ -38,7 +38,6 @@ module fw_incidence
       procedure :: scatter
       procedure :: gather_row
       procedure :: scatter_row
-      procedure :: gather_harmonic
       procedure :: scatter_harmonic
       procedure :: add_block
       procedure :: add_mapped_block
@@ -208,26 +207,6 @@ contains
          end do
       end do
    end subroutine scatter_row
-
-   !> values = factor B_n q for one row, complex amplitudes of harmonic h in columns.
-   pure subroutine gather_harmonic(self, row, h, map, n_mapped, factor, q, values)
-      class(incidence_type), intent(in) :: self
-      integer, intent(in) :: row, h
-      integer, intent(in) :: map(:)
-      integer, intent(in) :: n_mapped
-      complex(wp), intent(in) :: factor
-      !> Complex amplitudes (n_mapped, any number of columns).
-      complex(wp), intent(in) :: q(:, :)
-      complex(wp), intent(out) :: values(:)
-      integer :: e, place
-
-      values = (0.0_wp, 0.0_wp)
-      do e = self%first(row), self%first(row + 1) - 1
-         place = map(self%coordinate(e))
-         if (place == 0 .or. place > n_mapped) cycle
-         values = values + factor*harmonic_weight(self, e, h)*q(place, :size(values))
-      end do
-   end subroutine gather_harmonic
 
    !> q = q + B_n^H value for one row, complex amplitudes of harmonic h.
    pure subroutine scatter_harmonic(self, row, h, value, q)

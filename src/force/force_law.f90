@@ -131,7 +131,6 @@ module fw_force_law
       type(fft_type), allocatable :: fft
    contains
       procedure :: reserve => reserve_workspace
-      procedure :: renew_fft
       procedure :: measure_slip
       procedure :: measure_scale
       procedure :: always_closed
@@ -210,13 +209,6 @@ contains
       allocate (self%state(n), self%linear_state(n), source=pair_stuck)
       call fourier%plan_fft(n*n_components, self%fft)
    end subroutine reserve_workspace
-
-   !> Make a copy that is to live beside its original independent of it.
-   subroutine renew_fft(self)
-      class(force_workspace), intent(inout) :: self
-
-      if (allocated(self%fft)) call self%fft%renew()
-   end subroutine renew_fft
 
    !> Ask for `slip`, and for its derivative after `linearize`, from now on.
    pure subroutine measure_slip(self)

@@ -32,7 +32,6 @@ module fw_fft
       real(wp), allocatable :: cosine(:), sine(:)
    contains
       procedure :: plan
-      procedure :: renew
       procedure :: synthesise
       procedure :: analyse
    end type fft_type
@@ -50,13 +49,6 @@ contains
       self%cosine = [(cos(2.0_wp*pi*k/n_time), k=0, n_time - 1)]
       self%sine = [(sin(2.0_wp*pi*k/n_time), k=0, n_time - 1)]
    end subroutine plan
-
-   !> A copy of a table is a table: nothing is shared.
-   subroutine renew(self)
-      class(fft_type), intent(inout) :: self
-
-      if (self%n_rows > 0) call self%plan(self%n_rows, self%n_time)
-   end subroutine renew
 
    !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.
    subroutine synthesise(self, harmonic, column, coefficients, values)
@@ -114,7 +106,8 @@ contains
    !> Whether FFTW stands behind fft_type.
    logical, parameter :: has_fftw = .true.
 
-   !> A pair of plans with their own buffers; belongs to one thread.
+   !> A pair of plans with their own buffers; belongs to one thread, and is not to be copied: both
+   !> would destroy the same plans.
    type :: fft_type
       !> Number of rows (pairs times components), and of instants in a period.
       integer :: n_rows = 0
@@ -129,7 +122,6 @@ contains
       type(c_ptr) :: backward = c_null_ptr
    contains
       procedure :: plan
-      procedure :: renew
       procedure :: synthesise
       procedure :: analyse
       final :: destroy
@@ -162,18 +154,6 @@ contains
                                              FFTW_ESTIMATE)
       !$omp end critical (fretwear_fftw)
    end subroutine plan
-
-   !> Give a copy plans of its own: those that came with it stay with the original.
-   !> Without this both would destroy the same plan, and two threads would share its buffers.
-   subroutine renew(self)
-      class(fft_type), intent(inout) :: self
-
-      self%forward = c_null_ptr
-      self%backward = c_null_ptr
-      if (allocated(self%values)) deallocate (self%values)
-      if (allocated(self%spectrum)) deallocate (self%spectrum)
-      if (self%n_rows > 0) call self%plan(self%n_rows, self%n_time)
-   end subroutine renew
 
    !> Values at the instants from coefficients; U_n = uc_n - i us_n stands at frequency n.
    subroutine synthesise(self, harmonic, column, coefficients, values)
