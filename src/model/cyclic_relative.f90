@@ -4,6 +4,7 @@
 !> sectors move alike.
 module fw_cyclic_relative
    use fw_cyclic_data, only: cyclic_type
+   use fw_divisor, only: common_divisor
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_relative, only: relative_type
@@ -253,19 +254,5 @@ contains
       end do
       row = 0
    end function first_dependent
-
-   !> Euclid's; 0 and n have n.
-   pure integer function common_divisor(a, b) result(divisor)
-      integer, intent(in) :: a, b
-      integer :: other, rest
-
-      divisor = a
-      other = b
-      do while (other > 0)
-         rest = modulo(divisor, other)
-         divisor = other
-         other = rest
-      end do
-   end function common_divisor
 
 end module fw_cyclic_relative

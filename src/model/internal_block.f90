@@ -1,5 +1,6 @@
 !> The internal block of a condensation at one harmonic, D_j = k_j - theta m_j + i s c_j: a
-!> diagonal, or factors where the damping couples the internal modes.
+!> diagonal, or factors where the damping couples the internal modes. A sector fills its own
+!> (fw_sector_stiffness).
 module fw_internal_block
    use fw_kinds, only: wp
    use fw_linalg, only: complex_lu_type
@@ -10,7 +11,6 @@ module fw_internal_block
    public :: internal_block
 
    type :: internal_block
-      private
       !> D^-1, of coupled modes that of the diagonal without damping; 0 of a free mode (n_internal).
       complex(wp), allocatable :: inverse(:)
       !> Whether damping couples the modes; `lu` has the factors of D then.

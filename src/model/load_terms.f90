@@ -5,6 +5,7 @@
 !> n being the harmonic, or an engine order over the greatest common divisor of all orders: omega is
 !> that divisor times the speed then.
 module fw_load_terms
+   use fw_divisor, only: common_divisor
    use fw_key, only: key
    use fw_key, only: key_visitor
    use fw_key_range, only: dof_numbers
@@ -82,19 +83,6 @@ contains
          allocate (self%harmonic(self%n_terms), source=1)
       end if
    end subroutine take_orders
-
-   pure integer function common_divisor(a, b) result(divisor)
-      integer, intent(in) :: a, b
-      integer :: other, rest
-
-      divisor = a
-      other = b
-      do while (other > 0)
-         rest = modulo(divisor, other)
-         divisor = other
-         other = rest
-      end do
-   end function common_divisor
 
    !> Add the terms to the static load and to the waves.
    pure subroutine add_to(self, static, waves, columns)

@@ -5,9 +5,9 @@
 !>
 !> Z_qi is not the transpose of Z_iq: the blocks of K, M and C are Hermitian, their sum is not.
 module fw_sector_stiffness
+   use fw_internal_block, only: internal_block
    use fw_kinds, only: wp
    use fw_lapack, only: zgemm
-   use fw_linalg, only: complex_lu_type
    use fw_sector_reduction, only: sector_reduction
    use fw_structure_operator, only: by_frequency
    implicit none (type, external)
@@ -28,13 +28,6 @@ module fw_sector_stiffness
       !> Whether the load is a wave of this nodal diameter.
       logical :: is_loaded = .true.
    end type harmonic_point
-
-   !> D, factored where damping couples the modes.
-   type :: internal_type
-      complex(wp), allocatable :: inverse(:)
-      logical :: coupled = .false.
-      type(complex_lu_type) :: lu
-   end type internal_type
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp)
 
@@ -65,7 +58,7 @@ contains
       complex(wp), intent(inout), contiguous :: matrix(:, :)
       complex(wp), intent(inout) :: load(:)
       logical, intent(out) :: failed
-      type(internal_type) :: internal
+      type(internal_block) :: internal
       complex(wp), allocatable :: z_iq(:, :), z_qi(:, :), solved(:, :)
       integer :: m, n
 
@@ -86,7 +79,7 @@ contains
       end if
       solved(:, :m) = z_iq
       solved(:, m + 1) = load_of(basis, basis%load_i, point)
-      call solve_internal(internal, m + 1, solved)
+      call internal%solve(m + 1, solved)
       call zgemm('T', 'N', m, m, n, -one, z_qi, n, solved, n, one, matrix, m)
       load = load - matmul(transpose(z_qi), solved(:, m + 1))
    end subroutine form_sector
@@ -101,7 +94,7 @@ contains
       real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: derivative(:)
-      type(internal_type) :: internal
+      type(internal_block) :: internal
       complex(wp), allocatable :: block(:, :), x(:, :)
       integer :: m, n
       logical :: failed
@@ -128,7 +121,7 @@ contains
       x(:, 1) = matmul(block, q) + internal_slope(basis, slopes, x(:, 1))
       if (basis%waves%acts()) x(:, 1) = x(:, 1) - load_factor* &
                                         slope_of(basis, basis%load_i, point, slopes)
-      call solve_internal(internal, 1, x)
+      call internal%solve(1, x)
       call combine_rows(basis, point, m + 1, m + n, .true., block)
       call add_whirl(basis, point, m, 0, block, adjoint=.true.)
       derivative = derivative - matmul(x(:, 1), block)
@@ -142,7 +135,7 @@ contains
       real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: observed(:)
-      type(internal_type) :: internal
+      type(internal_block) :: internal
       logical :: failed
 
       observed = matmul(turned(basis%observe_q, point), q)
@@ -175,7 +168,7 @@ contains
       real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: x(:), x_slope(:)
-      type(internal_type) :: internal
+      type(internal_block) :: internal
       complex(wp) :: block(basis%n_internal, basis%n_coordinates), column(basis%n_internal, 1)
       logical :: failed
 
@@ -187,7 +180,7 @@ contains
       end associate
       column(:, 1) = load_factor*slope_of(basis, basis%load_i, point, slopes) - &
                      matmul(block, q) - internal_slope(basis, slopes, x)
-      call solve_internal(internal, 1, column)
+      call internal%solve(1, column)
       x_slope = column(:, 1)
    end subroutine follow_frequency
 
@@ -200,7 +193,7 @@ contains
       complex(wp), intent(in) :: q(:)
       complex(wp), intent(out) :: work
       complex(wp), intent(out), optional :: slope, row(:)
-      type(internal_type) :: internal
+      type(internal_block) :: internal
       complex(wp) :: x(basis%n_internal), x_slope(basis%n_internal), f_i(basis%n_internal)
       complex(wp) :: f_q(basis%n_coordinates)
       complex(wp), allocatable :: z_iq(:, :)
@@ -223,7 +216,7 @@ contains
          call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
          call add_whirl(basis, point, m, 0, z_iq)
          call factor_internal(basis, point, internal, failed)
-         call solve_internal(internal, m, z_iq)
+         call internal%solve(m, z_iq)
       end associate
       row = row - matmul(f_i, z_iq)
    end subroutine work_of_sector
@@ -232,7 +225,7 @@ contains
    function modes_of(basis, point, internal, load_factor, q) result(x)
       type(sector_reduction), intent(in) :: basis
       type(harmonic_point), intent(in) :: point
-      type(internal_type), intent(in) :: internal
+      type(internal_block), intent(in) :: internal
       real(wp), intent(in) :: load_factor
       complex(wp), intent(in) :: q(:)
       complex(wp) :: x(basis%n_internal)
@@ -243,7 +236,7 @@ contains
          call combine_rows(basis, point, m + 1, m + n, .false., z_iq)
          call add_whirl(basis, point, m, 0, z_iq)
          rhs(:, 1) = load_factor*load_of(basis, basis%load_i, point) - matmul(z_iq, q)
-         call solve_internal(internal, 1, rhs)
+         call internal%solve(1, rhs)
          x = rhs(:, 1)
       end associate
    end function modes_of
@@ -305,10 +298,11 @@ contains
       end do
    end subroutine add_whirl
 
+   !> D, factored where damping or whirl couples the modes.
    subroutine factor_internal(basis, point, self, failed)
       type(sector_reduction), intent(in) :: basis
       type(harmonic_point), intent(in) :: point
-      type(internal_type), intent(out) :: self
+      type(internal_block), intent(out) :: self
       logical, intent(out) :: failed
       integer :: j
 
@@ -347,25 +341,6 @@ contains
          end if
       end do
    end subroutine factor_internal
-
-   !> D x = rhs in place.
-   subroutine solve_internal(self, n_right, rhs)
-      type(internal_type), intent(in) :: self
-      integer, intent(in) :: n_right
-      complex(wp), intent(inout), contiguous :: rhs(:, :)
-      integer :: j
-
-      if (self%coupled) then
-         call self%lu%solve(n_right, rhs)
-         do j = 1, size(self%inverse)
-            if (abs(self%inverse(j)) <= 0.0_wp) rhs(j, :n_right) = (0.0_wp, 0.0_wp)
-         end do
-      else
-         do j = 1, n_right
-            rhs(:, j) = self%inverse*rhs(:, j)
-         end do
-      end if
-   end subroutine solve_internal
 
    !> D' times a vector.
    pure function internal_slope(basis, slopes, vector) result(product)
