@@ -267,7 +267,7 @@ class Harmonics(TypedDict, total=False):
     #: instants (default: 'hbm')
     method: Literal["hbm", "tcm", "tcm_least_squares", "hdhb"]
     #: H, the highest harmonic; with accuracy the most that may be used (default: 53 with accuracy,
-    #: 7 with 'mode', else 1)
+    #: 7 with 'mode', 'resonance', &control, else 1)
     n_harmonics: int
     #: instants of a period, at least 2H+1; 0: chosen (default: 0)
     n_time: int

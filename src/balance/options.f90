@@ -74,7 +74,7 @@ contains
                           self%method, method_words)
       call keys%bind(key('n_harmonics', 'H, the highest harmonic; with accuracy the most that '// &
                          'may be used', from_to(1, 10000), &
-                         absent="53 with accuracy, 7 with 'mode'"), &
+                         absent="53 with accuracy, 7 with 'mode', 'resonance', &control"), &
                      self%n_harmonics)
       call keys%bind(key('n_time', 'instants of a period, at least 2H+1; 0: chosen', &
                          from_to(0, 1000000)), self%n_time)

@@ -52,7 +52,7 @@ module fw_read_case
 
    !> Harmonics of a nonlinear mode, a resonance or a controlled response where nothing is said of
    !> them: frequencies to some 1e-5.
-   integer, parameter :: usual_of_mode = 7
+   integer, parameter :: usual_harmonics = 7
 
 contains
 
@@ -142,8 +142,8 @@ contains
       if (case%sensitivity%is_wanted()) return
       if (any(case%analysis == [analysis_mode, analysis_resonance]) .or. &
           case%control%is_wanted()) then
-         case%harmonics%n_harmonics = usual_of_mode
-         call reader%amend('harmonics', 'n_harmonics', to_text(usual_of_mode))
+         case%harmonics%n_harmonics = usual_harmonics
+         call reader%amend('harmonics', 'n_harmonics', to_text(usual_harmonics))
          return
       end if
       if (.not. has_nonlinear(case) .or. .not. goes_with_accuracy(case)) return
