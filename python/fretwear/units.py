@@ -53,11 +53,15 @@ def converted(values: Mapping[str, list[str]], settings: Iterable[tuple[str, str
     given = [*((key, list(words)) for key, words in values.items()),
              *((key, _words(value)) for key, value in settings)]
     last = {_base(key): words for key, words in given}
-    last["sweep%unit"], by_hertz = _frequency_unit(last)
+    last["sweep%unit"], by_hertz = _frequency_unit(last, given)
     found = [("sweep%unit", f"'{last['sweep%unit'][0]}'")] if by_hertz else []
     for key, words in given:
         unit = _unit_of(_base(key), last)
-        if unit is None or not any(_WITH_UNIT.match(word) for word in words):
+        if unit is None:
+            continue
+        if not any(_WITH_UNIT.match(word) for word in words):
+            if any(_base(name) == _base(key) for name, _ in found):  # set over a value with a unit
+                found.append((key, ", ".join(words)))
             continue
         numbers = [_convert(key, word, unit, system) for word in words]
         found.append((key, ", ".join(numbers)))
@@ -72,14 +76,16 @@ def _words(value: str) -> list[str]:
     return [word.strip().strip("'\"") for word in value.split(",")]
 
 
-def _frequency_unit(last: Mapping[str, list[str]]) -> tuple[list[str], bool]:
+def _frequency_unit(last: Mapping[str, list[str]],
+                    given: Iterable[tuple[str, list[str]]]) -> tuple[list[str], bool]:
     """The unit of the frequencies of the sweep; hertz, where they were typed and it was not said.
     """
     said = last.get("sweep%unit", [""])[0]
     if said:
         return [said], False
-    typed = any("hz" in word.lower() for key in ("start", "end", "frequencies", "frequency")
-                for word in last.get(f"sweep%{key}", []))
+    keys = {f"sweep%{key}" for key in ("start", "end", "frequencies", "frequency")}
+    typed = any("hz" in word.lower() for key, words in given if _base(key) in keys
+                for word in words)
     return (["Hz"], True) if typed else (["rad/s"], False)
 
 

@@ -64,6 +64,19 @@ def test_a_namelist_with_units(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert fw.Case.from_file(tmp_path / "effective.nml").namelist()
 
 
+def test_a_number_replaces_a_value_with_a_unit(tmp_path: Path) -> None:
+    """What is set last holds, whether it has a unit or not."""
+    from fretwear._native import namelist_values
+
+    path = tmp_path / "case.nml"
+    path.write_text(OSCILLATOR)
+    case = fw.Case.from_file(path, sweep={"start": "0.2 Hz"}).replace(sweep={"start": 0.05})
+    for changed in (case, fw.Case.from_file(path).overridden(["sweep%start=0.05"])):
+        values = namelist_values(changed.namelist())
+        assert float(values["sweep%start"][0]) == 0.05
+        assert float(values["sweep%end"][0]) == pytest.approx(0.1)
+
+
 def test_a_list_takes_a_unit_for_each() -> None:
     case = fw.Case(SECTOR, sweep={"frequencies": ["1.01 kHz", "61500 rpm", "6500 rad/s"]})
     with fw.Steps(case.replace(harmonics={"n_harmonics": 1})) as steps:
