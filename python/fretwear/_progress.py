@@ -73,7 +73,7 @@ class Bar:
         except ImportError:
             self._line = _Line()
         else:
-            self._bar = tqdm(unit="point", dynamic_ncols=True, leave=True)
+            self._bar = tqdm(unit=" points", dynamic_ncols=True, leave=True)
 
     def show(self, state: State) -> None:
         """Show how far the run is, and how long the rest may take."""

@@ -158,6 +158,8 @@ class ResultFile:
         except OSError as error:
             reason = str(error) if self._path is None or self._path.exists() else (
                 "there is no such file")
+            if "file signature not found" in reason:
+                reason = "it is no HDF5 file; a run of fw_run writes one"
             raise OutputError(f"{self.name}: cannot be read: {reason}") from None
         with file:
             yield file
