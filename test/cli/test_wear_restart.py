@@ -33,7 +33,8 @@ def test_same_numbers(tmp_path, name):
     steps = len(whole["omega"]) - 1
     assert steps > 8
     for stop in (1, 7):
-        part = merged(groups, {"wear": {"max_steps": stop}, "output": {}})
+        part = merged(groups, {"case": {"max_seconds": 900.0}, "wear": {"max_steps": stop},
+                               "output": {}})
         # The steps of pseudo-time are brought to equilibrium at the end of a run: cut behind it.
         keep = stop if name == "pseudo-time" else stop + 1
         run(tmp_path, part, name="part", status=4)
