@@ -58,6 +58,10 @@ module fw_branch
 
    !> First step where n_points leaves the choice: this part of the interval.
    integer, parameter :: default_steps = 100
+   !> Way back of the frequency between two turns, relative, that harmonics and instants of a balance
+   !> may make of a curve that does not turn: forces with corners leave harmonics out that fall as
+   !> the power 2.5 of their number only.
+   real(wp), parameter :: smooth_ripple = 1.0e-5_wp, ripple = 2.0e-4_wp
    !> Unknowns up to which a branch is followed without condensation.
    integer, parameter :: whole_up_to = 150
 
@@ -94,10 +98,10 @@ module fw_branch
       !> The whole structure was small enough, and had no solution where the branch begins.
       logical :: is_condensed = .false.
       type(multiplier_track), private :: track
-      !> The last point with multipliers, and whether a fold lies behind it.
+      !> The last point with multipliers, and distances to the folds behind it.
       type(branch_point), private :: last
       type(point_type), private :: last_point
-      logical, private :: has_fold = .false.
+      real(wp), allocatable, private :: folds(:)
       !> Of its multipliers since the point before it.
       real(wp), private :: movement(2) = 0.0_wp
    contains
@@ -209,7 +213,8 @@ contains
       if (.not. self%has_begun .or. self%has_no_start) return
       call self%level%solver%method%newton%linear%add_work(self%branch%curve%corrector%linear)
       call self%branch%bifurcations%doubt(self%branch%track)
-      call self%branch%bifurcations%merge_turns()
+      call self%branch%bifurcations%merge_turns( &
+         merge(ripple, smooth_ripple, case%contact%n_pairs > 0))
       call self%branch%closing_words(case, observer%run_out, words)
       call observer%on_message(words)
    end subroutine finish
@@ -347,7 +352,9 @@ contains
       if (point%fold) then
          ! One just beyond a bound belongs to no point of the sweep.
          if (is_within(self, point%place)) call add_fold(self, found, point)
-         self%has_fold = .true.
+         if (self%track%n > 0) then
+            self%folds = [self%folds, self%curve%corrector%metric%chord(self%last, found)]
+         end if
          return
       end if
       if (.not. allocated(point%multipliers)) return
@@ -359,7 +366,7 @@ contains
       end if
       self%last = found
       self%last_point = point
-      self%has_fold = .false.
+      self%folds = [real(wp) ::]
    end subroutine note
 
    !> The maxima between a point and the last.
@@ -441,7 +448,7 @@ contains
       probe%case => case
       probe%first = self%last
       probe%second = found
-      probe%has_fold = self%has_fold
+      probe%folds = self%folds
       call search_crossings(probe, self%last_point, point, self%movement, self%track%n - 1, &
                             .true., self%bifurcations, error)
       self%n_solved = self%n_solved + probe%n_solved
@@ -456,14 +463,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call solve_between(self%branch, self%case, self%first, self%second, share, &
-                         self%case%sweep%stability, point, error)
+                         self%case%sweep%stability, point, error, self%reached)
       self%n_solved = self%n_solved + 1
       self%iterations = self%iterations + point%iterations
    end subroutine at
 
    !> Solve across the chord between two points of the branch, at a share of it: where it turns,
    !> a frequency in between would not tell which part is meant.
-   subroutine solve_between(self, case, first, second, share, with_stability, point, error)
+   subroutine solve_between(self, case, first, second, share, with_stability, point, error, &
+                            reached)
       type(branch_type), intent(inout) :: self
       type(case_type), intent(in) :: case
       type(branch_point), intent(in) :: first, second
@@ -471,6 +479,8 @@ contains
       logical, intent(in) :: with_stability
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
+      !> Distance from the first.
+      real(wp), intent(out), optional :: reached
       type(branch_point) :: found
       real(wp) :: ds
 
@@ -478,6 +488,7 @@ contains
          ds = curve%corrector%metric%chord(first, second)
          call interpolate(curve%corrector%metric, first, second, share, found)
          call curve%corrector%correct(self%solved, first, ds, found, error)
+         if (present(reached)) reached = curve%corrector%metric%chord(first, found)
       end associate
       if (allocated(error)) return
       if (found%report%converged) call describe(self, case, found, with_stability, point, error)

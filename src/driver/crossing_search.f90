@@ -38,8 +38,11 @@ module fw_crossing_search
    type, abstract :: probe_type
       !> Solutions given, and their iterations.
       integer :: n_solved = 0, iterations = 0
-      !> Whether the branch turns between the two, where a multiplier passes 1.
-      logical :: has_fold = .false.
+      !> Distances from the first to where the branch turns between the two: a multiplier passes 1
+      !> there.
+      real(wp), allocatable :: folds(:)
+      !> Distance from the first to the solution given last.
+      real(wp) :: reached = 0.0_wp
    contains
       procedure(solution_at), deferred :: at
    end type probe_type
@@ -61,6 +64,8 @@ module fw_crossing_search
    type :: end_type
       real(wp) :: share = 0.0_wp
       type(point_type) :: point
+      !> Distance from the first.
+      real(wp) :: reached = 0.0_wp
    end type end_type
 
    !> Solutions for one place, of which so many before there is nothing but bisection: roots take
@@ -96,8 +101,8 @@ contains
       type(bifurcation_list), intent(inout) :: list
       type(error_type), allocatable, intent(out) :: error
 
-      call split(probe, end_type(0.0_wp, first), end_type(1.0_wp, second), movement, 0, after, &
-                 on_branch, list, error)
+      call split(probe, end_type(0.0_wp, first), end_type(1.0_wp, second, huge(1.0_wp)), movement, &
+                 0, after, on_branch, list, error)
    end subroutine search_crossings
 
    !> One place at a time.
@@ -111,16 +116,21 @@ contains
       type(bifurcation_list), intent(inout) :: list
       type(error_type), allocatable, intent(out) :: error
       type(end_type) :: middle
-      integer :: crossing
-      logical :: is_none
+      integer :: crossing, n_folds
+      logical :: is_none, holds_more
 
+      n_folds = folds_between(probe, low, high)
       associate (a => low%point%multipliers, b => high%point%multipliers)
          crossing = crossing_between(signature_of(a), signature_of(b))
-         is_none = crossing == crossing_none .or. crossing == crossing_plus .and. probe%has_fold
-         if (crossing == crossing_several .and. halvings < most_halvings .or. is_none .and. &
-             halvings < most_looks .and. may_hide(a, b, movement, probe%has_fold)) then
+         ! A fold passes one multiplier: one that none has passed hides another that came back.
+         is_none = crossing == merge(crossing_plus, crossing_none, n_folds == 1)
+         holds_more = crossing == crossing_several .or. n_folds > 1 .or. n_folds == 1 .and. &
+                      .not. is_none
+         if (holds_more .and. halvings < most_halvings .or. is_none .and. &
+             halvings < most_looks .and. may_hide(a, b, movement, n_folds > 0)) then
             middle%share = 0.5_wp*(low%share + high%share)
             call probe%at(middle%share, middle%point, error)
+            middle%reached = probe%reached
             if (allocated(error)) return
          end if
          if (is_known(middle%point)) then
@@ -132,9 +142,20 @@ contains
             return
          end if
       end associate
-      if (is_none) return
+      if (is_none .or. n_folds > 1) return
+      if (holds_more) crossing = crossing_several
       call locate(probe, low, high, crossing, after, on_branch, list, error)
    end subroutine split
+
+   !> How often the branch turns within a bracket.
+   pure integer function folds_between(probe, low, high) result(n)
+      class(probe_type), intent(in) :: probe
+      type(end_type), intent(in) :: low, high
+
+      n = 0
+      if (.not. allocated(probe%folds)) return
+      n = count(probe%folds > low%reached .and. probe%folds <= high%reached)
+   end function folds_between
 
    !> Narrow a bracket down to the place.
    subroutine locate(probe, first, second, crossing, after, on_branch, list, error)

@@ -53,9 +53,6 @@ module fw_bifurcation
 
    !> Two turns are one place where frequencies and amplitudes agree to this, relative.
    real(wp), parameter :: same_place = 1.0e-9_wp, same_amplitude = 1.0e-6_wp
-   !> Way back of the frequency between two turns, relative, that harmonics and instants of a
-   !> balance may make of a curve that does not turn.
-   real(wp), parameter :: ripple = 1.0e-5_wp
    !> A multiplier that passes 1 this near to a fold, whose own is off 1 by so much, is that of the
    !> fold.
    real(wp), parameter :: beside = 3.0e-4_wp, beside_amplitude = 0.03_wp, off_one = 1.0e-3_wp
@@ -83,8 +80,10 @@ contains
    !> Turns that are one place become one, or none where the branch goes on as before; what
    !> truncation may have made of a curve is left open: two turns with next to no way back between
    !> them, and a multiplier that passes 1 beside a fold instead of at it.
-   subroutine merge_turns(self)
+   subroutine merge_turns(self, ripple)
       class(bifurcation_list), intent(inout) :: self
+      !> Way back between two turns, relative to the place, that truncation may have made.
+      real(wp), intent(in) :: ripple
       type(bifurcation_type), allocatable :: kept(:)
       integer :: k, last, n
 
