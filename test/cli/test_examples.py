@@ -53,7 +53,8 @@ NUMBERS = {
     # corners is the highest turns with round-off: 0.38081 to 0.38114 with five kernels of OpenBLAS.
     "blade_sector/frf_2000rpm.nml": [("peak/amplitude", None, Ellipsis, 0.38097, 2e-3)],
     "blade_sector/frf_48.nml": [("amplitude", None, 0, 0.9286232, 1e-6)],
-    "blade_sector/mode.nml": [("mode/damping_ratio", None, Ellipsis, 9.480733e-4, 1e-6)],
+    # The number of tolerance = 1e-12; damping is a thousandth of the forces that balance to 1e-8.
+    "blade_sector/mode.nml": [("mode/damping_ratio", None, Ellipsis, 9.48072086e-4, 1e-5)],
 }
 
 
