@@ -58,9 +58,9 @@ module fw_branch
 
    !> First step where n_points leaves the choice: this part of the interval.
    integer, parameter :: default_steps = 100
-   !> Way back of the frequency between two turns, relative, that harmonics and instants of a balance
-   !> may make of a curve that does not turn: forces with corners leave harmonics out that fall as
-   !> the power 2.5 of their number only.
+   !> Way back of the frequency between two turns, relative, that harmonics and instants of a
+   !> balance may make of a curve that does not turn: of forces with corners the harmonics that are
+   !> left out fall as the power 2.5 of their number only.
    real(wp), parameter :: smooth_ripple = 1.0e-5_wp, ripple = 2.0e-4_wp
    !> Unknowns up to which a branch is followed without condensation.
    integer, parameter :: whole_up_to = 150

@@ -50,8 +50,8 @@ module fw_restart_file
    !> Keys in which a case may differ from the run that it continues. What matters of the files is
    !> compared by itself.
    character(*), parameter :: free_keys(*) = [character(18) :: 'case%title', 'case%threads', &
-      'case%max_seconds', 'model%file', 'contact%worn', 'contact%worn_step', 'wear%n_cycles', 'wear%max_steps', &
-      'wear%check_steps', 'output%file']
+      'case%max_seconds', 'model%file', 'contact%worn', 'contact%worn_step', 'wear%n_cycles', &
+      'wear%max_steps', 'wear%check_steps', 'output%file']
 
    !> The datasets of a step besides those of every point.
    character(*), parameter :: own_names(*) = [character(21) :: '/restart/vibration', &
