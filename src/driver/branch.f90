@@ -353,6 +353,7 @@ contains
          ! One just beyond a bound belongs to no point of the sweep.
          if (is_within(self, point%place)) call add_fold(self, found, point)
          if (self%track%n > 0) then
+            ! Counts of multipliers that pass 1 leave it out.
             self%folds = [self%folds, self%curve%corrector%metric%chord(self%last, found)]
          end if
          return

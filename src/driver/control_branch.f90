@@ -77,6 +77,8 @@ contains
       strategy%method%newton%loosest = tight_forcing
    end subroutine begin
 
+   !> Points of the branch of one amplitude after those of the other; `more` is false after the
+   !> last of them.
    subroutine next(self, case, observer, point, more, error)
       class(control_branch), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -216,6 +218,7 @@ contains
       request%amplitude = self%amplitude(self%k)
    end function request_at
 
+   !> Seconds since the point before: those of a point hold what was solved to find it.
    subroutine note_time(self, point)
       class(control_branch), intent(inout) :: self
       type(point_type), intent(inout) :: point

@@ -105,7 +105,8 @@ contains
                  0, after, on_branch, list, error)
    end subroutine search_crossings
 
-   !> One place at a time.
+   !> One place at a time: a bracket is halved while it holds more than one, or may hide two. What
+   !> most_halvings have not parted is added as one place that is left open.
    recursive subroutine split(probe, low, high, movement, halvings, after, on_branch, list, error)
       class(probe_type), intent(inout) :: probe
       type(end_type), intent(in) :: low, high
@@ -142,12 +143,14 @@ contains
             return
          end if
       end associate
+      ! Folds that were not parted are known as such; what passes with them cannot be told.
       if (is_none .or. n_folds > 1) return
       if (holds_more) crossing = crossing_several
       call locate(probe, low, high, crossing, after, on_branch, list, error)
    end subroutine split
 
-   !> How often the branch turns within a bracket.
+   !> How often the branch turns within a bracket. Distances from the first grow along a step, so
+   !> they put folds and solutions in order, which frequencies beside a fold do not.
    pure integer function folds_between(probe, low, high) result(n)
       class(probe_type), intent(in) :: probe
       type(end_type), intent(in) :: low, high

@@ -67,7 +67,8 @@ module fw_mode_start
 
 contains
 
-   !> Build the problem, find the mode and its onset; refuse what has no such mode.
+   !> Build the problem and find the mode; refuse what has no such mode. Its onset is looked for
+   !> later, from points of the curve (fw_mode_onset).
    subroutine build(self, case, error)
       class(mode_start), intent(inout), target :: self
       type(case_type), intent(in) :: case
