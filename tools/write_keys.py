@@ -187,7 +187,8 @@ def settings(groups: Keys) -> str:
             line += f', "{name}"'
     text = [SETTINGS_HEAD, *lines, line + "]"]
     text += ["",
-             "#: Units of the keys that have one: length L, mass M, time s and force F of the model,",
+             "#: Units of the keys that have one: length L, mass M, time s and force F of the "
+             "model,",
              "#: or `unit` where another key says it.", "UNITS: dict[str, str] = {"]
     text += [f'    "{group}%{name}": "{key["unit"]}",' for group, content in groups.items()
              for name, key in content["keys"].items() if key.get("unit")]
