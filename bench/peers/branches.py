@@ -175,7 +175,7 @@ def write_branches(rows: list[BranchRow]) -> str:
         "converge in Octave beyond 0.5806 in example 03, and shrink to the shortest at 1.65 in "
         "example 07, where it was stopped. With 1024 instants the balance of example 03 has teeth: "
         "each instant that closes turns the curve back by 2e-5 of the frequency, and this program "
-        "follows those turns and leaves them open; located events have none.",
+        "follows those turns and leaves most of them open; located events have none.",
         "",
         *table(["example", "instants", "points of NLvib", "its last frequency", "points",
                 "points before", "time [ms]", "before [ms]", "to its end"],
