@@ -4,11 +4,7 @@ module fw_branch
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_bifurcation, only: bifurcation_list
-   use fw_bifurcation, only: bifurcation_type
-   use fw_bifurcation, only: kind_fold
-   use fw_bifurcation, only: kind_undecided
-   use fw_bifurcation, only: way_bracket
-   use fw_bifurcation, only: way_turn
+   use fw_branch_fold, only: described_fold
    use fw_branch_peaks, only: branch_peaks
    use fw_branch_peaks, only: branch_segment
    use fw_branch_step, only: interpolate
@@ -37,8 +33,6 @@ module fw_branch
    use fw_recovery, only: recover_point
    use fw_slip_gap, only: lacks_friction
    use fw_solution, only: is_lasting
-   use fw_stability_crossing, only: critical_multiplier
-   use fw_stability_crossing, only: crossing_plus
    use fw_stability_crossing, only: movement_between
    use fw_stability_crossing, only: multiplier_track
    use fw_stability_crossing, only: signature_of
@@ -351,7 +345,7 @@ contains
       if (allocated(error)) return
       if (point%fold) then
          ! One just beyond a bound belongs to no point of the sweep.
-         if (is_within(self, point%place)) call add_fold(self, found, point)
+         if (is_within(self, point%place)) call self%bifurcations%add(described_fold(found, point))
          if (self%track%n > 0) then
             ! Counts of multipliers that pass 1 leave it out.
             self%folds = [self%folds, self%curve%corrector%metric%chord(self%last, found)]
@@ -412,29 +406,6 @@ contains
 
       is_within = (place - self%ends(1))*(place - self%ends(2)) <= 0.0_wp
    end function is_within
-
-   !> A place that would not settle may be one of round-off: it is left open.
-   subroutine add_fold(self, found, point)
-      type(branch_type), intent(inout) :: self
-      type(branch_point), intent(in) :: found
-      type(point_type), intent(in) :: point
-      type(bifurcation_type) :: fold
-
-      fold%kind = kind_fold
-      fold%found_by = way_turn
-      if (found%unsettled > 0.0_wp) then
-         fold%kind = kind_undecided
-         fold%found_by = way_bracket
-         fold%error = found%unsettled
-      end if
-      fold%place = point%place
-      fold%amplitude = point%amplitude
-      fold%coefficients = point%coefficients
-      if (allocated(point%multipliers)) then
-         fold%multiplier = critical_multiplier(point%multipliers, crossing_plus)
-      end if
-      call self%bifurcations%add(fold)
-   end subroutine add_fold
 
    !> Locate the changes of stability since the last point, the fold left out.
    subroutine look_between(self, case, found, point, error)

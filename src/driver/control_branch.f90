@@ -7,11 +7,7 @@
 module fw_control_branch
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_bifurcation, only: bifurcation_list
-   use fw_bifurcation, only: bifurcation_type
-   use fw_bifurcation, only: kind_fold
-   use fw_bifurcation, only: kind_undecided
-   use fw_bifurcation, only: way_bracket
-   use fw_bifurcation, only: way_turn
+   use fw_branch_fold, only: described_fold
    use fw_case, only: case_type
    use fw_continuation, only: arclength_type
    use fw_continuation, only: branch_point
@@ -198,7 +194,7 @@ contains
       point%served_by = served_by_arclength
       point%fold = found%fold
       if (found%fold .and. (found%p - self%ends(1))*(found%p - self%ends(2)) <= 0.0_wp) then
-         call add_fold(self, found, point)
+         call self%folds%add(described_fold(found, point))
       end if
       point%tangent_omega = found%t_p
       ! That of a motion half a period later is not the one of the curve.
@@ -228,26 +224,6 @@ contains
       point%seconds = real(now - self%clock, wp)/real(rate, wp)
       self%clock = now
    end subroutine note_time
-
-   !> A place that would not settle may be one of round-off: it is left open.
-   subroutine add_fold(self, found, point)
-      class(control_branch), intent(inout) :: self
-      type(branch_point), intent(in) :: found
-      type(point_type), intent(in) :: point
-      type(bifurcation_type) :: fold
-
-      fold%kind = kind_fold
-      fold%found_by = way_turn
-      if (found%unsettled > 0.0_wp) then
-         fold%kind = kind_undecided
-         fold%found_by = way_bracket
-         fold%error = found%unsettled
-      end if
-      fold%place = point%place
-      fold%amplitude = point%amplitude
-      fold%coefficients = point%coefficients
-      call self%folds%add(fold)
-   end subroutine add_fold
 
    !> The direction of the branch at a point, by a difference along the tangent.
    subroutine point_along(self, case, found, point, error)
