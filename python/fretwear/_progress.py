@@ -104,15 +104,17 @@ def stages(*, quiet: bool) -> Callable[[str, int, int], None] | None:
         return lambda name, done, total: print(
             f"\r{name} {done} of {total}".ljust(40), file=sys.stderr,
             end="\n" if done == total else "", flush=True)
-    bar = tqdm(dynamic_ncols=True, leave=False,
-               bar_format="{desc}{n_fmt} of {total_fmt} |{bar}| {elapsed}<{remaining}")
+    bars: dict[str, Any] = {}
 
     def show(name: str, done: int, total: int) -> None:
-        if name != bar.desc.removesuffix(": "):
-            bar.reset(total)
-            bar.set_description(name, refresh=False)
-        bar.update(done - bar.n)
-        bar.refresh()
+        if name not in bars:
+            for other in list(bars):
+                bars.pop(other).close()
+            bars[name] = tqdm(desc=name, total=total, dynamic_ncols=True, leave=False, bar_format=(
+                "{desc}: {n_fmt} of {total_fmt} |{bar}| {elapsed}<{remaining}"))
+        bars[name].update(done - bars[name].n)
+        if done == total:
+            bars.pop(name).close()
 
     return show
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
+from fretwear._progress import stages
 from fretwear.errors import InputError
 from fretwear.reduction import ReducedSystem, reduce
 
@@ -169,6 +172,24 @@ def test_progress_of_the_stages_ends_where_it_should(loads: np.ndarray) -> None:
     reduced(loads, progress=lambda *stage: told.append(stage))
     assert told[0][0] == "factors"
     assert told[-1] == ("contact shapes", 1, 1)
+
+
+class Terminal(io.StringIO):
+    """Text that says that somebody looks at it."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_bars_of_stages_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    show = stages(quiet=False)
+    assert show is not None and terminal.getvalue() == ""  # nothing before there is a stage
+    for stage in (("factors", 0, 1), ("shapes", 1, 2), ("shapes", 2, 2), ("factors", 0, 1)):
+        show(*stage)
+    assert terminal.getvalue().count("factors") == 2
+    assert "shapes" in terminal.getvalue()
+    assert stages(quiet=True) is None
 
 
 def test_shapes_beyond_the_memory_are_refused_before_the_work(
