@@ -41,6 +41,18 @@ def test_a_branch_goes_straight_through_where_another_crosses_it(stability):
                                                              rel=1e-6)
 
 
+def test_a_branch_point_beside_a_fold():
+    """3e-6 of the frequency and 0.4 % of the amplitude apart (by shooting), within one step."""
+    sample = random_sample("parametric", 3)
+    sample.start = 1.45
+    _, found = bifurcations.named(bifurcations.PROGRAM, sample)
+    true = [("branch point", 1.2886725), ("branch point", 1.2639940), ("fold", 1.2639907)]
+    found.sort(key=lambda place: place[2])
+    assert [kind for kind, *_ in found] == [kind for kind, _ in true]
+    assert [omega for _, omega, _ in found] == pytest.approx([omega for _, omega in true],
+                                                             rel=1e-6)
+
+
 def test_the_comparison_sees_what_is_wrong():
     true = [("fold", 1.0, 2.0), ("period doubling", 1.5, 1.0)]
     assert bifurcations.compare("folds", true, list(true)).worst == 0.0
