@@ -361,7 +361,8 @@ contains
          ! Twice as wide again. What is left is some whole number of widths: the limit lies between
          ! two, so that round-off does not decide.
          from = slide%stretch%to
-         if (to - from > 2.5_wp*width) then
+         ! Without room for more pieces all the rest is one.
+         if (to - from > 2.5_wp*width .and. has_room(self, k)) then
             call motion%stretch(cells, 0, from, from + 2.0_wp*width, slide%stretch)
          else
             call motion%stretch(cells, 0, from, to, slide%stretch)

@@ -55,9 +55,7 @@ contains
       integer :: k, interval
 
       self%stops = .false.
-      call take_step(motion, cells, lands, self)
-      ! Without room for more pieces the step is taken as it is.
-      self%divides = self%divides .and. may_divide
+      call take_step(motion, cells, lands, may_divide, self)
       if (self%divides) return
       call pulls_and_rates(motion, self, f, df)
       call find_stop(motion, cells, self, f, df, interval, angle)
@@ -73,7 +71,7 @@ contains
             self%stages%gain = 1.0_wp
             return
          end if
-         call take_step(motion, cells, lands, self)
+         call take_step(motion, cells, lands, may_divide, self)
          call pulls_and_rates(motion, self, f, df)
          ! A pull that does not fall there has no root near by: the first one is kept.
          if (.not. df(n_points) < 0.0_wp) return
@@ -84,10 +82,10 @@ contains
    end subroutine slide_along
 
    !> Directions at the points of the stretch.
-   pure subroutine take_step(motion, cells, lands, self)
+   pure subroutine take_step(motion, cells, lands, may_divide, self)
       type(motion_type), intent(in) :: motion
       type(cells_type), intent(in) :: cells
-      logical, intent(in) :: lands
+      logical, intent(in) :: lands, may_divide
       type(slide_type), intent(inout) :: self
       real(wp) :: slope, h
       logical :: done
@@ -113,7 +111,8 @@ contains
          end if
          ! The last coefficient weighs more than what the step leaves out, which is of twice its
          ! order where phi is smooth; where it is not, as before contact ends, it is all there is.
-         self%divides = h > narrowest .and. (.not. done .or. &
+         ! Without room for more pieces the step is taken as it is.
+         self%divides = may_divide .and. h > narrowest .and. (.not. done .or. &
             h*abs(stages%last)*maxval(s%radius) > step_tolerance*motion%largest_radius)
       end associate
    end subroutine take_step
