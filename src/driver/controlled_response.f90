@@ -15,6 +15,7 @@ module fw_controlled_response
    use fw_guess, only: stuck_guess
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
+   use fw_model, only: model_type
    use fw_newton, only: solver_report
    use fw_point, only: point_type
    use fw_point, only: served_by_free_guess
@@ -66,6 +67,9 @@ module fw_controlled_response
       logical :: is_node = .false.
       !> What of the amplitude stands still in the linear solution, under static loads.
       real(wp) :: rest = 0.0_wp
+      !> Largest vibratory load [force], 0 where it is not known so, and what holds and what carries
+      !> the place that is observed, of the model alone [force/length, mass].
+      real(wp) :: force = 0.0_wp, held_by = 0.0_wp, carried = 0.0_wp
       real(wp), allocatable :: y(:), r(:)
       !> Which of the guesses led to the last solution.
       integer :: guess = 0
@@ -120,6 +124,9 @@ module fw_controlled_response
 
    !> An observed quantity below this part of all others rests.
    real(wp), parameter :: at_rest = 1.0e-10_wp
+   !> So does one that moves by less than this part of what the largest load would do right there:
+   !> round-off of the response, a thousandfold near a resonance.
+   real(wp), parameter :: round_off = 1.0e-12_wp
    !> Rounds in which the norm that residuals are compared to follows the load.
    integer, parameter :: most_rounds = 4
 
@@ -135,12 +142,40 @@ contains
       call self%method%start(case, case%harmonics)
       call new_control_system(self%system, case%control%observed, case%control%of, self%control)
       self%base = case%model%harmonic_scale
+      call weigh_place(self, case%model, case%control%observed)
       self%can_turn = .true.
       if (allocated(case%model%waves%harmonic)) then
          self%can_turn = all(modulo(case%model%waves%harmonic, 2) == 1)
       end if
       allocate (self%y(self%control%n), self%r(self%control%n), source=0.0_wp)
    end subroutine start
+
+   !> What a load right at the place that is observed would meet there.
+   pure subroutine weigh_place(self, model, observed)
+      class(controlled_response), intent(inout) :: self
+      type(model_type), intent(in) :: model
+      integer, intent(in) :: observed
+      real(wp) :: length
+      integer :: i, k
+
+      self%force = 0.0_wp
+      ! Loads of matrices of nodal diameters are none of dofs, those of powers wait for a frequency.
+      if (model%cyclic%has_nodal()) return
+      if (allocated(model%waves%power)) then
+         if (any(model%waves%power > 0)) return
+      end if
+      self%force = abs(self%base)*max(maxval(abs(model%load_cosine)), maxval(abs(model%load_sine)))
+      if (allocated(model%load_wave)) then
+         self%force = max(self%force, abs(self%base)*maxval(abs([0.0_wp, model%load_wave])))
+      end if
+      ! Sectors that are all solved for observe the same rows, one after the other.
+      k = modulo(observed - 1, size(model%observe_matrix, 1)) + 1
+      associate (row => model%observe_matrix(k, :))
+         length = max(sum(row**2)**2, tiny(1.0_wp))
+         self%held_by = sum([(row(i)**2*abs(model%stiffness(i, i)), i=1, size(row))])/length
+         self%carried = sum([(row(i)**2*abs(model%mass(i, i)), i=1, size(row))])/length
+      end associate
+   end subroutine weigh_place
 
    !> The load and the motion at a frequency and an amplitude.
    subroutine solve(self, case, request, point, error)
@@ -327,7 +362,7 @@ contains
          if (allocated(error)) return
          if (guess == 3) call stuck_guess(self%system, self%y(:self%system%n))
          if (guess == 4) call free_guess(self%system, self%y(:self%system%n))
-         call scale_linear(self, amplitude, guess == 3, is_there)
+         call scale_linear(self, omega, amplitude, guess == 3, is_there)
       end select
    end subroutine make_guess
 
@@ -363,9 +398,9 @@ contains
    end subroutine multiply_vibration
 
    !> The linear solution under the load of the case, scaled to the amplitude.
-   subroutine scale_linear(self, amplitude, notes_rest, is_there)
+   subroutine scale_linear(self, omega, amplitude, notes_rest, is_there)
       class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: amplitude
+      real(wp), intent(in) :: omega, amplitude
       !> Keep its static part as that of the response.
       logical, intent(in) :: notes_rest
       !> False where what is observed rests.
@@ -385,7 +420,8 @@ contains
       end if
       vibration = self%control%size_of_motion()
       others = norm2(self%y(:n))
-      is_there = vibration > at_rest*others .and. vibration > 0.0_wp
+      is_there = vibration > at_rest*others .and. vibration > 0.0_wp .and. &
+                 vibration*(self%held_by + omega**2*self%carried) >= round_off*self%force
       self%is_node = .not. is_there
       if (.not. is_there) return
       ! The largest of the period has the static part on top.

@@ -211,6 +211,23 @@ def test_a_place_at_rest_is_told(tmp_path):
     assert first(read(tmp_path / "case.h5"), 1)[0] == pytest.approx(1.0, rel=1e-10)
 
 
+def test_a_node_is_told_where_round_off_moves_it(tmp_path):
+    """Loads of opposite signs on both sides of the middle of three alike: it moved by 1e-17, and a
+    load of 1e16 was found for it."""
+    groups = merged(DUFFING, {
+        "model": {"n_dof": 3, "mass": [1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0], "damping": None,
+                  "stiffness": [2.0, -1, 0, -1, 2.0, -1, 0, -1, 2.0], "rayleigh_mass": 0.04},
+        "spring": {"side_1": 2}, "harmonics": {"n_harmonics": 5},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [2, 0, 0], "mu": 1.0,
+                    "tangential_stiffness": 1.0, "normal_load": 0.5},
+        "load": {"cosine": [1.0, 0, -1.0]}, "sweep": {"values": [0.9, 1.1, 1.5]},
+        "output": {"observe": [2]}})
+    assert "u2 rests under the load (a node)" in told(tmp_path, groups)
+    # Nearly a node: the load is large, and right.
+    run(tmp_path, merged(groups, {"load": {"cosine": [1.0, 0, -1.0 + 1e-6]}}))
+    assert first(read(tmp_path / "case.h5")) == pytest.approx(1.0, rel=1e-8)
+
+
 def told(folder, groups):
     """What a run that fails says."""
     write_namelist(folder / "case.nml", groups)
