@@ -91,7 +91,8 @@ int fw_new_model(fw_handle handle, int n_dof, int n_pairs);
                   "coriolis", skew, row after row
    n_dof:         "load/static", "load/cosine", "load/sine", "load/static_rotation"
    n_pairs:       "contact/mu", "contact/gap", "contact/area", "contact/normal_load",
-                  "contact/tangential_stiffness", "contact/normal_stiffness"
+                  "contact/tangential_stiffness", "contact/normal_stiffness", "contact/slip_speed"
+   n_springs:     "spring/coefficient", as many as "spring/side_1" has dofs
    3 * n_pairs:   "contact/position", pair after pair
    m * n_dof:     "load/harmonic_cosine", "load/harmonic_sine", a load of m harmonics each, harmonic
                   after harmonic
@@ -109,6 +110,8 @@ int fw_put_reals(fw_handle handle, const char *name, size_t n, const double *val
 
 /* 3 * n_pairs: "contact/side_1" (required where there are pairs), "contact/side_2"; the signed
    numbers, from 1, of the dofs (t1, t2, n) of a pair, 0 for none or the ground.
+   n_springs: "spring/side_1", as many nonlinear springs as it has dofs; "spring/side_2",
+   "spring/sector_2", "spring/power" (0, 0 and 3 without them).
    m: "load/harmonic", the harmonics 0, 1, .. of the loads above.
    Of sectors: 1: "cyclic/n_sectors"; "cyclic/left" and "cyclic/right", as many each; n_pairs:
    "contact/sector_2". */

@@ -47,6 +47,10 @@ class ContactPairs:
         Constant compressive force of pairs without a normal dof [force].
     tangential_stiffness, normal_stiffness : float or (n_pairs,), optional
         Stiffness of the elastic law ('penalty') [force/length].
+    slip_speed : float or (n_pairs,), optional
+        Sliding velocity of smooth friction ('regularised') [length/s].
+    law : str, optional
+        The law of the pairs where a case does not name one: 'penalty', 'rigid', ...
     position : (n_pairs, 3), optional
         Coordinates, for pictures [length].
     patch : sequence of str, optional
@@ -64,6 +68,8 @@ class ContactPairs:
     position: ArrayLike | None = None
     patch: Sequence[str] | None = None
     sector_2: ArrayLike | None = None
+    slip_speed: ArrayLike | None = None
+    law: str | None = None
 
     def checked(self, n_dof: int) -> ContactPairs:
         """The same with arrays that fit each other; raises InputError where they do not."""
@@ -74,7 +80,9 @@ class ContactPairs:
             name: None if getattr(self, name) is None else
             array(f"contact.{name}", getattr(self, name), (n_pairs,))
             for name in ("mu", "gap", "area", "normal_load", "tangential_stiffness",
-                         "normal_stiffness")}
+                         "normal_stiffness", "slip_speed")}
+        if self.law is not None:
+            values["law"] = text("contact.law", self.law)
         if self.sector_2 is not None:
             values["sector_2"] = _whole_numbers("contact.sector_2", self.sector_2, n_pairs)
         if self.position is not None:
@@ -320,7 +328,8 @@ class Model:
             try:
                 return cls(
                     found.get("mass"), found.get("damping"), found.get("stiffness"),
-                    contact=_contact_of(found), observe=_observed_of(file), **loads,
+                    contact=_contact_of(found, file), observe=_observed_of(file), **loads,
+                    springs=_springs_of(file),
                     sectors=read_sectors(file), harmonic=_waves_of(file),
                     stiffness_rotation=found.get("stiffness_rotation"),
                     coriolis=found.get("coriolis"),
@@ -340,21 +349,32 @@ class Model:
         Raises
         ------
         InputError
-            The model has springs, which the format does not hold.
+            A name has letters that are not ASCII.
         OutputError
             The file cannot be written.
         """
-        if self.springs:
-            raise InputError("springs: a model file cannot hold them; leave them out and give them "
-                             "to the case")
         pairs = {f"contact/{name}": values for name in _IN_NAMELIST
                  if (values := getattr(self.contact, name, None)) is not None}
         try:
-            groups = {} if self.sectors is None else {"cyclic": self.sectors.attributes()}
-            write_model_file(path, {**self._datasets(), **pairs}, title=self.title,
-                             unit_system=self.unit_system, groups=groups)
+            groups: dict[str, Mapping[str, int | str]] = {}
+            if self.sectors is not None:
+                groups["cyclic"] = self.sectors.attributes()
+            if self.contact is not None and self.contact.law is not None:
+                groups["contact"] = {"law": self.contact.law}
+            write_model_file(path, {**self._datasets(), **pairs, **self._spring_datasets()},
+                             title=self.title, unit_system=self.unit_system, groups=groups)
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {error}") from None
+
+    #: The same, as results have it.
+    save = to_hdf5
+
+    def _spring_datasets(self) -> dict[str, NDArray[Any]]:
+        """The springs as a model file has them."""
+        if not self.springs:
+            return {}
+        return {f"spring/{name}": np.array([getattr(spring, name) for spring in self.springs])
+                for name in _SPRING}
 
     def _datasets(self) -> dict[str, NDArray[Any]]:
         """What a session takes as parts of a model, by the names in a model file."""
@@ -405,7 +425,8 @@ class Model:
             if self.contact.patch is not None:
                 session.put_texts("contact/patch", self.contact.patch)
             settings += [(f"contact%{name}", literal(getattr(self.contact, name)))
-                         for name in _IN_NAMELIST if getattr(self.contact, name) is not None]
+                         for name in ("law", *_IN_NAMELIST)
+                         if getattr(self.contact, name) is not None]
         return tuple(settings)
 
     def _spring_settings(self) -> list[tuple[str, str]]:
@@ -413,13 +434,14 @@ class Model:
             return []
         return [("spring%n_springs", literal(len(self.springs)))] + [
             (f"spring%{name}", literal([getattr(spring, name) for spring in self.springs]))
-            for name in ("side_1", "side_2", "sector_2", "coefficient", "power")]
+            for name in _SPRING]
 
 
+_SPRING = ("side_1", "side_2", "sector_2", "coefficient", "power")
 _CONTACT = tuple(f"contact/{name}" for name in (
     "side_1", "side_2", "sector_2", "mu", "gap", "area", "position", "patch"))
 #: Constants that a session takes as keys, so that one of another law is refused.
-_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness")
+_IN_NAMELIST = ("normal_load", "tangential_stiffness", "normal_stiffness", "slip_speed")
 _LOADS = {"load/static": "static", "load/cosine": "cosine", "load/sine": "sine",
           "load/static_rotation": "static_rotation"}
 
@@ -492,14 +514,35 @@ def _rows(observe: Mapping[str, Observation], n_dof: int) -> tuple[tuple[str, ..
     return tuple(observe), rows
 
 
-def _contact_of(found: Mapping[str, Any]) -> ContactPairs | None:
+def _springs_of(file: h5py.File) -> list[Spring]:
+    if "spring" not in file:
+        return []
+    group = file["spring"]
+    if strange := sorted(set(group) - set(_SPRING)):
+        raise InputError(f"dataset /spring/{strange[0]}: is nothing that is read, expected "
+                         f"{', '.join(_SPRING)}")
+    for name in ("side_1", "coefficient"):
+        if name not in group:
+            raise InputError(f"dataset /spring/{name} is missing")
+    n = group["side_1"].shape
+    values = {}
+    for name in group:
+        if group[name].shape not in ((), n):
+            raise InputError(f"dataset /spring/{name}: has shape {group[name].shape}, expected {n}")
+        values[name] = np.broadcast_to(group[name][()], n).tolist()
+    return [Spring(**dict(zip(values, row))) for row in zip(*values.values())]
+
+
+def _contact_of(found: Mapping[str, Any], file: h5py.File) -> ContactPairs | None:
     if "contact/side_1" not in found:
         return None
     parts = {name: found.get(f"contact/{name}") for name in (
         "side_2", "sector_2", "mu", "gap", "area", "position", *_IN_NAMELIST)}
     patch = found.get("contact/patch")
     names = None if patch is None else [_text(name) for name in patch]
-    return ContactPairs(found["contact/side_1"], **parts, patch=names)
+    law = file["contact"].attrs.get("law")
+    return ContactPairs(found["contact/side_1"], **parts, patch=names,
+                        law=None if law is None else _text(law))
 
 
 def _whole_numbers(name: str, values: ArrayLike, n: int) -> NDArray[np.int64]:

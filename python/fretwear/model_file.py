@@ -19,7 +19,7 @@ _SMALL = 3_000_000
 
 def write_model_file(path: str | Path, datasets: Mapping[str, NDArray[Any]], *, title: str,
                      unit_system: str = "", attributes: Mapping[str, str] | None = None,
-                     groups: Mapping[str, Mapping[str, int]] | None = None) -> None:
+                     groups: Mapping[str, Mapping[str, int | str]] | None = None) -> None:
     """Write a model file; an older one of that name is replaced once the new one is complete.
 
     Parameters
@@ -53,9 +53,10 @@ def write_model_file(path: str | Path, datasets: Mapping[str, NDArray[Any]], *, 
                 if name == "mesh/basis":
                     packed["chunks"] = data.shape   # read as one
                 file.create_dataset(name, data=data, **(packed if data.size > 10_000 else {}))
-            for group, numbers in (groups or {}).items():
+            for group, values in (groups or {}).items():
                 file.require_group(group).attrs.update(
-                    {name: np.int32(number) for name, number in numbers.items()})
+                    {name: np.bytes_(value.encode()) if isinstance(value, str) else np.int32(value)
+                     for name, value in values.items()})
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)

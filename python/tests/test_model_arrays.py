@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import scipy.sparse
@@ -141,9 +142,93 @@ def test_stiffnesses_that_the_law_does_not_take_are_remarked(tmp_path: Path) -> 
                contact={"law": "dlft", "tangential_stiffness": 1.0})
 
 
-def test_a_model_file_is_not_written_without_what_it_cannot_hold(tmp_path: Path) -> None:
-    with pytest.raises(fw.InputError, match="springs"):
-        fw.Model([[1]], None, [[1]], springs=[fw.Spring(1)]).to_hdf5(tmp_path / "model.h5")
+#: Pairs with a law and its constants, and springs: nothing is left to the case.
+WHOLE = fw.Model(
+    np.diag([1.0, 2.0]), [[0.04, 0.0], [0.0, 0.1]], [[2.0, -1.0], [-1.0, 1.5]], cosine=[1.0, 0.0],
+    contact=fw.ContactPairs([[1, 0, 0], [2, 0, 0]], [[2, 0, 0], [0, 0, 0]], mu=[0.3, 0.2],
+                            normal_load=[1.0, 2.0], slip_speed=0.02, law="regularised"),
+    springs=[fw.Spring(1, 2, 0.5, 3), fw.Spring(-2, coefficient=0.1, power=2)])
+INLINE = '''&model n_dof = 2 mass = 1 0 0 2 damping = 0.04 0 0 0.1 stiffness = 2 -1 -1 1.5 /
+&load cosine = 1 0 /
+&contact n_pairs = 2 side_1 = 1 0 0 2 0 0 side_2 = 2 0 0 0 0 0 mu = 0.3 0.2
+   normal_load = 1 2 slip_speed = 0.02 law = 'regularised' /
+&spring n_springs = 2 side_1 = 1 -2 side_2 = 2 0 coefficient = 0.5 0.1 power = 3 2 /
+'''
+SWEEP = "&harmonics n_harmonics = 3 / &sweep start = 0.4 end = 1.2 n_points = 5 /"
+
+
+def test_a_model_file_holds_everything_of_the_structure(tmp_path: Path) -> None:
+    """The matrices, pairs, law and springs of a file are those of the namelist, to the bit."""
+    WHOLE.save(tmp_path / "whole.h5")
+    (tmp_path / "case.nml").write_text("&model source = 'hdf5' file = 'whole.h5' /" + SWEEP)
+    read = fw.run(tmp_path / "case.nml", in_memory=True)
+    inline = fw.run(fw.Case.from_text(INLINE + SWEEP), in_memory=True)
+    groups: Groups = {"harmonics": {"n_harmonics": 3}}
+    for other in (inline, fw.frf(WHOLE, 0.4, 1.2, 5, **groups),
+                  fw.frf(fw.Model.from_hdf5(tmp_path / "whole.h5"), 0.4, 1.2, 5, **groups)):
+        assert read.coefficients.tobytes() == other.coefficients.tobytes()
+        assert read.force.tobytes() == other.force.tobytes()
+    # The effective case reads back to the same.
+    (tmp_path / "again.nml").write_text(read.namelist)
+    again = fw.run(tmp_path / "again.nml", in_memory=True)
+    assert again.coefficients.tobytes() == read.coefficients.tobytes()
+
+
+def test_the_case_stands_above_the_springs_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "whole.h5"
+    WHOLE.save(path)
+    groups: Any = {"sweep": {"start": 0.6, "end": 0.8, "n_points": 2},
+                   "harmonics": {"n_harmonics": 3}}
+
+    def answer(model: fw.Model | Path, **more: Any) -> Any:
+        return fw.run(fw.Case(model, **groups, **more)).coefficients
+
+    def sprung(*springs: fw.Spring) -> fw.Model:
+        return fw.Model(WHOLE.M, WHOLE.C, WHOLE.K, contact=WHOLE.contact, cosine=WHOLE.cosine,
+                        springs=springs)
+
+    stiffer = sprung(fw.Spring(1, 2, 0.7, 3), fw.Spring(-2, coefficient=0.1, power=2))
+    for spring, model in (
+            ({"coefficient": [0.7, 0.1]}, stiffer), ({"n_springs": 0}, sprung()),
+            ({"n_springs": 1, "side_1": 1, "coefficient": 0.2},
+             sprung(fw.Spring(1, coefficient=0.2)))):
+        assert answer(path, spring=spring).tobytes() == answer(model).tobytes()
+    with pytest.raises(fw.InputError, match="n_springs = 3: the model holds 2; give side_1"):
+        fw.Case(path, **groups, spring={"n_springs": 3}).check()
+    with pytest.raises(fw.InputError, match=r"side_1\(2\) = 4"):
+        fw.Case(path, **groups, spring={"side_1": [1, 4]}).check()
+
+
+@pytest.mark.parametrize(("name", "value", "told"), [
+    ("spring/coefficient", [1.0, 2.0, 3.0],
+     r"/spring/coefficient has shape \(3,?\), expected \(2,?\)"),
+    ("spring/power", [3, 3, 3],
+     "/spring/power has 3 values, expected 2, as many as /spring/side_1"),
+    ("spring/coefficient", None, "/spring/coefficient is missing"),
+    ("spring/side_2", [[1], [2]], "/spring/side_2 has shape .*expected 1 dimension"),
+    ("spring/power", [3, 0], r"holds power\(2\) = 0: must be an integer from 1 to 99"),
+    ("spring/side_1", [1, 5], r"holds side_1\(2\) = 5: must be"),
+    ("spring/stiffness", [1.0, 1.0], "/spring/stiffness is nothing that is read; expected there: "
+     "side_1, side_2, sector_2, coefficient, power"),
+    ("contact.law", "glue", "attribute law of /contact is .glue., expected 'dlft', "),
+])
+def test_springs_and_laws_of_a_file_are_checked(tmp_path: Path, name: str, value: Any,
+                                                told: str) -> None:
+    path = tmp_path / "whole.h5"
+    WHOLE.save(path)
+    with h5py.File(path, "r+") as file:
+        if name == "contact.law":
+            file["contact"].attrs["law"] = value
+        else:
+            if name in file:
+                del file[name]
+            if value is not None:
+                file[name] = value
+    with pytest.raises(fw.InputError, match=told):
+        fw.Case(path, sweep={"start": 1.0, "end": 2.0, "n_points": 2}).check()
+
+
+def test_a_model_file_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(fw.OutputError, match="cannot be written"):
         fw.Model([[1]], None, [[1]]).to_hdf5(tmp_path / "none" / "model.h5")
     assert not list(tmp_path.iterdir())
@@ -185,3 +270,28 @@ def test_a_result_in_memory_is_that_of_the_file(tmp_path: Path) -> None:
         _ = here.path
     with pytest.raises(fw.OutputError, match="cannot be written"):
         here.save(tmp_path / "none" / "saved.h5")
+
+
+def test_springs_are_parts_of_a_model_in_memory() -> None:
+    """What C and Fortran give by the names of datasets."""
+    from fretwear._native import Session
+
+    def effective(**springs: Any) -> str:
+        with Session() as session:
+            session.new_model(1, 0)
+            for name, values in {"mass": [1.0], "stiffness": [1.0]}.items():
+                session.put(name, np.array(values))
+            for name, values in springs.items():
+                session.put(f"spring/{name}", np.array(values))
+            session.read("&sweep start = 0.5 end = 1.0 n_points = 2 /", "here.nml", ())
+            return session.text("namelist")
+
+    assert "n_springs = 2" in effective(
+        side_1=np.array([1, -1], dtype=np.int32), coefficient=[0.5, 1.0])
+    for springs, told in (
+            ({"coefficient": [1.0]}, "spring/coefficient has 1 values: must be 0"),
+            ({"side_1": np.array([1], dtype=np.int32)}, "lacks spring/coefficient"),
+            ({"side_1": np.array([1], dtype=np.int32), "coefficient": [1.0],
+              "power": np.array([3, 3], dtype=np.int32)}, "spring/power has 2 values: must be 1")):
+        with pytest.raises(fw.InputError, match=told):
+            effective(**springs)

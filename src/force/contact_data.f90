@@ -50,6 +50,8 @@ module fw_contact_data
       !> Coordinates of the pairs, for pictures (3, n_pairs), and the names of their patches.
       real(wp), allocatable :: position(:, :)
       type(string_type), allocatable :: patch(:)
+      !> The model says which law, where the case does not; no input.
+      logical :: law_is_of_model = .false.
       !> No law was given, and the program took one; no input.
       logical :: law_is_chosen = .false.
    end type contact_type

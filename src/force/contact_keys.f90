@@ -21,7 +21,7 @@ module fw_contact_keys
    private
 
    public :: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, bind_normal_load, &
-             bind_laws, bind_march, bind_worn, bind_springs
+             bind_laws, bind_march, bind_worn, bind_n_springs, bind_springs
 
    !> More pairs or springs are taken for a mistake.
    integer, parameter :: most = 1000000
@@ -160,28 +160,37 @@ contains
                          at_least(0), only='worn'), step)
    end subroutine bind_worn
 
+   !> The number of springs, which becomes the size 'n_springs' of all arrays of the group.
+   subroutine bind_n_springs(keys, springs)
+      class(key_visitor), intent(inout) :: keys
+      type(spring_type), intent(inout) :: springs
+
+      call keys%open('spring', 'nonlinear springs')
+      call keys%bind(key('n_springs', 'required with coefficient; 0 switches the springs of a '// &
+                         'file off', from_to(0, most), absent=of_file), springs%n_springs)
+      call keys%set_size('n_springs', springs%n_springs)
+   end subroutine bind_n_springs
+
    !> Group &spring. Arrays that are needed and not given are left unallocated.
    subroutine bind_springs(keys, springs)
       class(key_visitor), intent(inout) :: keys
       type(spring_type), intent(inout) :: springs
       logical :: needed
 
-      call keys%open('spring', 'nonlinear springs')
-      call keys%bind(key('n_springs', 'required with coefficient', from_to(0, most)), &
-                     springs%n_springs)
-      call keys%set_size('n_springs', springs%n_springs)
-      needed = springs%n_springs > 0
+      needed = springs%n_springs > 0 .and. .not. allocated(springs%side_1)
       call keys%bind(key('side_1', 'dof on one side', dof_numbers(), shape='n_springs', &
-                         absent='required'), springs%side_1, needed)
+                         absent='of the file, else required'), springs%side_1, needed)
       call keys%bind(key('side_2', 'dof on the other side, 0: ground', dof_numbers(), &
-                         shape='n_springs'), springs%side_2, default=0)
+                         shape='n_springs', absent=of_file), springs%side_2, default=0)
       call keys%bind(key('sector_2', 'sector of side 2, counted from that of side 1', &
-                         shape='n_springs', only='&cyclic'), springs%sector_2, default=0)
+                         shape='n_springs', absent=of_file, only='&cyclic'), &
+                     springs%sector_2, default=0)
       call keys%bind(key('coefficient', 'force = coefficient * elongation**power', &
-                         unit='F/L^power', shape='n_springs', absent='required'), &
-                     springs%coefficient, needed)
+                         unit='F/L^power', shape='n_springs', &
+                         absent='of the file, else required'), springs%coefficient, needed)
       call keys%bind(key('power', 'odd powers keep the symmetry of odd harmonics', &
-                         from_to(1, 99), shape='n_springs'), springs%power, default=3)
+                         from_to(1, 99), shape='n_springs', absent=of_file), &
+                     springs%power, default=3)
    end subroutine bind_springs
 
 end module fw_contact_keys

@@ -4,6 +4,7 @@
 !> Each part is checked for its size as it comes, so that the call that is wrong is the one that is
 !> told; what the values must be (finite, symmetric) is checked with those of files later.
 module fw_memory_model
+   use fw_contact_data, only: spring_type
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_failure
@@ -39,7 +40,12 @@ module fw_memory_model
       [character(28) :: 'load/harmonic_cosine', 'load/harmonic_sine']
    character(*), parameter :: pair_names(*) = &
       [character(28) :: 'contact/mu', 'contact/gap', 'contact/area', 'contact/normal_load', &
-       'contact/tangential_stiffness', 'contact/normal_stiffness', 'contact/position']
+       'contact/tangential_stiffness', 'contact/normal_stiffness', 'contact/slip_speed', &
+       'contact/position']
+   !> Of as many springs as the first of these parts says.
+   character(*), parameter :: spring_reals(*) = [character(28) :: 'spring/coefficient']
+   character(*), parameter :: spring_integers(*) = &
+      [character(20) :: 'spring/side_1', 'spring/side_2', 'spring/sector_2', 'spring/power']
    character(*), parameter :: integer_names(*) = &
       [character(20) :: 'contact/side_1', 'contact/side_2', 'load/harmonic']
    character(*), parameter :: text_names(*) = &
@@ -109,9 +115,13 @@ contains
       else if (any(wave_names == name)) then
          ! As many as there are harmonics, which may be given later.
          columns = size(values)/rows
+      else if (any(spring_reals == name)) then
+         ! Of any number: whether it fits the others is known when all are there.
+         self%parts%springs%coefficient = values
+         return
       else if (.not. any(matrix_names == name) .and. .not. any(load_names == name)) then
          call unknown_name(name, [matrix_names, load_names, wave_names, pair_names, &
-                                  sector_reals], 'real', error)
+                                  spring_reals, sector_reals], 'real', error)
          return
       end if
       ! The product in 64 bits: n_dof**2 passes the range of 32.
@@ -154,6 +164,8 @@ contains
             parts%tangential_stiffness = values
          case ('contact/normal_stiffness')
             parts%normal_stiffness = values
+         case ('contact/slip_speed')
+            parts%slip_speed = values
          case default ! 'contact/position'
             parts%position = reshape(values, [3, self%n_pairs])
          end select
@@ -173,8 +185,12 @@ contains
          call put_sector_integers(name, values, self%n_pairs, self%parts%cyclic, message)
          if (allocated(message)) call fatal_error(error, name//' '//message, status_input)
          return
+      else if (any(spring_integers == name)) then
+         call put_spring_integers(name, values, self%parts%springs)
+         return
       else if (.not. any(integer_names == name)) then
-         call unknown_name(name, [integer_names, sector_integers], 'integer', error)
+         call unknown_name(name, [integer_names, spring_integers, sector_integers], 'integer', &
+                           error)
          return
       end if
       if (name == 'load/harmonic') then
@@ -192,6 +208,18 @@ contains
       if (name == 'contact/side_1') self%parts%side_1 = reshape(values, [3, self%n_pairs])
       if (name == 'contact/side_2') self%parts%side_2 = reshape(values, [3, self%n_pairs])
    end subroutine put_integers
+
+   !> Dofs, sectors and powers of springs, whose number is checked when all are there.
+   subroutine put_spring_integers(name, values, springs)
+      character(*), intent(in) :: name
+      integer, intent(in) :: values(:)
+      type(spring_type), intent(inout) :: springs
+
+      if (name == 'spring/side_1') springs%side_1 = values
+      if (name == 'spring/side_2') springs%side_2 = values
+      if (name == 'spring/sector_2') springs%sector_2 = values
+      if (name == 'spring/power') springs%power = values
+   end subroutine put_spring_integers
 
    !> A text, or a list of them with one for each pair.
    subroutine put_texts(self, name, texts, error)
@@ -297,7 +325,37 @@ contains
          allocate (self%parts%side_2(3, self%n_pairs), source=0)
       end if
       if (.not. allocated(error)) call check_waves(self%parts, error)
+      if (.not. allocated(error)) call count_springs(self%parts%springs, error)
    end subroutine check
+
+   !> As many springs as have a side 1; every other part is of these, or is not given.
+   subroutine count_springs(springs, error)
+      type(spring_type), intent(inout) :: springs
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n
+
+      n = 0
+      if (allocated(springs%side_1)) n = size(springs%side_1)
+      if (allocated(springs%coefficient)) then
+         call check_size('spring/coefficient', size(springs%coefficient, kind=i8), n, 1, error)
+      else if (n > 0) then
+         call fatal_error(error, 'the model in memory lacks spring/coefficient', status_input)
+      end if
+      if (.not. allocated(error)) call check_one('spring/side_2', springs%side_2)
+      if (.not. allocated(error)) call check_one('spring/sector_2', springs%sector_2)
+      if (.not. allocated(error)) call check_one('spring/power', springs%power)
+      if (.not. allocated(error)) springs%n_springs = n
+
+   contains
+
+      subroutine check_one(name, values)
+         character(*), intent(in) :: name
+         integer, allocatable, intent(in) :: values(:)
+
+         if (allocated(values)) call check_size(name, size(values, kind=i8), n, 1, error)
+      end subroutine check_one
+
+   end subroutine count_springs
 
    !> Loads of harmonics have one column for each of these.
    subroutine check_waves(parts, error)

@@ -5,6 +5,7 @@
 !> (i, j) is the one h5py calls [i-1, j-1].
 module fw_model_file
    use fw_air_file, only: read_air_file
+   use fw_contact_data, only: spring_type
    use fw_cyclic_file, only: read_cyclic_file
    use fw_cyclic_parts, only: cyclic_parts
    use fw_error, only: error_type
@@ -16,12 +17,16 @@ module fw_model_file
    use fw_hdf5, only: read_attribute
    use fw_hdf5, only: read_dataset
    use fw_kinds, only: wp
+   use fw_laws, only: law_number
+   use fw_laws, only: law_words
    use fw_model_file_parts, only: read_dofs
    use fw_model_file_parts, only: read_matrix
    use fw_model_file_parts, only: read_names
    use fw_model_file_parts, only: read_pair_values
    use fw_model_file_parts, only: read_positions
    use fw_model_file_parts, only: read_vector
+   use fw_reader_text, only: words_text
+   use fw_spring_file, only: read_spring_file
    use fw_text, only: string_type
    use fw_text, only: to_text
    implicit none (type, external)
@@ -51,9 +56,15 @@ module fw_model_file
       real(wp), allocatable :: mu(:), gap(:), area(:)
       !> Constant normal load [force] and stiffnesses [force/length] of the pairs (n_pairs).
       real(wp), allocatable :: normal_load(:), tangential_stiffness(:), normal_stiffness(:)
+      !> Sliding velocity of smooth friction (n_pairs) [length/s], and the law of the pairs, a
+      !> number in `law_words`; 0: left to the case.
+      real(wp), allocatable :: slip_speed(:)
+      integer :: law = 0
       !> Coordinates of the pairs (3, n_pairs) [length] and the names of their patches (n_pairs).
       real(wp), allocatable :: position(:, :)
       type(string_type), allocatable :: patch(:)
+      !> Nonlinear springs, with what the file says of them.
+      type(spring_type) :: springs
       !> Loads (n_dof) [force]; the last per square of the rotation speed.
       real(wp), allocatable :: load_static(:), load_cosine(:), load_sine(:)
       real(wp), allocatable :: load_static_rotation(:)
@@ -102,6 +113,7 @@ contains
                                                      max(1, model%cyclic%n_sectors), &
                                                      model%cyclic%air, error)
       if (.not. allocated(error)) call read_contact(file, model, error)
+      if (.not. allocated(error)) call read_spring_file(file, model%springs, error)
       if (.not. allocated(error)) call read_loads(file, model, error)
       if (.not. allocated(error)) call read_observed(file, model, error)
       call file%close(ignored)
@@ -184,6 +196,9 @@ contains
       if (allocated(error)) return
       call read_pair_values(file, '/contact/normal_stiffness', n, model%normal_stiffness, error)
       if (allocated(error)) return
+      call read_pair_values(file, '/contact/slip_speed', n, model%slip_speed, error)
+      if (.not. allocated(error)) call read_law(file, model%law, error)
+      if (allocated(error)) return
       call read_positions(file, '/contact/position', n, model%position, error)
       if (allocated(error)) return
       call read_names(file, '/contact/patch', n, model%patch, error)
@@ -195,6 +210,23 @@ contains
                            to_text(size(model%cyclic%sector_2))//' values, expected '// &
                            to_text(n), error)
    end subroutine read_contact
+
+   !> The law of the pairs, by its word; a file need not have one.
+   subroutine read_law(file, law, error)
+      type(hdf5_file), intent(in) :: file
+      integer, intent(inout) :: law
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: word
+
+      if (.not. has_attribute(file, '/contact', 'law')) return
+      call read_attribute(file, '/contact', 'law', word, error)
+      if (allocated(error)) return
+      law = law_number(word)
+      ! Left to the case, another law than the one that was meant would be solved.
+      if (law > 0) return
+      call fatal_error(error, file%path//': attribute law of /contact is "'//word// &
+                       '", expected '//words_text(law_words), status_input)
+   end subroutine read_law
 
    !> Loads; an absent one is zero.
    subroutine read_loads(file, model, error)

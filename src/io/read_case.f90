@@ -264,7 +264,7 @@ contains
          allocate (case%inputs(0))
          call append(case%inputs, worn)
       end if
-      call read_springs(reader, case%model%cyclic%n_solved(), case%springs)
+      call read_springs(reader, raw%springs, case%model%cyclic%n_solved(), case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
       call read_loads(reader, options, raw, terms)
       wanted = case%sensitivity%parameters

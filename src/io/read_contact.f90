@@ -5,7 +5,8 @@
 module fw_read_contact
    use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
-                              bind_normal_load, bind_laws, bind_march, bind_springs
+                              bind_normal_load, bind_laws, bind_march, bind_n_springs, &
+                              bind_springs
    use fw_kinds, only: wp
    use fw_laws, only: law_words, is_rigid
    use fw_model_file, only: file_model_type
@@ -75,6 +76,11 @@ contains
          call contact%constants%offer('tangential_stiffness', values)
          call repeat_values(file_model%normal_stiffness, n_file, n_sectors, values)
          call contact%constants%offer('normal_stiffness', values)
+         call repeat_values(file_model%slip_speed, n_file, n_sectors, values)
+         call contact%constants%offer('slip_speed', values)
+         ! Only with the pairs that it was written for: other pairs take the usual law.
+         contact%law_is_of_model = file_model%law > 0
+         if (contact%law_is_of_model) contact%law = file_model%law
          if (allocated(file_model%position)) contact%position = file_model%position
          if (allocated(file_model%patch)) contact%patch = file_model%patch
       else if (n_file > 0 .and. contact%n_pairs > 0 &
@@ -308,18 +314,33 @@ contains
       has = contact%side_1(n, :) /= 0 .or. contact%side_2(n, :) /= 0
    end function has_normal
 
-   !> Group &spring.
-   subroutine read_springs(reader, n_sectors, springs)
+   !> Group &spring, on top of the springs of the model as &contact is on top of its pairs.
+   subroutine read_springs(reader, file_springs, n_sectors, springs)
       type(reader_type), intent(inout) :: reader
+      !> What the model holds; overridden here.
+      type(spring_type), intent(in) :: file_springs
       !> Sectors whose motion is solved for.
       integer, intent(in) :: n_sectors
       type(spring_type), intent(inout) :: springs
       integer :: m, i, j
 
-      if (reader%given('spring', 'coefficient') .and. &
-          .not. reader%given('spring', 'n_springs')) then
-         call reader%refuse('spring', 'n_springs', 'is missing: must be the number of springs')
-      end if
+      ! The default of the key is what the model holds.
+      springs%n_springs = file_springs%n_springs
+      call bind_n_springs(reader, springs)
+      associate (n_file => file_springs%n_springs)
+         if (springs%n_springs == n_file .and. n_file > 0) then
+            ! The same springs: what the case gives replaces one array after the other.
+            springs = file_springs
+         else if (n_file > 0 .and. springs%n_springs > 0 .and. &
+                  .not. reader%given('spring', 'side_1')) then
+            call reader%refuse('spring', 'n_springs', '= '//to_text(springs%n_springs)// &
+                               ': the model holds '//to_text(n_file)//'; give side_1 and '// &
+                               'coefficient for other springs, or 0 for none')
+         else if (reader%given('spring', 'coefficient') .and. &
+                  .not. reader%given('spring', 'n_springs')) then
+            call reader%refuse('spring', 'n_springs', 'is missing: must be the number of springs')
+         end if
+      end associate
       call bind_springs(reader, springs)
       ! What was needed and not given is a problem already; the arrays only have to exist.
       m = springs%n_springs

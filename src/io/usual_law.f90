@@ -29,6 +29,8 @@ contains
       type(case_type), intent(inout) :: case
 
       if (reader%given('contact', 'law') .or. case%contact%n_pairs == 0) return
+      ! What was saved with the pairs is as good as given.
+      if (case%contact%law_is_of_model) return
       associate (contact => case%contact)
          contact%law = usual_law(goes_with_events(case))
          ! Integrated in time, the rigid laws are one, and nothing was chosen.
