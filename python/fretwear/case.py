@@ -7,13 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-import h5py
-
 from ._namelist import literal
-from ._native import Session, namelist_values
+from ._native import Session
+from ._words import where_it_belongs
 from .errors import InputError, OutputError
 from .model import Model
-from .units import converted, has_units
 
 if TYPE_CHECKING:
     import sys
@@ -165,28 +163,11 @@ class Case:
         try:
             settings = () if self._model is None else self._model.give_to(session)
             settings = (*settings, *self._overrides)
-            if has_units(self._text, self._overrides):
-                settings = (*settings, *self._without_units())
             session.read(self._text, os.fspath(self._path), settings)
         except BaseException:
             session.close()
             raise
         return session
-
-    def _without_units(self) -> list[tuple[str, str]]:
-        """Settings that replace values with units by numbers in those of the model."""
-        values = namelist_values(self._text) if self._text else {}
-        system = "" if self._model is None else self._model.unit_system
-        named = [*values.get("model%file", []), *(value.strip("'") for key, value in
-                                                  self._overrides if key == "model%file")]
-        if self._model is None and named:
-            try:
-                with h5py.File(self._path.parent / named[-1], "r") as file:
-                    said = file.attrs.get("unit_system", "")
-                    system = said.decode() if isinstance(said, bytes) else str(said)
-            except OSError:  # matrices, or what the library will complain of
-                system = ""
-        return converted(values, self._overrides, system)
 
     def namelist(self) -> str:
         """The effective input: every key with its value and what it accepts.
@@ -215,8 +196,9 @@ def _settings(groups: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Settings as the library takes them: group%key, and a value as a namelist has it."""
     for group, keys in groups.items():
         if not isinstance(keys, Mapping):
-            raise InputError(f"{group}: is a {type(keys).__name__}, must be a dictionary of the "
-                             f"keys of the group, such as {group}={{'key': value}}")
+            raise InputError(f"{group}: " + (where_it_belongs(group) or (
+                f"is a {type(keys).__name__}, must be a dictionary of the keys of the group, such "
+                f"as {group}={{'key': value}}")))
         name = "model" if group == "structure" else group
         for key, value in keys.items():
             yield f"{name}%{key}", literal(value, f"{group}[{key!r}]")

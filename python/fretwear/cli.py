@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 
 from . import __version__
+from ._words import HintingParser
 from .errors import FretwearError, OutputError
 
 __all__ = ["COMMANDS", "main"]
@@ -63,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """The parser; only the module of the subcommand at hand is imported."""
-    parser = argparse.ArgumentParser(
+    parser = HintingParser(
         prog="fretwear", allow_abbrev=False,
         description="Pictures, reports, models and studies around fw_run.")
     parser.add_argument("--version", action="version", version=f"fretwear {__version__}")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ._arguments import whole
 from ._native import namelist_values
 from ._notebook import result_dataset, result_html
+from ._words import did_you_mean
 from .bifurcation import Bifurcation, read_bifurcations
 from .case import Case
 from .cycle import Cycle, read_cycle, read_peak_cycle
@@ -583,6 +584,9 @@ class Result(ResultFile):
         if kind is None:
             kind = next((name for name in _WHOLE if name in fitting), None)
         if kind not in fitting:
+            if kind is not None and kind not in kinds.KINDS:
+                raise InputError(f"kind = {kind!r}: must be among {', '.join(kinds.KINDS)}"
+                                 + did_you_mean(kind, words=kinds.KINDS))
             asked = "nothing is there to draw" if kind is None else f"kind = {kind!r} does not fit"
             raise AbsentError(f"{self.name}: {asked}; of this result "
                               + (", ".join(fitting) or "no picture") + " can be drawn")

@@ -123,6 +123,9 @@ class Structure(TypedDict, total=False):
     source: Literal["inline", "hdf5", "matrix_market"]
     #: model file, relative to the namelist (required unless inline)
     file: str
+    #: units of length, mass, time and force, such as 'mm-tonne-s-N': for values with units, and in
+    #: results (default: of the file)
+    unit_system: str
     #: order of the matrices; with a file it may be left out (required inline)
     n_dof: int
     #: [M] symmetric, no negative diagonal; may be singular (required inline)
@@ -216,17 +219,18 @@ class Contact(TypedDict, total=False):
 class Spring(TypedDict, total=False):
     """Group &spring: nonlinear springs."""
 
-    #: required with coefficient (default: 0)
+    #: required with coefficient; 0 switches the springs of a file off (default: of the file, else
+    #: 0)
     n_springs: int
-    #: dof on one side (required)
+    #: dof on one side (default: of the file, else required)
     side_1: ArrayLike
-    #: dof on the other side, 0: ground (default: 0)
+    #: dof on the other side, 0: ground (default: of the file, else 0)
     side_2: ArrayLike
-    #: sector of side 2, counted from that of side 1; only: &cyclic (default: 0)
+    #: sector of side 2, counted from that of side 1; only: &cyclic (default: of the file, else 0)
     sector_2: ArrayLike
-    #: [F/L^power] force = coefficient * elongation**power (required)
+    #: [F/L^power] force = coefficient * elongation**power (default: of the file, else required)
     coefficient: ArrayLike
-    #: odd powers keep the symmetry of odd harmonics (default: 3)
+    #: odd powers keep the symmetry of odd harmonics (default: of the file, else 3)
     power: ArrayLike
 
 

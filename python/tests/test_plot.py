@@ -288,6 +288,7 @@ def test_command_line(coarse: Result, tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize(("options", "status", "message"), [
     (["--kind", "respons"], 3, "must be among response, cycle"),
+    (["--kind", "respons"], 3, "; did you mean response?"),
     (["--point", "41"], 3, "point 41: there are 40, counted from 1"),
     (["--pairs", "one"], 3, "must be numbers"),
     (["--observe", "tpi"], 3, "available: tip, tip_x"),
@@ -301,6 +302,16 @@ def test_command_line_refuses(coarse: Result, options: list[str], status: int, m
     monkeypatch.chdir(tmp_path)
     assert main(["plot", str(coarse.path), *options]) == status
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("words", "meant"), [
+    (["plto", "a.h5"], "plot"), (["plot", "a.h5", "--knid", "response"], "--kind"),
+    (["study", "study.toml", "--worker=2"], "--workers")])
+def test_the_nearest_command_and_option_are_named(words: list[str], meant: str,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(words)
+    assert f"did you mean {meant}?" in capsys.readouterr().err
 
 
 def test_values_are_shown_in_a_readable_unit() -> None:

@@ -136,6 +136,13 @@ def test_a_wrong_key_is_answered_with_the_right_one() -> None:
         fw.frf(RUBBING, 1, 2, 3, contact={"nu": "x"})  # type: ignore[typeddict-unknown-key]
     with pytest.raises(fw.InputError, match=r"mu\(1\) = -1"):
         fw.frf(RUBBING, 1, 2, 3, contact={"mu": -1})
+    unknown: Any = {"continuation": "arclength"}
+    with pytest.raises(fw.InputError, match=r"continuation: is a key: .*sweep=\{.continuation"):
+        fw.frf(RUBBING, 1, 2, 3, **unknown)
+    with pytest.raises(fw.InputError, match=r"harmonic: is no group .*did you mean harmonics\?"):
+        fw.frf(RUBBING, 1, 2, 3, **dict[str, Any](harmonic=3))
+    with pytest.raises(fw.InputError, match=r"no group &swep.*did you mean sweep\?"):
+        fw.Case(RUBBING, **dict[str, Any](swep={"start": 1.0})).check()
     with pytest.raises(fw.InputError, match=r"harmonics: is a int"):
         fw.Case(RUBBING, harmonics=3)  # type: ignore[arg-type]
     with pytest.raises(fw.InputError, match=r"sweep\['start'\]: is set by an argument"):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from project import EXAMPLE
+from project import EXAMPLE, PROGRAM, ROOT
 
 import fretwear as fw
 from fretwear.cli import main
@@ -92,10 +94,15 @@ def test_a_sweep_over_a_parameter_has_its_unit() -> None:
 
 
 @pytest.mark.parametrize(("groups", "told"), [
-    ({"contact": {"gap": "5 N"}}, r"contact%gap = '5 N': is in N, must be in a unit of L"),
-    ({"contact": {"gap": "5 mmm"}}, r"contact%gap = '5 mmm'.*mmm"),
-    ({"sweep": {"start": "3 mm"}}, r"sweep%start = '3 mm': is in mm, must be in a unit of Hz"),
-    ({"solver": {"tolerance": "1 mm"}}, r"solver%tolerance"),
+    ({"contact": {"gap": "5 N"}}, r"&contact gap = '5 N': is in N, must be in a unit of L"),
+    ({"contact": {"gap": "5 mmm"}}, "'5 mmm': mmm is no unit that is known here: must be one of L"),
+    ({"sweep": {"start": "3 mm"}}, r"'3 mm': is in mm, must be in a unit of Hz"),
+    ({"solver": {"tolerance": "1 mm"}}, "&solver tolerance = '1 mm': the key has no unit"),
+    ({"structure": {"unit_system": "m-kg-s-N"}, "contact": {"gap": "5 um"}},
+     "&model unit_system = 'm-kg-s-N': the model says 'mm-tonne-s-N'"),
+    ({"spring": {"n_springs": 2, "side_1": [1, 2], "power": [2, 3], "coefficient": "1 N/mm^3"}},
+     "powers of the springs differ"),
+    ({"resonance": {"parameter": "contact%gap", "as": "factor", "start": "1 um"}}, "has no unit"),
 ])
 def test_what_is_no_such_quantity_is_refused(groups: dict[str, Any], told: str) -> None:
     with pytest.raises(fw.InputError, match=told):
@@ -105,5 +112,64 @@ def test_what_is_no_such_quantity_is_refused(groups: dict[str, Any], told: str) 
 def test_a_model_without_units_takes_numbers() -> None:
     model = fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0])
     case = fw.Case(model, sweep={"start": 0.5, "end": 1.0, "n_points": 2}, load={"cosine": "1 N"})
-    with pytest.raises(fw.InputError, match="give it a unit_system, such as 'mm-tonne-s-N'"):
+    with pytest.raises(fw.InputError, match="give &model unit_system, such as 'mm-tonne-s-N'"):
         case.check()
+    assert "cosine = 1 " in case.replace(structure={"unit_system": "m-kg-s-N"}).namelist()
+    with pytest.raises(fw.InputError, match=r"is no consistent system of units.*0\.001 forces"):
+        case.replace(structure={"unit_system": "mm-kg-s-N"}).check()
+    with pytest.raises(fw.InputError, match="'furlongs', are not known here"):
+        case.replace(structure={"unit_system": "furlongs"}).check()
+
+
+def test_the_program_reads_units_itself(tmp_path: Path) -> None:
+    """A namelist that states its units; options need no quotes, and springs have their power."""
+    (tmp_path / "case.nml").write_text("""
+&model n_dof = 1 mass = '1 kg' stiffness = '1 kN/m' damping = '0.5 N s/m'
+       unit_system = 'mm-tonne-s-N' /
+&load cosine = '2000 mN' /
+&spring n_springs = 2 side_1 = 2*1 coefficient = 2*'1 N/mm^3' /
+&sweep start = '30 rad/s' end = '300 rpm' n_points = 3 / &output observe = 1 /
+""")
+    said = subprocess.run([PROGRAM, "--check", "--set", "load%sine=3 N", "case.nml"],
+                          cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    for line in ("mass = 0.001 ", "stiffness = 1 ", "damping = 5e-4 ", "cosine = 2 ", "sine = 3 ",
+                 "coefficient = 1 ", "start = 30 ", "end = 31.415926535897"):
+        assert f"   {line}" in said
+    wrong = subprocess.run([PROGRAM, "--check", "--set", "load%sine=3 mm", "case.nml"],
+                           cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert wrong.returncode == 3
+    assert "--set load%sine=3 mm: &load sine = 3 mm: is in mm, must be in a unit of F" \
+        in wrong.stderr
+
+
+def test_the_table_of_units_is_that_of_pint() -> None:
+    """Every unit with every prefix: the number is that of pint, or pint knows no such unit."""
+    source = (ROOT / "src" / "io" / "unit_table.f90").read_text()
+    names = re.findall(r"named_unit\('(\w+)'.*?(, yes|, no, yes)?\)", source)
+    prefixes = [("", ""), *re.findall(r"prefix_type\('(\w+)', *'(\w+)'", source)]
+    assert len(names) > 45
+    assert len(prefixes) > 9
+    units = [f"{symbol if marks != ', no, yes' else word}{name}" for name, marks in names
+             for symbol, word in (prefixes if marks else prefixes[:1]) if name != "1"]
+    units += ["newtons", "kilonewtons", "N/mm^2*m^2", "kg m/s**2", "1/s^2*kg*m", "N*s^-1*min",
+              "kN * turn", "meter ** 2 * pascal", "MPa mm^2"]
+    registry = pint.UnitRegistry(on_redefinition="ignore")
+    # Elsewhere hertz are bare per second, and 1 Hz were 1 rad/s.
+    registry.define("hertz = 2 * π * radian / second = Hz")
+    registry.define("revolutions_per_minute = 2 * π * radian / minute = rpm")
+    whole, expected = [], []
+    for unit in units:
+        # To a force, by powers of metres, kilograms and seconds.
+        powers = registry.Quantity(1.0, unit.replace("^", "**")).dimensionality
+        missing = {"m": 1 - powers["[length]"], "kg": 1 - powers["[mass]"],
+                   "s": -2 - powers["[time]"]}
+        text = unit + "".join(f"*{base}^{power:g}" for base, power in missing.items() if power)
+        whole.append(f"2.5 {text}")
+        expected.append(registry.Quantity(2.5, text.replace("^", "**")).to("N").magnitude)
+    n = len(units)
+    model = fw.Model(np.eye(n), None, np.eye(n), unit_system="mm-tonne-s-N")
+    from fretwear._native import namelist_values
+
+    case = fw.Case(model, load={"cosine": whole}, sweep={"start": 2.0, "end": 3.0, "n_points": 2})
+    found = np.array(namelist_values(case.namelist())["load%cosine"], dtype=float)
+    assert found == pytest.approx(expected, rel=1e-14)

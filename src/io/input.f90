@@ -34,6 +34,7 @@ module fw_input
       procedure :: parse
       procedure :: given
       procedure :: place_of
+      procedure :: text_of
       procedure :: require_group
       procedure :: find_scalar
       procedure :: find_last
@@ -92,6 +93,25 @@ contains
       if (i > 0) place = location(self%namelist%entries(i), self%namelist%source)
       place = place//': &'//group//' '//key
    end function place_of
+
+   !> The first value of a key as it was typed, without its quotes; empty where there is none.
+   pure function text_of(self, group, key) result(text)
+      class(input_type), intent(in) :: self
+      character(*), intent(in) :: group, key
+      character(:), allocatable :: text
+      integer :: i
+
+      text = ''
+      i = last_entry(self%namelist, group, key)
+      if (i == 0) return
+      associate (entry => self%namelist%entries(i))
+         if (size(entry%values) > 0) text = entry%values(1)%text
+         ! Overrides need no quotes: everything behind the = is the text.
+         if (allocated(entry%raw)) then
+            if (.not. (entry%values(1)%quoted .and. size(entry%values) == 1)) text = entry%raw
+         end if
+      end associate
+   end function text_of
 
    !> Record a problem where a group is neither in the file nor in an override.
    subroutine require_group(self, group, purpose)

@@ -15,7 +15,7 @@ module fw_read_case
    use fw_read_contact, only: read_contact, read_springs
    use fw_read_control, only: read_control
    use fw_read_cyclic, only: check_sectors, read_cyclic
-   use fw_read_model, only: read_model, read_loads, finish_model
+   use fw_read_model, only: find_unit_system, read_model, read_loads, finish_model
    use fw_read_options, only: read_harmonics, read_mode, read_sweep
    use fw_read_output, only: read_output, read_observed
    use fw_read_resonance, only: check_resonance, read_resonance
@@ -27,6 +27,7 @@ module fw_read_case
    use fw_solver_options, only: continuation_natural
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
+   use fw_unit_values, only: convert_units, has_units
    use fw_usual_law, only: choose_law
    use fw_values, only: number_text, quoted_text
    implicit none (type, external)
@@ -118,6 +119,8 @@ contains
       call new_reader(reader, text, input%path, input%overrides, error, input%origin)
       if (allocated(error)) return
       reader%tries_files = input%tries_files
+      call read_units(reader, input%path, error, memory_model)
+      if (allocated(error)) return
       call read_keys(reader, input%path, case, error, memory_model)
       if (allocated(error)) return
       call choose_law(reader, case)
@@ -130,6 +133,22 @@ contains
       if (.not. allocated(error)) call check_resonance(case, error)
       if (.not. allocated(error)) call check_sensitivity(case, error)
    end subroutine read_groups
+
+   !> Values with units become numbers, if there are any.
+   subroutine read_units(reader, path, error, memory_model)
+      type(reader_type), intent(inout) :: reader
+      character(*), intent(in) :: path
+      type(error_type), allocatable, intent(out) :: error
+      type(file_model_type), intent(in), optional :: memory_model
+      type(record_list) :: keys
+      character(:), allocatable :: system
+
+      if (.not. has_units(reader)) return
+      call list_keys(keys)
+      call find_unit_system(reader, directory_of(path), system, memory_model)
+      call convert_units(reader, keys, system)
+      call reader%raise(error)
+   end subroutine read_units
 
    !> Where nothing is said of the harmonics, an accuracy chooses them, if the rest of the case goes
    !> with one: a single harmonic says little of friction and gaps.

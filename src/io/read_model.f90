@@ -6,6 +6,9 @@
 module fw_read_model
    use fw_error, only: error_type
    use fw_kinds, only: wp
+   use fw_hdf5, only: has_attribute
+   use fw_hdf5, only: hdf5_file
+   use fw_hdf5, only: read_attribute
    use fw_load_terms, only: load_terms
    use fw_matrix_checks, only: check_matrix, check_skew, check_vector
    use fw_matrix_market, only: read_matrix_market_model
@@ -27,7 +30,7 @@ module fw_read_model
    implicit none (type, external)
    private
 
-   public :: read_model, read_loads, finish_model
+   public :: read_model, read_loads, finish_model, find_unit_system
 
    !> HDF5 can crash over a damaged file: reading is tried in a process of its own first.
    type, extends(trial_type) :: model_trial
@@ -70,9 +73,58 @@ contains
                             trim(source_words(options%source))//"': give source = "// &
                             "'hdf5' or 'matrix_market', or remove file")
       end if
+      call take_unit_system(reader, options, raw)
       call read_matrices(reader, is_inline, n_dof, raw)
       call options%bind_additions(reader)
    end subroutine read_model
+
+   !> What the case says of the units, or the model; not both, where they differ.
+   subroutine take_unit_system(reader, options, raw)
+      type(reader_type), intent(inout) :: reader
+      type(model_options), intent(in) :: options
+      type(file_model_type), intent(inout) :: raw
+
+      if (.not. allocated(options%unit_system)) return
+      if (allocated(raw%unit_system)) then
+         if (len_trim(raw%unit_system) > 0 .and. raw%unit_system /= options%unit_system) then
+            call reader%refuse('model', 'unit_system', '= '//quoted_text(options%unit_system)// &
+                               ': the model says '//quoted_text(raw%unit_system)//': remove it')
+            return
+         end if
+      end if
+      raw%unit_system = options%unit_system
+   end subroutine take_unit_system
+
+   !> The units of the model before anything else of it is read; empty where nothing says them, or
+   !> where the file cannot be read, which is told when the model is.
+   subroutine find_unit_system(reader, directory, system, memory_model)
+      type(reader_type), intent(in) :: reader
+      character(*), intent(in) :: directory
+      character(:), allocatable, intent(out) :: system
+      type(file_model_type), intent(in), optional :: memory_model
+      type(hdf5_file) :: file
+      type(error_type), allocatable :: error
+      character(:), allocatable :: path
+
+      system = reader%text_of('model', 'unit_system')
+      if (len(system) > 0) return
+      if (present(memory_model)) then
+         if (allocated(memory_model%unit_system)) system = memory_model%unit_system
+         return
+      end if
+      ! A prefix of Matrix Market files is no file, or none of HDF5: it says no units.
+      path = in_directory(reader%text_of('model', 'file'), directory)
+      if (path == directory) return
+      ! A damaged file ends the trial, and not the program.
+      if (reader%tries_files) call try_file(model_trial(), path, error)
+      if (.not. allocated(error)) call file%open_read(path, error)
+      if (allocated(error)) return
+      if (has_attribute(file, '/', 'unit_system')) then
+         call read_attribute(file, '/', 'unit_system', system, error)
+         if (.not. allocated(system)) system = ''
+      end if
+      call file%close(error)
+   end subroutine find_unit_system
 
    !> Key `source`; the matrices of the calling program need no group &model.
    subroutine choose_source(reader, in_memory, options)

@@ -25,6 +25,8 @@ module fw_model_keys
    type :: model_options
       integer :: source = source_inline
       character(:), allocatable :: file
+      !> Units of the model, such as 'mm-tonne-s-N'.
+      character(:), allocatable :: unit_system
       !> Factors of the mass [1/s] and of the stiffness [s] in the damping.
       real(wp) :: rayleigh_mass = 0.0_wp
       real(wp) :: rayleigh_stiffness = 0.0_wp
@@ -61,6 +63,9 @@ contains
       call keys%bind(key('file', 'model file, relative to the namelist', &
                          absent='required unless inline'), self%file, &
                      needed=any(self%source == [source_hdf5, source_matrix_market]))
+      call keys%bind(key('unit_system', "units of length, mass, time and force, such as "// &
+                         "'mm-tonne-s-N': for values with units, and in results", &
+                         absent='of the file'), self%unit_system)
    end subroutine bind_file
 
    subroutine bind_order(keys, n_dof, is_inline)

@@ -13,6 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from .. import __version__
+from .._words import HintingParser
 from .model import ReducedDisk, build_full, reduce_disk
 from .model_file import write_model
 from .parameters import DiskParameters, ParameterError
@@ -63,7 +64,7 @@ def _summary(model: ReducedDisk, n_free: int, output: str, seconds: float) -> No
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = HintingParser(
         prog="python -m fretwear.disk", allow_abbrev=False,
         description="Generate the reduced model of one sector of a shrouded bladed disk (units "
                     "mm, tonne, s, N).")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from .._words import did_you_mean
 from ..errors import AbsentError, InputError, OutputError
 from ..result import Result
 from ..rows import choose_point
@@ -69,7 +70,7 @@ def _draw_together(options: argparse.Namespace) -> int:
     kind = options.kind or "response"
     if kind not in TOGETHER:
         raise InputError(f"--kind {options.kind}: of several results one of "
-                         f"{', '.join(TOGETHER)} is drawn")
+                         f"{', '.join(TOGETHER)} is drawn" + did_you_mean(kind, words=TOGETHER))
     _only(options, "several results", "kind",
           "nodal_diameter" if kind == "campbell" else "observe")
     stem = f"{Path(options.result[0]).stem}_{'together' if kind == 'response' else kind}"
@@ -143,7 +144,8 @@ def _kinds(result: Result, text: str | None) -> list[str]:
             raise InputError(f"--kind {name}: is drawn of several results: name two or more, at "
                              f"several {'speeds' if name == 'campbell' else 'loads'}")
         if name not in KINDS:
-            raise InputError(f"--kind {name}: must be among {', '.join(KINDS)}")
+            raise InputError(f"--kind {name}: must be among {', '.join(KINDS)}"
+                             + did_you_mean(name, words=KINDS))
     return names
 
 

@@ -7,9 +7,7 @@ name with dashes. Exit status: 0 done, 2 usage, 3 parameters not accepted, 5 fil
 from __future__ import annotations
 
 import argparse
-import difflib
 import math
-import re
 import sys
 import time
 from dataclasses import fields
@@ -18,6 +16,7 @@ from typing import Any, NoReturn
 
 from .. import __version__
 from .._progress import stages
+from .._words import near_options
 from .model import FullModel, ReducedModel, build_full, reduce_model
 from .model_file import write_model
 from .parameters import (
@@ -42,10 +41,7 @@ class _Parser(argparse.ArgumentParser):
     """Parser that names the nearest option instead of printing all of them."""
 
     def error(self, message: str) -> NoReturn:
-        known = [text for action in self._actions for text in action.option_strings]
-        wrong = re.findall(r"--[\w-]+", message) if "unrecognized" in message else []
-        near = [match for text in wrong for match in difflib.get_close_matches(text, known, 1)]
-        hint = f"; did you mean {', '.join(near)}?" if near else ""
+        hint = near_options(self, message)
         self.exit(_USAGE, f"fretwear.sector: {message}{hint} (--help lists all options)\n")
 
 
