@@ -17,7 +17,6 @@ module fw_model_file
    use fw_hdf5, only: read_attribute
    use fw_hdf5, only: read_dataset
    use fw_kinds, only: wp
-   use fw_laws, only: law_number
    use fw_laws, only: law_words
    use fw_model_file_parts, only: read_dofs
    use fw_model_file_parts, only: read_matrix
@@ -221,7 +220,7 @@ contains
       if (.not. has_attribute(file, '/contact', 'law')) return
       call read_attribute(file, '/contact', 'law', word, error)
       if (allocated(error)) return
-      law = law_number(word)
+      law = findloc(law_words, word, dim=1)
       ! Left to the case, another law than the one that was meant would be solved.
       if (law > 0) return
       call fatal_error(error, file%path//': attribute law of /contact is "'//word// &
