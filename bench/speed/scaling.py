@@ -18,10 +18,11 @@ from scipy.linalg import eigh
 
 from bench.common.measure import Bench, Cost, Groups, Run
 from bench.common.sector import COARSE, FAST, case, sector_file
+from bench.speed.small import SmallCase, measure_small
 
 __all__ = ["Measured", "Scaling", "Threads", "measure_scaling"]
 
-PAIRS = (16, 48, 96, 192, 384, 768)
+PAIRS = (16, 48, 96, 192, 384, 768, 1536)
 HARMONICS = (1, 3, 7, 17, 31)
 #: Most unknowns that are measured: beyond, a frequency takes minutes.
 MOST_UNKNOWNS = 41000
@@ -45,8 +46,8 @@ class Measured:
     """A size: seconds of a frequency and of everything before, memory [MB], and counts.
 
     `stuck` is the first natural frequency [Hz] with every pair stuck, `peak` the largest tip
-    amplitude found [mm]; Newton steps and GMRES iterations are means of a frequency. `before` and
-    `memory_before` are those of the other program, NaN where there is none.
+    amplitude found [mm]; Newton steps and GMRES iterations are means of a frequency. What ends in
+    `before` is the other program's, NaN where there is none.
     """
 
     pairs: int
@@ -64,6 +65,8 @@ class Measured:
     peak: float
     before: float = math.nan
     memory_before: float = math.nan
+    newton_before: float = math.nan
+    krylov_before: float = math.nan
 
     @property
     def full_matrix(self) -> float:
@@ -83,11 +86,13 @@ class Threads:
 
 @dataclass(frozen=True)
 class Scaling:
-    """Every size, both ends of the paper's table with its number of instants, and two threads."""
+    """Every size, the ends of the paper's table with its number of instants, threads, a small case.
+    """
 
     rows: list[Measured]
     paper: list[Measured]
     threads: list[Threads]
+    small: list[SmallCase]
 
 
 def measure_scaling(bench: Bench, step: Callable[[str], None], other: Bench | None = None
@@ -102,7 +107,9 @@ def measure_scaling(bench: Bench, step: Callable[[str], None], other: Bench | No
                  if unknowns_of(pairs, n) <= MOST_UNKNOWNS]
     paper = [measure_size(bench, PAIRS[0], n, PAPER_TIME) for n in PAPER_HARMONICS]
     step("two threads")
-    return Scaling(rows, paper, measure_two_threads(bench))
+    threads = measure_two_threads(bench)
+    step("a small case")
+    return Scaling(rows, paper, threads, measure_small(bench, other))
 
 
 def measure_two_threads(bench: Bench) -> list[Threads]:
@@ -164,8 +171,14 @@ def measure_size(bench: Bench, pairs: int, n_harmonics: int, n_time: int = N_TIM
                     cost.memory, run.unknowns, run.unknowns_left, float(run.iterations.mean()),
                     cost.krylov_iterations / n_points, run.usable, n_points, stuck,
                     float(run.amplitude[:, 0].max()),
-                    *((statistics.median(processor_seconds(*one) for one in before),
-                       before[0][1].memory) if before else ()))
+                    *(of_the_other(before, n_points) if before else ()))
+
+
+def of_the_other(runs: list[tuple[Run, Cost]], n_points: int) -> tuple[float, float, float, float]:
+    """Time of a frequency [s], memory [MB], Newton steps and GMRES iterations of a frequency."""
+    run, cost = runs[0]
+    return (statistics.median(processor_seconds(*one) for one in runs), cost.memory,
+            float(run.iterations.mean()), cost.krylov_iterations / n_points)
 
 
 def processor_seconds(run: Run, cost: Cost) -> float:

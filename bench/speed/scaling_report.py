@@ -28,6 +28,7 @@ from bench.speed.scaling import (
     Scaling,
     Threads,
 )
+from bench.speed.small import write_small
 
 __all__ = ["write_scaling"]
 
@@ -52,7 +53,7 @@ def write_scaling(images: Path, found: Scaling) -> str:
     draw(images / "benchmark_scaling.png", rows)
     columns = ("pairs", "H", "unknowns", "in linear problems", "usable", "Newton steps",
                "GMRES iterations", "time [ms]", "set-up [s]", "memory [MB]", "full matrix [MB]",
-               "time before [ms]", "memory before [MB]")
+               "time before [ms]", "steps before", "iterations before", "memory before [MB]")
     return "\n".join([
         "## Scaling", "",
         "Bladed-disk sector at 4400 rpm with finer and finer flanks and a mesh away from them that "
@@ -72,6 +73,7 @@ def write_scaling(images: Path, found: Scaling) -> str:
                           f"{r.usable} of {r.points}", f"{r.newton:.1f}", f"{r.krylov:.0f}",
                           f"{1e3 * r.seconds:.3g}", f"{r.setup:.2f}", f"{r.memory:.0f}",
                           f"{r.full_matrix:.3g}", shown(1e3 * r.before),
+                          shown(r.newton_before), shown(r.krylov_before),
                           shown(r.memory_before)) for r in rows)),
         "", "![Time and memory against pairs and harmonics](images/benchmark_scaling.png)", "",
         *largest_matrix(rows), "",
@@ -83,6 +85,7 @@ def write_scaling(images: Path, found: Scaling) -> str:
         "", *exponents(rows), *reasons(rows), "",
         "### Many harmonics against one", "", *over_harmonics(found.paper), "",
         *two_threads(found.threads),
+        *write_small(found.small),
         "### Finer flanks", "", *finer_flanks(rows)])
 
 
