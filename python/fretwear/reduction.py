@@ -30,6 +30,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from .errors import InputError
 
@@ -101,8 +102,9 @@ class Bonded:
         def answer(block: slice) -> None:
             flexible[:, block] = self._solve(contact[block].toarray().conj().T)
 
-        # SuperLU works outside Python's lock: blocks are solved side by side.
-        with ThreadPoolExecutor(os.cpu_count()) as workers:
+        # SuperLU works outside Python's lock: blocks are solved side by side. The small products
+        # inside would start threads of their own, which wait for one another most of the time.
+        with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as workers:
             for done, _ in enumerate(workers.map(answer, blocks), 1):
                 if progress:
                     progress("contact shapes", done, len(blocks))
