@@ -220,10 +220,9 @@ contains
       if (.not. has_attribute(file, '/contact', 'law')) return
       call read_attribute(file, '/contact', 'law', word, error)
       if (allocated(error)) return
-      ! 0 in the end: left to the case, another law than the one that was meant would be solved.
-      do law = size(law_words), 1, -1
-         if (law_words(law) == word) return
-      end do
+      law = findloc(law_words == word, .true., dim=1)
+      ! Left to the case, another law than the one that was meant would be solved.
+      if (law > 0) return
       call fatal_error(error, file%path//': attribute law of /contact is "'//word// &
                        '", expected '//words_text(law_words), status_input)
    end subroutine read_law
