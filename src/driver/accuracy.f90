@@ -411,7 +411,7 @@ contains
 
       call need(self, k, doublings, error)
       if (allocated(error)) return
-      if (self%level(self%current, self%doublings)%solver%n_converged > 0) then
+      if (self%level(self%current, self%doublings)%solver%known%kept > 0) then
          call self%level(k, doublings)%take_over(self%level(self%current, self%doublings))
       end if
       self%current = k
@@ -470,9 +470,9 @@ contains
 
       memory%level = [self%current, self%doublings]
       associate (solver => self%level(self%current, self%doublings)%solver)
-         if (solver%n_converged == 0) return
-         memory%x = solver%last
-         memory%omega = solver%omega_last
+         if (solver%known%kept == 0) return
+         memory%x = solver%known%x(:, 1)
+         memory%omega = solver%known%place(1)
       end associate
    end subroutine remember
 
@@ -483,7 +483,7 @@ contains
 
       self%current = memory%level(1)
       self%doublings = memory%level(2)
-      call self%level(self%current, self%doublings)%solver%know(memory%x, memory%omega)
+      call self%level(self%current, self%doublings)%solver%known%begin_with(memory%omega, memory%x)
    end subroutine recall
 
 end module fw_accuracy

@@ -132,9 +132,9 @@ contains
 
       memory%level(1) = self%current
       associate (solver => self%level(self%current)%solver)
-         if (solver%n_converged == 0) return
-         memory%x = solver%last
-         memory%omega = solver%omega_last
+         if (solver%known%kept == 0) return
+         memory%x = solver%known%x(:, 1)
+         memory%omega = solver%known%place(1)
       end associate
    end subroutine remember
 
@@ -144,7 +144,7 @@ contains
       type(solver_memory), intent(in) :: memory
 
       self%current = memory%level(1)
-      call self%level(self%current)%solver%know(memory%x, memory%omega)
+      call self%level(self%current)%solver%known%begin_with(memory%omega, memory%x)
    end subroutine recall
 
 end module fw_adaptive

@@ -135,8 +135,8 @@ contains
       class(level_type), intent(in) :: source
       real(wp) :: x(self%system%n)
 
-      call carry_solution(source%system, source%solver%last, self%system, x)
-      call self%solver%know(x, source%solver%omega_last)
+      call carry_solution(source%system, source%solver%known%x(:, 1), self%system, x)
+      call self%solver%known%begin_with(source%solver%known%place(1), x)
       associate (pairs => source%system%problem%forces%pairs)
          self%system%work(pairs)%x_start = source%system%work(pairs)%x_start
       end associate

@@ -2,6 +2,7 @@
 !> fail, from the points before.
 module fw_mode_path
    use fw_error, only: error_type
+   use fw_extrapolation, only: best_order
    use fw_extrapolation, only: extrapolate
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
@@ -165,26 +166,18 @@ contains
       call self%remember(p, y)
    end subroutine restart
 
-   !> The orders that would have come nearest to a new point: beyond a kink a high one is worse than
-   !> none.
+   !> The orders that would have come nearest to a new point.
    subroutine choose_orders(self, p, y)
       class(mode_path), intent(inout) :: self
       real(wp), intent(in) :: p, y(:)
-      real(wp) :: off(2), least(2), guess(size(y))
       integer :: k, n
 
+      k = self%kept
       n = self%system%n_static
-      self%order = 0
-      least = huge(1.0_wp)
-      do k = 1, self%kept
-         call extrapolate(exp(self%p(:k) - p), self%y(:n, :), 1.0_wp, guess(:n))
-         call extrapolate(self%p(:k), self%y(n + 1:, :), p, guess(n + 1:))
-         off = [norm2(guess(:n) - y(:n)), norm2(guess(n + 1:) - y(n + 1:))]
-         where (off < least) self%order = k - 1
-         least = min(off, least)
-      end do
+      self%order = [best_order(exp(self%p(:k) - p), self%y(:n, :), 1.0_wp, y(:n)), &
+                    best_order(self%p(:k), self%y(n + 1:, :), p, y(n + 1:))]
       ! With the new point one more has become possible; nothing is known of it.
-      if (self%kept == 1) self%order = 1
+      if (k == 1) self%order = 1
    end subroutine choose_orders
 
 end module fw_mode_path

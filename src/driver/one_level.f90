@@ -150,9 +150,9 @@ contains
       class(one_level), intent(in) :: self
       type(solver_memory), intent(out) :: memory
 
-      if (self%level%solver%n_converged == 0) return
-      memory%x = self%level%solver%last
-      memory%omega = self%level%solver%omega_last
+      if (self%level%solver%known%kept == 0) return
+      memory%x = self%level%solver%known%x(:, 1)
+      memory%omega = self%level%solver%known%place(1)
    end subroutine remember
 
    !> Go on from such a solution.
@@ -160,7 +160,7 @@ contains
       class(one_level), intent(inout) :: self
       type(solver_memory), intent(in) :: memory
 
-      call self%level%solver%know(memory%x, memory%omega)
+      call self%level%solver%known%begin_with(memory%omega, memory%x)
    end subroutine recall
 
 end module fw_one_level

@@ -18,6 +18,7 @@ module fw_other_starts
    use fw_point, only: served_by_integration
    use fw_point, only: served_by_other_balance
    use fw_point_solver, only: point_solver
+   use fw_solution_history, only: solution_history
    use fw_strategy, only: point_request
    use fw_text, only: to_text
    implicit none (type, external)
@@ -34,9 +35,8 @@ module fw_other_starts
 
    !> What a solver knows, to be given back where a start leads nowhere.
    type :: known_solutions
-      real(wp), allocatable :: last(:), before(:)
-      real(wp) :: omega_last = 0.0_wp, omega_before = 0.0_wp
-      integer :: n_converged = 0, point_failures = 0
+      type(solution_history) :: solutions
+      integer :: point_failures = 0
    end type known_solutions
 
 contains
@@ -290,7 +290,7 @@ contains
       call integrate_a_few(case, level, request, x, done, error)
       if (allocated(error) .or. .not. done) return
       known = solutions_of(level%solver)
-      call level%solver%know(x, request%place())
+      call level%solver%known%begin_with(request%place(), x)
       work = 0
       call go_from_here(case, level, known, request, point, work, done, error)
       spent = spent + work
@@ -339,11 +339,7 @@ contains
       type(point_solver), intent(in) :: solver
       type(known_solutions) :: known
 
-      known%last = solver%last
-      known%before = solver%before
-      known%omega_last = solver%omega_last
-      known%omega_before = solver%omega_before
-      known%n_converged = solver%n_converged
+      known%solutions = solver%known
       known%point_failures = solver%point_failures
    end function solutions_of
 
@@ -351,11 +347,7 @@ contains
       type(known_solutions), intent(in) :: known
       type(point_solver), intent(inout) :: solver
 
-      solver%last = known%last
-      solver%before = known%before
-      solver%omega_last = known%omega_last
-      solver%omega_before = known%omega_before
-      solver%n_converged = known%n_converged
+      solver%known = known%solutions
       solver%point_failures = known%point_failures
    end subroutine give_back
 

@@ -28,6 +28,7 @@ module fw_point_solver
    use fw_tail, only: recover_tail
    use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution, only: solution_method
+   use fw_solution_history, only: solution_history
    use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request
    use fw_solver_options, only: pseudo_time_options
@@ -65,16 +66,14 @@ module fw_point_solver
       type(solution_method) :: method
       type(stability_solver) :: stability
       type(sensitivity_solver) :: sensitivity
-      !> The present solution, and the last two converged ones with their frequencies. (Of a sweep
-      !> over another parameter, here and below its values.)
-      real(wp), allocatable :: x(:), last(:), before(:), r(:)
+      !> The present solution, and the last converged ones with their frequencies. (Of a sweep over
+      !> another parameter, here and below its values.)
+      real(wp), allocatable :: x(:), r(:)
+      type(solution_history) :: known
       !> The point to be solved, and the best that was found of it where nothing converged.
       real(wp) :: omega_wanted = -1.0_wp
       real(wp) :: best_residual = huge(1.0_wp)
       real(wp), allocatable :: best(:)
-      real(wp) :: omega_last = -1.0_wp
-      real(wp) :: omega_before = -1.0_wp
-      integer :: n_converged = 0
       !> Points that the pseudo-time fallback has saved.
       integer :: n_by_flow = 0
       integer :: flow_failures = 0
@@ -88,7 +87,6 @@ module fw_point_solver
    contains
       procedure :: start
       procedure :: solve
-      procedure :: know
    end type point_solver
 
 contains
@@ -103,7 +101,8 @@ contains
       integer, intent(in) :: n
 
       call self%method%start(case, harmonics)
-      allocate (self%x(n), self%last(n), self%before(n), self%r(n), source=0.0_wp)
+      allocate (self%x(n), self%r(n), source=0.0_wp)
+      call self%known%start(n)
    end subroutine start
 
    !> Solve at a frequency; not converging is an outcome, marked in the point.
@@ -238,7 +237,7 @@ contains
          if (report%converged) self%n_by_flow = self%n_by_flow + 1
          if (.not. goes_on(self, report, iterations)) return
       end if
-      if (self%n_converged == 0) then
+      if (self%known%kept == 0) then
          call raise_load(self, system, omega, report, iterations, error)
          if (report%converged) self%served_by = served_by_raised_load
       else
@@ -263,7 +262,7 @@ contains
       if (.not. last_report%converged) return
       report = last_report
       self%served_by = served_by_free_guess
-      call remember(self, omega)
+      call self%known%remember(omega, self%x)
    end subroutine from_free_guess
 
    !> Integrate in pseudo-time from the last solution, or from the stuck guess.
@@ -279,8 +278,8 @@ contains
 
       call system%set_parameter(omega, error)
       if (allocated(error)) return
-      if (self%n_converged > 0) then
-         self%x = self%last
+      if (self%known%kept > 0) then
+         self%x = self%known%x(:, 1)
       else
          call stuck_guess(system, self%x)
       end if
@@ -289,7 +288,7 @@ contains
       iterations = iterations + report%iterations
       if (report%converged) then
          self%served_by = served_by_pseudo_time
-         call remember(self, omega)
+         call self%known%remember(omega, self%x)
       else
          call note_best(self, report)
       end if
@@ -338,7 +337,7 @@ contains
       ! On every way out: the system serves other points after this one.
       system%load_share = 1.0_wp
       if (report%converged) then
-         call remember(self, omega)
+         call self%known%remember(omega, self%x)
       else if (.not. allocated(error)) then
          call system%set_parameter(omega, error)
       end if
@@ -356,7 +355,7 @@ contains
       call system%set_parameter(omega, error)
       if (allocated(error)) return
       call try_guesses(self, system, omega, report, iterations)
-      if (report%converged) call remember(self, omega)
+      if (report%converged) call self%known%remember(omega, self%x)
    end subroutine from_guesses
 
    !> First half of the way from the last point, which may take halves of its own, then the rest.
@@ -371,8 +370,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: middle
 
-      ! omega_last moves on with every success, also within this procedure.
-      middle = 0.5_wp*(self%omega_last + omega)
+      ! The last place moves on with every success, also within this procedure.
+      middle = 0.5_wp*(self%known%place(1) + omega)
       call from_guesses(self, system, middle, report, iterations, error)
       if (allocated(error)) return
       if (depth < max_halvings .and. goes_on(self, report, iterations)) then
@@ -399,19 +398,16 @@ contains
       type(solver_report), intent(out) :: report
       integer, intent(inout) :: iterations
       integer :: guess, first
-      real(wp) :: step
 
       first = 3
-      if (self%n_converged > 0) first = 2
-      if (self%n_converged > 1) first = 1
+      if (self%known%kept > 0) first = 2
+      if (self%known%kept > 1) first = 1
       do guess = first, 3
          select case (guess)
          case (1)
-            ! In units of the last interval, which may be shorter than this one.
-            step = (omega - self%omega_last)/(self%omega_last - self%omega_before)
-            self%x = self%last + step*(self%last - self%before)
+            call self%known%predict(omega, self%x)
          case (2)
-            self%x = self%last
+            self%x = self%known%x(:, 1)
          case default
             call stuck_guess(system, self%x)
          end select
@@ -461,39 +457,11 @@ contains
       self%best = self%x
    end subroutine note_best
 
-   !> Take a solution from elsewhere, such as one with other harmonics, for the last known one.
-   subroutine know(self, x, omega)
-      class(point_solver), intent(inout) :: self
-      real(wp), intent(in) :: x(:), omega
-
-      self%last = x
-      self%omega_last = omega
-      ! No second point: an extrapolation over two numbers of harmonics would mix them.
-      self%n_converged = 1
-   end subroutine know
-
    !> Whether a point is worth every way to it, with it the number of points in a row that failed.
    pure logical function looks_again(n_failed)
       integer, intent(in) :: n_failed
 
       looks_again = n_failed <= most_point_failures .or. popcnt(n_failed) == 1
    end function looks_again
-
-   !> A solution for the guesses of the next points.
-   subroutine remember(self, omega)
-      class(point_solver), intent(inout) :: self
-      real(wp), intent(in) :: omega
-
-      ! The same frequency again: no direction to extrapolate in.
-      if (abs(omega - self%omega_last) <= 0.0_wp) then
-         self%last = self%x
-         return
-      end if
-      self%before = self%last
-      self%omega_before = self%omega_last
-      self%last = self%x
-      self%omega_last = omega
-      self%n_converged = self%n_converged + 1
-   end subroutine remember
 
 end module fw_point_solver

@@ -4,7 +4,11 @@ module fw_extrapolation
    implicit none (type, external)
    private
 
-   public :: extrapolate
+   public :: best_order, extrapolate
+
+   !> A higher order has to come this much nearer than all lower ones: beyond a jump or a kink all
+   !> are off alike, and a high one is worse than none there.
+   real(wp), parameter :: clearly = 0.6_wp
 
 contains
 
@@ -25,5 +29,24 @@ contains
          value = value + weight*y(:, i)
       end do
    end subroutine extrapolate
+
+   !> The order of the polynomial through the first columns of y that comes clearly nearest to a
+   !> value known at another place.
+   pure integer function best_order(x, y, at, value) result(order)
+      !> As many as are known, one at least.
+      real(wp), intent(in) :: x(:), y(:, :), at, value(:)
+      real(wp) :: off, least, guess(size(value))
+      integer :: k
+
+      order = 0
+      least = huge(1.0_wp)
+      do k = 1, size(x)
+         call extrapolate(x(:k), y, at, guess)
+         off = norm2(guess - value)
+         if (off >= clearly*least) cycle
+         order = k - 1
+         least = off
+      end do
+   end function best_order
 
 end module fw_extrapolation
