@@ -6,10 +6,14 @@ module fw_polynomial_law
    use fw_force_law, only: pair_mixed
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
+   use fw_lapack, only: dgemm
    implicit none (type, external)
    private
 
    public :: polynomial_law, new_polynomial
+
+   !> Instants of one product: enough for the speed of dgemm, few enough for the cache.
+   integer, parameter :: block = 64
 
    type, extends(force_law) :: polynomial_law
       !> Force per length**power (n_elements).
@@ -97,21 +101,23 @@ contains
       class(polynomial_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
-      integer :: i, j, k, nc
-      real(wp) :: slope
+      real(wp) :: sloped(fourier%n_coefficients, block)
+      integer :: i, j, k, first, last, nc
 
       nc = fourier%n_coefficients
       work%linear_state = work%state
       if (.not. allocated(work%jacobian)) allocate (work%jacobian(nc, nc, self%n_elements))
       work%jacobian = 0.0_wp
       do i = 1, self%n_elements
-         do k = 1, fourier%n_time
-            slope = self%slope_at(i, work%prediction_time(i, 1, k))
-            do j = 1, nc
-               ! G = analysis diag(slope) synthesis, transposed: the first index is the input.
-               work%jacobian(:, j, i) = work%jacobian(:, j, i) + &
-                                        (slope*fourier%analysis(j, k))*fourier%synthesis(:, k)
+         do first = 1, fourier%n_time, block
+            last = min(first + block - 1, fourier%n_time)
+            do k = first, last
+               sloped(:, k - first + 1) = self%slope_at(i, work%prediction_time(i, 1, k))* &
+                                          fourier%synthesis(:, k)
             end do
+            ! G = analysis diag(slope) synthesis, transposed: the first index is the input.
+            call dgemm('N', 'T', nc, nc, last - first + 1, 1.0_wp, sloped, nc, &
+                       fourier%analysis(:, first:last), nc, 1.0_wp, work%jacobian(1, 1, i), nc)
          end do
          ! Inputs are rows here: what is filtered has no derivative.
          do j = 1, fourier%n_retained
