@@ -20,8 +20,8 @@ from fretwear.settings import Groups
 SAME = 1e-6
 #: The search for a maximum ends at 1e-4 of its height; widths are read between other samples then.
 SAME_WIDTH = 1e-3
-#: Of iterations and residuals, which depend on the way, nothing is asked.
-OF_THE_WAY = ("iterations", "residual", "seconds", "served_by", "peak/bandwidth")
+#: Of iterations, residuals and estimates from them nothing is asked: they depend on the way.
+OF_THE_WAY = ("iterations", "residual", "floquet/error", "seconds", "served_by", "peak/bandwidth")
 
 SECTOR = fw.Case.from_file(EXAMPLE / "blade_sector" / "frf.nml", harmonics={"n_time": 64},
                            output={"observe": ["tip", "tip_x"]})

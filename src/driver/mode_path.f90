@@ -50,6 +50,8 @@ module fw_mode_path
    integer, parameter :: most_iterations = 25
    !> ln A closer than this are one amplitude.
    real(wp), parameter :: same = 1.0e-9_wp
+   !> Of two orders of guesses the one that did better serves, by however little.
+   real(wp), parameter :: any_nearer = 1.0_wp
 
 contains
 
@@ -174,8 +176,8 @@ contains
 
       k = self%kept
       n = self%system%n_static
-      self%order = [best_order(exp(self%p(:k) - p), self%y(:n, :), 1.0_wp, y(:n)), &
-                    best_order(self%p(:k), self%y(n + 1:, :), p, y(n + 1:))]
+      self%order = [best_order(exp(self%p(:k) - p), self%y(:n, :), 1.0_wp, y(:n), any_nearer), &
+                    best_order(self%p(:k), self%y(n + 1:, :), p, y(n + 1:), any_nearer)]
       ! With the new point one more has become possible; nothing is known of it.
       if (k == 1) self%order = 1
    end subroutine choose_orders

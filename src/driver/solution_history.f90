@@ -13,6 +13,9 @@ module fw_solution_history
    !> Steps longer than this many of the last one are guessed by a straight line at most: what a
    !> curved one leaves out grows with their power.
    real(wp), parameter :: far = 2.0_wp
+   !> Share of what a line would have been off that a curve has to come nearer than: two orders that
+   !> did alike say that neither fits.
+   real(wp), parameter :: clearly = 0.6_wp
 
    type :: solution_history
       !> How many there are.
@@ -52,6 +55,7 @@ contains
    pure subroutine remember(self, place, x)
       class(solution_history), intent(inout) :: self
       real(wp), intent(in) :: place, x(:)
+      integer :: k
 
       if (self%kept > 0) then
          ! No direction to extrapolate in.
@@ -59,10 +63,13 @@ contains
             self%x(:, 1) = x
             return
          end if
-         self%order = best_order(self%place(:self%kept), self%x, place, x)
+         self%order = best_order(self%place(:self%kept), self%x, place, x, clearly)
       end if
-      self%place = [place, self%place(:most_kept - 1)]
-      self%x(:, 2:) = self%x(:, :most_kept - 1)
+      do k = most_kept, 2, -1
+         self%place(k) = self%place(k - 1)
+         self%x(:, k) = self%x(:, k - 1)
+      end do
+      self%place(1) = place
       self%x(:, 1) = x
       self%kept = min(most_kept, self%kept + 1)
       ! The second solution makes a line possible, and nothing is known of it.

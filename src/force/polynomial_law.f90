@@ -3,6 +3,7 @@ module fw_polynomial_law
    use fw_force_law, only: force_law
    use fw_force_law, only: force_workspace
    use fw_force_law, only: law_facts
+   use fw_force_law, only: law_room
    use fw_force_law, only: pair_mixed
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
@@ -30,6 +31,11 @@ module fw_polynomial_law
       procedure :: n_parameters
       procedure :: by_parameter
    end type polynomial_law
+
+   !> Slopes at the instants of a block times the base functions there (n_coefficients, block).
+   type, extends(law_room) :: polynomial_room
+      real(wp), allocatable :: sloped(:, :)
+   end type polynomial_room
 
 contains
 
@@ -101,31 +107,50 @@ contains
       class(polynomial_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
-      real(wp) :: sloped(fourier%n_coefficients, block)
-      integer :: i, j, k, first, last, nc
+      integer :: i, j, nc
 
       nc = fourier%n_coefficients
       work%linear_state = work%state
-      if (.not. allocated(work%jacobian)) allocate (work%jacobian(nc, nc, self%n_elements))
-      work%jacobian = 0.0_wp
-      do i = 1, self%n_elements
-         do first = 1, fourier%n_time, block
-            last = min(first + block - 1, fourier%n_time)
-            do k = first, last
-               sloped(:, k - first + 1) = self%slope_at(i, work%prediction_time(i, 1, k))* &
-                                          fourier%synthesis(:, k)
-            end do
-            ! G = analysis diag(slope) synthesis, transposed: the first index is the input.
-            call dgemm('N', 'T', nc, nc, last - first + 1, 1.0_wp, sloped, nc, &
-                       fourier%analysis(:, first:last), nc, 1.0_wp, work%jacobian(1, 1, i), nc)
+      if (.not. allocated(work%jacobian)) then
+         allocate (work%jacobian(nc, nc, self%n_elements))
+         allocate (polynomial_room :: work%room)
+      end if
+      select type (room => work%room)
+      class is (polynomial_room)
+         if (.not. allocated(room%sloped)) allocate (room%sloped(nc, block))
+         do i = 1, self%n_elements
+            call differentiate(self, i, fourier, work%prediction_time(i, 1, :), room%sloped, &
+                               work%jacobian(:, :, i))
          end do
-         ! Inputs are rows here: what is filtered has no derivative.
-         do j = 1, fourier%n_retained
-            if (fourier%harmonic(j) <= self%highest_harmonic) cycle
-            work%jacobian(fourier%column(j):fourier%column(j) + 1, :, i) = 0.0_wp
-         end do
+      end select
+      ! Inputs are rows here: what is filtered has no derivative.
+      do j = 1, fourier%n_retained
+         if (fourier%harmonic(j) <= self%highest_harmonic) cycle
+         work%jacobian(fourier%column(j):fourier%column(j) + 1, :, :) = 0.0_wp
       end do
    end subroutine linearize
+
+   !> G = analysis diag(slope) synthesis of an element, transposed: the first index is the input.
+   subroutine differentiate(self, element, fourier, y, sloped, gain)
+      class(polynomial_law), intent(in) :: self
+      integer, intent(in) :: element
+      type(fourier_type), intent(in) :: fourier
+      !> At the instants.
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(inout), contiguous :: sloped(:, :), gain(:, :)
+      integer :: first, k, last, nc
+
+      nc = fourier%n_coefficients
+      gain = 0.0_wp
+      do first = 1, fourier%n_time, block
+         last = min(first + block - 1, fourier%n_time)
+         do k = first, last
+            sloped(:, k - first + 1) = self%slope_at(element, y(k))*fourier%synthesis(:, k)
+         end do
+         call dgemm('N', 'T', nc, nc, last - first + 1, 1.0_wp, sloped, nc, &
+                    fourier%analysis(:, first:last), nc, 1.0_wp, gain, nc)
+      end do
+   end subroutine differentiate
 
    !> d force/d elongation [force/length] of an element.
    elemental real(wp) function slope_at(self, element, y) result(slope)

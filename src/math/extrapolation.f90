@@ -6,10 +6,6 @@ module fw_extrapolation
 
    public :: best_order, extrapolate
 
-   !> A higher order has to come this much nearer than all lower ones: beyond a jump or a kink all
-   !> are off alike, and a high one is worse than none there.
-   real(wp), parameter :: clearly = 0.6_wp
-
 contains
 
    !> The polynomial through the first columns of y, which are values at x, at another place
@@ -30,11 +26,13 @@ contains
       end do
    end subroutine extrapolate
 
-   !> The order of the polynomial through the first columns of y that comes clearly nearest to a
-   !> value known at another place.
-   pure integer function best_order(x, y, at, value) result(order)
+   !> The order of the polynomial through the first columns of y that comes nearest to a value known
+   !> at another place; beyond a jump or a kink all are off alike, a high one more than others.
+   pure integer function best_order(x, y, at, value, share) result(order)
       !> As many as are known, one at least.
       real(wp), intent(in) :: x(:), y(:, :), at, value(:)
+      !> A higher order has to come nearer than this share of what the best lower one is off.
+      real(wp), intent(in) :: share
       real(wp) :: off, least, guess(size(value))
       integer :: k
 
@@ -43,7 +41,7 @@ contains
       do k = 1, size(x)
          call extrapolate(x(:k), y, at, guess)
          off = norm2(guess - value)
-         if (off >= clearly*least) cycle
+         if (off >= share*least) cycle
          order = k - 1
          least = off
       end do
