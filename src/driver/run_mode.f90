@@ -12,6 +12,7 @@ module fw_run_mode
    use fw_error, only: error_type
    use fw_error, only: status_stopped
    use fw_kinds, only: wp
+   use fw_mode_apart, only: begin_apart
    use fw_mode_branching, only: branch_watch
    use fw_mode_cycles, only: cycle_finder
    use fw_mode_group, only: mode_row
@@ -60,6 +61,8 @@ module fw_run_mode
       type(onset_finder) :: onset
       !> ln A of the last row, and the amplitude of a fold below the first one that was passed over.
       real(wp) :: end_p = 0.0_wp, jumped_at = 0.0_wp
+      !> Whether there is one at all: of what did not converge nothing is told.
+      logical :: begins = .true.
       !> ln A of the first solution, below the lowest amplitude, and its unknowns.
       real(wp) :: first_p = 0.0_wp
       real(wp), allocatable :: first_y(:)
@@ -136,8 +139,10 @@ contains
       call curve%sensitivity%describe(derivatives)
       call summary%describe_sensitivity(derivatives)
       call curve%sensitivity%remark(case, curve%start%balance, summary%remarks)
-      call summary%describe_mode(curve%table, case%model%observe_name(1)%text, &
-                                 case%mode%control == control_observed, case%mode%end)
+      if (curve%begins) then
+         call summary%describe_mode(curve%table, case%model%observe_name(1)%text, &
+                                    case%mode%control == control_observed, case%mode%end)
+      end if
    end subroutine run_mode
 
    subroutine describe_start(start, table)
@@ -174,6 +179,7 @@ contains
       if (.not. report%converged) then
          call add_row(case, curve, y, report, served_by_newton, state, error)
          state%is_incomplete = .true.
+         curve%begins = .false.
          call observer%on_message('the first point did not converge: no curve to follow')
       else if (case%mode%continuation == continuation_arclength) then
          call along_branch(case, curve, observer, state, y, report, error)
@@ -233,6 +239,11 @@ contains
          ! About another position, or springs: nearer to the linear mode.
          amplitude = merge(1.0_wp/smaller, smaller, curve%start%slides)*amplitude
       end do
+      if (.not. (report%converged .or. curve%start%slides)) then
+         amplitude = case%mode%start
+         call begin_apart(curve%path, curve%start%y, amplitude, y, report, error)
+         if (allocated(error)) return
+      end if
       if (.not. report%converged) return
       call curve%onset%note(curve%start%system, y)
       curve%first_p = log(amplitude)

@@ -51,6 +51,31 @@ def test_a_pair_that_parts_at_every_amplitude_has_its_onset_at_zero(tmp_path):
     assert found["omega"] == pytest.approx(2.0 / (1.0 + 1.0 / np.sqrt(1.3)), rel=1e-3)
 
 
+def test_a_friction_joint_that_is_not_pressed_has_a_mode(tmp_path):
+    """Gap 0 and no load: pairs part at every amplitude, and nothing has a size of its own. The
+    linear motion was no start for it, and what had not converged was told as damping."""
+    groups = {"model": {"n_dof": 2, "mass": [1.0, 0, 0, 1], "stiffness": [2.0, -1, -1, 2],
+                        "damping": [0.04, 0, 0, 0.04]},
+              "contact": {"n_pairs": 1, "law": "penalty", "side_1": [2, 0, 1], "mu": 1.0,
+                          "gap": 0.0, "tangential_stiffness": 1.0, "normal_stiffness": 3.0},
+              "output": {"observe": [1, 2]}}
+    found = follow(tmp_path, groups, 0.05, 20.0, 5, n_points=4)
+    assert found["attributes of mode"]["onset_amplitude"] == 0.0
+    for name in ("omega", "mode/damping_ratio"):
+        assert found[name] == pytest.approx(found[name][0], rel=1e-7)
+    # A gap far below the amplitude is none.
+    apart = follow(tmp_path, merged(groups, {"contact": {"gap": 1e-6}}), 10.0, 20.0, 5, n_points=2)
+    assert found["omega"][-1] == pytest.approx(apart["omega"][-1], rel=1e-6)
+    # One so stiff that no mode is found says so, and nothing else.
+    write_namelist(tmp_path / "stiff.nml", merged(groups, {
+        "case": {"analysis": "mode"}, "mode": {"start": 0.05, "end": 20.0},
+        "harmonics": {"n_harmonics": 5}, "contact": {"normal_stiffness": 30.0}}))
+    done = subprocess.run([PROGRAM, "stiff.nml"], cwd=tmp_path, text=True, capture_output=True,
+                          timeout=limit(60.0), check=False, env=PATIENT)
+    assert done.returncode == 0 or "the first point did not converge" in done.stderr
+    assert done.returncode == 0 or "damping  " not in done.stdout
+
+
 def test_onset_has_a_kink_in_damping_alone(tmp_path):
     """Damping grows at once beyond the onset, the frequency with the power 3/2 of the excess; the
     curve goes on in order, and no step fails for it."""
