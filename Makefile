@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help deps build debug run test lint keys docs clean
+.PHONY: help deps build configured program debug run test lint keys docs clean
 .PHONY: fuzz notebooks wheel ways sensitivities resonances modes calibration stops controls
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
@@ -16,6 +16,8 @@ BUILD := build/release
 RUN := build/run
 PYTHON := build/venv/bin/python
 EXAMPLE := example/blade_sector
+# Two targets may want the same environment; ninja runs the compilers side by side.
+.NOTPARALLEL:
 # Options for CMake, such as CMAKE_OPTIONS=-DCMAKE_PREFIX_PATH=/some/where
 CMAKE_OPTIONS ?=
 # system, scipy (the OpenBLAS of the Python package scipy-openblas32), or auto: the faster one
@@ -33,15 +35,24 @@ build/deps.stamp: tools/deps.sh
 	@tools/deps.sh build/venv
 	@touch $@
 
-build: build/deps.stamp ## optimised program build/release/fw_run
+# Building, running and drawing take three of the many Python packages.
+build/run.stamp: tools/deps.sh
+	@mkdir -p build
+	@if [ ! -f build/deps.stamp ]; then tools/deps.sh build/venv run; fi
+	@touch $@
+
+build: build/deps.stamp configured ## optimised program build/release/fw_run
+	@cmake --build $(BUILD) --target fw_run fretwear_python fretwear_shared
+
+configured: build/run.stamp
 	@if ! grep -qs FRETWEAR_PYTHON:BOOL=ON $(BUILD)/CMakeCache.txt || \
 	   ! grep -qs FRETWEAR_BLAS:STRING=$(BLAS)$$ $(BUILD)/CMakeCache.txt || \
 	   [ ! -f $(BUILD)/build.ninja ] || [ -n "$(CMAKE_OPTIONS)" ]; then \
-	   tools/deps.sh build/venv; \
+	   if [ -f build/deps.stamp ]; then tools/deps.sh build/venv; else \
+	      tools/deps.sh build/venv run; fi; \
 	   cmake -S . -B $(BUILD) -G Ninja -DFRETWEAR_NATIVE=ON -DFRETWEAR_PYTHON=ON \
 	      "-DPython3_EXECUTABLE=$(CURDIR)/$(PYTHON)" -DFRETWEAR_BLAS=$(BLAS) $(CMAKE_OPTIONS); \
 	fi
-	@cmake --build $(BUILD) --target fw_run fretwear_python fretwear_shared
 
 debug: build/deps.stamp ## build/debug: every check, and floating-point traps
 	@cmake -S . -B build/debug -G Ninja -DCMAKE_BUILD_TYPE=Debug $(CMAKE_OPTIONS)
@@ -50,9 +61,12 @@ debug: build/deps.stamp ## build/debug: every check, and floating-point traps
 run: $(RUN)/frf.png ## response of the blade sector with its picture, in build/run
 	@echo "results: $(RUN)/frf.h5, $(RUN)/frf_stuck.h5, $(RUN)/frf.png"
 
-# `build` always runs, and changes fw_run only where a source has changed; the recipe of fw_run is
+# `program` always runs, and changes fw_run only where a source has changed; the recipe of fw_run is
 # empty so that make looks at its time again afterwards.
-$(BUILD)/fw_run: build ;
+program: configured
+	@cmake --build $(BUILD) --target fw_run
+
+$(BUILD)/fw_run: program ;
 
 $(RUN)/frf.h5: $(EXAMPLE)/frf.nml $(wildcard $(EXAMPLE)/*.h5) $(BUILD)/fw_run
 	@mkdir -p $(RUN)

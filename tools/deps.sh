@@ -2,18 +2,26 @@
 # Install what the build needs: compilers and libraries through the system's package manager where
 # that is allowed, Python packages into a virtual environment. Otherwise say what is missing.
 #
-#     tools/deps.sh VENV_DIRECTORY
+#     tools/deps.sh VENV_DIRECTORY [run]
+#
+# `run`: of the Python packages only what building, running and drawing take.
 #
 # With BLAS=scipy, or BLAS=auto where the system's OpenBLAS does not know this processor, the newer
 # one of the Python package scipy-openblas32 goes into the environment too.
 set -euo pipefail
 venv=$1
+for_what=${2:-all}
+run_packages=(numpy h5py matplotlib)
 python_modules=(numpy scipy h5py skfem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm
                 selenium pytest xdist gcovr nbclient ipykernel mypy ruff fortitude ford sphinx
                 numpydoc myst_parser fpm)
 python_packages=(numpy scipy h5py scikit-fem matplotlib xarray pyyeti meshio pyarrow distributed bokeh tqdm pint
                  selenium pytest pytest-xdist gcovr nbclient ipykernel mypy ruff fortitude-lint
                  ford sphinx numpydoc myst-parser fpm)
+if [ "$for_what" = run ]; then
+   python_modules=("${run_packages[@]}")
+   python_packages=("${run_packages[@]}")
+fi
 
 has_command() { command -v "$1" >/dev/null 2>&1; }
 
@@ -88,22 +96,29 @@ if [ "${#missing[@]}" -gt 0 ]; then
 fi
 
 has_modules() {
-   local module
-   for module in "${python_modules[@]}"; do
-      "$1" -c "import importlib.util, sys; sys.exit(importlib.util.find_spec('$module') is None)" ||
-         return 1
-   done
+   "$1" -c 'import sys; from importlib.util import find_spec
+sys.exit(any(find_spec(name) is None for name in sys.argv[1:]))' "${python_modules[@]}"
+}
+
+# An environment of its own, which takes further packages.
+stands_alone() {
+   grep -qs 'include-system-site-packages = false' "$1/pyvenv.cfg" &&
+      "$1/bin/python" -m pip --version >/dev/null 2>&1
 }
 
 # Where the interpreter has every module already nothing is downloaded; otherwise the environment
 # stands alone, because packages of two origins need not fit each other.
 if ! { [ -x "$venv/bin/python" ] && has_modules "$venv/bin/python"; }; then
-   rm -rf "$venv"
-   if has_modules python3; then
+   if ! stands_alone "$venv"; then rm -rf "$venv"; fi
+   if [ ! -d "$venv" ] && has_modules python3; then
       python3 -m venv --system-site-packages --without-pip "$venv"
    else
-      echo "deps: Python packages into $venv, for pictures and tests (some minutes)" >&2
-      python3 -m venv "$venv"
+      if [ "$for_what" = run ]; then
+         echo "deps: Python packages into $venv, for pictures" >&2
+      else
+         echo "deps: Python packages into $venv, for pictures and tests (some minutes)" >&2
+      fi
+      [ -d "$venv" ] || python3 -m venv "$venv"
       if ! "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
          "${python_packages[@]}"; then
          echo "deps: pip could not install ${python_packages[*]} into $venv" >&2
