@@ -8,7 +8,7 @@ module fw_control_options
    implicit none (type, external)
    private
 
-   public :: control_options, of_words, of_first_harmonic, of_largest
+   public :: control_options, of_first_harmonic, of_largest
 
    character(*), parameter :: of_words(*) = [character(14) :: 'first_harmonic', 'largest']
    integer, parameter :: of_first_harmonic = 1, of_largest = 2

@@ -13,7 +13,7 @@ module fw_mode_options
    private
 
    public :: mode_options
-   public :: control_words, control_observed, control_modal
+   public :: control_observed, control_modal
 
    !> What an amplitude is: of the first harmonic of the first observed quantity, or
    !> sqrt(U_1^H M U_1) of the whole structure.

@@ -12,10 +12,10 @@ module fw_harmonics_options
    private
 
    public :: harmonics_options
-   public :: method_words, method_hbm, method_tcm, method_tcm_least_squares, method_hdhb
+   public :: method_hbm, method_tcm, method_tcm_least_squares, method_hdhb
    public :: sampling_words, sampling_uniform, sampling_events, sampling_auto
    public :: instants_per_event_wave, most_for_accuracy, usual_accuracy
-   public :: parity_words, parity_auto, parity_all, parity_odd
+   public :: parity_auto, parity_all, parity_odd
 
    character(*), parameter :: method_words(*) = &
       [character(17) :: 'hbm', 'tcm', 'tcm_least_squares', 'hdhb']

@@ -14,7 +14,7 @@ module fw_resonance_options
 
    public :: resonance_options
    public :: condition_words, condition_amplitude, condition_phase
-   public :: spacing_words, spacing_linear, spacing_log
+   public :: spacing_linear, spacing_log
    public :: as_words, as_value, as_factor
    public :: resonance_words
 

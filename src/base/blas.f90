@@ -11,7 +11,7 @@ module fw_blas
    implicit none (type, external)
    private
 
-   public :: describe_blas, slow_kernel, vector_level_of, text_length
+   public :: describe_blas, slow_kernel, text_length
 
    !> Of names and versions.
    integer, parameter :: text_length = 128

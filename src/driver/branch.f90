@@ -48,7 +48,7 @@ module fw_branch
    implicit none (type, external)
    private
 
-   public :: branch_type, branch_source
+   public :: branch_source
 
    !> First step where n_points leaves the choice: this part of the interval.
    integer, parameter :: default_steps = 100

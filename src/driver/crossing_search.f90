@@ -32,7 +32,7 @@ module fw_crossing_search
    implicit none (type, external)
    private
 
-   public :: probe_type, search_crossings, is_symmetric
+   public :: probe_type, search_crossings
 
    !> Gives solutions between two.
    type, abstract :: probe_type

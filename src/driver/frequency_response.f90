@@ -45,7 +45,7 @@ module fw_frequency_response
    implicit none (type, external)
    private
 
-   public :: run_frequency_response, new_strategy
+   public :: run_frequency_response
 
 contains
 

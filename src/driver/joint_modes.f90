@@ -13,7 +13,7 @@ module fw_joint_modes
    private
 
    public :: joint_mode_type, find_joint_modes, held_stiffness, most_dofs
-   public :: state_words, state_free, state_sliding, state_stuck
+   public :: state_free, state_sliding, state_stuck
 
    !> What the joint does, in the order of the constants.
    character(*), parameter :: state_words(*) = [character(7) :: 'free', 'sliding', 'stuck']

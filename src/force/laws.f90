@@ -12,7 +12,7 @@ module fw_laws
    implicit none (type, external)
    private
 
-   public :: law_words, law_help, law_number, law_with_tail, new_law, facts_of, is_rigid
+   public :: law_words, law_help, law_number, new_law, facts_of, is_rigid
    public :: law_under_accuracy, usual_law, is_of_high_order, is_viscous
 
    character(*), parameter :: law_words(*) = &

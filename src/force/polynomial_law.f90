@@ -11,7 +11,7 @@ module fw_polynomial_law
    implicit none (type, external)
    private
 
-   public :: polynomial_law, new_polynomial
+   public :: new_polynomial
 
    !> Instants of one product: enough for the speed of dgemm, few enough for the cache.
    integer, parameter :: block = 64

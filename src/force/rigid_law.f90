@@ -27,7 +27,7 @@ module fw_rigid_law
    implicit none (type, external)
    private
 
-   public :: rigid_law, friction_of_high_order
+   public :: friction_of_high_order
 
    type, extends(friction_by_events) :: rigid_law
    contains

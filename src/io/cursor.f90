@@ -7,7 +7,7 @@ module fw_cursor
    implicit none (type, external)
    private
 
-   public :: cursor_type, is_blank, is_digit, is_name_start
+   public :: cursor_type
 
    character(*), parameter :: tab = achar(9), newline = achar(10), return = achar(13)
    !> What ends a number or word outside of quotes.

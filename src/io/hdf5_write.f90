@@ -28,7 +28,7 @@ module fw_hdf5_write
    implicit none (type, external)
    private
 
-   public :: write_dataset, new_dataset, new_space, write_dataset_raw
+   public :: write_dataset, new_dataset, new_space
 
    !> `call write_dataset(file, name, values, error)`: h5py shows the dimensions of `values`
    !> in reversed order. Groups on the way are created.

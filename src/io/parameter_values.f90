@@ -13,7 +13,7 @@ module fw_parameter_values
    implicit none (type, external)
    private
 
-   public :: n_values, get_parameter, put_parameter
+   public :: get_parameter, put_parameter
 
 contains
 

@@ -27,7 +27,7 @@ module fw_read_case
    use fw_solver_options, only: continuation_natural
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
-   use fw_unit_values, only: convert_units, has_units
+   use fw_unit_values, only: convert_units, has_units, needs_system
    use fw_usual_law, only: choose_law
    use fw_values, only: number_text, quoted_text
    implicit none (type, external)
@@ -145,7 +145,10 @@ contains
 
       if (.not. has_units(reader)) return
       call list_keys(keys)
-      call find_unit_system(reader, directory_of(path), system, memory_model)
+      system = reader%text_of('model', 'unit_system')
+      if (needs_system(reader, keys)) then
+         call find_unit_system(reader, directory_of(path), system, memory_model)
+      end if
       call convert_units(reader, keys, system)
       call reader%raise(error)
    end subroutine read_units

@@ -16,7 +16,7 @@ module fw_read_output
    implicit none (type, external)
    private
 
-   public :: read_output, read_observed, bind_observed
+   public :: read_output, read_observed
 
 contains
 

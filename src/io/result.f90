@@ -43,7 +43,7 @@ module fw_result
    implicit none (type, external)
    private
 
-   public :: result_writer, result_format, result_format_version
+   public :: result_writer
 
    integer, parameter :: result_format_version = 1
 

@@ -13,7 +13,7 @@ module fw_result_labels
    implicit none (type, external)
    private
 
-   public :: label_dataset, label_quantity, unit_of
+   public :: label_dataset, label_quantity
 
    type :: label_type
       character(64) :: name

@@ -28,7 +28,7 @@ module fw_unit_values
    implicit none (type, external)
    private
 
-   public :: has_units, check_system, convert_units
+   public :: has_units, needs_system, convert_units
 
    character(*), parameter :: example = "'mm-tonne-s-N'"
 
@@ -37,23 +37,47 @@ contains
    !> Whether some value may carry a unit; seldom, so that most cases need nothing of this.
    pure logical function has_units(reader) result(has)
       type(reader_type), intent(in) :: reader
-      integer :: i, k, number_end, unit_start
+      integer :: i
 
       has = .false.
       do i = 1, reader%namelist%n_entries
-         associate (entry => reader%namelist%entries(i))
-            do k = 1, size(entry%values)
-               if (.not. (entry%values(k)%quoted .or. allocated(entry%raw))) cycle
-               ! A title such as '5 mm' is taken for one here, and left alone later.
-               call split_quantity(entry%values(k)%text, number_end, unit_start)
-               has = has .or. unit_start > 0
-            end do
-            ! Options need no quotes: the unit is a word of its own then.
-            if (allocated(entry%raw)) has = has .or. scan(entry%raw, ' ') > 0
-         end associate
+         ! A title such as '5 mm' is taken for one here, and left alone later.
+         has = is_quantity(reader%namelist%entries(i))
          if (has) return
       end do
    end function has_units
+
+   !> Whether an assignment has a value that may be a number with a unit.
+   pure logical function is_quantity(entry)
+      type(entry_type), intent(in) :: entry
+      integer :: k, number_end, unit_start
+
+      is_quantity = .false.
+      do k = 1, size(entry%values)
+         if (.not. (entry%values(k)%quoted .or. allocated(entry%raw))) cycle
+         call split_quantity(entry%values(k)%text, number_end, unit_start)
+         is_quantity = is_quantity .or. unit_start > 0
+      end do
+      ! Options need no quotes: the unit is a word of its own then.
+      if (allocated(entry%raw)) is_quantity = is_quantity .or. scan(entry%raw, ' ') > 0
+   end function is_quantity
+
+   !> Whether a value can be converted only where the units of the model are known, for which a file
+   !> may have to be opened.
+   logical function needs_system(reader, keys) result(needs)
+      type(reader_type), intent(in) :: reader
+      type(record_list), intent(in) :: keys
+      character(40) :: unit
+      logical :: is_number
+      integer :: i
+
+      needs = .false.
+      do i = 1, reader%namelist%n_entries
+         if (.not. is_quantity(reader%namelist%entries(i))) cycle
+         call find_unit(reader, keys, i, unit, is_number)
+         needs = needs .or. (is_number .and. scan(unit, 'LMF') > 0)
+      end do
+   end function needs_system
 
    !> Refuse a system of units that is none: four units, one newton for one kilogram in one metre
    !> per second squared. `ok` is false too where nothing is said.
@@ -100,10 +124,9 @@ contains
       character(*), intent(in) :: text
       type(unit_type) :: system(4)
       character(:), allocatable :: message
-      ! Longest of a declaration: 20.
       character(40) :: unit
-      integer :: i, k, last
-      logical :: is_known
+      integer :: i, last
+      logical :: is_known, is_number
 
       call check_system(text, system, is_known, message)
       if (allocated(message)) then
@@ -114,20 +137,37 @@ contains
       last = reader%namelist%n_entries
       call take_hertz(reader)
       do i = 1, last
-         associate (entry => reader%namelist%entries(i))
-            do k = 1, keys%n
-               if (keys%records(k)%key%name == entry%key) then
-                  if (keys%records(k)%group == entry%group) exit
-               end if
-            end do
-            ! Unknown keys are told later; words and texts are what they are.
-            if (k > keys%n) cycle
-            if (all(keys%records(k)%kind /= [character(7) :: 'real', 'integer'])) cycle
-            unit = unit_of(reader, entry, keys%records(k)%key%unit, keys)
-         end associate
-         call convert_entry(reader, i, trim(unit), text, system, is_known)
+         if (.not. is_quantity(reader%namelist%entries(i))) cycle
+         call find_unit(reader, keys, i, unit, is_number)
+         if (is_number) call convert_entry(reader, i, trim(unit), text, system, &
+                                           is_known)
       end do
    end subroutine convert_units
+
+   !> The unit of the key of an assignment.
+   subroutine find_unit(reader, keys, i_entry, unit, is_number)
+      type(reader_type), intent(in) :: reader
+      type(record_list), intent(in) :: keys
+      integer, intent(in) :: i_entry
+      ! Longest of a declaration: 20.
+      character(40), intent(out) :: unit
+      !> False for keys that are not known, which is told later, and for words and texts, which are
+      !> what they are.
+      logical, intent(out) :: is_number
+      integer :: k
+
+      unit = ''
+      is_number = .false.
+      associate (entry => reader%namelist%entries(i_entry))
+         do k = 1, keys%n
+            if (keys%records(k)%key%name /= entry%key) cycle
+            if (keys%records(k)%group /= entry%group) cycle
+            is_number = any(keys%records(k)%kind == [character(7) :: 'real', 'integer'])
+            if (is_number) unit = unit_of(reader, entry, keys%records(k)%key%unit, keys)
+            return
+         end do
+      end associate
+   end subroutine find_unit
 
    !> Frequencies typed in hertz are those of a sweep in hertz, where it does not say.
    subroutine take_hertz(reader)

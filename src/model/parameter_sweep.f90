@@ -9,7 +9,7 @@ module fw_parameter_sweep
    implicit none (type, external)
    private
 
-   public :: parameter_sweep, as_words, as_value, as_factor
+   public :: parameter_sweep, as_value, as_factor
 
    character(*), parameter :: words(*) = [character(28) :: 'frequency', parameter_words]
    character(*), parameter :: as_words(*) = [character(6) :: 'value', 'factor']

@@ -16,7 +16,7 @@ module fw_sector
    implicit none (type, external)
    private
 
-   public :: sector_at, sector_rows, tie_sector, damp_modes, add_sector_spring
+   public :: sector_at, sector_rows, damp_modes, add_sector_spring
 
 contains
 

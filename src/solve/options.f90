@@ -13,10 +13,10 @@ module fw_solver_options
    private
 
    public :: solver_options, pseudo_time_options, sweep_options
-   public :: solver_words, solver_newton, solver_powell, solver_kinsol, solver_pseudo_time
-   public :: linear_words, linear_auto, linear_lu, linear_krylov
-   public :: jacobian_words, jacobian_analytic, jacobian_difference
-   public :: flow_words, flow_rotated, flow_identity, flow_preconditioned
+   public :: solver_newton, solver_powell, solver_kinsol, solver_pseudo_time
+   public :: linear_auto, linear_lu, linear_krylov
+   public :: jacobian_analytic, jacobian_difference
+   public :: flow_rotated, flow_identity, flow_preconditioned
    public :: scheme_words, scheme_implicit_euler, scheme_bdf, scheme_rosenbrock, &
              scheme_runge_kutta
    public :: unit_words, unit_rad_per_second, unit_hertz

@@ -9,7 +9,7 @@ module fw_pseudo_scheme
    implicit none (type, external)
    private
 
-   public :: pseudo_scheme, pseudo_scales, estimate_scales
+   public :: pseudo_scheme, estimate_scales
 
    !> Size of the unknowns and of pseudo-time in which they move.
    type :: pseudo_scales

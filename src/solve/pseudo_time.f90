@@ -24,7 +24,7 @@ module fw_pseudo_time
    implicit none (type, external)
    private
 
-   public :: pseudo_time_solver, pseudo_report, new_scheme
+   public :: pseudo_time_solver, pseudo_report
 
    !> `iterations` counts linear solutions (of the explicit scheme: steps), Newton's at the end
    !> included.

@@ -14,8 +14,8 @@ module fw_wear_options
 
    public :: wear_options
    public :: follow_range
-   public :: wear_scheme_words, wear_explicit, wear_implicit, wear_pseudo_time
-   public :: wear_law_words, wear_archard, wear_energy
+   public :: wear_explicit, wear_implicit, wear_pseudo_time
+   public :: wear_archard, wear_energy
 
    character(*), parameter :: wear_scheme_words(*) = &
       [character(11) :: 'explicit', 'implicit', 'pseudo_time']

@@ -9,7 +9,7 @@ module fw_wear_tableau
    implicit none (type, external)
    private
 
-   public :: tableau_type, new_tableau, highest_order
+   public :: tableau_type, new_tableau
 
    integer, parameter :: highest_order = 4
 
