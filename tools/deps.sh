@@ -119,7 +119,8 @@ if ! { [ -x "$venv/bin/python" ] && has_modules "$venv/bin/python"; }; then
          echo "deps: Python packages into $venv, for pictures and tests (some minutes)" >&2
       fi
       [ -d "$venv" ] || python3 -m venv "$venv"
-      if ! "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+      # Byte code comes with the first use of a module: of most there is none.
+      if ! "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile \
          "${python_packages[@]}"; then
          echo "deps: pip could not install ${python_packages[*]} into $venv" >&2
          exit 1

@@ -494,7 +494,7 @@ class Result(ResultFile):
         if isinstance(observe, str):
             if observe not in names:
                 raise InputError(f"{self.name}: '{observe}' is not observed; available: "
-                                 + ", ".join(names))
+                                 + ", ".join(names) + did_you_mean(observe, words=names))
             return names.index(observe)
         if not names:
             raise AbsentError(f"{self.name}: nothing is observed; name something in "

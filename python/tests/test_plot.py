@@ -292,6 +292,7 @@ def test_command_line(coarse: Result, tmp_path: Path, monkeypatch: pytest.Monkey
     (["--point", "41"], 3, "point 41: there are 40, counted from 1"),
     (["--pairs", "one"], 3, "must be numbers"),
     (["--observe", "tpi"], 3, "available: tip, tip_x"),
+    (["--observe", "tpi"], 3, "; did you mean tip?"),
     (["--kind", "wear_bars"], 3, "case%analysis = 'wear'"),
     (["--kind", "response", "-o", "a.xyz"], 3, "xyz"),
     (["-o", "none/a.png"], 5, "there is no folder"),

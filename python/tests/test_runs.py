@@ -131,6 +131,10 @@ def test_a_case_does_not_change_with_its_copies() -> None:
 # -------------------------------------------------------------------------------- errors
 
 
+_SWEPT = fw.Case(RUBBING, sweep={"start": 0.6, "end": 1.6, "n_points": 5},
+                 contact={"law": "penalty"}, harmonics={"n_harmonics": 1})
+
+
 def test_a_wrong_key_is_answered_with_the_right_one() -> None:
     with pytest.raises(fw.InputError, match=r"argument contact%nu='x'.*did you mean mu\?"):
         fw.frf(RUBBING, 1, 2, 3, contact={"nu": "x"})  # type: ignore[typeddict-unknown-key]
@@ -143,6 +147,10 @@ def test_a_wrong_key_is_answered_with_the_right_one() -> None:
         fw.frf(RUBBING, 1, 2, 3, **dict[str, Any](harmonic=3))
     with pytest.raises(fw.InputError, match=r"no group &swep.*did you mean sweep\?"):
         fw.Case(RUBBING, **dict[str, Any](swep={"start": 1.0})).check()
+    with pytest.raises(fw.InputError, match=r"no derivatives by it.*did you mean contact%mu\?"):
+        fw.optimise(_SWEPT, minimise="max_amplitude", over="contact%nu", bounds=(0.1, 1.0))
+    with pytest.raises(fw.InputError, match=r"is no quantity.*did you mean max_amplitude\?"):
+        fw.optimise(_SWEPT, minimise="max_amplitud", over="contact%mu", bounds=(0.1, 1.0))
     with pytest.raises(fw.InputError, match=r"harmonics: is a int"):
         fw.Case(RUBBING, harmonics=3)  # type: ignore[arg-type]
     with pytest.raises(fw.InputError, match=r"sweep\['start'\]: is set by an argument"):

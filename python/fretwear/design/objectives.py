@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import namelist_values
+from .._words import did_you_mean
 from ..analyses import run
 from ..case import Case
 from ..errors import InputError
@@ -98,7 +99,8 @@ def new_objective(what: Objective, unknowns: Unknowns, case: Case) -> Evaluate:
     if not match or match[1] not in OBJECTIVES:
         raise InputError(f"{what!r}: is no quantity; there are " + ", ".join(OBJECTIVES)
                          + ", with the name of an observed quantity in brackets where it is not "
-                           "the first")
+                           "the first"
+                         + did_you_mean(str(what).partition("[")[0], words=OBJECTIVES))
     name, observe = match[1], match[2]
     analysis = namelist_values(case.namelist())["case%analysis"][0]
     wanted = "frf" if name in _AT_PEAK else "point"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import namelist_values
+from .._words import did_you_mean
 from ..case import Case
 from ..errors import InputError
 
@@ -181,7 +182,7 @@ def case_values(case: Case, keys: Sequence[str]) -> dict[str, Floats]:
     for key in keys:
         if key not in _KEYS:
             raise InputError(f"{key}: there are no derivatives by it; there are by "
-                             + ", ".join(_KEYS))
+                             + ", ".join(_KEYS) + did_you_mean(key, words=_KEYS))
     found: dict[str, Floats] = {}
     with case.open() as session:
         texts = namelist_values(session.text("namelist"))

@@ -14,6 +14,7 @@ from typing import Any, Union
 import numpy as np
 
 from .._namelist import literal
+from .._words import did_you_mean
 from ..errors import InputError, OutputError
 from .quantities import check_quantity
 
@@ -156,7 +157,8 @@ class _Reader:
     def known(self, group: Mapping[str, Any], names: Sequence[str], where: str) -> None:
         for name in group:
             if name not in names:
-                self.wrong("is not known; expected " + ", ".join(names), f"{where}{name}")
+                self.wrong("is not known; expected " + ", ".join(names)
+                           + did_you_mean(name, words=names), f"{where}{name}")
 
     def group(self, content: Mapping[str, Any], name: str,
               names: Sequence[str]) -> Mapping[str, Any]:

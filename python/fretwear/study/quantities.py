@@ -11,6 +11,7 @@ from typing import Optional, Union
 
 import numpy as np
 
+from .._words import did_you_mean
 from ..errors import AbsentError, InputError
 from ..result import Result
 
@@ -87,7 +88,8 @@ def check_quantity(text: object) -> str | None:
     """What is wrong with the text of a quantity; None where nothing is."""
     match = _FORM.match(text) if isinstance(text, str) else None
     if not match or match[1] not in QUANTITIES:
-        return f"'{text}' is not known; expected some of {', '.join(QUANTITIES)}"
+        return (f"'{text}' is not known; expected some of {', '.join(QUANTITIES)}"
+                + did_you_mean(str(text).partition("[")[0], words=QUANTITIES))
     if match[2] and not QUANTITIES[match[1]][1]:
         return f"'{match[1]}' is not of an observed quantity; write it without [{match[2]}]"
     return None
