@@ -92,8 +92,10 @@ def steps(python: str, build: Path, work: Path) -> list[Step]:
         Step("programs in C, C++, Fortran 77 and Fortran 2018 built", "example/legacy, CMake",
              (f"cmake -S {ROOT}/example/legacy -B {legacy} -DCMAKE_PREFIX_PATH={work}/prefix",
               f"cmake --build {legacy}")),
-        Step("and run, from their own memory", "frf_c, frf_f77",
-             (f"{legacy}/frf_c {ROOT}/example/blade_sector/sector_16.h5",)),
+        Step("and run, from their own memory", "frf_c",
+             (f"{python} {ROOT}/example/legacy/export_model.py "
+              f"{ROOT}/example/blade_sector/sector_16.h5 sector.dat",
+              f"{legacy}/frf_c sector.dat c.txt")),
     ]
 
 
