@@ -137,8 +137,11 @@ contains
       logical :: counts(3)
       integer :: i, j, n
 
-      allocate (prediction%inertia(self%n_pairs, 3), prediction%damping(self%n_pairs, 3), &
-                source=0.0_wp)
+      ! Another frequency may come later.
+      if (.not. allocated(prediction%inertia)) allocate (prediction%inertia(self%n_pairs, 3))
+      if (.not. allocated(prediction%damping)) allocate (prediction%damping(self%n_pairs, 3))
+      prediction%inertia = 0.0_wp
+      prediction%damping = 0.0_wp
       n = maxval(self%fourier%harmonic)
       do i = 1, self%n_pairs
          counts = self%joint%row(:, i) > 0 .and. .not. self%joint%idle(:, i)

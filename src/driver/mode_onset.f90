@@ -43,9 +43,10 @@ module fw_mode_onset
    !> Amplitude over the lowest one at which the motion is that near rest.
    real(wp), parameter :: near_rest = 1.0e-6_wp
    !> Ratios of two amplitudes between which the onset is known well enough: by solutions, to look
-   !> at the position there, and about a position that is known.
-   real(wp), parameter :: rough = 1.0_wp + 4.0e-3_wp, coarse = 1.0_wp + 1.0e-4_wp, &
-                          fine = 1.0_wp + 1.0e-13_wp
+   !> at the position there, about positions in a line that is to be confirmed, about those in one
+   !> that was, and about a position that is known.
+   real(wp), parameter :: rough = 1.0_wp + 4.0e-3_wp, near = 1.0_wp + 1.0e-3_wp, &
+                          coarse = 1.0_wp + 1.0e-4_wp, fine = 1.0_wp + 1.0e-13_wp
 
 contains
 
@@ -125,9 +126,14 @@ contains
       type(onset_finder), intent(inout) :: self
       real(wp), intent(in) :: amplitude, y(:)
 
-      self%low = [amplitude, self%low(1)]
-      self%y(:, 2) = self%y(:, 1)
-      self%y(:, 1) = y
+      if (amplitude > self%low(1)) then
+         self%low = [amplitude, self%low(1)]
+         self%y(:, 2) = self%y(:, 1)
+         self%y(:, 1) = y
+      else if (amplitude > self%low(2)) then
+         self%low(2) = amplitude
+         self%y(:, 2) = y
+      end if
       self%n_low = self%n_low + 1
    end subroutine take
 
@@ -147,31 +153,91 @@ contains
       onset = self%low(1)
       if (self%n_low == 0) return
       high = self%high
-      call bisect(self, path%system, coarse, onset, high)
+      call bisect(self, path%system, near, onset, high)
       y = position(self, onset)
       call path%solve(log(onset), y, report, error)
       if (allocated(error)) return
       if (report%converged .and. is_stuck(self, path%system)) then
-         ! About the position just below nothing moves any more up to the onset.
-         if (report%iterations > 0) call take(self, onset, y)
-         ratio = fine
+         if (report%iterations == 0) then
+            ! About the position just below nothing moves any more up to the onset.
+            call bisect(self, path%system, fine, onset, high)
+            return
+         end if
+         call take(self, onset, y)
+         call close_in(self, path, high, ratio, error)
       else
          self%high = onset
-         call bisect_solutions(self, path, rough, error)
-         if (allocated(error)) return
-         ! One row tells nothing of how the position moves.
-         if (self%n_low < 2) then
-            call bisect_solutions(self, path, coarse, error)
-            if (allocated(error)) return
-         end if
-         onset = self%low(1)
-         high = self%high
          ratio = coarse
+         call come_down(self, path, high, error)
       end if
-      if (departure(self, path%system, high, position(self, high)) > 0.0_wp) then
-         call bisect(self, path%system, ratio, onset, high)
-      end if
+      if (allocated(error)) return
+      onset = self%low(1)
+      call bisect(self, path%system, ratio, onset, high)
    end subroutine find
+
+   !> From a solution just below: another one tells how the position moves from there up to `high`,
+   !> where the motion departed about positions in the line before.
+   subroutine close_in(self, path, high, ratio, error)
+      type(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      real(wp), intent(inout) :: high
+      !> What the bracket is worth: all digits where the line down to the row below is one.
+      real(wp), intent(out) :: ratio
+      type(error_type), allocatable, intent(out) :: error
+      integer :: before
+
+      before = path%iterations
+      call look(self, path, self%low(1)/rough, error)
+      if (allocated(error)) return
+      ratio = merge(fine, coarse, path%iterations == before)
+      if (departure(self, path%system, high, position(self, high)) <= 0.0_wp) high = self%high
+   end subroutine close_in
+
+   !> From a solution just above. The onset is near: what positions in a straight line say is off by
+   !> little. Two solutions below it, apart enough to tell how the position moves, save halvings
+   !> from the row below.
+   subroutine come_down(self, path, high, error)
+      type(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      real(wp), intent(out) :: high
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: below
+      integer :: k
+
+      high = self%high
+      do k = 1, 2
+         below = self%high/rough**k
+         if (below <= self%low(2)) exit
+         call look(self, path, below, error)
+         if (allocated(error)) return
+         if (self%high < high) exit
+      end do
+      call bisect_solutions(self, path, rough, error)
+      if (allocated(error)) return
+      ! One row tells nothing of how the position moves.
+      if (self%n_low < 2) call bisect_solutions(self, path, coarse, error)
+      if (allocated(error)) return
+      call descend(self, path%system, high)
+   end subroutine come_down
+
+   !> By growing steps from a solution above the onset, to where the motion last departs about
+   !> positions in a straight line.
+   subroutine descend(self, system, high)
+      type(onset_finder), intent(in) :: self
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(out) :: high
+      real(wp) :: trial, ratio
+
+      high = self%high
+      ratio = coarse
+      do
+         trial = high/ratio
+         if (trial <= self%low(1)) return
+         if (departure(self, system, trial, position(self, trial)) <= 0.0_wp) return
+         high = trial
+         ratio = ratio**2
+      end do
+   end subroutine descend
 
    !> Unknowns of the stuck motion: positions in a straight line.
    function position(self, amplitude) result(y)
@@ -212,24 +278,34 @@ contains
       type(mode_path), intent(inout) :: path
       real(wp), intent(in) :: ratio
       type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
-      real(wp) :: departed, middle, y(size(self%y, 1))
 
       ! By halves: solutions that lie together tell little of how the position moves.
       do while (self%high > ratio*self%low(1))
-         middle = sqrt(self%low(1)*self%high)
-         y = position(self, middle)
-         call path%solve(log(middle), y, report, error)
+         call look(self, path, sqrt(self%low(1)*self%high), error)
          if (allocated(error)) return
-         departed = departed_by(self, path%system)
-         if (report%converged .and. departed <= 0.0_wp) then
-            call take(self, middle, y)
-         else
-            self%high = middle
-            if (report%converged) call self%known%take_above(middle, departed)
-         end if
       end do
    end subroutine bisect_solutions
+
+   !> Solve at an amplitude, and note on which side of the onset it is.
+   subroutine look(self, path, amplitude, error)
+      type(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      real(wp), intent(in) :: amplitude
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: departed, y(size(self%y, 1))
+
+      y = position(self, amplitude)
+      call path%solve(log(amplitude), y, report, error)
+      if (allocated(error)) return
+      departed = departed_by(self, path%system)
+      if (report%converged .and. departed <= 0.0_wp) then
+         call take(self, amplitude, y)
+      else if (amplitude > self%low(1)) then
+         self%high = amplitude
+         if (report%converged) call self%known%take_above(amplitude, departed)
+      end if
+   end subroutine look
 
    !> That of a motion.
    real(wp) function departure(self, system, amplitude, y)

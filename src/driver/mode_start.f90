@@ -3,10 +3,12 @@
 module fw_mode_start
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
+   use fw_balance_state, only: new_balance_state
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_input
+   use fw_force_law, only: pair_open
    use fw_fourier, only: to_real
    use fw_guess, only: stuck_guess
    use fw_kinds, only: wp
@@ -18,6 +20,7 @@ module fw_mode_start
    use fw_newton, only: solver_report
    use fw_problem, only: build_system
    use fw_solver_options, only: linear_lu
+   use fw_structure_operator, only: structure_state
    use fw_stuck_modes, only: find_stuck_modes
    use fw_stuck_modes, only: stuck_modes
    use fw_text, only: to_text
@@ -82,13 +85,16 @@ contains
       if (.not. allocated(error)) call at_rest(self, x, modes, error)
       if (.not. allocated(error)) call choose(self, modes, error)
       if (allocated(error)) return
-      if (any_rigid(self%problem) .or. self%case%model%cyclic%is_cyclic) then
-         ! Their numbers of the method are those of the structure near the frequency of the mode;
-         ! waves of other nodal diameters that harmonics may meet stay as coordinates.
+      if (self%case%model%cyclic%is_cyclic) then
+         ! Waves of other nodal diameters that harmonics may meet stay as coordinates.
          self%case%sweep%start = modes%omega(self%number)
          call at_rest(self, x, modes, error)
-         if (allocated(error)) return
+      else if (any_rigid(self%problem)) then
+         ! Their numbers of the method are those of the structure near the frequency of the mode.
+         self%case%sweep%start = modes%omega(self%number)
+         call scale_anew(self, x, modes, error)
       end if
+      if (allocated(error)) return
       call note_frequencies(self, modes)
       call take_mode(self, modes, x, error)
    end subroutine build
@@ -163,10 +169,6 @@ contains
       real(wp), allocatable, intent(out) :: x(:)
       type(stuck_modes), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
-      type(newton_solver) :: newton
-      type(solver_report) :: report
-      real(wp), allocatable :: r(:), guess(:)
-      logical :: done
 
       call build_system(self%case, self%problem, self%balance, error, keep_all=.true.)
       if (allocated(error)) return
@@ -181,18 +183,70 @@ contains
                           to_text(most_unknowns)//" at most; leave it to 'auto'", status_input)
          return
       end if
+      allocate (x(self%balance%n), source=0.0_wp)
+      call come_to_rest(self, .true., x, error)
+      if (.not. allocated(error)) call find_modes(self, modes, error)
+   end subroutine at_rest
+
+   !> The problem of a structure of which nothing is condensed, at another frequency: its laws take
+   !> their stiffness there, all else is as it was.
+   subroutine scale_anew(self, x, modes, error)
+      class(mode_start), intent(inout), target :: self
+      !> The position at rest and the modes about it.
+      real(wp), intent(inout), contiguous :: x(:)
+      type(stuck_modes), intent(inout) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      class(structure_state), allocatable :: stand
+      integer, allocatable :: before(:)
+
+      associate (pairs => self%problem%forces%pairs)
+         before = self%balance%work(pairs)%state
+         call move_alloc(self%balance%structure_state, stand)
+         call self%problem%structure%at(stand, self%case%sweep%start, 0.0_wp, error)
+         if (allocated(error)) return
+         call self%problem%scale_forces(stand, self%case%sweep%start)
+         call new_balance_state(self%problem, self%balance, stand)
+         call come_to_rest(self, .false., x, error)
+         if (allocated(error)) return
+         ! Stuck pairs are held whatever their stiffness; what is open, and slopes of springs, may
+         ! have changed.
+         if (self%problem%forces%n_laws == 1 .and. &
+             all((before == pair_open) .eqv. (self%balance%work(pairs)%state == pair_open))) return
+      end associate
+      call find_modes(self, modes, error)
+   end subroutine scale_anew
+
+   !> The position at rest, or the guess where none is found.
+   subroutine come_to_rest(self, guesses, x, error)
+      class(mode_start), intent(inout), target :: self
+      !> Take a guess of its own, not the one in x.
+      logical, intent(in) :: guesses
+      real(wp), intent(inout), contiguous :: x(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(newton_solver) :: newton
+      type(solver_report) :: report
+      real(wp) :: r(size(x)), guess(size(x))
+
       call take_load(self)
       self%balance%load_share = 0.0_wp
       call self%balance%set_point(self%case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
-      allocate (x(self%balance%n), r(self%balance%n))
-      call stuck_guess(self%balance, x)
+      if (guesses) call stuck_guess(self%balance, x)
       guess = x
       newton%options = self%case%solver
       newton%options%tolerance = max(rest_tolerance, self%case%solver%tolerance)
       call newton%solve(self%balance, x, report)
       if (.not. report%converged) x = guess
       call self%balance%residual(x, r)
+   end subroutine come_to_rest
+
+   !> The modes where the balance was evaluated last.
+   subroutine find_modes(self, modes, error)
+      class(mode_start), intent(inout) :: self
+      type(stuck_modes), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      logical :: done
+
       call find_stuck_modes(self%balance, modes, done)
       if (done) done = size(modes%omega) > 0
       self%slides = .not. done .and. self%problem%n_pairs > 0
@@ -201,7 +255,7 @@ contains
       call fatal_error(error, "case%analysis = 'mode': with its closed pairs stuck nothing of "// &
                        'the structure can vibrate, or a part has neither stiffness nor mass', &
                        status_input)
-   end subroutine at_rest
+   end subroutine find_modes
 
    !> Frequencies that harmonics of the curve may meet: of a cyclic structure each has its own nodal
    !> diameter.

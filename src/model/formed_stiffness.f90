@@ -89,10 +89,12 @@ contains
 
       self%is_static = .false.
       if (size(self%matrix, 1) <= few) return
-      ! Of structures with mass the first columns differ.
-      do h = 1, size(self%matrix, 3)
-         do j = 1, size(self%matrix, 2)
-            if (any(abs(self%matrix(:, j, h) - real(self%matrix(:, j, 1), wp)) > 0.0_wp)) return
+      ! Of structures with mass the first columns differ, but for harmonic 0: it comes last.
+      do j = 1, size(self%matrix, 2)
+         do h = size(self%matrix, 3), 1, -1
+            if (any(abs(aimag(self%matrix(:, j, h))) > 0.0_wp)) return
+            if (any(abs(real(self%matrix(:, j, h), wp) - real(self%matrix(:, j, 1), wp)) > &
+                    0.0_wp)) return
          end do
       end do
       self%is_static = .true.

@@ -162,7 +162,7 @@ contains
    subroutine march(self, x_start)
       class(planar_pair_type), intent(inout) :: self
       real(wp), intent(in) :: x_start(2)
-      real(wp) :: x(2), after(2), m(2, 2), inverse(2, 2)
+      real(wp) :: x(2), after(2), first(2), m(2, 2), inverse(2, 2)
       logical :: settled, unique
 
       self%moved = .not. self%closed
@@ -174,12 +174,13 @@ contains
          if (map%motion%remembers .and. &
              maxval(abs(after - x_start)) > periodic_tolerance*scale) then
             x = after
+            first = after
             ! x is anywhere now; only a unique limit may be taken from there.
             call settle(map, scale, periodic_tolerance, x, settled)
             call invert(map%m, inverse, unique)
             ! A pair that slips in its limit has but one.
             unique = unique .and. (map%path%lands .or. map%path%slip_angle() > brief)
-            if (.not. (settled .and. unique)) call march_plainly(self, x_start)
+            if (.not. (settled .and. unique)) call march_plainly(self, first)
          end if
          self%z_end = map%to
          self%drift = 0.0_wp
@@ -187,14 +188,16 @@ contains
       end associate
    end subroutine march
 
-   !> Plain turns; Newton's method where they creep.
-   subroutine march_plainly(self, x_start)
+   !> Plain turns behind the first one; Newton's method where they creep.
+   subroutine march_plainly(self, first)
       class(planar_pair_type), intent(inout) :: self
-      real(wp), intent(in) :: x_start(2)
+      !> Where the first turn has led.
+      real(wp), intent(in) :: first(2)
       real(wp) :: x(2), after(2), m(2, 2)
       logical :: settled
 
-      x = x_start
+      x = first
+      self%turns = 2
       associate (map => self%map, scale => self%map%motion%scale)
          do
             call map%turn(x, after, m)
