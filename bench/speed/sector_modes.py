@@ -4,7 +4,8 @@
 
 41 amplitudes over four decades (1e-4 to 1 mm at the tip) against 41 frequencies around the peak at
 0.5 N, one after the other in turn, so that a busy machine slows both; the smallest of several runs.
-The sweep takes instants, as it does where nothing is said, and in another column events as the mode.
+The sweep takes instants, as it does where nothing is said, and in another column events, as modes
+do.
 And the peaks of sweeps at five loads against those that one mode gives without a load. Writes both
 tables between their marks in docs/benchmarks/modes.md.
 """
