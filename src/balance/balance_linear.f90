@@ -33,7 +33,12 @@ contains
 
       do k = 1, self%problem%forces%n_laws
          if (size(self%work(k)%state) == 0) cycle
-         call self%problem%forces%entry(k)%law%linearize(self%problem%fourier, self%work(k))
+         associate (entry => self%problem%forces%entry(k))
+            call entry%law%linearize(self%problem%fourier, self%work(k))
+            if (self%nearly .and. self%has_large_blocks) then
+               call self%near(k)%take(entry%row, pins_last(entry), self%work(k))
+            end if
+         end associate
       end do
       call choose_active(self)
       call self%problem%structure%restrict(self%structure_state, self%active%n_active, &
@@ -167,7 +172,7 @@ contains
          self%scratch%active_out(:self%active%n_used, k) = &
             self%scratch%product(self%active%used(:self%active%n_used), k)
       end do
-      call add_forces(self, self%problem%incidence%identity, m, self%balance)
+      call add_forces(self, self%problem%incidence%identity, m, self%balance, .false.)
       rhs = rhs - self%scratch%active_out(:self%active%n_active, :)
    end subroutine reduce_shaped
 
@@ -217,16 +222,18 @@ contains
    ! na entries each, but are n_coordinates apart in the scratch.
    module procedure apply
       integer :: k, na
+      logical :: roughly
 
       na = self%active%n_active
-      if (self%nearly .and. self%asked >= near_enough) then
+      roughly = self%nearly .and. self%asked >= near_enough
+      if (roughly .and. self%splits()) then
          call self%problem%structure%multiply_nearly(self%structure_state, vector, &
                                                      self%scratch%active_out)
       else
          call self%problem%structure%multiply_active(self%structure_state, vector, &
                                                      self%scratch%active_out)
       end if
-      call add_forces(self, self%active%place, na, vector)
+      call add_forces(self, self%active%place, na, vector, roughly)
       if (allocated(self%shift)) call add_shift(self, na, vector)
       do k = 1, self%problem%fourier%n_coefficients
          product((k - 1)*na + 1:k*na) = self%scratch%active_out(:na, k)
@@ -261,19 +268,21 @@ contains
 
    !> active_out = active_out + what the forces add to the product, Z_r v being in active_out. Laws
    !> that take the balance take that of the others, but not of one another.
-   subroutine add_forces(self, map, n_mapped, vector)
+   subroutine add_forces(self, map, n_mapped, vector, roughly)
       type(balance_state), intent(inout) :: self
       !> Places of the coordinates in the vector, and its rows.
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
+      !> With the derivatives of the laws in single precision.
+      logical, intent(in) :: roughly
       integer :: k
 
       ! Two passes: outputs of the laws without the balance are in active_out before the others
       ! take their inputs from it.
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))
-            call multiply_element(self, entry, map, n_mapped, vector, work)
+            call multiply_element(self, k, map, n_mapped, vector, roughly, work)
             if (entry%law%prediction%takes_balance) cycle
             call add_outputs(self, entry, work, self%active%place, self%active%n_used, &
                              self%scratch%active_out)
@@ -289,12 +298,14 @@ contains
    end subroutine add_forces
 
    !> Outputs of the derivative of a law for a vector.
-   subroutine multiply_element(self, entry, map, n_mapped, vector, work)
+   subroutine multiply_element(self, law, map, n_mapped, vector, roughly, work)
       type(balance_state), intent(in) :: self
-      type(force_entry), intent(in) :: entry
+      !> Its number.
+      integer, intent(in) :: law
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
+      logical, intent(in) :: roughly
       type(force_workspace), intent(inout) :: work
       integer :: i
 
@@ -316,12 +327,27 @@ contains
          integer, intent(in) :: i
 
          if (work%linear_state(i) == pair_open) return
-         call gather_inputs(self, entry, i, map, n_mapped, vector, work%linear_rests(i), &
-                            self%scratch%active_out, work%input(:, i))
-         call multiply_derivative_of(work, i)
+         associate (entry => self%problem%forces%entry(law))
+            call gather_inputs(self, entry, i, map, n_mapped, vector, work%linear_rests(i), &
+                               self%scratch%active_out, work%input(:, i))
+            if (roughly .and. self%has_large_blocks .and. &
+                work%linear_state(i) == pair_mixed) then
+               call self%near(law)%multiply(entry%row(:, i), i, work)
+            else
+               call multiply_derivative_of(work, i)
+            end if
+         end associate
       end subroutine multiply_one
 
    end subroutine multiply_element
+
+   !> Whether normal components that bear throughout have the derivative 1 and nothing else.
+   pure logical function pins_last(entry)
+      type(force_entry), intent(in) :: entry
+
+      pins_last = entry%law%prediction%takes_balance .and. &
+                  entry%law%prediction%order(size(entry%row, 1)) == 0
+   end function pins_last
 
    !> Outputs of all elements from their inputs.
    subroutine multiply_derivative(work)

@@ -36,8 +36,8 @@ contains
    module procedure build_preconditioner
       integer :: h
 
-      self%preconditioner%is_split = self%nearly .and. .not. allocated(self%shift)
-      if (.not. (self%nearly .or. allocated(self%shift) .or. by_waves(self))) then
+      self%preconditioner%is_split = self%splits() .and. .not. allocated(self%shift)
+      if (.not. (self%preconditioner%is_split .or. allocated(self%shift) .or. by_waves(self))) then
          if (self%active%n_active >= alike_from .and. self%preconditioner%left_out == 0 .and. &
              self%has_static_laws) call are_alike(self, self%preconditioner%is_split)
       end if
@@ -287,7 +287,8 @@ contains
       associate (kept => self%preconditioner, nc => self%problem%fourier%n_coefficients, &
                  nh => self%problem%fourier%n_retained, na => self%active%n_active)
          ! At once only with factors that know every coordinate, of each harmonic or of all.
-         if (by_waves(self) .or. .not. knows_all(self) .or. (kept%is_split .and. self%nearly)) then
+         if (by_waves(self) .or. .not. knows_all(self) .or. &
+             (kept%is_split .and. self%splits())) then
             do j = 1, size(columns, 2)
                call self%precondition(columns(:, j))
             end do

@@ -28,9 +28,9 @@ contains
       nh = self%problem%fourier%n_retained
       ! Blocks that are all alike have no part of their own.
       rank = 0
-      if (self%nearly) rank = self%problem%structure%split_rank()
+      if (self%splits()) rank = self%problem%structure%split_rank()
       allocate (static(self%active%n_used, na + rank), dynamic(rank, rank, nh))
-      if (self%nearly) then
+      if (self%splits()) then
          call self%problem%structure%static_block(self%structure_state, static)
       else
          call read_alike(self, static)

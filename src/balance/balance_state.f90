@@ -22,6 +22,7 @@ module fw_balance_state
    use fw_input_rates, only: take_means
    use fw_input_rates, only: take_rates
    use fw_kept_factors, only: kept_factors
+   use fw_near_derivative, only: near_derivative
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_structure_operator, only: structure_state
@@ -63,6 +64,10 @@ module fw_balance_state
       logical :: pins_normals = .true.
       !> Whether the inputs of the laws are displacements alone, the same in all harmonics.
       logical, private :: has_static_laws = .false.
+      !> Whether the structure is nearly one at rest and a low rank.
+      logical, private :: has_split = .false.
+      !> Whether near products take the derivatives of the laws in single precision.
+      logical, private :: has_large_blocks = .false.
       !> Whether the blocks Z_n of all harmonics are one, and the frequency and the value of the
       !> parameter where they were compared.
       logical, private :: is_alike = .false.
@@ -70,6 +75,8 @@ module fw_balance_state
       !> The linear problem of a step, see fw_balance_linear.
       type(active_set) :: active
       type(kept_factors) :: preconditioner
+      !> Derivatives of the laws for products that only have to be near (n_laws).
+      type(near_derivative), allocatable, private :: near(:)
       type(balance_scratch) :: scratch
    contains
       procedure :: set_parameter
@@ -99,6 +106,7 @@ module fw_balance_state
       procedure :: precondition
       procedure :: precondition_columns
       procedure :: strengthen_preconditioner => take_whole
+      procedure :: splits
       procedure :: assemble
    end type balance_state
 
@@ -245,6 +253,10 @@ module fw_balance_state
       end subroutine precondition_columns
    end interface
 
+   !> Numbers in the derivatives of all elements from which copies in single precision pay: those
+   !> of 16 pairs and 15 harmonics, a megabyte.
+   integer, parameter :: large_blocks = 125000
+
 contains
 
    !> A state of a problem; set_frequency comes before the first residual.
@@ -272,11 +284,36 @@ contains
       call self%active%reserve(m)
       call self%preconditioner%reserve(m, problem%fourier%n_retained)
       self%has_static_laws = all_are_static(problem)
-      self%nearly = problem%structure%split_rank() > 0 .and. self%has_static_laws
+      self%has_split = problem%structure%split_rank() > 0 .and. self%has_static_laws
+      allocate (self%near(problem%forces%n_laws))
+      self%has_large_blocks = blocks_are_large(problem)
+      self%nearly = self%has_split .or. self%has_large_blocks
       if (problem%structure%n_alike > 1) call self%preconditioner%reserve_waves( &
          problem%structure%n_slots, problem%structure%n_alike, problem%fourier%n_retained)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)
    end subroutine new_balance_state
+
+   !> Whether near products and the preconditioner take the structure for one of low rank.
+   pure logical function splits(self)
+      class(balance_state), intent(in) :: self
+
+      splits = self%nearly .and. self%has_split
+   end function splits
+
+   !> Whether the derivatives of the laws are larger than what processors keep at hand.
+   pure logical function blocks_are_large(problem)
+      type(balance_problem), intent(in) :: problem
+      integer :: k, n_numbers
+
+      n_numbers = 0
+      do k = 1, problem%forces%n_laws
+         associate (law => problem%forces%entry(k)%law)
+            n_numbers = n_numbers + law%n_elements* &
+                        (law%n_components*problem%fourier%n_coefficients)**2
+         end associate
+      end do
+      blocks_are_large = n_numbers >= large_blocks
+   end function blocks_are_large
 
    !> Bring the problem to a value of the parameter that moves, at the present frequency, or to a
    !> frequency where none does.

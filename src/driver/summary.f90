@@ -184,7 +184,7 @@ contains
                     to_text(linear%preconditioners)//' preconditioners'// &
                     trim(merge(repeat(' ', 32), ', where Newton''s method was used', &
                                kind == solver_newton)))
-      if (system%nearly .and. linear%krylov_iterations > 0) then
+      if (system%splits() .and. linear%krylov_iterations > 0) then
          call add_line(self%work, 'linear products', 'static stiffness and '// &
                        to_text(system%problem%structure%split_rank())//' patterns of motion')
       end if
