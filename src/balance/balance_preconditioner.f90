@@ -287,8 +287,7 @@ contains
       associate (kept => self%preconditioner, nc => self%problem%fourier%n_coefficients, &
                  nh => self%problem%fourier%n_retained, na => self%active%n_active)
          ! At once only with factors that know every coordinate, of each harmonic or of all.
-         if (by_waves(self) .or. .not. knows_all(self) .or. &
-             (kept%is_split .and. self%splits())) then
+         if (by_waves(self) .or. .not. knows_all(self)) then
             do j = 1, size(columns, 2)
                call self%precondition(columns(:, j))
             end do
@@ -350,7 +349,8 @@ contains
          end do
       end do
       if (self%preconditioner%is_split) then
-         call self%preconditioner%split%solve_alike(self%problem%fourier%harmonic(first) == 0, b)
+         call self%preconditioner%split%solve_alike(self%problem%fourier%harmonic(first) == 0, &
+                                                    first, n_columns, b)
          scale = self%preconditioner%split%moving%scale
       else
          call self%preconditioner%harmonic(first)%solve_scaled(size(b, 2), b)

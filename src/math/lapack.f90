@@ -11,7 +11,7 @@ module fw_lapack
 
    public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
-   public :: zggev, sgemv, sgetrf, strsv, dlaswp, dtrsm
+   public :: zggev, sgemv, sgetrf, strsm, strsv, dlaswp, dtrsm
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -168,6 +168,15 @@ module fw_lapack
          complex(sp), intent(in) :: alpha, a(lda, *)
          complex(sp), intent(inout) :: b(ldb, *)
       end subroutine ctrsm
+
+      !> As ctrsm for real matrices.
+      subroutine strsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+         import :: sp
+         character, intent(in) :: side, uplo, transa, diag
+         integer, intent(in) :: m, n, lda, ldb
+         real(sp), intent(in) :: alpha, a(lda, *)
+         real(sp), intent(inout) :: b(ldb, *)
+      end subroutine strsm
 
       !> As ztrsv in single precision.
       subroutine ctrsv(uplo, trans, diag, n, a, lda, x, incx)

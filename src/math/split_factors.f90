@@ -9,6 +9,7 @@ module fw_split_factors
    use fw_kinds, only: wp
    use fw_lapack, only: cgemm
    use fw_lapack, only: sgetrf
+   use fw_lapack, only: strsm
    use fw_lapack, only: strsv
    use fw_linalg, only: complex_lu_type
    use fw_panel_solve, only: panel_factors
@@ -156,22 +157,62 @@ contains
       end do
    end subroutine solve
 
-   !> P_0^-1 (`is_constant`) or P_1^-1 of many right-hand sides of the order of one, in place; for
-   !> rank 0 alone. Those of P_0 are real.
-   subroutine solve_alike(self, is_constant, b)
+   !> Right-hand sides of the order of one in place, `n_columns` of a harmonic, one harmonic behind
+   !> the other from `first` on; those of harmonic 0 (`is_constant`) are real, and by themselves.
+   subroutine solve_alike(self, is_constant, first, n_columns, b)
       class(split_factors), intent(inout) :: self
       logical, intent(in) :: is_constant
+      integer, intent(in) :: first, n_columns
       complex(sp), intent(inout), contiguous :: b(:, :)
-      integer :: j
 
-      if (.not. is_constant) then
+      if (is_constant) then
+         call solve_constants(self, n_columns, b)
+      else
          call self%panels%solve(size(b, 2), b)
-         return
+         if (self%rank > 0) call subtract_patterns(self, first, n_columns, b)
       end if
-      do j = 1, size(b, 2)
-         call solve_constant(self, b(:, j))
-      end do
    end subroutine solve_alike
+
+   !> Of A_n^-1 what the patterns add, `n_columns` of every harmonic.
+   subroutine subtract_patterns(self, first, n_columns, b)
+      type(split_factors), intent(in) :: self
+      integer, intent(in) :: first, n_columns
+      complex(sp), intent(inout), contiguous :: b(:, :)
+      complex(sp), parameter :: one = (1.0_sp, 0.0_sp), zero = (0.0_sp, 0.0_sp)
+      complex(sp), allocatable :: pattern(:, :), turned(:, :)
+      integer :: h, k, n
+
+      n = size(b, 2)
+      allocate (pattern(self%rank, n), turned(self%rank, n))
+      call cgemm('T', 'N', self%rank, n, self%n, one, self%v, self%n, b, self%n, zero, pattern, &
+                 self%rank)
+      do h = 1, n/n_columns
+         k = (h - 1)*n_columns
+         call cgemm('N', 'N', self%rank, n_columns, self%rank, one, &
+                    self%t(1, 1, first + h - 1), self%rank, pattern(1, k + 1), self%rank, zero, &
+                    turned(1, k + 1), self%rank)
+      end do
+      call cgemm('N', 'N', self%n, n, self%rank, -one, self%u, self%n, turned, self%rank, one, b, &
+                 self%n)
+   end subroutine subtract_patterns
+
+   !> Harmonic 0 of many.
+   subroutine solve_constants(self, n_columns, b)
+      type(split_factors), intent(in) :: self
+      integer, intent(in) :: n_columns
+      complex(sp), intent(inout), contiguous :: b(:, :)
+      real(sp), allocatable :: means(:, :)
+      integer :: i, ld
+
+      ld = size(self%constant, 1)
+      means = real(b(:, :n_columns), sp)
+      do i = 1, self%n
+         if (self%pivot(i) /= i) means([i, self%pivot(i)], :) = means([self%pivot(i), i], :)
+      end do
+      call strsm('L', 'L', 'N', 'U', self%n, n_columns, 1.0_sp, self%constant, ld, means, self%n)
+      call strsm('L', 'U', 'N', 'N', self%n, n_columns, 1.0_sp, self%constant, ld, means, self%n)
+      b(:, :n_columns) = cmplx(means, kind=sp)
+   end subroutine solve_constants
 
    !> Harmonic 0, which is real.
    subroutine solve_constant(self, b)

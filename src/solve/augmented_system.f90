@@ -176,6 +176,7 @@ contains
       self%n = inner%n + n_extra
       self%reference = inner%reference
       self%reduced = inner%reduced
+      self%nearly = inner%nearly
       self%interrupt => inner%interrupt
       if (allocated(self%unit)) deallocate (self%unit, self%adjusted, self%inner_part, &
                                             self%extra_part)
@@ -290,11 +291,22 @@ contains
       integer :: k
 
       k = self%n_linear_inner
+      call pass_precision(self)
       call self%inner%apply(vector(:k), product(:k))
+      self%inner%asked = 0.0_wp
       if (self%n_linear_extra == 0) return
       call self%rows(vector(:k), vector(k + 1:), product(k + 1:))
       call self%add_columns(vector(k + 1:), product(:k))
    end subroutine apply
+
+   !> The solution that asks for products is the one of this system: its precision, and whether it
+   !> may rest on what is nearly right, hold inside as well.
+   subroutine pass_precision(self)
+      class(augmented_system), intent(inout) :: self
+
+      self%inner%asked = self%asked
+      self%inner%nearly = self%nearly
+   end subroutine pass_precision
 
    subroutine strengthen_inner(self, is_stronger)
       class(augmented_system), intent(inout) :: self
@@ -309,7 +321,9 @@ contains
       logical :: singular
       integer :: j, n
 
+      call pass_precision(self)
       call self%inner%build_preconditioner()
+      self%inner%asked = 0.0_wp
       n = self%n_linear_extra
       if (n == 0) return
       call reserve_columns(self)

@@ -17,6 +17,7 @@ module fw_wear_system
    use fw_force_law, only: pair_stuck
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
+   use fw_lapack, only: dgemv
    implicit none (type, external)
    private
 
@@ -388,6 +389,11 @@ contains
       if (.not. is_built) call find_slopes(self)
       k = self%n_linear_inner
       n = self%n_linear_extra
+      if (size(v, 2) == 1) then
+         ! A product of matrices would pack the slopes for one column.
+         call dgemv('T', k, n, -1.0_wp, self%slopes, max(1, k), v, 1, 1.0_wp, rows, 1)
+         return
+      end if
       call dgemm('T', 'N', n, size(v, 2), k, -1.0_wp, self%slopes, max(1, k), v, &
                  max(1, size(v, 1)), 1.0_wp, rows, size(rows, 1))
    end subroutine subtract_rows
