@@ -47,6 +47,8 @@ module fw_point_solver
    !> Steps of the pseudo-time fallback, and failures in a row after which it is left alone: a
    !> joint that cannot carry its load has no solution to flow to.
    integer, parameter :: fallback_steps = 60, max_flow_failures = 2
+   !> Unknowns up to which pseudo-time comes before a raised load on the way to a first point.
+   integer, parameter :: flow_first_up_to = 4000
    !> Points that fail in a row after which a sweep spends less on a point: it has gone where no
    !> solution exists, or where none is found in this way. After 4, 8, 16, .. of them it looks
    !> again: a sweep that begins where nothing is found comes to where something is.
@@ -114,6 +116,7 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
+      real(wp) :: tolerance
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
@@ -124,7 +127,10 @@ contains
       system%interrupt => request%interrupt
       if (allocated(system%mover)) call system%set_frequency(request%omega, error)
       if (allocated(error)) return
+      tolerance = self%method%newton%options%tolerance
+      self%method%newton%options%tolerance = max(tolerance, request%tolerance)
       call reach(self, case, system, request, report, point%iterations, error)
+      self%method%newton%options%tolerance = tolerance
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return
       if (self%out_of_work .and. .not. report%converged) then
@@ -228,6 +234,14 @@ contains
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
 
+      ! The flow forms and factors matrices of all coordinates for every step: with many of them the
+      ! load is raised first, where there is no point to come from.
+      if (self%known%kept == 0 .and. size(self%x) > flow_first_up_to) then
+         call raise_load(self, system, omega, report, iterations, error)
+         if (allocated(error)) return
+         if (report%converged) self%served_by = served_by_raised_load
+         if (.not. goes_on(self, report, iterations)) return
+      end if
       ! No flow has been derived for the whole of cyclic structures.
       if (self%flow_failures < max_flow_failures .and. .not. case%model%cyclic%is_cyclic) then
          call by_flow(self, case, pseudo_time_options(max_steps=fallback_steps), system, omega, &
@@ -238,6 +252,7 @@ contains
          if (.not. goes_on(self, report, iterations)) return
       end if
       if (self%known%kept == 0) then
+         if (size(self%x) > flow_first_up_to) return
          call raise_load(self, system, omega, report, iterations, error)
          if (report%converged) self%served_by = served_by_raised_load
       else

@@ -36,6 +36,8 @@ module fw_strategy
       class(interrupt_type), pointer :: interrupt => null()
       !> Derivatives by parameters.
       logical :: sensitivity = .false.
+      !> Relative residual that is enough, where less than the case asks for is wanted.
+      real(wp) :: tolerance = 0.0_wp
    contains
       procedure :: place
       procedure :: describe => describe_request

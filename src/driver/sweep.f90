@@ -152,7 +152,8 @@ contains
       self%n_given = self%n_given + 1
    end subroutine next_of_list
 
-   !> Solve on the way to the first row; what fails there is of no account.
+   !> Solve on the way to the first row; what fails there is of no account, and what is solved only
+   !> tells solutions apart.
    subroutine come_to_first(self, case, observer, error)
       class(list_source), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -160,6 +161,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_request) :: request
       type(point_type) :: point
+      !> Residual that is enough.
+      real(wp), parameter :: on_the_way = 1.0e-3_wp
       integer :: k
 
       do k = 1, size(self%lead)
@@ -170,6 +173,7 @@ contains
          request%contact = .false.
          request%histories = .false.
          request%sensitivity = .false.
+         request%tolerance = on_the_way
          call self%strategy%solve_in_time(case, request, point, error)
          if (allocated(error)) return
       end do
