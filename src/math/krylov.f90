@@ -10,6 +10,8 @@ module fw_krylov
    use fw_interrupt, only: must_end
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
+   use fw_tall_product, only: multiply_transposed
+   use fw_tall_product, only: subtract_product
    implicit none (type, external)
    private
 
@@ -191,9 +193,8 @@ contains
       ! One pass loses orthogonality where the product lies almost in the basis; after the second it
       ! is orthogonal to working precision ("twice is enough").
       do pass = 1, 2
-         call dgemv('T', n, j, 1.0_wp, self%basis, n, self%product, 1, 0.0_wp, self%coefficients, 1)
-         call dgemv('N', n, j, -1.0_wp, self%basis, n, self%coefficients, 1, 1.0_wp, &
-            self%product, 1)
+         call multiply_transposed(n, j, self%basis, self%product, self%coefficients)
+         call subtract_product(n, j, self%basis, self%coefficients, self%product)
          self%hessenberg(:j, j) = self%hessenberg(:j, j) + self%coefficients(:j)
       end do
       self%hessenberg(j + 1, j) = norm2(self%product)

@@ -18,9 +18,9 @@
 module fw_augmented_system
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_lapack, only: dgemv
    use fw_linalg, only: lu_type
    use fw_parameter_system, only: parameter_system
+   use fw_tall_product, only: subtract_product
    implicit none (type, external)
    private
 
@@ -375,7 +375,7 @@ contains
       call self%subtract_rows(self%inner_part(:k, :), self%extra_part(:n, :), is_built=.true.)
       call self%complement%solve(self%extra_part(:n, 1))
       vector(k + 1:) = self%extra_part(:n, 1)
-      call dgemv('N', k, n, -1.0_wp, self%columns, max(1, k), self%extra_part, 1, 1.0_wp, vector, 1)
+      call subtract_product(k, n, self%columns, self%extra_part, vector)
    end subroutine precondition
 
    !> Column by column: rows of the conditions take what the product of the inner system leaves.

@@ -61,7 +61,7 @@ module fw_wear_step
 
    !> Relative residual of the linear solution of a pseudo-time step, and the growth of the
    !> residual of the vibration above which such a step is corrected.
-   real(wp), parameter :: linear_tolerance = 1.0e-4_wp, largest_lag = 1.0e-2_wp
+   real(wp), parameter :: linear_tolerance = 1.0e-3_wp, largest_lag = 1.0e-2_wp
    !> The same of a step of high order: above, its depths are not to be trusted.
    real(wp), parameter :: farthest_lag = 0.3_wp
    integer, parameter :: max_corrections = 5

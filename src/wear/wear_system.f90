@@ -17,7 +17,7 @@ module fw_wear_system
    use fw_force_law, only: pair_stuck
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_lapack, only: dgemv
+   use fw_tall_product, only: multiply_transposed
    implicit none (type, external)
    private
 
@@ -45,6 +45,8 @@ module fw_wear_system
       !> they are of.
       real(wp), allocatable, private :: slopes(:, :)
       integer, allocatable, private :: built_for(:)
+      !> Of a vector what they make of it (n_pairs).
+      real(wp), allocatable, private :: turned(:)
       !> Cycles of the step when it was built.
       real(wp), private :: built_cycles = 0.0_wp
    contains
@@ -101,6 +103,7 @@ contains
       where (self%weight <= 0.0_wp) self%weight = tangential
       where (self%weight <= 0.0_wp) self%weight = 1.0_wp
       allocate (self%wearing(contact%n_pairs), source=0)
+      allocate (self%turned(contact%n_pairs), source=0.0_wp)
    end subroutine new_wear_system
 
    !> Unknowns of the vibration; the depths follow them.
@@ -391,7 +394,8 @@ contains
       n = self%n_linear_extra
       if (size(v, 2) == 1) then
          ! A product of matrices would pack the slopes for one column.
-         call dgemv('T', k, n, -1.0_wp, self%slopes, max(1, k), v, 1, 1.0_wp, rows, 1)
+         call multiply_transposed(k, n, self%slopes, v, self%turned)
+         rows(:n, 1) = rows(:n, 1) - self%turned(:n)
          return
       end if
       call dgemm('T', 'N', n, size(v, 2), k, -1.0_wp, self%slopes, max(1, k), v, &
