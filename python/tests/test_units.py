@@ -96,6 +96,9 @@ def test_a_sweep_over_a_parameter_has_its_unit() -> None:
 @pytest.mark.parametrize(("groups", "told"), [
     ({"contact": {"gap": "5 N"}}, r"&contact gap = '5 N': is in N, must be in a unit of L"),
     ({"contact": {"gap": "5 mmm"}}, "'5 mmm': mmm is no unit that is known here: must be one of L"),
+    ({"contact": {"gap": "1e400 m"}}, "1e400 is no number, or too large in L"),
+    ({"contact": {"gap": "1e307 m"}}, "1e307 is no number, or too large in L"),
+    ({"sweep": {"start": "1 Hz^999/Hz^998"}}, "is no unit that is known here"),
     ({"sweep": {"start": "3 mm"}}, r"'3 mm': is in mm, must be in a unit of Hz"),
     ({"solver": {"tolerance": "1 mm"}}, "&solver tolerance = '1 mm': the key has no unit"),
     ({"structure": {"unit_system": "m-kg-s-N"}, "contact": {"gap": "5 um"}},

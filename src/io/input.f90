@@ -105,11 +105,11 @@ contains
       i = last_entry(self%namelist, group, key)
       if (i == 0) return
       associate (entry => self%namelist%entries(i))
-         if (size(entry%values) > 0) text = entry%values(1)%text
+         if (size(entry%values) == 0) return
+         text = entry%values(1)%text
+         if (.not. allocated(entry%raw)) return
          ! Overrides need no quotes: everything behind the = is the text.
-         if (allocated(entry%raw)) then
-            if (.not. (entry%values(1)%quoted .and. size(entry%values) == 1)) text = entry%raw
-         end if
+         if (.not. (entry%values(1)%quoted .and. size(entry%values) == 1)) text = entry%raw
       end associate
    end function text_of
 

@@ -35,6 +35,8 @@ module fw_unit_table
 
    real(wp), parameter :: turn = 8.0_wp*atan(1.0_wp), inch = 0.0254_wp, foot = 0.3048_wp, &
                           pound = 0.45359237_wp, gravity = 9.80665_wp
+   !> Powers of ten that a factor to SI has at most.
+   real(wp), parameter :: most_digits = 100.0_wp
    logical, parameter :: yes = .true., no = .false.
    ! Powers of metre, kilogram and second in each kind of quantity.
    integer, parameter :: none(3) = 0, length(3) = [1, 0, 0], mass(3) = [0, 1, 0], &
@@ -113,10 +115,13 @@ contains
          call find_unit(text(at:last), part, ok, system)
          if (.not. ok) return
          call read_power(text, last + 1, power, at, ok)
+         ! Powers may be absurd, and nothing here may overflow.
+         ok = ok .and. abs(log10(unit%factor) + sign*power*log10(part%factor)) < most_digits
+         if (.not. ok) return
          unit%factor = unit%factor*part%factor**(sign*power)
          unit%powers = unit%powers + sign*power*part%powers
          at = next(text, at)
-         if (.not. ok .or. at > len(text)) return
+         if (at > len(text)) return
          ! Nothing between two units is a product.
          sign = merge(-1, 1, text(at:at) == '/')
          if (scan(text(at:at), '*/') > 0) at = at + 1

@@ -391,6 +391,10 @@ contains
       else
          call read_unit(unit, wanted, ok)
       end if
+      if (.not. ok) then
+         message = 'a unit of '//unit//' is too far from 1 to be converted: must be a number'
+         return
+      end if
       call read_unit(value(unit_start:), given, ok)
       if (.not. ok) then
          message = value(unit_start:)//' is no unit that is known here: must be one of '//unit// &
@@ -399,8 +403,11 @@ contains
          message = 'is in '//value(unit_start:)//', must be in a unit of '//unit//of_model
       else
          call read_real(value(:number_end), found, ok)
-         number = number_text(scaled(found, given%factor/wanted%factor))
-         if (.not. ok) message = value(:number_end)//' is no number'
+         ! Of the smallest numbers too, whose logarithm is no finite one.
+         if (ok) ok = log10(max(abs(found), tiny(1.0_wp))) + log10(given%factor/wanted%factor) < &
+                      log10(huge(1.0_wp)) - 1.0_wp
+         if (.not. ok) message = value(:number_end)//' is no number, or too large in '//unit
+         if (ok) number = number_text(scaled(found, given%factor/wanted%factor))
       end if
    end subroutine convert
 
