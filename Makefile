@@ -8,6 +8,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help deps build configured program debug run test lint keys docs clean
 .PHONY: fuzz notebooks wheel ways sensitivities resonances modes calibration stops controls
+.PHONY: parameters
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -187,6 +188,9 @@ resonances: build ## 200 random resonances over a parameter against sweeps, in d
 
 controls: build ## 200 random responses of given amplitude against equations of another code
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/control_family.py -o docs/robustness.md
+
+parameters: build ## 160 random sweeps over matrices against equations of another code, and runs
+	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/parameter_family.py -o docs/robustness.md
 
 modes: build ## 200 random nonlinear modes against whole structures, in docs/robustness.md
 	PYTHONPATH=python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/modes/mode_family.py \

@@ -310,7 +310,8 @@ class Sweep(_Sweep, total=False):
     #: 'frequency')
     parameter: Literal["frequency", "load%harmonic_scale", "load%static_scale", "contact%mu",
                        "contact%normal_load", "contact%gap", "contact%tangential_stiffness",
-                       "contact%normal_stiffness", "spring%coefficient"]
+                       "contact%normal_stiffness", "spring%coefficient", "model%modal_damping",
+                       "model%rotation_speed", "model%rayleigh_mass", "model%rayleigh_stiffness"]
     #: a list of frequencies in any order, in place of start, end and n_points; only: analysis =
     #: 'frf', 'time', continuation = 'natural' (default: none)
     frequencies: ArrayLike

@@ -11,6 +11,7 @@ module fw_balance_problem
    use fw_incidence, only: new_incidence
    use fw_joint, only: joint_type
    use fw_kinds, only: wp
+   use fw_reduction, only: held_basis
    use fw_structure_operator, only: structure_operator
    use fw_structure_operator, only: structure_state
    implicit none (type, external)
@@ -37,6 +38,14 @@ module fw_balance_problem
       !> Norm of the vibratory load on the structure [force], below whose round-off no load of the
       !> joint is one; 0 where it is not known.
       real(wp) :: load_size = 0.0_wp
+      !> Of a structure that is condensed anew as its matrices change: lowest and highest frequency
+      !> [rad/s], whether all of its modes are coordinates, and the modes that they are then: the
+      !> same whatever the matrices, so that unknowns keep their meaning.
+      real(wp) :: range(2) = 0.0_wp
+      logical :: keeps_all = .false.
+      type(held_basis) :: basis
+      !> Laws are those of another problem, with the stiffness that its structure gave them.
+      logical :: borrows_laws = .false.
    contains
       procedure :: coordinate_of
       procedure :: scale_forces
@@ -80,7 +89,7 @@ contains
       if (allocated(depth)) self%depth = depth
    end subroutine new_balance_problem
 
-   !> Give laws that take the balance their stiffness, from the structure.
+   !> Give laws that take the balance their stiffness, from the structure; again where it changed.
    subroutine scale_forces(self, stand, highest)
       class(balance_problem), intent(inout) :: self
       !> The structure at a frequency.
@@ -137,7 +146,7 @@ contains
       logical :: counts(3)
       integer :: i, j, n
 
-      ! Another frequency may come later.
+      ! Another frequency or other matrices may come later.
       if (.not. allocated(prediction%inertia)) allocate (prediction%inertia(self%n_pairs, 3))
       if (.not. allocated(prediction%damping)) allocate (prediction%damping(self%n_pairs, 3))
       prediction%inertia = 0.0_wp

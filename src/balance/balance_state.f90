@@ -84,6 +84,8 @@ module fw_balance_state
       procedure :: set_load_factors
       procedure :: vibratory_factor
       procedure :: take_loads
+      procedure :: renew_structure
+      procedure :: renew_workspaces
       procedure :: parameter
       procedure :: follow
       procedure :: set_point
@@ -111,13 +113,15 @@ module fw_balance_state
    end type balance_state
 
    abstract interface
-      !> Change the problem of a state, and the state itself; the frequency is set behind it.
-      subroutine apply_value(self, state, value)
-         import :: parameter_mover, balance_state, wp
+      !> Change the problem of a state, and the state itself; the frequency is set behind it. An
+      !> error is a value that the problem cannot be brought to.
+      subroutine apply_value(self, state, value, error)
+         import :: parameter_mover, balance_state, wp, error_type
          implicit none (type, external)
-         class(parameter_mover), intent(in) :: self
+         class(parameter_mover), intent(inout) :: self
          class(balance_state), intent(inout) :: state
          real(wp), intent(in) :: value
+         type(error_type), allocatable, intent(out) :: error
       end subroutine apply_value
 
       !> dR/dvalue at the last evaluated and linearized point x.
@@ -326,10 +330,22 @@ contains
          call self%set_point(parameter, 0.0_wp, error)
          return
       end if
-      call self%mover%apply(self, parameter)
-      self%value = parameter
-      call self%set_point(self%frequency(), 0.0_wp, error)
+      call move_by(self, parameter, error)
+      if (.not. allocated(error)) call self%set_point(self%frequency(), 0.0_wp, error)
    end subroutine set_parameter
+
+   !> Let the mover do it, which is not a part of the state meanwhile.
+   subroutine move_by(self, value, error)
+      class(balance_state), intent(inout) :: self
+      real(wp), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+      class(parameter_mover), allocatable :: mover
+
+      call move_alloc(self%mover, mover)
+      call mover%apply(self, value, error)
+      call move_alloc(mover, self%mover)
+      if (.not. allocated(error)) self%value = value
+   end subroutine move_by
 
    !> Where `set_parameter` has brought it.
    pure real(wp) function parameter(self)
@@ -346,11 +362,61 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (allocated(self%mover) .and. allocated(other%mover)) then
-         call self%mover%apply(self, other%value)
-         self%value = other%value
+         call move_by(self, other%value, error)
+         if (allocated(error)) return
+         if (self%problem%borrows_laws) call take_stiffness(self, other%problem)
       end if
       call self%set_frequency(other%frequency(), error)
    end subroutine follow
+
+   !> Rigid laws of another problem of the case: one and the same law has one eps.
+   subroutine take_stiffness(self, other)
+      class(balance_state), intent(inout) :: self
+      type(balance_problem), intent(in) :: other
+      integer :: k
+
+      do k = 1, self%problem%forces%n_laws
+         associate (own => self%problem%forces%entry(k)%law%prediction, &
+                    given => other%forces%entry(k)%law%prediction)
+            if (.not. given%takes_balance) cycle
+            own%stiffness = given%stiffness
+            if (.not. allocated(given%inertia)) cycle
+            own%inertia = given%inertia
+            own%damping = given%damping
+         end associate
+      end do
+      call self%renew_workspaces()
+   end subroutine take_stiffness
+
+   !> The structure of the problem has changed: the state stands where it stood, under its loads.
+   subroutine renew_structure(self, error)
+      class(balance_state), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      class(structure_state), allocatable :: before
+
+      call move_alloc(self%structure_state, before)
+      call self%problem%structure%new_state(self%structure_state)
+      self%structure_state%load_factor = before%load_factor
+      self%nearly = self%problem%structure%split_rank() > 0 .and. self%has_static_laws
+      self%compared_at = -huge(1.0_wp)
+      if (before%omega < 0.0_wp) return
+      call self%problem%structure%at(self%structure_state, before%omega, before%self_excitation, &
+                                     error)
+   end subroutine renew_structure
+
+   !> Laws of the problem have other constants, which workspaces hold; where the march starts
+   !> stays.
+   subroutine renew_workspaces(self)
+      class(balance_state), intent(inout) :: self
+      type(force_workspace), allocatable :: work(:)
+      integer :: k
+
+      call self%problem%forces%reserve(self%problem%fourier, work)
+      do k = 1, size(work)
+         if (allocated(self%work(k)%x_start)) work(k)%x_start = self%work(k)%x_start
+      end do
+      call move_alloc(work, self%work)
+   end subroutine renew_workspaces
 
    !> Factors of the static and of the vibratory loads of the model.
    subroutine set_load_factors(self, static, vibratory)

@@ -3,7 +3,7 @@
 !>
 !> Loads get factors. Pairs and springs get laws made anew from their data, as the builder makes
 !> them; the stiffness that the structure gave a rigid law stays, as a number of the method on which
-!> its solutions do not depend.
+!> its solutions do not depend. What changes matrices condenses the structure again.
 module fw_moved_parameter
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
@@ -12,20 +12,20 @@ module fw_moved_parameter
    use fw_case_forces, only: new_forces
    use fw_contact_data, only: contact_type
    use fw_contact_data, only: spring_type
-   use fw_force_law, only: force_workspace
+   use fw_error, only: error_type
    use fw_force_list, only: force_list
    use fw_kinds, only: wp
+   use fw_moved_structure, only: move_structure
    use fw_parameter_slopes, only: parameter_entry
    use fw_parameter_slopes, only: parameter_slope
    use fw_parameter_slopes, only: slope_finder
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient
-   use fw_parameters, only: gap
+   use fw_parameter_values, only: put_parameter
    use fw_parameters, only: harmonic_scale
-   use fw_parameters, only: normal_load
-   use fw_parameters, only: normal_stiffness
+   use fw_parameters, only: is_of_matrices
+   use fw_parameters, only: is_per_pair
+   use fw_parameters, only: is_per_spring
    use fw_parameters, only: static_scale
-   use fw_parameters, only: tangential_stiffness
    implicit none (type, external)
    private
 
@@ -35,99 +35,99 @@ module fw_moved_parameter
       !> As in fw_parameters.
       integer :: number = 0
       !> The value is a factor of those of the case, or the value itself of all elements.
-      logical :: is_factor = .false.
-      !> Values of the case: one, or one for each element.
+      logical :: by_factor = .false.
+      !> Values of the case as it was read: one, or one for each element.
       real(wp), allocatable :: base(:)
-      !> Pairs and springs of the case; not allocated for loads.
-      type(contact_type), allocatable, private :: contact
-      type(spring_type), allocatable, private :: springs
-      integer, private :: filter_harmonics = 0
+      !> The case at the present value: pairs and springs, and the rest where matrices change; none
+      !> of it for loads.
+      type(case_type) :: case
+      !> The eps of rigid laws stays where matrices change, so that a residual has the slope that
+      !> `derive` gives.
+      logical :: holds_eps = .false.
+      !> What the problem was built with.
+      real(wp), allocatable :: built(:)
    contains
       procedure :: apply
+      procedure :: change
       procedure :: derive
+      procedure :: find_slope
+      procedure :: values_at
    end type moved_parameter
 
 contains
 
    !> A parameter of a case, which the case has (fw_parameter_checks).
-   function new_moved_parameter(case, number, is_factor) result(self)
+   function new_moved_parameter(case, number, by_factor) result(self)
       type(case_type), intent(in) :: case
       integer, intent(in) :: number
-      logical, intent(in) :: is_factor
+      logical, intent(in) :: by_factor
       type(moved_parameter) :: self
 
       self%number = number
-      self%is_factor = is_factor
+      self%by_factor = by_factor
       call get_parameter(case, number, self%base)
-      if (is_load(number)) return
-      self%contact = case%contact
-      self%springs = case%springs
-      self%filter_harmonics = case%harmonics%filter_harmonics
+      self%built = self%base
+      if (is_of_matrices(number)) then
+         self%case = case
+      else if (.not. is_load(number)) then
+         ! Matrices are large, and stay.
+         self%case%contact = case%contact
+         self%case%springs = case%springs
+         self%case%harmonics%filter_harmonics = case%harmonics%filter_harmonics
+      end if
    end function new_moved_parameter
 
-   !> Loads are moved by factors of the state, all else by new laws.
+   !> Loads are moved by factors of the state, all else by other laws or matrices.
    pure logical function is_load(number)
       integer, intent(in) :: number
 
       is_load = any(number == [harmonic_scale, static_scale])
    end function is_load
 
-   !> The values that a value of the parameter stands for.
-   pure function elements_at(self, value) result(values)
-      type(moved_parameter), intent(in) :: self
+   !> What the parameter is at a value or factor, each pair or spring its own.
+   pure function values_at(self, value) result(values)
+      class(moved_parameter), intent(in) :: self
       real(wp), intent(in) :: value
       real(wp) :: values(size(self%base))
 
       values = value
-      if (self%is_factor) values = value*self%base
-   end function elements_at
+      if (self%by_factor) values = value*self%base
+   end function values_at
 
-   subroutine apply(self, state, value)
+   subroutine apply(self, state, value, error)
+      class(moved_parameter), intent(inout) :: self
+      class(balance_state), intent(inout) :: state
+      real(wp), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. is_load(self%number)) then
+         call put_parameter(self%case, self%number, self%values_at(value), error)
+         if (allocated(error)) return
+      end if
+      call self%change(state, value, error)
+   end subroutine apply
+
+   !> Bring the problem of a state, and the state, to a value at which the case is.
+   subroutine change(self, state, value, error)
       class(moved_parameter), intent(in) :: self
       class(balance_state), intent(inout) :: state
       real(wp), intent(in) :: value
-      real(wp) :: factor, values(size(self%base))
+      type(error_type), allocatable, intent(out) :: error
 
-      values = elements_at(self, value)
-      if (.not. is_load(self%number)) then
-         call take_values(self, state, values)
-         return
-      end if
-      factor = values(1)/self%base(1)
-      if (self%number == harmonic_scale) then
-         call state%set_load_factors(1.0_wp, factor)
-      else
-         call state%set_load_factors(factor, 1.0_wp)
-      end if
-   end subroutine apply
-
-   !> Laws of other constants, and workspaces that go with them.
-   subroutine take_values(self, state, values)
-      type(moved_parameter), intent(in) :: self
-      class(balance_state), intent(inout) :: state
-      real(wp), intent(in) :: values(:)
-      type(contact_type) :: contact
-      type(spring_type) :: springs
-
-      contact = self%contact
-      springs = self%springs
-      select case (self%number)
-      case (friction_coefficient)
-         contact%mu = values
-      case (normal_load)
-         contact%normal_load = values
-      case (gap)
-         contact%gap = values
-      case (tangential_stiffness)
-         contact%tangential_stiffness = values
-      case (normal_stiffness)
-         contact%normal_stiffness = values
-      case default
-         springs%coefficient = values
-      end select
-      call renew_laws(state%problem, contact, springs, self%filter_harmonics)
-      call renew_workspaces(state)
-   end subroutine take_values
+      associate (factor => self%values_at(value)/self%built)
+         if (self%number == harmonic_scale) then
+            call state%set_load_factors(1.0_wp, factor(1))
+         else if (self%number == static_scale) then
+            call state%set_load_factors(factor(1), 1.0_wp)
+         else if (is_of_matrices(self%number)) then
+            call move_structure(self%case, self%holds_eps, state, error)
+         else
+            call renew_laws(state%problem, self%case%contact, self%case%springs, &
+                            self%case%harmonics%filter_harmonics)
+            call state%renew_workspaces()
+         end if
+      end associate
+   end subroutine change
 
    !> The laws of a problem anew, from pairs and springs whose constants have changed since it was
    !> built. States take new workspaces then.
@@ -159,19 +159,6 @@ contains
       end do
    end subroutine renew_laws
 
-   !> Workspaces hold constants of their laws; where the march starts stays.
-   subroutine renew_workspaces(state)
-      class(balance_state), intent(inout) :: state
-      type(force_workspace), allocatable :: work(:)
-      integer :: k
-
-      call state%problem%forces%reserve(state%problem%fourier, work)
-      do k = 1, size(work)
-         if (allocated(state%work(k)%x_start)) work(k)%x_start = state%work(k)%x_start
-      end do
-      call move_alloc(work, state%work)
-   end subroutine renew_workspaces
-
    !> Of elements that move together the sum.
    subroutine derive(self, state, x, dr)
       class(moved_parameter), intent(in) :: self
@@ -180,31 +167,59 @@ contains
       real(wp), intent(out), contiguous :: dr(:)
       type(slope_finder) :: finder
       type(parameter_slope) :: slope
-      type(parameter_entry) :: entry
-      real(wp) :: rate(size(self%base)), values(size(self%base))
-      integer :: i
+      real(wp) :: rate
 
-      rate = 1.0_wp
-      if (self%is_factor) rate = self%base
       if (is_load(self%number)) then
-         call state%derivative_by_loads(merge(rate(1), 0.0_wp, self%number == static_scale)/ &
-                                        self%base(1), &
-                                        merge(rate(1), 0.0_wp, self%number == harmonic_scale)/ &
-                                        self%base(1), dr)
+         ! Its value may be 0.
+         rate = merge(1.0_wp, 1.0_wp/self%base(1), self%by_factor)
+         call state%derivative_by_loads(merge(rate, 0.0_wp, self%number == static_scale), &
+                                        merge(rate, 0.0_wp, self%number == harmonic_scale), dr)
          return
       end if
-      values = elements_at(self, state%value)
-      call finder%start(state)
-      call finder%prepare(state, x, residual_only=.true.)
-      dr = 0.0_wp
-      entry%number = self%number
-      do i = 1, size(self%base)
-         if (.not. abs(rate(i)) > 0.0_wp) cycle
-         entry%element = i
-         entry%value = values(i)
-         call finder%find(state, entry, slope)
-         dr = dr + rate(i)*reshape(slope%residual, [size(dr)])
-      end do
+      call self%find_slope(finder, state, x, state%value, slope, &
+                           residual_only=.not. is_of_matrices(self%number))
+      dr = reshape(slope%residual, [size(dr)])
    end subroutine derive
+
+   !> Slope by the value or the factor that all elements share, at the motion x where the state was
+   !> evaluated and linearized: the sum over the numbers that the parameter is made of.
+   subroutine find_slope(self, finder, state, x, value, slope, residual_only)
+      class(moved_parameter), intent(in) :: self
+      type(slope_finder), intent(inout) :: finder
+      class(balance_state), intent(inout) :: state
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(in) :: value
+      type(parameter_slope), intent(out) :: slope
+      !> As in slope_finder%prepare.
+      logical, intent(in), optional :: residual_only
+      type(parameter_slope) :: one
+      type(parameter_entry) :: entry
+      real(wp) :: rate, values(size(self%base))
+      integer :: i
+
+      call finder%start(state)
+      call finder%prepare(state, x, residual_only)
+      values = self%values_at(value)
+      entry%number = self%number
+      if (is_of_matrices(self%number)) entry%change = &
+         findloc(self%case%model%changes%parameter, self%number, dim=1)
+      do i = 1, size(values)
+         entry%value = values(i)
+         if (is_per_pair(self%number) .or. is_per_spring(self%number)) entry%element = i
+         rate = 1.0_wp
+         if (self%by_factor) rate = self%base(i)
+         call finder%find(state, entry, one)
+         if (i == 1) then
+            slope = one
+            slope%residual = rate*one%residual
+            slope%observed = rate*one%observed
+            slope%work = rate*one%work
+         else
+            slope%residual = slope%residual + rate*one%residual
+            slope%observed = slope%observed + rate*one%observed
+            slope%work = slope%work + rate*one%work
+         end if
+      end do
+   end subroutine find_slope
 
 end module fw_moved_parameter

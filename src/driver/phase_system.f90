@@ -22,7 +22,6 @@ module fw_phase_system
    use fw_parameters, only: harmonic_scale
    use fw_plane_system, only: plane_system
    use fw_resonance_options, only: resonance_options
-   use fw_varied_slope, only: find_varied_slope
    implicit none (type, external)
    private
 
@@ -131,9 +130,6 @@ contains
 
       omega = self%state%frequency()
       call self%mover%bring(self%options%value_at(parameter), self%problem, self%state, error)
-      if (.not. allocated(error) .and. self%state%n + 1 /= self%n) then
-         call fatal_error(error, 'other modes count with this value', status_input)
-      end if
       if (.not. allocated(error) .and. omega > 0.0_wp) then
          call self%state%set_frequency(omega, error)
       end if
@@ -152,7 +148,11 @@ contains
 
       n = self%state%n
       call work_at(self, x(:n), work)
-      call find_varied_slope(self%mover, finder, self%state, x(:n), slope, work)
+      call self%mover%find_slope(finder, self%state, x(:n), self%mover%value, slope)
+      if (self%mover%number == harmonic_scale) then
+         ! F^H U has the load twice: linear in the coordinates, quadratic behind the condensation.
+         slope%work = (work + finder%work_at_rest)/self%mover%value
+      end if
       dr(:n) = reshape(slope%residual, [n])
       dr(n + 1) = self%work_unit*real(slope%work, wp)
       ! d(value)/d(what steps are even in).

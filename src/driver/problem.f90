@@ -38,15 +38,19 @@ module fw_problem
    use fw_memory, only: require_memory
    use fw_moved_parameter, only: moved_parameter
    use fw_moved_parameter, only: new_moved_parameter
-   use fw_moved_parameter, only: renew_laws
+   use fw_moved_structure, only: fullest_case
+   use fw_moved_structure, only: meets_modes
+   use fw_moved_structure, only: move_structure
    use fw_parameter_sweep, only: as_factor
    use fw_parameters, only: gap
    use fw_parameters, only: harmonic_scale
+   use fw_parameters, only: is_of_matrices
    use fw_plain_structure, only: new_plain_structure
    use fw_plain_structure, only: plain_structure
    use fw_reduction, only: held_basis
    use fw_sector_means, only: means_none
    use fw_sector_means, only: means_split
+   use fw_solver_options, only: continuation_arclength
    use fw_solver_options, only: linear_lu
    use fw_solver_options, only: solver_powell
    use fw_structure_operator, only: structure_operator
@@ -56,7 +60,7 @@ module fw_problem
    implicit none (type, external)
    private
 
-   public :: build_system, renew_forces
+   public :: build_system
 
    !> Instants at least where the events decide and instants only isolate them.
    integer, parameter :: fewest_for_events = 8
@@ -82,11 +86,20 @@ contains
       !> left for other problems of the case.
       type(held_basis), intent(inout), optional :: held
       class(structure_state), allocatable :: stand
+      type(case_type), allocatable :: fullest
 
-      call build_problem(case, problem, stand, error, keep_all, of_level, forces, held)
+      if (is_of_matrices(case%varied)) then
+         allocate (fullest)
+         call fullest_case(case, fullest, error)
+         if (allocated(error)) return
+         call build_problem(fullest, problem, stand, error, keep_all, of_level, forces, held)
+      else
+         call build_problem(case, problem, stand, error, keep_all, of_level, forces, held)
+      end if
       if (allocated(error)) return
       call new_balance_state(problem, system, stand)
-      call let_move(case, system, error)
+      if (allocated(fullest)) call move_structure(case, .false., system, error)
+      if (.not. allocated(error)) call let_move(case, system, error)
    end subroutine build_system
 
    !> Give the state the parameter that the case goes over, and its first value; that of a given
@@ -101,6 +114,8 @@ contains
       allocate (mover)
       if (case%over%is_wanted()) then
          mover = new_moved_parameter(case, case%over%number, case%over%as == as_factor)
+         ! Along a branch the residual is to have the slope that is known of it.
+         mover%holds_eps = case%sweep%continuation == continuation_arclength
       else
          mover = new_moved_parameter(case, harmonic_scale, .false.)
       end if
@@ -127,7 +142,9 @@ contains
       type(fourier_type) :: fourier
       class(structure_operator), allocatable :: structure
       type(force_list) :: laws
+      type(held_basis) :: basis
       real(wp) :: range(2)
+      logical :: keeps_all
 
       harmonics = case%harmonics
       if (present(of_level)) harmonics = of_level
@@ -161,27 +178,34 @@ contains
          range(1) = max(range(1), 0.1_wp*minval(case%sweep%range()))
       end if
       call turn_joint(case%model, case%contact, fourier%harmonic, joint, error)
-      if (.not. allocated(error)) call new_structure(case, joint, laws, fourier, range, structure, &
-                                                     error, keep_all, held)
+      if (allocated(error)) return
+      keeps_all = .false.
+      if (present(keep_all)) keeps_all = keep_all
+      if (is_of_matrices(case%varied) .and. .not. keeps_all) then
+         call meets_modes(case, joint%relative, fourier%harmonic, range, keeps_all, error)
+         if (allocated(error)) return
+      end if
+      if (is_of_matrices(case%varied)) then
+         if (present(held)) basis = held
+         call new_structure(case, joint, laws, fourier, range, structure, error, keeps_all, basis)
+         if (present(held)) held = basis
+      else
+         call new_structure(case, joint, laws, fourier, range, structure, error, keeps_all, held)
+      end if
       if (allocated(error)) return
       call structure%new_state(stand)
       call structure%at(stand, case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
       call new_balance_problem(joint, structure, fourier, laws, case%contact%depth, problem)
+      problem%range = range
+      problem%keeps_all = keeps_all
+      if (basis%is_known()) problem%basis = basis
+      problem%borrows_laws = present(forces)
       problem%load_size = norm2([case%model%load_cosine, case%model%load_sine])
       problem%reduced = case%solver%skips
       problem%solves_values = harmonics%method == method_hdhb
       if (.not. present(forces)) call problem%scale_forces(stand, range(2))
    end subroutine build_problem
-
-   !> The laws anew from pairs and springs whose constants have changed since the problem was built.
-   !> States take new workspaces then.
-   subroutine renew_forces(case, problem)
-      type(case_type), intent(in) :: case
-      type(balance_problem), intent(inout) :: problem
-
-      call renew_laws(problem, case%contact, case%springs, case%harmonics%filter_harmonics)
-   end subroutine renew_forces
 
    !> The structure of a case, condensed.
    subroutine new_structure(case, joint, forces, fourier, range, structure, error, keep_all, &
@@ -194,7 +218,7 @@ contains
       real(wp), intent(in) :: range(2)
       class(structure_operator), allocatable, intent(out) :: structure
       type(error_type), allocatable, intent(out) :: error
-      logical, intent(in), optional :: keep_all
+      logical, intent(in) :: keep_all
       !> Of plain structures, see build_system.
       type(held_basis), intent(inout), optional :: held
       type(plain_structure), allocatable :: plain
@@ -204,8 +228,10 @@ contains
 
       if (.not. case%model%cyclic%is_cyclic) then
          allocate (plain)
+         ! Of matrices that change none or all: coordinates are to be the same.
          call new_plain_structure(case%model, joint%relative, fourier%harmonic, range, plain, &
-                                  error, keep_all, held=held)
+                                  error, keep_all, held=held, &
+                                  keep_none=is_of_matrices(case%varied))
          call move_alloc(plain, structure)
          return
       end if

@@ -21,8 +21,10 @@ module fw_stability_solver
    use fw_harmonics_options, only: parity_auto
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
+   use fw_moved_parameter, only: moved_parameter
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
+   use fw_parameters, only: is_of_matrices
    use fw_point, only: point_type
    use fw_problem, only: build_system
    use fw_recovery, only: carry_solution
@@ -58,7 +60,7 @@ contains
       complex(wp), allocatable :: better(:)
       logical :: marched(2)
 
-      call floquet_multipliers(system, case%model, x, point%multipliers, error, marched=marched(1))
+      call find_multipliers(case, system, x, point%multipliers, error, marched=marched(1))
       if (allocated(error)) return
       allocate (point%multiplier_error(size(point%multipliers)), source=huge(1.0_wp))
       call refine(self, case, system, x, better, marched(2), error)
@@ -94,9 +96,32 @@ contains
       call self%newton%solve(self%fine, y, report)
       if (report%interrupted) call stop_run(system%interrupt, error)
       if (allocated(error) .or. .not. report%converged) return
-      call floquet_multipliers(self%fine, case%model, y, better, error, halved=.true., &
-                               marched=marched)
+      call find_multipliers(case, self%fine, y, better, error, halved=.true., marched=marched)
    end subroutine refine
+
+   !> Perturbations live in the model at the value where the system stands.
+   subroutine find_multipliers(case, system, x, multipliers, error, halved, marched)
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(in) :: system
+      real(wp), intent(in), contiguous :: x(:)
+      complex(wp), allocatable, intent(out) :: multipliers(:)
+      type(error_type), allocatable, intent(out) :: error
+      !> As in floquet_multipliers.
+      logical, intent(in), optional :: halved
+      logical, intent(out) :: marched
+
+      if (allocated(system%mover)) then
+         select type (mover => system%mover)
+         type is (moved_parameter)
+            if (is_of_matrices(mover%number)) then
+               call floquet_multipliers(system, mover%case%model, x, multipliers, error, halved, &
+                                        marched)
+               return
+            end if
+         end select
+      end if
+      call floquet_multipliers(system, case%model, x, multipliers, error, halved, marched)
+   end subroutine find_multipliers
 
    !> The balance with twice the harmonics and no filter: what a filter does is an error, too.
    subroutine build(self, case, system, error)

@@ -82,6 +82,8 @@ module fw_case
       !> The parameter of fw_parameters that changes from point to point (0: none), and what the
       !> model is formed from, only where that changes its matrices.
       integer :: varied = 0
+      !> Lowest and highest value of a parameter of the matrices that changes so.
+      real(wp) :: varied_span(2) = 0.0_wp
       type(model_origin), allocatable :: origin
    contains
       procedure :: bind_keys => bind_case_keys

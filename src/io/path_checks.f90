@@ -10,9 +10,9 @@ module fw_path_checks
    use fw_parameter_checks, only: check_parameter
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, normal_load, &
-                            normal_stiffness, parameter_words, spring_coefficient, static_scale, &
-                            tangential_stiffness
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
+                            normal_load, normal_stiffness, parameter_words, spring_coefficient, &
+                            static_scale, tangential_stiffness
    use fw_solver_options, only: jacobian_analytic
    use fw_solver_options, only: solver_newton
    use fw_values, only: number_text
@@ -58,8 +58,7 @@ contains
          call get_parameter(case, over%number, base)
          counts = which_count(case, over%number)
          base = pack(base, counts)
-         lowest = min(over%start, over%end)
-         if (allocated(over%values)) lowest = min(lowest, minval(over%values))
+         lowest = minval(over%ends())
          if (over%as == as_factor) then
             if (.not. any(abs(base) > 0.0_wp)) then
                call fatal_error(error, "sweep%as = 'factor': "// &
@@ -75,7 +74,9 @@ contains
                              status_input)
             return
          end if
-         if (any(over%number == [friction_coefficient, normal_load]) .and. lowest < 0.0_wp) then
+         if (over%as == as_factor .and. is_of_matrices(over%number)) lowest = base(1)*lowest
+         if ((any(over%number == [friction_coefficient, normal_load]) .or. &
+              is_of_matrices(over%number)) .and. lowest < 0.0_wp) then
             call refuse_lowest('at least 0')
          else if (any(over%number == [tangential_stiffness, normal_stiffness]) .and. &
                   .not. lowest > 0.0_wp) then
@@ -94,12 +95,16 @@ contains
 
    end subroutine check_values
 
-   !> Pairs that a parameter is of; all springs, and the one factor of loads.
+   !> Pairs that a parameter is of; all springs, and the one value of loads and matrices.
    function which_count(case, number) result(counts)
       type(case_type), intent(in) :: case
       integer, intent(in) :: number
       logical, allocatable :: counts(:)
 
+      if (is_of_matrices(number)) then
+         counts = [.true.]
+         return
+      end if
       select case (number)
       case (harmonic_scale, static_scale)
          counts = [.true.]

@@ -9,7 +9,10 @@ module fw_read_case
    use fw_kinds, only: wp
    use fw_load_terms, only: load_terms
    use fw_model_file, only: file_model_type
+   use fw_model_forming, only: form_structure
    use fw_model_keys, only: model_options
+   use fw_parameter_sweep, only: as_factor
+   use fw_parameter_values, only: get_parameter
    use fw_parameters, only: is_of_matrices
    use fw_paths, only: directory_of, read_text_file, resolve_path, stem_of
    use fw_read_contact, only: read_contact, read_springs
@@ -24,6 +27,7 @@ module fw_read_case
    use fw_reader, only: reader_type, new_reader
    use fw_reader_text, only: printable
    use fw_records, only: record_list
+   use fw_resonance_options, only: resonance_as_factor => as_factor
    use fw_solver_options, only: continuation_natural
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
@@ -218,6 +222,8 @@ contains
       call list_inputs(path, raw, case%inputs)
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep, case%over)
+      if (.not. reader%failed()) call vary_matrices(case, error)
+      if (allocated(error)) return
       call case%solver%bind_keys(reader)
       call case%pseudo_time%bind_keys(reader)
       call case%wear%bind_keys(reader, case%analysis == analysis_wear)
@@ -228,6 +234,39 @@ contains
       call read_observed(reader, raw, case%model)
       call read_control(reader, case%model, case%control)
    end subroutine read_keys
+
+   !> Matrices that change from point to point: what they are formed from is kept, and the values
+   !> that they are to serve. Nothing is kept of others.
+   subroutine vary_matrices(case, error)
+      type(case_type), intent(inout) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: base(:)
+      real(wp) :: span(2)
+      logical :: by_factor
+
+      if (.not. allocated(case%origin)) return
+      span = case%over%ends()
+      by_factor = case%over%as == as_factor
+      if (case%analysis == analysis_resonance) then
+         span = [case%resonance%start, case%resonance%end]
+         by_factor = case%resonance%as == resonance_as_factor
+      else if (is_of_matrices(case%over%number) .and. allocated(case%origin%raw%stiffness)) then
+         case%varied = case%over%number
+         if (all(case%origin%wanted /= case%varied)) then
+            case%origin%wanted = [case%origin%wanted, case%varied]
+         end if
+         call form_structure(case%origin%options, case%origin%raw, case%origin%static, &
+                             case%origin%wanted, case%model, error)
+         if (allocated(error)) return
+      end if
+      if (is_of_matrices(case%varied)) then
+         call get_parameter(case, case%varied, base)
+         case%varied_span = [minval(span), maxval(span)]
+         if (by_factor) case%varied_span = base(1)*case%varied_span
+      else
+         deallocate (case%origin)
+      end if
+   end subroutine vary_matrices
 
    !> What every key is and holds by default: the keys that an empty input is asked for.
    subroutine list_keys(keys)
@@ -293,6 +332,9 @@ contains
       if (case%varied > 0) then
          if (all(wanted /= case%varied)) wanted = [wanted, case%varied]
          if (is_of_matrices(case%varied)) allocate (case%origin)
+      else if (reader%given('sweep', 'parameter')) then
+         ! The matrices may be what the sweep goes over, which is read after them.
+         allocate (case%origin)
       end if
       call finish_model(reader, options, raw, terms, case%model, case%origin, error, wanted)
       if (.not. allocated(case%title)) then

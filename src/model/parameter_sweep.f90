@@ -5,7 +5,6 @@ module fw_parameter_sweep
    use fw_key_range, only: above
    use fw_kinds, only: wp
    use fw_parameters, only: parameter_words
-   use fw_parameters, only: spring_coefficient
    implicit none (type, external)
    private
 
@@ -31,6 +30,7 @@ module fw_parameter_sweep
       procedure :: bind_values
       procedure :: is_wanted
       procedure :: value
+      procedure :: ends
       procedure :: is_ordered
    end type parameter_sweep
 
@@ -43,10 +43,8 @@ contains
       integer :: choice
 
       choice = self%number + 1
-      ! Matrices would have to be condensed anew at every value: they stand last, and are left out.
       call keys%bind_word(key('parameter', 'what the sweep goes over: start, end and values '// &
-                              'are of it', only="analysis = 'frf'"), choice, &
-                          words(:spring_coefficient + 1))
+                              'are of it', only="analysis = 'frf'"), choice, words)
       self%number = choice - 1
    end subroutine bind_parameter
 
@@ -85,6 +83,16 @@ contains
       share = real(k - 1, wp)/real(n - 1, wp)
       value = (1.0_wp - share)*self%start + share*self%end
    end function value
+
+   !> Lowest and highest of the values.
+   pure function ends(self) result(span)
+      class(parameter_sweep), intent(in) :: self
+      real(wp) :: span(2)
+
+      span = [min(self%start, self%end), max(self%start, self%end)]
+      if (allocated(self%values)) span = [min(span(1), minval(self%values)), &
+                                          max(span(2), maxval(self%values))]
+   end function ends
 
    !> Whether values only rise or only fall.
    pure logical function is_ordered(self)

@@ -86,7 +86,7 @@ contains
 
    !> Prepare the condensation of a model to its relative coordinates.
    subroutine new_plain_structure(model, relative, harmonic, omega_range, self, error, keep_all, &
-                                  forms_blocks, held)
+                                  forms_blocks, held, keep_none)
       type(model_type), intent(in) :: model
       type(relative_type), intent(in) :: relative
       !> Harmonics in use.
@@ -101,9 +101,11 @@ contains
       logical, intent(in), optional :: forms_blocks
       !> Modes of the model with these relative coordinates held, see new_reduction.
       type(held_basis), intent(inout), optional :: held
+      !> Condense every internal mode, whatever a harmonic may hit.
+      logical, intent(in), optional :: keep_none
 
       call new_reduction(model, relative, harmonic, omega_range, self%basis, error, keep_all, &
-                         held)
+                         held, keep_none)
       if (allocated(error)) return
       self%knows_field = .true.
       self%n_coordinates = self%basis%n_coordinates

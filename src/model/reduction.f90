@@ -13,7 +13,7 @@ module fw_reduction
    implicit none (type, external)
    private
 
-   public :: reduction_type, new_reduction, held_basis
+   public :: reduction_type, new_reduction, held_basis, may_resonate_between
 
    type :: reduction_type
       integer :: n_coordinates = 0
@@ -65,7 +65,8 @@ module fw_reduction
 contains
 
    !> Build the basis; errors where the structure has a part that nothing holds.
-   subroutine new_reduction(model, relative, harmonic, omega_range, self, error, keep_all, held)
+   subroutine new_reduction(model, relative, harmonic, omega_range, self, error, keep_all, held, &
+                            keep_none)
       type(model_type), intent(in) :: model
       type(relative_type), intent(in) :: relative
       integer, intent(in) :: harmonic(:)
@@ -77,6 +78,8 @@ contains
       logical, intent(in), optional :: keep_all
       !> Of the same model and relative coordinates: taken where it is known, else found and left.
       type(held_basis), intent(inout), optional :: held
+      !> Condense every internal mode, whatever a harmonic may hit.
+      logical, intent(in), optional :: keep_none
       type(held_basis) :: basis
       real(wp), allocatable :: t_q(:, :), t_i(:, :)
       logical, allocatable :: keep(:)
@@ -96,6 +99,7 @@ contains
       call check_free_modes(self, error)
       if (allocated(error)) return
       keep = undamped_resonances(self, harmonic, omega_range)
+      if (present(keep_none)) keep = keep .and. .not. keep_none
       if (present(keep_all)) keep = keep .or. keep_all
       if (any(keep)) then
          call move_to_coordinates(keep, t_q, t_i, self)
@@ -259,21 +263,65 @@ contains
       integer, intent(in) :: harmonic(:)
       real(wp), intent(in) :: omega_range(2)
       logical :: keep(self%n_internal)
-      ! Near a pole digits are lost as well.
-      real(wp), parameter :: margin = 1.0e-2_wp
-      real(wp) :: frequency
       integer :: j
 
-      keep = .false.
       do j = 1, self%n_internal
-         if (self%k_i(j) <= 0.0_wp .or. self%m_i(j) <= 0.0_wp) cycle
-         frequency = sqrt(self%k_i(j)/self%m_i(j))
-         ! Damping ratio: c/(2 sqrt(k m)).
-         if (self%c_i(j) > 2.0_wp*undamped_ratio*sqrt(self%k_i(j)*self%m_i(j))) cycle
-         keep(j) = any(frequency >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
-                       frequency <= (1.0_wp + margin)*harmonic*omega_range(2))
+         keep(j) = is_undamped(self, j) .and. is_hit(frequency(self, j), frequency(self, j), &
+                                                     harmonic, omega_range)
       end do
    end function undamped_resonances
+
+   !> Whether a harmonic may hit an internal mode without damping where the structure goes from one
+   !> to another, mode after mode.
+   pure logical function may_resonate_between(one, other, harmonic, omega_range) result(may)
+      !> Of the same relative coordinates, nothing kept.
+      type(reduction_type), intent(in) :: one, other
+      integer, intent(in) :: harmonic(:)
+      real(wp), intent(in) :: omega_range(2)
+      real(wp) :: ends(2)
+      integer :: j
+
+      may = .false.
+      do j = 1, one%n_internal
+         if (.not. (is_undamped(one, j) .or. is_undamped(other, j))) cycle
+         ends = [frequency(one, j), frequency(other, j)]
+         may = may .or. is_hit(minval(ends), maxval(ends), harmonic, omega_range)
+      end do
+   end function may_resonate_between
+
+   !> Damping ratio: c/(2 sqrt(k m)); static and free modes do not count.
+   pure logical function is_undamped(self, mode)
+      type(reduction_type), intent(in) :: self
+      integer, intent(in) :: mode
+
+      associate (k => self%k_i(mode), m => self%m_i(mode), c => self%c_i(mode))
+         is_undamped = k > 0.0_wp .and. m > 0.0_wp
+         if (is_undamped) is_undamped = .not. c > 2.0_wp*undamped_ratio*sqrt(k*m)
+      end associate
+   end function is_undamped
+
+   !> Of an internal mode [rad/s]; 0 where it does not vibrate.
+   pure real(wp) function frequency(self, mode)
+      type(reduction_type), intent(in) :: self
+      integer, intent(in) :: mode
+
+      frequency = 0.0_wp
+      if (self%k_i(mode) > 0.0_wp .and. self%m_i(mode) > 0.0_wp) then
+         frequency = sqrt(self%k_i(mode)/self%m_i(mode))
+      end if
+   end function frequency
+
+   !> Whether a harmonic lies between two frequencies of a mode, or so near that digits are lost.
+   pure logical function is_hit(lowest, highest, harmonic, omega_range)
+      real(wp), intent(in) :: lowest, highest
+      integer, intent(in) :: harmonic(:)
+      real(wp), intent(in) :: omega_range(2)
+      ! Near a pole digits are lost as well.
+      real(wp), parameter :: margin = 1.0e-2_wp
+
+      is_hit = any(highest >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
+                   lowest <= (1.0_wp + margin)*harmonic*omega_range(2))
+   end function is_hit
 
    !> Kept modes are scaled to a largest displacement of 1: their equations are forces then, as
    !> those of the relative coordinates are, and the norm of a residual means the same in all units.

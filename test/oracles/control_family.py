@@ -94,8 +94,9 @@ def spring_force(groups, displacement):
     return force
 
 
-def point_errors(groups, matrices, omega, row, force, scale):
-    """Residual of the equilibrium, and defect of the law (nan where it is not judged)."""
+def point_errors(groups, matrices, omega, row, force, scale, held_by=None):
+    """Residual of the equilibrium, and defect of the law (nan where it is not judged); `held_by` is
+    the stiffness that gives rigid pairs their eps, where it is another."""
     n = groups["model"]["n_dof"]
     contact = groups["contact"]
     side = np.reshape(contact["side_1"], (-1, 3))
@@ -120,7 +121,8 @@ def point_errors(groups, matrices, omega, row, force, scale):
             # The elongation of a spring is a coordinate too: it rests where others are moved.
             # Where a pair moves that dof, the two are one coordinate.
             held.append(pair_rows((spring, 0, 0), (0, 0, 0), n))
-        stiffnesses = automatic_penalty(matrices[2], np.concatenate(held)).reshape(-1, 3)
+        held_by = matrices[2] if held_by is None else held_by
+        stiffnesses = automatic_penalty(held_by, np.concatenate(held)).reshape(-1, 3)
     else:
         stiffnesses = np.zeros((len(side), 3))
         stiffnesses[:, :2] = np.array(contact["tangential_stiffness"])[:, None]

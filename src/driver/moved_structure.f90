@@ -1,0 +1,133 @@
+!> A structure whose matrices follow a parameter: condensed anew in the place where it stands, as
+!> coordinates that mean the same at all values.
+!>
+!> Relative displacements do. Modes that the contact holds are others at each value: they are
+!> condensed, unless one without damping may meet a harmonic on the way. Then all of them are
+!> coordinates, in the modes of one value, which span what those of any other do.
+module fw_moved_structure
+   use fw_balance_problem, only: balance_problem
+   use fw_balance_state, only: balance_state
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_kinds, only: wp
+   use fw_parameter_values, only: put_parameter
+   use fw_plain_structure, only: new_plain_structure
+   use fw_plain_structure, only: plain_structure
+   use fw_reduction, only: may_resonate_between
+   use fw_reduction, only: new_reduction
+   use fw_reduction, only: reduction_type
+   use fw_relative, only: relative_type
+   use fw_structure_operator, only: structure_state
+   implicit none (type, external)
+   private
+
+   public :: fullest_case, meets_modes, move_structure
+
+contains
+
+   !> The case at the largest of its values: loads and matrices that vanish elsewhere are there, and
+   !> with them the harmonics and the coordinates that all values need.
+   subroutine fullest_case(case, fullest, error)
+      type(case_type), intent(in) :: case
+      type(case_type), intent(out) :: fullest
+      type(error_type), allocatable, intent(out) :: error
+
+      fullest = case
+      associate (span => case%varied_span)
+         call put_parameter(fullest, case%varied, &
+                            [merge(span(1), span(2), abs(span(1)) > abs(span(2)))], error)
+      end associate
+   end subroutine fullest_case
+
+   !> Whether a mode that the contact holds may be met between the ends of the values.
+   subroutine meets_modes(case, relative, harmonic, range, meets, error)
+      type(case_type), intent(in) :: case
+      type(relative_type), intent(in) :: relative
+      integer, intent(in) :: harmonic(:)
+      !> [rad/s]
+      real(wp), intent(in) :: range(2)
+      logical, intent(out) :: meets
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: moved
+      type(reduction_type) :: basis(2)
+      integer :: k
+
+      meets = .false.
+      moved = case
+      do k = 1, 2
+         call put_parameter(moved, case%varied, case%varied_span(k:k), error)
+         if (allocated(error)) return
+         call new_reduction(moved%model, relative, harmonic, range, basis(k), error, &
+                            keep_none=.true.)
+         if (allocated(error)) return
+      end do
+      meets = may_resonate_between(basis(1), basis(2), harmonic, range)
+   end subroutine meets_modes
+
+   !> Bring the structure of a state's problem to the matrices of the case. Rigid laws take their
+   !> eps from it, as a case of its own would, unless they are to hold it.
+   subroutine move_structure(case, holds_eps, state, error)
+      type(case_type), intent(in) :: case
+      logical, intent(in) :: holds_eps
+      class(balance_state), intent(inout) :: state
+      type(error_type), allocatable, intent(out) :: error
+
+      logical :: scales
+
+      associate (problem => state%problem)
+         scales = .not. (holds_eps .or. problem%borrows_laws)
+         if (scales) scales = take_balance(problem)
+         if (scales .or. .not. problem%keeps_all) then
+            call take_structure(case, .false., problem, error)
+            if (allocated(error)) return
+         end if
+         if (scales) call scale_laws(case, problem, error)
+         if (allocated(error)) return
+         if (problem%keeps_all) call take_structure(case, .true., problem, error)
+         if (allocated(error)) return
+      end associate
+      call state%renew_workspaces()
+      call state%renew_structure(error)
+   end subroutine move_structure
+
+   !> Whether a law has an eps.
+   pure logical function take_balance(problem)
+      type(balance_problem), intent(in) :: problem
+
+      take_balance = problem%forces%entry(problem%forces%pairs)%law%prediction%takes_balance
+   end function take_balance
+
+   !> Condense the matrices of the case, or take all of their modes.
+   subroutine take_structure(case, keeps_all, problem, error)
+      type(case_type), intent(in) :: case
+      logical, intent(in) :: keeps_all
+      type(balance_problem), intent(inout) :: problem
+      type(error_type), allocatable, intent(out) :: error
+      type(plain_structure), allocatable :: plain
+
+      allocate (plain)
+      if (keeps_all) then
+         call new_plain_structure(case%model, problem%joint%relative, problem%fourier%harmonic, &
+                                  problem%range, plain, error, keep_all=.true., &
+                                  held=problem%basis)
+      else
+         call new_plain_structure(case%model, problem%joint%relative, problem%fourier%harmonic, &
+                                  problem%range, plain, error, keep_none=.not. problem%keeps_all)
+      end if
+      if (allocated(error)) return
+      call move_alloc(plain, problem%structure)
+   end subroutine take_structure
+
+   !> eps of the structure as it is, at the frequency where the case begins.
+   subroutine scale_laws(case, problem, error)
+      type(case_type), intent(in) :: case
+      type(balance_problem), intent(inout) :: problem
+      type(error_type), allocatable, intent(out) :: error
+      class(structure_state), allocatable :: stand
+
+      call problem%structure%new_state(stand)
+      call problem%structure%at(stand, case%sweep%start, 0.0_wp, error)
+      if (.not. allocated(error)) call problem%scale_forces(stand, problem%range(2))
+   end subroutine scale_laws
+
+end module fw_moved_structure
