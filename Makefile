@@ -189,7 +189,7 @@ resonances: build ## 200 random resonances over a parameter against sweeps, in d
 controls: build ## 200 random responses of given amplitude against equations of another code
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/control_family.py -o docs/robustness.md
 
-parameters: build ## 160 random sweeps over matrices against equations of another code, and runs
+parameters: build ## 112 random sweeps over matrices against equations of another code, and runs
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/parameter_family.py -o docs/robustness.md
 
 modes: build ## 200 random nonlinear modes against whole structures, in docs/robustness.md

@@ -17,7 +17,19 @@ module fw_balance_problem
    implicit none (type, external)
    private
 
-   public :: balance_problem, new_balance_problem
+   public :: balance_problem, problem_origin, new_balance_problem
+
+   !> What it takes to condense the structure anew as its matrices change.
+   type :: problem_origin
+      !> Lowest and highest frequency [rad/s].
+      real(wp) :: range(2) = 0.0_wp
+      !> Whether all modes of the structure are coordinates, and the modes that they are then: the
+      !> same whatever the matrices, so that unknowns keep their meaning.
+      logical :: keeps_all = .false.
+      type(held_basis) :: basis
+      !> Laws are those of another problem, with the stiffness that its structure gave them.
+      logical :: borrows_laws = .false.
+   end type problem_origin
 
    type :: balance_problem
       !> Unknowns.
@@ -38,14 +50,8 @@ module fw_balance_problem
       !> Norm of the vibratory load on the structure [force], below whose round-off no load of the
       !> joint is one; 0 where it is not known.
       real(wp) :: load_size = 0.0_wp
-      !> Of a structure that is condensed anew as its matrices change: lowest and highest frequency
-      !> [rad/s], whether all of its modes are coordinates, and the modes that they are then: the
-      !> same whatever the matrices, so that unknowns keep their meaning.
-      real(wp) :: range(2) = 0.0_wp
-      logical :: keeps_all = .false.
-      type(held_basis) :: basis
-      !> Laws are those of another problem, with the stiffness that its structure gave them.
-      logical :: borrows_laws = .false.
+      !> How it was built.
+      type(problem_origin) :: origin
    contains
       procedure :: coordinate_of
       procedure :: scale_forces

@@ -10,8 +10,8 @@ contains
    !> dR/d omega = Z' q - F', with what the forces add to it; of another parameter its own.
    module procedure parameter_derivative
 
-      if (allocated(self%mover)) then
-         call self%mover%derive(self, x, dr)
+      if (allocated(self%moved%mover)) then
+         call self%moved%mover%derive(self, self%moved%value, x, dr)
       else
          call self%derivative_by(by_frequency, x, dr)
       end if

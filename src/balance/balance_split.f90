@@ -78,7 +78,7 @@ contains
       complex(wp), allocatable :: first(:, :), other(:, :)
       integer :: h, m
 
-      associate (place => [self%frequency(), self%value])
+      associate (place => [self%frequency(), self%moved%value])
          is_so = self%is_alike
          if (all(abs(self%compared_at - place) <= 0.0_wp)) return
          ! Blocks that were found to differ are not compared again.

@@ -30,7 +30,7 @@ module fw_balance_state
    implicit none (type, external)
    private
 
-   public :: balance_state, new_balance_state, parameter_mover
+   public :: balance_state, new_balance_state, parameter_mover, moving_parameter
 
    !> A parameter of the problem that a path follows, in place of the frequency.
    type, abstract :: parameter_mover
@@ -38,6 +38,12 @@ module fw_balance_state
       procedure(apply_value), deferred :: apply
       procedure(derive_by_value), deferred :: derive
    end type parameter_mover
+
+   !> One that moves, where there is one, and its value.
+   type :: moving_parameter
+      class(parameter_mover), allocatable :: mover
+      real(wp) :: value = 0.0_wp
+   end type moving_parameter
 
    !> A problem where one worker stands.
    type, extends(parameter_system) :: balance_state
@@ -55,8 +61,10 @@ module fw_balance_state
       real(wp) :: load_share = 1.0_wp
       !> The parameter that `set_parameter` moves, and its value; the frequency where none is given.
       !> The problem belongs to one state then, or to several that stand at one value.
-      class(parameter_mover), allocatable :: mover
-      real(wp) :: value = 0.0_wp
+      type(moving_parameter) :: moved
+      !> Of a response whose load is what `set_parameter` moves: the parameter that it goes along
+      !> (`set_place`); the frequency where none is given.
+      type(moving_parameter) :: along
       !> What a step of pseudo-time adds to the derivative, P/h, outside of the contact laws
       !> (n_coordinates, n_coordinates, n_retained); only allocated during such a step.
       complex(wp), allocatable :: shift(:, :, :)
@@ -80,9 +88,11 @@ module fw_balance_state
       type(balance_scratch) :: scratch
    contains
       procedure :: set_parameter
+      procedure :: set_place
       procedure :: set_frequency
       procedure :: set_load_factors
       procedure :: vibratory_factor
+      procedure :: static_factor
       procedure :: take_loads
       procedure :: renew_structure
       procedure :: renew_workspaces
@@ -124,14 +134,17 @@ module fw_balance_state
          type(error_type), allocatable, intent(out) :: error
       end subroutine apply_value
 
-      !> dR/dvalue at the last evaluated and linearized point x.
-      subroutine derive_by_value(self, state, x, dr)
+      !> dR/dvalue at the last evaluated and linearized point x, and what it makes of observed
+      !> quantities while the coordinates stay (n_observed, n_retained).
+      subroutine derive_by_value(self, state, value, x, dr, observed)
          import :: parameter_mover, balance_state, wp
          implicit none (type, external)
          class(parameter_mover), intent(in) :: self
          class(balance_state), intent(inout) :: state
+         real(wp), intent(in) :: value
          real(wp), intent(in), contiguous :: x(:)
          real(wp), intent(out), contiguous :: dr(:)
+         complex(wp), intent(out), optional :: observed(:, :)
       end subroutine derive_by_value
    end interface
 
@@ -326,33 +339,51 @@ contains
       real(wp), intent(in) :: parameter
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. allocated(self%mover)) then
+      if (.not. allocated(self%moved%mover)) then
          call self%set_point(parameter, 0.0_wp, error)
          return
       end if
-      call move_by(self, parameter, error)
-      if (.not. allocated(error)) call self%set_point(self%frequency(), 0.0_wp, error)
+      call move(self, self%moved, parameter, error)
+      if (allocated(error)) return
+      call self%set_point(self%frequency(), 0.0_wp, error)
    end subroutine set_parameter
 
-   !> Let the mover do it, which is not a part of the state meanwhile.
-   subroutine move_by(self, value, error)
+   !> Bring the problem to a place on the path of a response whose load is found: a frequency, or a
+   !> value of the parameter that it goes along.
+   subroutine set_place(self, place, error)
       class(balance_state), intent(inout) :: self
+      real(wp), intent(in) :: place
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. allocated(self%along%mover)) then
+         call self%set_frequency(place, error)
+         return
+      end if
+      call move(self, self%along, place, error)
+      if (allocated(error)) return
+      call self%set_point(self%frequency(), 0.0_wp, error)
+   end subroutine set_place
+
+   !> Let a mover do it, which is no part of the state meanwhile.
+   subroutine move(self, parameter, value, error)
+      class(balance_state), intent(inout) :: self
+      type(moving_parameter), intent(inout) :: parameter
       real(wp), intent(in) :: value
       type(error_type), allocatable, intent(out) :: error
       class(parameter_mover), allocatable :: mover
 
-      call move_alloc(self%mover, mover)
+      call move_alloc(parameter%mover, mover)
       call mover%apply(self, value, error)
-      call move_alloc(mover, self%mover)
-      if (.not. allocated(error)) self%value = value
-   end subroutine move_by
+      call move_alloc(mover, parameter%mover)
+      if (.not. allocated(error)) parameter%value = value
+   end subroutine move
 
    !> Where `set_parameter` has brought it.
    pure real(wp) function parameter(self)
       class(balance_state), intent(in) :: self
 
       parameter = self%frequency()
-      if (allocated(self%mover)) parameter = self%value
+      if (allocated(self%moved%mover)) parameter = self%moved%value
    end function parameter
 
    !> Go to where another state of the case stands: its frequency, and its value of the parameter.
@@ -361,11 +392,15 @@ contains
       class(balance_state), intent(in) :: other
       type(error_type), allocatable, intent(out) :: error
 
-      if (allocated(self%mover) .and. allocated(other%mover)) then
-         call move_by(self, other%value, error)
+      if (allocated(self%along%mover) .and. allocated(other%along%mover)) then
+         call move(self, self%along, other%along%value, error)
          if (allocated(error)) return
-         if (self%problem%borrows_laws) call take_stiffness(self, other%problem)
       end if
+      if (allocated(self%moved%mover) .and. allocated(other%moved%mover)) then
+         call move(self, self%moved, other%moved%value, error)
+         if (allocated(error)) return
+      end if
+      if (self%problem%origin%borrows_laws) call take_stiffness(self, other%problem)
       call self%set_frequency(other%frequency(), error)
    end subroutine follow
 
@@ -432,12 +467,26 @@ contains
    !> What `set_load_factors` gave the vibratory loads.
    pure real(wp) function vibratory_factor(self) result(factor)
       class(balance_state), intent(in) :: self
+
+      factor = factor_of(self, .false.)
+   end function vibratory_factor
+
+   !> And the static ones; 1 where none are in the balance.
+   pure real(wp) function static_factor(self) result(factor)
+      class(balance_state), intent(in) :: self
+
+      factor = factor_of(self, .true.)
+   end function static_factor
+
+   pure real(wp) function factor_of(self, static) result(factor)
+      type(balance_state), intent(in) :: self
+      logical, intent(in) :: static
       integer :: h
 
       factor = 1.0_wp
-      h = findloc(self%problem%fourier%harmonic > 0, .true., dim=1)
+      h = findloc((self%problem%fourier%harmonic == 0) .eqv. static, .true., dim=1)
       if (h > 0) factor = self%structure_state%load_factor(h)
-   end function vibratory_factor
+   end function factor_of
 
    !> The factors of the loads of another state of the problem.
    subroutine take_loads(self, other)

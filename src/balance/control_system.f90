@@ -8,7 +8,8 @@
 !> quantity with what the load moves where the coordinates rest. As a curve in s cut by a plane that
 !> turns with the point: the border is dg, at the instant of the largest |u| for the latter.
 !> Single valued in the frequency where the response to a given load has folds; where it folds all
-!> the same, at internal resonances, it can be followed: its own parameter is the frequency.
+!> the same, at internal resonances, it can be followed: its own parameter is the place of the
+!> state, the frequency or the parameter that it goes along.
 module fw_control_system
    use fw_balance_state, only: balance_state
    use fw_complex_form, only: amplitudes_of
@@ -39,9 +40,10 @@ module fw_control_system
       real(wp) :: least_reference = 0.0_wp
       !> T (n_coordinates, n_retained), U_F and the static part (n_retained).
       complex(wp), allocatable, private :: row(:, :), by_load(:), constant(:)
-      !> U at the last point (n_retained), and the frequency that T is of [rad/s].
+      !> U at the last point (n_retained), and the place that T is of.
       complex(wp), allocatable :: motion(:)
-      real(wp), private :: omega = -1.0_wp
+      real(wp), private :: place = 0.0_wp
+      logical, private :: stands = .false.
       !> dg = sum of Re(weight dU) at the last linearized point (n_retained).
       complex(wp), allocatable, private :: weight(:)
    contains
@@ -49,6 +51,7 @@ module fw_control_system
       procedure :: take
       procedure :: set_parameter
       procedure :: parameter_derivative
+      procedure :: condition_slope
       procedure :: move
       procedure :: size_of_motion
       procedure :: conditions
@@ -77,17 +80,18 @@ contains
       end associate
    end subroutine new_control_system
 
-   !> Go to a frequency; the state stays at its load.
-   subroutine stand(self, omega, error)
+   !> Go to a place, a frequency or a value; the state stays at its load.
+   subroutine stand(self, place, error)
       class(control_system), intent(inout) :: self
-      real(wp), intent(in) :: omega
+      real(wp), intent(in) :: place
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: observed(:, :)
       real(wp) :: rest(self%state%n), scale
       integer :: h
 
-      if (abs(omega - self%omega) <= 0.0_wp) return
-      call self%state%set_frequency(omega, error)
+      if (self%stands .and. abs(place - self%place) <= 0.0_wp) return
+      self%stands = .false.
+      call self%state%set_place(place, error)
       if (allocated(error)) return
       associate (p => self%state%problem)
          allocate (observed(p%structure%n_observed, p%fourier%n_retained))
@@ -108,7 +112,9 @@ contains
          end if
          call self%state%set_parameter(scale, error)
       end associate
-      self%omega = omega
+      if (allocated(error)) return
+      self%place = place
+      self%stands = .true.
    end subroutine stand
 
    !> The further unknown is the load, in its unit.
@@ -122,7 +128,7 @@ contains
                                                               self%least_reference)
    end subroutine take
 
-   !> As a curve of its own: over the frequency.
+   !> As a curve of its own: over the place.
    subroutine set_parameter(self, parameter, error)
       class(control_system), intent(inout) :: self
       real(wp), intent(in) :: parameter
@@ -131,8 +137,8 @@ contains
       call self%stand(parameter, error)
    end subroutine set_parameter
 
-   !> By the frequency: dR/domega, and that of what is observed while the coordinates stay. The
-   !> load is that where the state stands.
+   !> By the place: dR/dplace, and that of what is observed while the coordinates stay. The load is
+   !> that where the state stands.
    subroutine parameter_derivative(self, x, dr)
       class(control_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
@@ -141,15 +147,30 @@ contains
       integer :: m, n
 
       n = self%state%n
-      call self%state%derivative_by(by_frequency, x(:n), dr(:n))
       associate (s => self%state%problem%structure, f => self%state%problem%fourier)
-         m = s%n_coordinates
-         allocate (q(m, f%n_retained), slope(s%n_observed, f%n_retained))
-         call amplitudes_of(f%harmonic, f%column, m, x(:n), m, q)
-         call s%observed_slope(self%state%structure_state, q, slope)
+         allocate (slope(s%n_observed, f%n_retained))
+         if (allocated(self%state%along%mover)) then
+            call self%state%along%mover%derive(self%state, self%state%along%value, x(:n), dr(:n), &
+                                               slope)
+         else
+            call self%state%derivative_by(by_frequency, x(:n), dr(:n))
+            m = s%n_coordinates
+            allocate (q(m, f%n_retained))
+            call amplitudes_of(f%harmonic, f%column, m, x(:n), m, q)
+            call s%observed_slope(self%state%structure_state, q, slope)
+         end if
       end associate
-      dr(n + 1) = sum(real(self%weight*slope(self%observed, :), wp))
+      dr(n + 1) = self%condition_slope(slope)
    end subroutine parameter_derivative
+
+   !> What a slope of the observed quantities at held unknowns (n_observed, n_retained) does to the
+   !> condition at the last linearized point.
+   pure real(wp) function condition_slope(self, observed) result(slope)
+      class(control_system), intent(in) :: self
+      complex(wp), intent(in) :: observed(:, :)
+
+      slope = sum(real(self%weight*observed(self%observed, :), wp))
+   end function condition_slope
 
    !> T by the transpose of the condensation, which is symmetric.
    subroutine find_row(self)

@@ -17,7 +17,7 @@ module fw_response_rows
 
    public :: response_row, new_rows, quantity_words, first_harmonic, largest, dissipation, &
              wear_volume, is_of_pairs
-   public :: value_words, resonance_omega, mode_omega, mode_damping_ratio
+   public :: value_words, resonance_omega, mode_omega, mode_damping_ratio, load_scale
 
    character(*), parameter :: quantity_words(*) = &
       [character(14) :: 'first_harmonic', 'largest', 'dissipation', 'wear_volume']
@@ -26,8 +26,9 @@ module fw_response_rows
    !> All numbers that are differentiated: behind those that are chosen stand those that come with
    !> an analysis, one for each point.
    character(*), parameter :: value_words(*) = &
-      [character(18) :: quantity_words, 'resonance_omega', 'mode_omega', 'mode_damping_ratio']
-   integer, parameter :: resonance_omega = 5, mode_omega = 6, mode_damping_ratio = 7
+      [character(18) :: quantity_words, 'resonance_omega', 'mode_omega', 'mode_damping_ratio', &
+       'load_scale']
+   integer, parameter :: resonance_omega = 5, mode_omega = 6, mode_damping_ratio = 7, load_scale = 8
 
    !> One number that is differentiated. What it does not depend on is not allocated.
    type :: response_row

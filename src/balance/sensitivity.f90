@@ -29,6 +29,8 @@ module fw_sensitivity
    private
 
    public :: sensitivity_finder, by_counts, by_direct, by_adjoint, change_of
+   ! For responses of given amplitude too.
+   public :: follow, held_change, pull_row
 
    !> How derivatives are found: by whichever way takes fewer solutions, or by one of the two.
    integer, parameter :: by_counts = 0, by_direct = 1, by_adjoint = 2

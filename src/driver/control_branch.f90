@@ -1,5 +1,5 @@
-!> Points of given amplitude along their branch over the frequency (group &control with
-!> continuation = 'arclength'): one branch after the other, one for each amplitude.
+!> Points of given amplitude along their branch over the frequency, or over another parameter (group
+!> &control with continuation = 'arclength'): one branch after the other, one for each amplitude.
 !>
 !> At a given amplitude the response has no folds of a resonance, but those of internal resonances
 !> are left, and the steps follow the curve: they are short where the load passes its minimum and
@@ -165,9 +165,13 @@ contains
       logical, intent(out) :: more
       type(error_type), allocatable, intent(out) :: error
       type(branch_point) :: here
+      type(point_request) :: at
       real(wp) :: unit
 
       here = found
+      at = request_at(self, case, observer, found%p)
+      ! There derivatives by parameters are none.
+      point%fold = found%fold
       associate (strategy => self%strategy, n => size(found%x) - 1)
          ! The strategy knows no unit.
          unit = strategy%control%load_unit
@@ -179,20 +183,18 @@ contains
          call strategy%turn_to_positive(here%report, error)
          more = here%report%converged
          if (more .and. .not. allocated(error)) then
-            call strategy%describe_point(case, request_at(self, case, observer, found%p), &
-                                         here%report, point, error)
+            call strategy%describe_point(case, at, here%report, point, error)
          end if
          strategy%control%load_unit = unit
       end associate
       if (allocated(error)) return
       if (.not. more) then
          self%is_short = .true.
-         call self%curve%end_early('the load vanishes at '//to_text(found%p)// &
-                                   ' rad/s: the structure vibrates by itself')
+         call self%curve%end_early('the load vanishes at '// &
+                                   trim(at%describe())//': the structure vibrates by itself')
          return
       end if
       point%served_by = served_by_arclength
-      point%fold = found%fold
       if (found%fold .and. (found%p - self%ends(1))*(found%p - self%ends(2)) <= 0.0_wp) then
          call self%folds%add(described_fold(found, point))
       end if
@@ -203,14 +205,14 @@ contains
    end subroutine add_point
 
    !> What is asked of the points of the branch at work.
-   function request_at(self, case, observer, omega) result(request)
+   function request_at(self, case, observer, place) result(request)
       class(control_branch), intent(in) :: self
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
-      real(wp), intent(in) :: omega
+      real(wp), intent(in) :: place
       type(point_request) :: request
 
-      request = new_request(case, omega, observer)
+      request = new_request(case, place, observer)
       request%amplitude = self%amplitude(self%k)
    end function request_at
 
@@ -232,15 +234,18 @@ contains
       type(branch_point), intent(in) :: found
       type(point_type), intent(inout) :: point
       type(error_type), allocatable, intent(out) :: error
-      !> Of the tangent, and what it may change of the frequency.
+      !> Of the tangent, and what it may change of the frequency or the parameter.
       real(wp), parameter :: longest = 1.0e-4_wp, difference = 1.0e-7_wp
       real(wp), allocatable :: beside(:, :)
-      real(wp) :: step, y(size(found%x)), z(1)
+      real(wp) :: most, step, y(size(found%x)), z(1)
       integer :: n, side
 
       n = size(found%x) - 1
       step = longest
-      if (abs(found%t_p)*step > difference*found%p) step = difference*found%p/abs(found%t_p)
+      most = difference*found%p
+      ! A parameter may be 0.
+      if (case%over%is_wanted()) most = difference*maxval(abs(self%ends))
+      if (abs(found%t_p)*step > most) step = most/abs(found%t_p)
       point%tangent_omega = found%t_p
       associate (control => self%strategy%control)
          do side = -1, 1, 2

@@ -16,7 +16,7 @@ contains
       real(wp) :: middle(2)
 
       ! Amplitudes by their ratio.
-      middle = [0.5_wp*(self%last%omega + omega), sqrt(self%last%amplitude*amplitude)]
+      middle = [0.5_wp*(self%last%place + place), sqrt(self%last%amplitude*amplitude)]
       call from_guesses(self, middle(1), middle(2), report, error)
       if (allocated(error) .or. report%interrupted) return
       if (.not. report%converged .and. depth < max_halvings) then
@@ -24,9 +24,9 @@ contains
          if (allocated(error) .or. report%interrupted) return
       end if
       if (.not. report%converged) return
-      call from_guesses(self, omega, amplitude, report, error)
+      call from_guesses(self, place, amplitude, report, error)
       if (allocated(error) .or. ends(report) .or. depth >= max_halvings) return
-      call approach(self, omega, amplitude, depth + 1, report, error)
+      call approach(self, place, amplitude, depth + 1, report, error)
    end procedure approach
 
    module procedure raise_amplitude
@@ -41,7 +41,7 @@ contains
       share = 0.0_wp
       step = smallest_start
       do
-         call from_guesses(self, omega, self%rest + min(1.0_wp, share + step)* &
+         call from_guesses(self, place, self%rest + min(1.0_wp, share + step)* &
                            (amplitude - self%rest), report, error)
          if (allocated(error) .or. report%interrupted) exit
          if (report%converged) then
@@ -73,7 +73,7 @@ contains
       largest = 0.0_wp
       do k = 1, most_secants
          self%control%of = of_first_harmonic
-         call from_guesses(self, omega, next, report, error)
+         call from_guesses(self, place, next, report, error)
          self%control%of = of
          if (allocated(error) .or. .not. report%converged) exit
          first = [first(2), next]
@@ -92,7 +92,7 @@ contains
       self%control%amplitude = amplitude
       if (.not. is_there) call attempt(self, report, error)
       if (allocated(error)) return
-      if (report%converged) call remember(self, omega, amplitude)
+      if (report%converged) call remember(self, place, amplitude)
    end procedure by_first_harmonic
 
    module procedure look_for_others
@@ -106,7 +106,7 @@ contains
          ! All stuck and all free: the two ends of what friction may do.
          do guess = 3, 4
             if (guess == self%guess .and. self%served_by /= served_by_smaller_steps) cycle
-            call make_guess(self, guess, omega, amplitude, is_there, error)
+            call make_guess(self, guess, request%place(), request%amplitude, is_there, error)
             if (allocated(error)) return
             if (.not. is_there) cycle
             call attempt(self, report, error)
@@ -115,8 +115,7 @@ contains
             if (.not. is_another) cycle
             self%n_others = self%n_others + 1
             if (self%n_others == 1) then
-               self%other_at%omega = omega
-               self%other_at%amplitude = amplitude
+               self%other_at = request
                self%other_loads = [min(s, self%y(size(found))), max(s, self%y(size(found)))]
             end if
             exit

@@ -29,6 +29,7 @@ module fw_controlled_response
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_run_state, only: run_state
+   use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution, only: solution_method
    use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request
@@ -45,7 +46,9 @@ module fw_controlled_response
    !> A solution to go on from.
    type :: known_point
       logical :: is_known = .false.
-      real(wp) :: omega = 0.0_wp, amplitude = 0.0_wp
+      !> The frequency, or the value of the parameter that the response goes along.
+      real(wp) :: place = 0.0_wp
+      real(wp) :: amplitude = 0.0_wp
       !> Unknowns of the balance, then the scale of the load.
       real(wp), allocatable :: y(:)
    end type known_point
@@ -56,6 +59,7 @@ module fw_controlled_response
       type(control_system) :: control
       type(solution_method) :: method
       type(stability_solver) :: stability
+      type(sensitivity_solver) :: sensitivity
       !> load%harmonic_scale of the case.
       real(wp) :: base = 1.0_wp
       !> Whether loads change their sign half a period later.
@@ -89,35 +93,35 @@ module fw_controlled_response
    ! Ways to a point that its guesses do not reach (fw_control_ways).
    interface
       !> First half of the way from the last point, which may take halves of its own, then the rest.
-      recursive module subroutine approach(self, omega, amplitude, depth, report, error)
+      recursive module subroutine approach(self, place, amplitude, depth, report, error)
          class(controlled_response), intent(inout) :: self
-         real(wp), intent(in) :: omega, amplitude
+         real(wp), intent(in) :: place, amplitude
          integer, intent(in) :: depth
          type(solver_report), intent(out) :: report
          type(error_type), allocatable, intent(out) :: error
       end subroutine approach
 
       !> From a small amplitude up, by steps that adapt.
-      module subroutine raise_amplitude(self, omega, amplitude, report, error)
+      module subroutine raise_amplitude(self, place, amplitude, report, error)
          class(controlled_response), intent(inout) :: self
-         real(wp), intent(in) :: omega, amplitude
+         real(wp), intent(in) :: place, amplitude
          type(solver_report), intent(out) :: report
          type(error_type), allocatable, intent(out) :: error
       end subroutine raise_amplitude
 
       !> The largest of a period has corners where another instant takes over, which the first
       !> harmonic has not: to where the one has the amplitude along the other, by secants.
-      module subroutine by_first_harmonic(self, omega, amplitude, report, error)
+      module subroutine by_first_harmonic(self, place, amplitude, report, error)
          class(controlled_response), intent(inout) :: self
-         real(wp), intent(in) :: omega, amplitude
+         real(wp), intent(in) :: place, amplitude
          type(solver_report), intent(out) :: report
          type(error_type), allocatable, intent(out) :: error
       end subroutine by_first_harmonic
 
       !> Whether other guesses lead to another load of the same amplitude; the solution stays.
-      module subroutine look_for_others(self, omega, amplitude, error)
+      module subroutine look_for_others(self, request, error)
          class(controlled_response), intent(inout) :: self
-         real(wp), intent(in) :: omega, amplitude
+         type(point_request), intent(in) :: request
          type(error_type), allocatable, intent(out) :: error
       end subroutine look_for_others
    end interface
@@ -193,11 +197,11 @@ contains
       self%control%interrupt => request%interrupt
       self%iterations = 0
       self%is_node = .false.
-      call reach(self, request%omega, request%amplitude, request%fallback, report, error)
+      call reach(self, request%place(), request%amplitude, request%fallback, report, error)
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return
       if (report%converged .and. request%fallback .and. may_have_others(self)) then
-         call look_for_others(self, request%omega, request%amplitude, error)
+         call look_for_others(self, request, error)
          if (allocated(error)) return
       end if
       call self%describe_point(case, request, report, point, error)
@@ -205,13 +209,13 @@ contains
       point%iterations = self%iterations
       if (report%converged) point%served_by = self%served_by
       if (.not. report%converged .and. self%rest >= request%amplitude) then
-         point%note = 'control: at omega = '//to_text(request%omega)//' rad/s static loads '// &
-                      'alone move '//case%model%observe_name(case%control%observed)%text//' by '// &
+         point%note = 'control: at '//trim(request%describe())//' static loads alone move '// &
+                      case%model%observe_name(case%control%observed)%text//' by '// &
                       to_text(self%rest)//', more than the amplitude '// &
                       to_text(request%amplitude)//'; give a larger one, or control%of = '// &
                       "'first_harmonic'"
       else if (self%is_node) then
-         point%note = 'control: at omega = '//to_text(request%omega)//' rad/s '// &
+         point%note = 'control: at '//trim(request%describe())//' '// &
                       case%model%observe_name(case%control%observed)%text//' rests under the '// &
                       'load (a node): no load gives it an amplitude; observe another place'
       end if
@@ -248,6 +252,10 @@ contains
       end if
       if (report%converged .and. request%stability) then
          call self%stability%find(case, self%system, self%y(:n), point, error)
+         if (allocated(error)) return
+      end if
+      if (report%converged .and. request%sensitivity) then
+         call self%sensitivity%find_controlled(case, self%control, self%y, point)
       end if
    end subroutine describe_point
 
@@ -264,33 +272,33 @@ contains
    end function may_have_others
 
    !> From what is known of the points before, then from linear solutions, then along a path.
-   subroutine reach(self, omega, amplitude, tries_all, report, error)
+   subroutine reach(self, place, amplitude, tries_all, report, error)
       class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: omega, amplitude
+      real(wp), intent(in) :: place, amplitude
       logical, intent(in) :: tries_all
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
 
       self%method%newton%linear%lu_left_out = .false.
-      call from_guesses(self, omega, amplitude, report, error)
+      call from_guesses(self, place, amplitude, report, error)
       if (allocated(error) .or. ends(report)) return
       if (.not. tries_all .or. self%is_node) return
       if (self%last%is_known) then
-         call approach(self, omega, amplitude, 1, report, error)
+         call approach(self, place, amplitude, 1, report, error)
          self%served_by = served_by_smaller_steps
          if (allocated(error) .or. ends(report)) return
       end if
-      call raise_amplitude(self, omega, amplitude, report, error)
+      call raise_amplitude(self, place, amplitude, report, error)
       self%served_by = served_by_raised_load
       if (allocated(error) .or. ends(report)) return
       if (self%control%of /= of_first_harmonic) then
-         call by_first_harmonic(self, omega, amplitude, report, error)
+         call by_first_harmonic(self, place, amplitude, report, error)
          self%served_by = served_by_smaller_steps
          if (allocated(error) .or. ends(report)) return
       end if
       if (.not. self%method%newton%linear%lu_left_out) return
       self%method%newton%linear%lu_follows = .true.
-      call from_guesses(self, omega, amplitude, report, error)
+      call from_guesses(self, place, amplitude, report, error)
       self%method%newton%linear%lu_follows = .false.
    end subroutine reach
 
@@ -302,19 +310,19 @@ contains
    end function ends
 
    !> Extrapolated, the nearest solution scaled, all stuck, all free.
-   subroutine from_guesses(self, omega, amplitude, report, error)
+   subroutine from_guesses(self, place, amplitude, report, error)
       class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: omega, amplitude
+      real(wp), intent(in) :: place, amplitude
       type(solver_report), intent(out) :: report
       type(error_type), allocatable, intent(out) :: error
       integer :: guess
       logical :: is_there
 
-      call self%control%stand(omega, error)
+      call self%control%stand(place, error)
       if (allocated(error)) return
       self%control%amplitude = amplitude
       do guess = 1, 4
-         call make_guess(self, guess, omega, amplitude, is_there, error)
+         call make_guess(self, guess, place, amplitude, is_there, error)
          if (allocated(error)) return
          if (.not. is_there) cycle
          call attempt(self, report, error)
@@ -322,17 +330,17 @@ contains
          if (ends(report)) exit
       end do
       if (.not. report%converged) return
-      call remember(self, omega, amplitude)
+      call remember(self, place, amplitude)
       self%guess = guess
       self%served_by = served_by_newton
       if (guess == 3 .and. self%before%is_known) self%served_by = served_by_other_guess
       if (guess == 4) self%served_by = served_by_free_guess
    end subroutine from_guesses
 
-   subroutine make_guess(self, guess, omega, amplitude, is_there, error)
+   subroutine make_guess(self, guess, place, amplitude, is_there, error)
       class(controlled_response), intent(inout) :: self
       integer, intent(in) :: guess
-      real(wp), intent(in) :: omega, amplitude
+      real(wp), intent(in) :: place, amplitude
       logical, intent(out) :: is_there
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: step
@@ -340,11 +348,11 @@ contains
       is_there = .true.
       select case (guess)
       case (1)
-         is_there = self%before%is_known .and. is_near(self%last, omega, amplitude)
-         if (is_there) is_there = is_near(self%before, omega, amplitude) .and. &
-                                  abs(self%last%omega - self%before%omega) > 0.0_wp
+         is_there = self%before%is_known .and. is_near(self%last, place, amplitude)
+         if (is_there) is_there = is_near(self%before, place, amplitude) .and. &
+                                  abs(self%last%place - self%before%place) > 0.0_wp
          if (.not. is_there) return
-         step = (omega - self%last%omega)/(self%last%omega - self%before%omega)
+         step = (place - self%last%place)/(self%last%place - self%before%place)
          ! Further than the points are apart, an extrapolation says nothing.
          is_there = abs(step) <= 2.0_wp
          self%y = self%last%y + step*(self%last%y - self%before%y)
@@ -352,7 +360,7 @@ contains
          is_there = self%last%is_known
          if (.not. is_there) return
          if (self%head%is_known .and. &
-             abs(self%head%omega - omega) < abs(self%last%omega - omega)) then
+             abs(self%head%place - place) < abs(self%last%place - place)) then
             call scale(self, self%head, amplitude)
          else
             call scale(self, self%last, amplitude)
@@ -367,12 +375,12 @@ contains
    end subroutine make_guess
 
    !> Whether a point is one of the same amplitude.
-   pure logical function is_near(point, omega, amplitude)
+   pure logical function is_near(point, place, amplitude)
       type(known_point), intent(in) :: point
-      real(wp), intent(in) :: omega, amplitude
+      real(wp), intent(in) :: place, amplitude
 
       is_near = point%is_known .and. abs(point%amplitude - amplitude) <= 0.0_wp .and. &
-                abs(point%omega - omega) > 0.0_wp
+                abs(point%place - place) > 0.0_wp
    end function is_near
 
    !> Another amplitude of a solution: its vibration and its load in proportion.
@@ -501,9 +509,9 @@ contains
    end subroutine turn_to_positive
 
    !> A solution for the guesses of the next points.
-   subroutine remember(self, omega, amplitude)
+   subroutine remember(self, place, amplitude)
       class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: omega, amplitude
+      real(wp), intent(in) :: place, amplitude
 
       if (self%last%is_known) then
          if (abs(self%last%amplitude - amplitude) > 0.0_wp) then
@@ -513,7 +521,7 @@ contains
       end if
       self%before = self%last
       self%last%is_known = .true.
-      self%last%omega = omega
+      self%last%place = place
       self%last%amplitude = amplitude
       self%last%y = self%y
       if (.not. self%head%is_known) self%head = self%last
@@ -526,10 +534,14 @@ contains
       type(run_state), intent(in) :: state
       type(summary_type), intent(inout) :: summary
       character(:), allocatable, intent(out) :: message
+      character(:), allocatable :: derivatives
 
       message = ''
       call summary%describe_work(self%system, self%method%newton%linear, case%solver%kind, &
                                  state%all_converged())
+      call self%sensitivity%describe(derivatives)
+      call summary%describe_sensitivity(derivatives)
+      call self%sensitivity%remark(case, self%system, summary%remarks)
       call self%remark(state%n_points, summary%remarks)
       if (state%was_stopped .or. state%all_converged()) return
       message = 'not converged: try smaller steps of frequency or amplitude, or more '// &
@@ -547,8 +559,8 @@ contains
       if (self%n_others == 0) return
       call remarks%add('several loads', 'at '//to_text(self%n_others)//' of '// &
                        to_text(n_points)//' points another load gives the same amplitude, as '// &
-                       'pairs stick or slip: at omega = '//to_text(self%other_at%omega)// &
-                       ' rad/s, amplitude '//to_text(self%other_at%amplitude)//', both '// &
+                       'pairs stick or slip: at '//trim(self%other_at%describe())// &
+                       ', amplitude '//to_text(self%other_at%amplitude)//', both '// &
                        to_text(self%other_loads(1))//' and '//to_text(self%other_loads(2))// &
                        "; follow the response over the load (sweep%parameter = "// &
                        "'load%harmonic_scale', continuation = 'arclength') to see which is meant")

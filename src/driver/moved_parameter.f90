@@ -116,9 +116,9 @@ contains
 
       associate (factor => self%values_at(value)/self%built)
          if (self%number == harmonic_scale) then
-            call state%set_load_factors(1.0_wp, factor(1))
+            call state%set_load_factors(state%static_factor(), factor(1))
          else if (self%number == static_scale) then
-            call state%set_load_factors(factor(1), 1.0_wp)
+            call state%set_load_factors(factor(1), state%vibratory_factor())
          else if (is_of_matrices(self%number)) then
             call move_structure(self%case, self%holds_eps, state, error)
          else
@@ -160,25 +160,28 @@ contains
    end subroutine renew_laws
 
    !> Of elements that move together the sum.
-   subroutine derive(self, state, x, dr)
+   subroutine derive(self, state, value, x, dr, observed)
       class(moved_parameter), intent(in) :: self
       class(balance_state), intent(inout) :: state
+      real(wp), intent(in) :: value
       real(wp), intent(in), contiguous :: x(:)
       real(wp), intent(out), contiguous :: dr(:)
+      complex(wp), intent(out), optional :: observed(:, :)
       type(slope_finder) :: finder
       type(parameter_slope) :: slope
       real(wp) :: rate
 
-      if (is_load(self%number)) then
+      if (is_load(self%number) .and. .not. present(observed)) then
          ! Its value may be 0.
          rate = merge(1.0_wp, 1.0_wp/self%base(1), self%by_factor)
          call state%derivative_by_loads(merge(rate, 0.0_wp, self%number == static_scale), &
                                         merge(rate, 0.0_wp, self%number == harmonic_scale), dr)
          return
       end if
-      call self%find_slope(finder, state, x, state%value, slope, &
-                           residual_only=.not. is_of_matrices(self%number))
+      call self%find_slope(finder, state, x, value, slope, residual_only= &
+                           .not. (is_of_matrices(self%number) .or. is_load(self%number)))
       dr = reshape(slope%residual, [size(dr)])
+      if (present(observed)) observed = slope%observed
    end subroutine derive
 
    !> Slope by the value or the factor that all elements share, at the motion x where the state was

@@ -75,15 +75,15 @@ contains
       logical :: scales
 
       associate (problem => state%problem)
-         scales = .not. (holds_eps .or. problem%borrows_laws)
+         scales = .not. (holds_eps .or. problem%origin%borrows_laws)
          if (scales) scales = take_balance(problem)
-         if (scales .or. .not. problem%keeps_all) then
+         if (scales .or. .not. problem%origin%keeps_all) then
             call take_structure(case, .false., problem, error)
             if (allocated(error)) return
          end if
          if (scales) call scale_laws(case, problem, error)
          if (allocated(error)) return
-         if (problem%keeps_all) call take_structure(case, .true., problem, error)
+         if (problem%origin%keeps_all) call take_structure(case, .true., problem, error)
          if (allocated(error)) return
       end associate
       call state%renew_workspaces()
@@ -108,11 +108,12 @@ contains
       allocate (plain)
       if (keeps_all) then
          call new_plain_structure(case%model, problem%joint%relative, problem%fourier%harmonic, &
-                                  problem%range, plain, error, keep_all=.true., &
-                                  held=problem%basis)
+                                  problem%origin%range, plain, error, keep_all=.true., &
+                                  held=problem%origin%basis)
       else
          call new_plain_structure(case%model, problem%joint%relative, problem%fourier%harmonic, &
-                                  problem%range, plain, error, keep_none=.not. problem%keeps_all)
+                                  problem%origin%range, plain, error, &
+                                  keep_none=.not. problem%origin%keeps_all)
       end if
       if (allocated(error)) return
       call move_alloc(plain, problem%structure)
@@ -127,7 +128,7 @@ contains
 
       call problem%structure%new_state(stand)
       call problem%structure%at(stand, case%sweep%start, 0.0_wp, error)
-      if (.not. allocated(error)) call problem%scale_forces(stand, problem%range(2))
+      if (.not. allocated(error)) call problem%scale_forces(stand, problem%origin%range(2))
    end subroutine scale_laws
 
 end module fw_moved_structure

@@ -125,7 +125,7 @@ contains
       self%work_limit = most_work*max(case%solver%max_iterations, least_counted)
       self%out_of_work = .false.
       system%interrupt => request%interrupt
-      if (allocated(system%mover)) call system%set_frequency(request%omega, error)
+      if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)
       if (allocated(error)) return
       tolerance = self%method%newton%options%tolerance
       self%method%newton%options%tolerance = max(tolerance, request%tolerance)

@@ -3,6 +3,7 @@ module fw_problem
    use fw_kinds, only: wp
    use fw_balance_problem, only: balance_problem
    use fw_balance_problem, only: new_balance_problem
+   use fw_balance_problem, only: problem_origin
    use fw_balance_state, only: balance_state
    use fw_balance_state, only: new_balance_state
    use fw_case, only: case_type
@@ -103,25 +104,33 @@ contains
    end subroutine build_system
 
    !> Give the state the parameter that the case goes over, and its first value; that of a given
-   !> amplitude is the load.
+   !> amplitude is the load, whatever the response goes along.
    subroutine let_move(case, system, error)
       type(case_type), intent(in) :: case
       type(balance_state), intent(inout) :: system
       type(error_type), allocatable, intent(out) :: error
-      type(moved_parameter), allocatable :: mover
+      type(moved_parameter), allocatable :: mover, load
 
-      if (.not. (case%over%is_wanted() .or. case%control%is_wanted())) return
-      allocate (mover)
       if (case%over%is_wanted()) then
+         allocate (mover)
          mover = new_moved_parameter(case, case%over%number, case%over%as == as_factor)
          ! Along a branch the residual is to have the slope that is known of it.
          mover%holds_eps = case%sweep%continuation == continuation_arclength
-      else
-         mover = new_moved_parameter(case, harmonic_scale, .false.)
       end if
-      call move_alloc(mover, system%mover)
-      call system%set_parameter(merge(case%over%start, case%model%harmonic_scale, &
-                                      case%over%is_wanted()), error)
+      if (case%control%is_wanted()) then
+         allocate (load)
+         load = new_moved_parameter(case, harmonic_scale, .false.)
+         call move_alloc(load, system%moved%mover)
+         if (allocated(mover)) then
+            call move_alloc(mover, system%along%mover)
+            call system%set_place(case%over%start, error)
+            if (allocated(error)) return
+         end if
+         call system%set_parameter(case%model%harmonic_scale, error)
+      else if (allocated(mover)) then
+         call move_alloc(mover, system%moved%mover)
+         call system%set_parameter(case%over%start, error)
+      end if
    end subroutine let_move
 
    !> What all workers share. The first state is made along the way: the stiffness of rigid laws
@@ -197,10 +206,8 @@ contains
       call structure%at(stand, case%sweep%start, 0.0_wp, error)
       if (allocated(error)) return
       call new_balance_problem(joint, structure, fourier, laws, case%contact%depth, problem)
-      problem%range = range
-      problem%keeps_all = keeps_all
-      if (basis%is_known()) problem%basis = basis
-      problem%borrows_laws = present(forces)
+      problem%origin = problem_origin(range=range, keeps_all=keeps_all, basis=basis, &
+                                      borrows_laws=present(forces))
       problem%load_size = norm2([case%model%load_cosine, case%model%load_sine])
       problem%reduced = case%solver%skips
       problem%solves_values = harmonics%method == method_hdhb

@@ -5,6 +5,8 @@ module fw_sensitivity_solver
    use, intrinsic :: ieee_arithmetic, only: ieee_value
    use fw_balance_state, only: balance_state
    use fw_case, only: case_type
+   use fw_control_sensitivity, only: find_control_slopes
+   use fw_control_system, only: control_system
    use fw_error, only: error_type
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_stuck
@@ -25,6 +27,7 @@ module fw_sensitivity_solver
    use fw_point, only: point_sensitivity
    use fw_point, only: point_type
    use fw_remarks, only: remark_list
+   use fw_response_rows, only: load_scale
    use fw_response_rows, only: mode_damping_ratio
    use fw_response_rows, only: mode_omega
    use fw_response_rows, only: resonance_omega
@@ -51,6 +54,7 @@ module fw_sensitivity_solver
    contains
       procedure :: find
       procedure :: find_mode
+      procedure :: find_controlled
       procedure :: renew
       procedure :: follow
       procedure :: describe
@@ -72,11 +76,21 @@ contains
       if (.not. self%is_started) call start(self, case)
       call self%finder%find(system%problem, system, x, done, error)
       if (allocated(error)) return
-      self%n_points = self%n_points + 1
       ! A located fold is singular but for round-off.
-      done = done .and. .not. point%fold
+      call take_point(self, case, system, done .and. .not. point%fold, point)
+   end subroutine find
+
+   !> Count a point with its derivatives, and lay them out. At a fold quantities have none: NaN, and
+   !> a remark.
+   subroutine take_point(self, case, system, done, point)
+      class(sensitivity_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(balance_state), intent(inout) :: system
+      logical, intent(in) :: done
+      type(point_type), intent(inout) :: point
+
+      self%n_points = self%n_points + 1
       if (.not. done) then
-         ! At a fold quantities have no derivative: NaN, and a remark.
          self%n_singular = self%n_singular + 1
          if (.not. allocated(self%finder%derivative)) then
             allocate (self%finder%derivative(size(self%finder%rows), size(self%finder%parameters)))
@@ -86,7 +100,27 @@ contains
       if (any(self%finder%rows%is_tied)) self%n_tied = self%n_tied + 1
       if (is_at_onset(case, system)) self%n_onset = self%n_onset + 1
       call lay_out(self, case, point)
-   end subroutine find
+   end subroutine take_point
+
+   !> The same for a response of given amplitude, with its load.
+   subroutine find_controlled(self, case, control, y, point)
+      class(sensitivity_solver), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      type(control_system), intent(inout) :: control
+      !> The solution, where the system stands.
+      real(wp), intent(in), contiguous :: y(:)
+      type(point_type), intent(inout) :: point
+      real(wp), allocatable :: load_by(:)
+      logical :: done
+
+      if (.not. self%is_started) call start(self, case)
+      allocate (load_by(size(self%finder%parameters)))
+      call find_control_slopes(control, y, self%finder, load_by, done)
+      done = done .and. .not. point%fold
+      if (.not. done) load_by = ieee_value(1.0_wp, ieee_quiet_nan)
+      call take_point(self, case, control%state, done, point)
+      call add_one(self, case, load_scale, point%load_scale, load_by, point)
+   end subroutine find_controlled
 
    !> The same for a nonlinear mode at a held amplitude, with its frequency and damping.
    subroutine find_mode(self, case, system, y, point)
@@ -102,16 +136,11 @@ contains
       if (.not. self%is_started) call start(self, case)
       allocate (omega_by(size(self%finder%parameters)), ratio_by(size(self%finder%parameters)))
       call find_mode_slopes(system, y, self%finder, omega_by, ratio_by, done)
-      self%n_points = self%n_points + 1
       if (.not. done) then
-         self%n_singular = self%n_singular + 1
-         self%finder%derivative = ieee_value(1.0_wp, ieee_quiet_nan)
          omega_by = ieee_value(1.0_wp, ieee_quiet_nan)
          ratio_by = omega_by
       end if
-      if (any(self%finder%rows%is_tied)) self%n_tied = self%n_tied + 1
-      if (is_at_onset(case, system%balance)) self%n_onset = self%n_onset + 1
-      call lay_out(self, case, point)
+      call take_point(self, case, system%balance, done, point)
       call add_one(self, case, mode_omega, point%omega, omega_by, point)
       associate (xi => system%frequency_unit*y(system%n))
          call add_one(self, case, mode_damping_ratio, 0.5_wp*xi/point%omega, ratio_by, point)

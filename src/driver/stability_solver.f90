@@ -21,6 +21,7 @@ module fw_stability_solver
    use fw_harmonics_options, only: parity_auto
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
+   use fw_model, only: model_type
    use fw_moved_parameter, only: moved_parameter
    use fw_newton, only: newton_solver
    use fw_newton, only: solver_report
@@ -110,18 +111,31 @@ contains
       logical, intent(in), optional :: halved
       logical, intent(out) :: marched
 
-      if (allocated(system%mover)) then
-         select type (mover => system%mover)
+      if (is_of_matrices(case%varied)) then
+         call floquet_multipliers(system, moved_model(system), x, multipliers, error, halved, &
+                                  marched)
+      else
+         call floquet_multipliers(system, case%model, x, multipliers, error, halved, marched)
+      end if
+   end subroutine find_multipliers
+
+   !> The model of the mover that changes it: that of the place, where the other is of the load.
+   function moved_model(system) result(model)
+      type(balance_state), intent(in) :: system
+      type(model_type) :: model
+
+      if (allocated(system%along%mover)) then
+         select type (mover => system%along%mover)
          type is (moved_parameter)
-            if (is_of_matrices(mover%number)) then
-               call floquet_multipliers(system, mover%case%model, x, multipliers, error, halved, &
-                                        marched)
-               return
-            end if
+            model = mover%case%model
+         end select
+      else
+         select type (mover => system%moved%mover)
+         type is (moved_parameter)
+            model = mover%case%model
          end select
       end if
-      call floquet_multipliers(system, case%model, x, multipliers, error, halved, marched)
-   end subroutine find_multipliers
+   end function moved_model
 
    !> The balance with twice the harmonics and no filter: what a filter does is an error, too.
    subroutine build(self, case, system, error)

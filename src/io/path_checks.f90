@@ -135,8 +135,11 @@ contains
       ! or for a load that the case gives.
       if (all(case%analysis /= [analysis_frf, analysis_point])) then
          with = "case%analysis: use 'frf' or 'point'"
-      else if (case%over%is_wanted()) then
-         with = 'sweep%parameter: the load is found for each amplitude; sweep frequencies'
+      else if (case%over%number == harmonic_scale) then
+         with = "sweep%parameter = 'load%harmonic_scale': the load is found for each "// &
+                'amplitude; sweep frequencies, or another parameter'
+      else if (case%over%number == static_scale .and. product(case%over%ends()) <= 0.0_wp) then
+         with = "sweep%parameter = 'load%static_scale' through 0: sweep on one side of it"
       else if (case%solver%kind /= solver_newton) then
          with = "solver%kind: use 'newton'"
       else if (case%solver%jacobian /= jacobian_analytic) then
@@ -149,8 +152,6 @@ contains
          with = 'harmonics%accuracy: give n_harmonics'
       else if (case%contact%memory == memory_carried .and. case%contact%n_pairs > 0) then
          with = "contact%memory = 'carried': use 'assembly'"
-      else if (case%sensitivity%is_wanted()) then
-         with = 'sensitivity%parameters: run the case at the loads that were found'
       else if (case%sweep%refine) then
          with = 'sweep%refine: no maxima are looked for'
       else if (case%output%tail > 0) then

@@ -12,8 +12,8 @@ module fw_read_sensitivity
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
    use fw_response_rows, only: dissipation, first_harmonic, is_of_pairs, largest, &
-                               mode_damping_ratio, mode_omega, quantity_words, resonance_omega, &
-                               wear_volume
+                               load_scale, mode_damping_ratio, mode_omega, quantity_words, &
+                               resonance_omega, wear_volume
    use fw_sensitivity_options, only: sensitivity_options
    use fw_solver_options, only: solver_newton
    use fw_text, only: lower_case, string_type
@@ -110,6 +110,7 @@ contains
          if (.not. options%is_wanted()) return
          options%has_harmonics = reader%given('harmonics', 'n_harmonics')
          if (case%analysis == analysis_resonance) options%further = [resonance_omega]
+         if (case%control%is_wanted()) options%further = [load_scale]
          if (case%analysis == analysis_mode) options%further = [mode_omega, mode_damping_ratio]
          if (size(options%quantities) > 0) return
          options%quantities = [first_harmonic, largest]
@@ -164,6 +165,11 @@ contains
             call fatal_error(error, asks//" = '"//trim(parameter_words(harmonic_scale))// &
                              "': no vibratory load acts on a nonlinear mode; leave it out", &
                              status_input)
+         else if (case%control%is_wanted() .and. .not. allocated(error) .and. &
+                  case%sensitivity%parameters(k) == harmonic_scale) then
+            call fatal_error(error, asks//" = '"//trim(parameter_words(harmonic_scale))// &
+                             "': the load is what control%amplitude finds; leave it out (its "// &
+                             'derivatives are those of load_scale)', status_input)
          end if
          if (.not. allocated(error)) call check_onset(case, case%sensitivity%parameters(k), error)
          if (allocated(error)) return

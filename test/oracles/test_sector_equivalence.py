@@ -5,6 +5,7 @@ import h5py
 import numpy as np
 import pytest
 import slow_balance as slow
+from cases import read, run
 from oracle_runs import run_case
 from project import ROOT
 
@@ -142,3 +143,43 @@ def test_sector_obeys_equilibrium_and_contact_law(tmp_path):
         assert defect < LAW, pair
         slipping += result.fraction[0, pair, 1] > 0.0
     assert slipping == 8
+
+
+def test_a_branch_of_a_given_amplitude(tmp_path):
+    """By arc length past the smallest load: under the loads that were found the sector moves so."""
+    groups = sector(harmonics={"n_time": 32})
+    groups["control"] = {"amplitude": [0.6]}
+    groups["sweep"].update(start=1021.5, end=1024.5, n_points=4, continuation="arclength")
+    run(tmp_path, groups)
+    branch = read(tmp_path / "case.h5")
+    assert branch["converged"].all()
+    scale, motion = branch["load/scale"], branch["coefficients"]
+    assert 0 < scale.argmin() < len(scale) - 1
+    assert np.hypot(*motion[:, 1:3, 0].T) == pytest.approx(np.full(len(scale), 0.6), rel=SAME)
+    for k in (scale.argmin(), len(scale) - 1):
+        alone = sector(harmonics={"n_time": 32})
+        alone["case"]["analysis"] = "point"
+        alone["load"]["harmonic_scale"] = float(scale[k])
+        alone["sweep"] = {"start": float(branch["omega"][k])}
+        found = run_case(tmp_path, alone)
+        size = np.abs(found.coefficients).max()
+        assert np.abs(found.coefficients[0] - motion[k]).max() < 1e-7 * size
+
+
+def test_speeds_are_sectors_of_their_own(tmp_path):
+    """Stiffness and static load of each speed, condensed again; rows are those of single runs."""
+    groups = sector(harmonics={"n_time": 32})
+    groups["case"]["analysis"] = "frf"
+    speeds = [SPEED, 0.7 * SPEED, 0.9 * SPEED]
+    groups["sweep"] = {"parameter": "model%rotation_speed", "frequency": 1022.0, "unit": "Hz",
+                       "values": speeds}
+    swept = run_case(tmp_path, groups)
+    assert swept.converged.all()
+    for k, speed in enumerate(speeds):
+        alone = sector(harmonics={"n_time": 32})
+        alone["case"]["analysis"] = "point"
+        alone["model"]["rotation_speed"] = speed
+        alone["sweep"] = {"start": 1022.0, "unit": "Hz"}
+        found = run_case(tmp_path, alone)
+        size = np.abs(found.coefficients).max()
+        assert np.abs(found.coefficients[0] - swept.coefficients[k]).max() < SAME * size
