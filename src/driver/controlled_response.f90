@@ -370,7 +370,7 @@ contains
          if (allocated(error)) return
          if (guess == 3) call stuck_guess(self%system, self%y(:self%system%n))
          if (guess == 4) call free_guess(self%system, self%y(:self%system%n))
-         call scale_linear(self, omega, amplitude, guess == 3, is_there)
+         call scale_linear(self, amplitude, guess == 3, is_there)
       end select
    end subroutine make_guess
 
@@ -406,9 +406,9 @@ contains
    end subroutine multiply_vibration
 
    !> The linear solution under the load of the case, scaled to the amplitude.
-   subroutine scale_linear(self, omega, amplitude, notes_rest, is_there)
+   subroutine scale_linear(self, amplitude, notes_rest, is_there)
       class(controlled_response), intent(inout) :: self
-      real(wp), intent(in) :: omega, amplitude
+      real(wp), intent(in) :: amplitude
       !> Keep its static part as that of the response.
       logical, intent(in) :: notes_rest
       !> False where what is observed rests.
@@ -429,7 +429,8 @@ contains
       vibration = self%control%size_of_motion()
       others = norm2(self%y(:n))
       is_there = vibration > at_rest*others .and. vibration > 0.0_wp .and. &
-                 vibration*(self%held_by + omega**2*self%carried) >= round_off*self%force
+                 vibration*(self%held_by + self%system%frequency()**2*self%carried) >= &
+                 round_off*self%force
       self%is_node = .not. is_there
       if (.not. is_there) return
       ! The largest of the period has the static part on top.
