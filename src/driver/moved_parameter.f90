@@ -204,8 +204,9 @@ contains
       call finder%prepare(state, x, residual_only)
       values = self%values_at(value)
       entry%number = self%number
-      if (is_of_matrices(self%number)) entry%change = &
-         findloc(self%case%model%changes%parameter, self%number, dim=1)
+      if (is_of_matrices(self%number)) then
+         entry%change = findloc(self%case%model%changes%parameter, self%number, dim=1)
+      end if
       do i = 1, size(values)
          entry%value = values(i)
          if (is_per_pair(self%number) .or. is_per_spring(self%number)) entry%element = i

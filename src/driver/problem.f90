@@ -99,8 +99,11 @@ contains
       end if
       if (allocated(error)) return
       call new_balance_state(problem, system, stand)
-      if (allocated(fullest)) call move_structure(case, .false., system, error)
-      if (.not. allocated(error)) call let_move(case, system, error)
+      if (allocated(fullest) .and. .not. case%over%is_wanted()) then
+         call move_structure(case, .false., system, error)
+         if (allocated(error)) return
+      end if
+      call let_move(case, system, error)
    end subroutine build_system
 
    !> Give the state the parameter that the case goes over, and its first value; that of a given
@@ -114,7 +117,10 @@ contains
       if (case%over%is_wanted()) then
          allocate (mover)
          mover = new_moved_parameter(case, case%over%number, case%over%as == as_factor)
-         ! Along a branch the residual is to have the slope that is known of it.
+         if (is_of_matrices(case%over%number)) call mover%apply(system, case%over%start, error)
+         if (allocated(error)) return
+         ! Along a branch the residual is to have the slope that is known of it: with the eps of the
+         ! first value.
          mover%holds_eps = case%sweep%continuation == continuation_arclength
       end if
       if (case%control%is_wanted()) then

@@ -17,6 +17,9 @@ module fw_remarks
    use fw_laws, only: law_under_accuracy
    use fw_laws, only: law_words
    use fw_laws, only: is_of_high_order
+   use fw_parameters, only: modal_damping
+   use fw_parameters, only: rayleigh_mass
+   use fw_parameters, only: rayleigh_stiffness
    use fw_peak, only: found_bound
    use fw_peak, only: found_unresolved
    use fw_peak, only: peak_type
@@ -112,6 +115,10 @@ contains
       type(case_type), intent(in) :: case
 
       is_undamped = .not. case%model%cyclic%is_cyclic
+      ! That of the case as it was read is none of the values of a sweep over it.
+      if (any(case%varied == [modal_damping, rayleigh_mass, rayleigh_stiffness])) then
+         is_undamped = .false.
+      end if
       if (is_undamped .and. allocated(case%model%damping)) then
          is_undamped = .not. any(abs(case%model%damping) > 0.0_wp)
       end if
