@@ -90,8 +90,8 @@ contains
       real(wp) :: span(2)
 
       span = [min(self%start, self%end), max(self%start, self%end)]
-      if (allocated(self%values)) span = [min(span(1), minval(self%values)), &
-                                          max(span(2), maxval(self%values))]
+      if (.not. allocated(self%values)) return
+      span = [min(span(1), minval(self%values)), max(span(2), maxval(self%values))]
    end function ends
 
    !> Whether values only rise or only fall.
