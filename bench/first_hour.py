@@ -2,8 +2,9 @@
 
     python -m bench.first_hour [--build build/release] [STEP ...]
 
-Prints the table of the document: elapsed time, and processor time of the step and of all that it
-starts, which is what it takes on a machine that does nothing else (less, where it uses two cores).
+Prints the table of the document, with elapsed times too. Processor time is that of the step and of
+all that it starts, which is what it takes on a machine that does nothing else (less, where it uses
+two cores).
 Steps whose packages are not there are left out. STEP: words of the first column.
 """
 

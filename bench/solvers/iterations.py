@@ -38,7 +38,7 @@ def write_iterations(images: Path, runs: dict[Solver, Run]) -> str:
         "## Iterations against frequency", "",
         f"The 50 frequencies of the table before, H = {N_HARMONICS}, {INSTANTS} instants, each "
         "point from the last one that converged (Newton, Powell and KINSOL: from the "
-        "extrapolation of the last two), `fallback = .false.`. Iterations are linear solutions; "
+        "extrapolation of those before), `fallback = .false.`. Iterations are linear solutions; "
         "Powell's are exact derivatives, between which it updates. Points that did "
         "not converge are crosses at the iterations that were spent.", "",
         *iterations_table(runs), "",
