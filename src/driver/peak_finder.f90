@@ -132,6 +132,10 @@ contains
       sample%row = self%n_rows
       ! In order, look_back decides of each row what of it is kept; in no order, all are kept.
       sample%is_needed = .not. self%in_order
+      ! The same solution once more, as in a list that names a frequency twice, is no neighbour.
+      if (.not. self%in_order) then
+         if (is_known(self%samples, sample)) return
+      end if
       call self%source%remember(sample%memory)
       call self%samples%insert(sample, place)
       self%n_following = self%n_following + 1
@@ -141,6 +145,24 @@ contains
          call self%samples%thin()
       end if
    end subroutine take
+
+   !> Whether a sample has the frequency and the amplitudes of one before.
+   pure logical function is_known(samples, sample)
+      type(sample_list), intent(in) :: samples
+      type(sample_type), intent(in) :: sample
+      !> Solutions of one point from two guesses, both within the tolerance.
+      real(wp), parameter :: same_amplitude = 1.0e-6_wp
+      integer :: k
+
+      is_known = .false.
+      do k = 1, samples%n
+         associate (other => samples%item(k)%at)
+            if (abs(other%omega - sample%omega) > same_frequency*sample%omega) cycle
+            is_known = is_known .or. all(abs(other%amplitude - sample%amplitude) <= &
+                                         same_amplitude*maxval(sample%amplitude))
+         end associate
+      end do
+   end function is_known
 
    !> Whether the last row and those before hide something; what is not needed is forgotten.
    subroutine look_back(self, place)

@@ -77,6 +77,9 @@ contains
       if (is_negative(stiffness)) call remarks%add('negative stiffness', &
          'the stiffness matrix is not positive: some deformation gives off energy, and nothing '// &
          'holds the structure where it is')
+      if (is_negative(case%model%mass)) call remarks%add('negative mass', &
+         'the mass matrix is not positive: some motion has negative kinetic energy, as of signs '// &
+         'or entries off the diagonal that are wrong; resonances are none of a structure then')
       if (is_negative(case%model%damping)) call remarks%add('negative damping', &
          'the damping matrix is not positive: some motion gains energy (flutter, where it is '// &
          'meant); a periodic response need not be the one that is seen')

@@ -5,7 +5,7 @@ import h5py
 import numpy as np
 import peak_family
 import pytest
-from cases import merged, run, write_namelist
+from cases import merged, read, run, write_namelist
 from limits import limit
 from project import PROGRAM
 
@@ -190,6 +190,21 @@ def test_a_peak_at_the_end_of_the_sweep_is_said(tmp_path):
     assert peak_family.reported(tmp_path / "case.h5")[1]
 
 
+def test_a_frequency_named_twice_is_no_maximum(tmp_path):
+    """Rows that repeat each other were neighbours of no width: maxima that are none, and none that
+    could be resolved."""
+    slider = merged(PLAIN, {"sweep": {"start": None, "end": None, "n_points": None}})
+    found = []
+    for name, values in (("once", [0.9, 1.0, 1.1, 0.8]),
+                         ("again", [0.9, 1.0, 1.0, 1.1, 0.8, 0.8, 1.0])):
+        run(tmp_path, merged(slider, {"sweep": {"frequencies": values}}), name=name)
+        found.append(read(tmp_path / f"{name}.h5"))
+        assert len(found[-1]["omega"]) == len(values)
+        assert remarks(tmp_path / f"{name}.h5") == []
+    for name in ("peak/omega", "peak/amplitude"):
+        assert found[1][name] == pytest.approx(found[0][name], rel=1e-4)
+
+
 #: A slider that nothing is wrong with, and a change to it with the remark that it draws.
 PLAIN = {"case": {"analysis": "frf"},
          "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.05},
@@ -198,6 +213,10 @@ PLAIN = {"case": {"analysis": "frf"},
          "load": {"cosine": 1.0}, "harmonics": {"n_harmonics": 3},
          "sweep": {"start": 0.5, "end": 1.5, "n_points": 11}}
 REMARKS = {"negative stiffness": {"model": {"stiffness": -1.0}},
+           "negative mass": {"model": {"n_dof": 2, "mass": [1.0, 2.0, 2.0, 1.0],
+                                       "stiffness": [2.0, -1.0, -1.0, 2.0],
+                                       "damping": [0.05, 0.0, 0.0, 0.05]},
+                             "load": {"cosine": [1.0, 0.0]}},
            "negative damping": {"model": {"damping": -0.05}},
            "high friction": {"contact": {"mu": 30.0}},
            "no load": {"load": {"cosine": 0.0}},
