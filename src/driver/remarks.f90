@@ -78,7 +78,7 @@ contains
          'the stiffness matrix is not positive: some deformation gives off energy, and nothing '// &
          'holds the structure where it is')
       if (is_negative(case%model%mass)) call remarks%add('negative mass', &
-         'the mass matrix is not positive: some motion has negative kinetic energy, as of signs '// &
+         'the mass matrix is not positive: motions have negative kinetic energy, as of signs '// &
          'or entries off the diagonal that are wrong; resonances are none of a structure then')
       if (is_negative(case%model%damping)) call remarks%add('negative damping', &
          'the damping matrix is not positive: some motion gains energy (flutter, where it is '// &
