@@ -39,6 +39,7 @@ COMMANDS = """## Measure
 | `python -m bench.speed.sectors` | sectors |
 | `python -m bench.speed.sector_modes` | modes |
 | `python -m bench.speed.imports` | imports |
+| `python -m bench.speed.patches` | patches |
 | `make bench-full` | all others |
 | `make compare OTHER=fw_run TIMES=9` | two builds side by side, on the screen |"""
 

@@ -40,12 +40,15 @@ module fw_augmented_system
       real(wp), allocatable, private :: columns(:, :)
       type(lu_type), private :: complement
       logical, private :: is_bordered = .false.
+      !> Whether the inner system offered what is nearly right when this one was made of it.
+      logical, private :: offers_nearly = .false.
       !> Scratch (n_extra), (inner%n).
       real(wp), allocatable, private :: unit(:), adjusted(:)
       !> The two parts of a vector (inner%n, 1), (n_extra, 1).
       real(wp), allocatable, private :: inner_part(:, :), extra_part(:, :)
    contains
       procedure :: augment
+      procedure :: offer_nearly
       procedure(bring_to_extra), deferred :: take
       procedure(evaluate_conditions), deferred :: conditions
       procedure(choose_linear), deferred :: choose
@@ -176,6 +179,7 @@ contains
       self%n = inner%n + n_extra
       self%reference = inner%reference
       self%reduced = inner%reduced
+      self%offers_nearly = inner%nearly
       self%nearly = inner%nearly
       self%interrupt => inner%interrupt
       if (allocated(self%unit)) deallocate (self%unit, self%adjusted, self%inner_part, &
@@ -298,6 +302,15 @@ contains
       call self%rows(vector(:k), vector(k + 1:), product(k + 1:))
       call self%add_columns(vector(k + 1:), product(:k))
    end subroutine apply
+
+   !> Take up again what is nearly right, after a solution that failed with it: who takes steps
+   !> says where another kind of problem begins.
+   subroutine offer_nearly(self)
+      class(augmented_system), intent(inout) :: self
+
+      self%nearly = self%offers_nearly
+      self%inner%nearly = self%offers_nearly
+   end subroutine offer_nearly
 
    !> The solution that asks for products is the one of this system: its precision, and whether it
    !> may rest on what is nearly right, hold inside as well.

@@ -120,6 +120,7 @@ contains
 
       self%base = base
       self%cycles = cycles
+      call self%offer_nearly()
    end subroutine begin_step
 
    !> Rates at the last point of the balance.
