@@ -61,9 +61,10 @@ module fw_wear_step
 
    !> Relative residual of the linear solution of a pseudo-time step, and the growth of the
    !> residual of the vibration above which such a step is corrected.
-   real(wp), parameter :: linear_tolerance = 1.0e-3_wp, largest_lag = 1.0e-2_wp
-   !> The same of a step of high order: above, its depths are not to be trusted.
-   real(wp), parameter :: farthest_lag = 0.3_wp
+   real(wp), parameter :: linear_tolerance = 1.0e-4_wp, largest_lag = 1.0e-2_wp
+   !> The same of a step of high order, whose stages mend what the solutions before them left; above
+   !> the lag its depths are not to be trusted.
+   real(wp), parameter :: stage_tolerance = 1.0e-3_wp, farthest_lag = 0.3_wp
    integer, parameter :: max_corrections = 5
    !> A pseudo-time step may exceed the growth of the depth that was aimed at by this factor.
    real(wp), parameter :: depth_allowance = 1.5_wp
@@ -297,7 +298,7 @@ contains
       logical :: done
 
       allocate (after%x(system%n))
-      call rosenbrock_step(system, self%newton%linear, linear_tolerance, before%x, cycles, &
+      call rosenbrock_step(system, self%newton%linear, stage_tolerance, before%x, cycles, &
                            after%x, report%error, report%iterations, done)
       if (.not. done) return
       call self%evaluate(system, after)
