@@ -75,5 +75,7 @@ def _range(case: Case, given: list[float] | None) -> tuple[float, float]:
         ends = sorted((float(values["sweep%start"][0]), float(values["sweep%end"][0])))
     except (KeyError, ValueError):
         return np.nan, np.nan
+    if ends[0] <= 0.0:  # one frequency, without an end
+        return np.nan, np.nan
     factor = _TURN if values.get("sweep%unit") == ["Hz"] else 1.0
     return factor * ends[0], factor * ends[1]

@@ -33,6 +33,13 @@ def test_command_marks_the_sweep(capsys: pytest.CaptureFixture[str]) -> None:
     assert "none of them" in capsys.readouterr().out
 
 
+def test_one_frequency_is_no_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    point = tmp_path / "point.nml"
+    point.write_text("&model n_dof = 1, mass = 1, stiffness = 1 / &sweep start = 1 /\n")
+    assert main(["modes", str(point)]) == 0
+    assert "sweep" not in capsys.readouterr().out
+
+
 def test_every_nodal_diameter_of_a_disk(capsys: pytest.CaptureFixture[str]) -> None:
     disk = ROOT / "example" / "shrouded_disk" / "wave.nml"
     assert main(["modes", str(disk), "-n", "2"]) == 0

@@ -391,3 +391,13 @@ def test_the_table_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                 tmp_path / "same.h5", "study")
     assert main(["plot", "same.h5"]) != 0
     assert "no number varies" in capsys.readouterr().err
+
+
+def test_held_amplitudes_are_curves_of_their_own() -> None:
+    """Nothing joins the end of one to the beginning of the next, and none has a peak."""
+    model = fretwear.Model([[1.0]], [[0.1]], [[1.0]], cosine=[1.0])
+    result = fretwear.frf(model, 0.5, 1.5, 3, control={"amplitude": [0.5, 1.0]})
+    axes = plot_response(result).axes[0]
+    heights = np.asarray(axes.lines[0].get_ydata(), dtype=float)
+    np.testing.assert_allclose(heights, [0.5, 0.5, 0.5, np.nan, 1.0, 1.0, 1.0], rtol=1e-6)
+    assert not axes.texts

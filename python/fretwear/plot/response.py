@@ -67,6 +67,8 @@ class Response:
         Kind, frequency [Hz] and amplitude of every place where it turns or its stability changes.
     parameter : str
         What the sweep goes over in place of the frequency; "" where it is the frequency.
+    held : (n_points,) or None
+        Amplitude that each point was to have, of runs with `&control`.
     """
 
     name: str
@@ -81,6 +83,12 @@ class Response:
     bifurcations: tuple[tuple[str, float, float], ...] = ()
     deviation: Floats | None = None
     parameter: str = ""
+    held: Floats | None = None
+
+    @property
+    def starts(self) -> NDArray[np.int_]:
+        """Points at which the curve for another amplitude of `&control` begins."""
+        return np.flatnonzero(np.diff(() if self.held is None else self.held)) + 1
 
     @property
     def axis(self) -> str:
@@ -132,7 +140,8 @@ def read_response(source: Source, observe: str | None = None) -> Response:
         None if over else _maximum(result, column),
         tuple((b.kind, b.frequency if b.parameter is None else b.parameter,
                float(b.amplitude[column])) for b in result.bifurcations),
-        _deviation(result, column), over)
+        _deviation(result, column), over,
+        result.control_amplitude if "control/amplitude" in result else None)
 
 
 def _deviation(result: Result, column: int) -> Floats | None:
@@ -220,6 +229,7 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
     doublings and other bifurcations have markers. With `sensitivity%deviation` a band shows the
     amplitude give or take its standard deviation. The lower panel shows stick, slip and open
     fractions, averaged over the pairs; along a branch that folds, against the number of the point.
+    Amplitudes held by `&control` have a curve each and no peak.
 
     Parameters
     ----------
@@ -244,7 +254,7 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
                                        height_ratios=(2.4, 1.0))
         _draw_states(lower, response)
     largest = _draw_amplitude(upper, response, stuck)
-    if response.converged.any():
+    if response.converged.any() and response.held is None:
         _annotate_peak(upper, response, stuck, modal_mass, largest)
     if not has_states or response.is_branch:
         upper.set_xlabel(response.axis)
@@ -263,7 +273,9 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
                           label="one standard deviation, to first order")
     unstable = (np.zeros(len(good), dtype=bool) if response.stable is None
                 else response.stable == 0)
-    axes.plot(response.frequency, np.where(unstable, np.nan, good), "-", marker=".",
+    # A gap between the curves of two amplitudes.
+    axes.plot(np.insert(response.frequency, response.starts, np.nan),
+              np.insert(np.where(unstable, np.nan, good), response.starts, np.nan), "-", marker=".",
               markersize=3.5, color=CURVE, linewidth=1.6, label=f"amplitude of {response.name}")
     if unstable.any():
         _draw_unstable(axes, response, good, unstable)
