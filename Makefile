@@ -137,8 +137,8 @@ bench-paper: build ## methods, iterations against frequency, aliasing
 bench-time: build ## harmonic balance against integration in time
 	PYTHONPATH=python $(PYTHON) -m bench.run time
 
-# Models that are not there yet are generated into build/bench first; 768 pairs and more take long.
-bench-scaling: build ## time and memory of a frequency, 16 to 1536 pairs, beside BEFORE=fw_run
+# Models that are not there yet are generated into build/bench first; 768 pairs take minutes.
+bench-scaling: build ## time and memory of a frequency, 16 to 768 pairs, beside BEFORE=fw_run
 	PYTHONPATH=python $(PYTHON) -m bench.run scaling $(if $(BEFORE),--before $(BEFORE))
 
 bench-limit: build ## where the time goes against its floor, and what is skipped

@@ -22,7 +22,7 @@ from bench.speed.small import SmallCase, measure_small
 
 __all__ = ["Measured", "Scaling", "Threads", "measure_scaling"]
 
-PAIRS = (16, 48, 96, 192, 384, 768, 1536)
+PAIRS = (16, 48, 96, 192, 384, 768)
 HARMONICS = (1, 3, 7, 17, 31)
 #: Most unknowns that are measured: beyond, a frequency takes minutes.
 MOST_UNKNOWNS = 41000

@@ -118,6 +118,15 @@ def test_explicit_steps_that_overshoot(tmp_path):
     assert b"steps too long" not in list(found.get("remarks/name", []))
 
 
+@pytest.mark.parametrize("steps", [{}, {"scheme": "pseudo_time"}], ids=["implicit", "pseudo-time"])
+def test_one_step_for_the_whole_wear(tmp_path, steps):
+    """What nothing estimates is not trusted without a word."""
+    case = scar(30, 4)
+    whole = marched(case).max()
+    found = worn(tmp_path, case, 7, max_depth_step=10.0 * whole, **steps)
+    assert b"steps too long" in list(found["remarks/name"])
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_random_scars(tmp_path, seed):
     """The first of the family that docs/robustness.md counts."""

@@ -168,12 +168,15 @@ def test_rotation_speed(tmp_path):
 
 
 def counts(folder, groups):
-    """Lines of the summary, and the seconds of the points."""
+    """Lines of the summary, and the seconds of the points behind the first.
+
+    The first pays for what is made once a run, and for memory that is touched first.
+    """
     write_namelist(folder / "case.nml", groups)
     done = subprocess.run([PROGRAM, "case.nml"], cwd=folder, text=True, capture_output=True,
                           check=True, env=PATIENT)
     with h5py.File(folder / "case.h5") as file:
-        return done.stdout, file["seconds"][()].sum()
+        return done.stdout, file["seconds"][1:].sum()
 
 
 def test_fifty_parameters_cost_less_than_a_solution_and_a_half(tmp_path):
@@ -190,8 +193,11 @@ def test_fifty_parameters_cost_less_than_a_solution_and_a_half(tmp_path):
     steps = int(re.search(r"iterations +(\d+)", text).group(1))
     # A step of Newton's method is a factorization (or a preconditioner and a few solutions).
     assert n_lu < 1.5 * steps and n_solutions < 1.5 * steps
-    without = {name: keys for name, keys in groups.items() if name != "sensitivity"}
-    pairs = [(counts(tmp_path, groups)[1], counts(tmp_path, without)[1]) for _ in range(7)]
+    # Far enough apart to take as many steps each as a point by itself.
+    several = merged(groups, {"case": {"analysis": "frf"},
+                              "sweep": {"start": 0.5, "end": 1.1, "n_points": 7}})
+    without = {name: keys for name, keys in several.items() if name != "sensitivity"}
+    pairs = [(counts(tmp_path, several)[1], counts(tmp_path, without)[1]) for _ in range(7)]
     with_them, alone = (min(times) for times in zip(*pairs, strict=True))
     assert with_them < 2.5 * alone
 

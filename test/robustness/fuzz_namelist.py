@@ -8,8 +8,8 @@ from fuzz_bases import namelists
 KEYS = {
     "case": ["title", "analysis", "threads", "max_seconds"],
     "sensitivity": ["parameters", "quantities", "deviation"],
-    "model": ["source", "file", "unit_system", "n_dof", "mass", "stiffness", "damping", "rayleigh_mass",
-              "rayleigh_stiffness", "modal_damping", "rotation_speed"],
+    "model": ["source", "file", "unit_system", "n_dof", "mass", "stiffness", "damping",
+              "rayleigh_mass", "rayleigh_stiffness", "modal_damping", "rotation_speed"],
     "cyclic": ["n_sectors", "engine_order", "mistuned", "n_modes", "n_interface", "left", "right"],
     "contact": ["n_pairs", "law", "side_1", "side_2", "sector_2", "mu", "gap", "area",
                 "normal_load", "tangential_stiffness", "normal_stiffness", "slip_speed",
