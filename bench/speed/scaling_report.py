@@ -82,7 +82,7 @@ def write_scaling(images: Path, found: Scaling) -> str:
         "Least-squares slopes of the logarithms over all sizes of a line; beside them the slope "
         "of one GMRES iteration, which is free of how many steps and iterations a size takes. "
         "Targets: linear in H, no worse than quadratic in the pairs, 1.7 up to 384.",
-        "", *exponents(rows), *reasons(rows), "",
+        "", *exponents(rows), "", *reasons(rows), "",
         "### Many harmonics against one", "", *over_harmonics(found.paper), "",
         *two_threads(found.threads),
         *write_small(found.small),
