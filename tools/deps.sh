@@ -106,11 +106,14 @@ stands_alone() {
       "$1/bin/python" -m pip --version >/dev/null 2>&1
 }
 
+# An environment that is active lends its packages to no other one.
+is_system() { python3 -c 'import sys; sys.exit(sys.prefix != sys.base_prefix)'; }
+
 # Where the interpreter has every module already nothing is downloaded; otherwise the environment
 # stands alone, because packages of two origins need not fit each other.
 if ! { [ -x "$venv/bin/python" ] && has_modules "$venv/bin/python"; }; then
    if ! stands_alone "$venv"; then rm -rf "$venv"; fi
-   if [ ! -d "$venv" ] && has_modules python3; then
+   if [ ! -d "$venv" ] && is_system && has_modules python3; then
       python3 -m venv --system-site-packages --without-pip "$venv"
    else
       if [ "$for_what" = run ]; then
