@@ -320,16 +320,18 @@ contains
    !> Whether the derivatives of the laws are larger than what processors keep at hand.
    pure logical function blocks_are_large(problem)
       type(balance_problem), intent(in) :: problem
-      integer :: k, n_numbers
+      ! Of thousands of pairs more than an integer holds.
+      real(wp) :: n_numbers
+      integer :: k
 
-      n_numbers = 0
+      n_numbers = 0.0_wp
       do k = 1, problem%forces%n_laws
          associate (law => problem%forces%entry(k)%law)
-            n_numbers = n_numbers + law%n_elements* &
-                        (law%n_components*problem%fourier%n_coefficients)**2
+            n_numbers = n_numbers + real(law%n_elements, wp)* &
+                        real(law%n_components*problem%fourier%n_coefficients, wp)**2
          end associate
       end do
-      blocks_are_large = n_numbers >= large_blocks
+      blocks_are_large = n_numbers >= real(large_blocks, wp)
    end function blocks_are_large
 
    !> Bring the problem to a value of the parameter that moves, at the present frequency, or to a
