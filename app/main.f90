@@ -100,7 +100,8 @@ contains
          return
       end if
       progress = new_progress(options%quiet, options%verbose, &
-                              in_hertz=case%sweep%unit == unit_hertz)
+                              in_hertz=case%sweep%unit == unit_hertz, &
+                              parameter_swept=case%over%number)
       call catch_interrupts()
       call run_case(case, progress, outcome, error)
       if (allocated(error)) return

@@ -6,6 +6,7 @@ module fw_progress
    use fw_kinds, only: pi
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
+   use fw_parameters, only: parameter_words
    use fw_point, only: point_type
    use fw_signals, only: was_interrupted
    use fw_text, only: to_text
@@ -31,6 +32,8 @@ module fw_progress
       integer :: shown = 0
       !> Whether frequencies are typed in Hz, and so shown.
       logical :: in_hertz = .false.
+      !> The parameter that is shown where a sweep goes over one; empty: the frequency.
+      character(:), allocatable :: parameter
       !> When the first point was begun.
       integer(i8) :: started = 0
       !> Point of the next line, where it is not known how many there will be.
@@ -59,16 +62,20 @@ module fw_progress
 
 contains
 
-   function new_progress(quiet, verbose, in_hertz) result(progress)
+   function new_progress(quiet, verbose, in_hertz, parameter_swept) result(progress)
       logical, intent(in) :: quiet, verbose
       !> Frequencies are to be shown in Hz.
       logical, intent(in) :: in_hertz
+      !> As in fw_parameters what the sweep goes over; 0: the frequency.
+      integer, intent(in) :: parameter_swept
       type(progress_type) :: progress
       integer(c_int), parameter :: standard_error = 2
 
       progress%quiet = quiet
       progress%verbose = verbose
       progress%in_hertz = in_hertz
+      progress%parameter = ''
+      if (parameter_swept > 0) progress%parameter = trim(parameter_words(parameter_swept))
       progress%draws_bar = c_isatty(standard_error) == 1
       if (verbose) progress%draws_bar = .false.
    end function new_progress
@@ -174,7 +181,7 @@ contains
              '/'//to_text(n_points)
    end function bar_text
 
-   !> Frequency and amplitude of a point; of wear the cycles and the largest depth.
+   !> Frequency, or parameter of a sweep, and amplitude of a point; of wear the cycles and the largest depth.
    function state_of(self, point) result(text)
       class(progress_type), intent(in) :: self
       type(point_type), intent(in) :: point
@@ -185,6 +192,8 @@ contains
          if (size(point%depth) > 0) then
             text = text//', depth '//number_text(rounded(maxval(point%depth)))
          end if
+      else if (len(self%parameter) > 0) then
+         text = ', '//self%parameter//' '//number_text(rounded(point%place))
       else if (self%in_hertz) then
          text = ', '//number_text(rounded(point%omega/(2.0_wp*pi)))//' Hz'
       else

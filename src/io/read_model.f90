@@ -74,7 +74,8 @@ contains
                             "'hdf5' or 'matrix_market', or remove file")
       end if
       call take_unit_system(reader, options, raw)
-      call read_matrices(reader, is_inline, n_dof, raw)
+      call read_matrices(reader, is_inline, n_dof, raw, needed=is_inline .and. &
+                         .not. allocated(options%file))
       call options%bind_additions(reader)
    end subroutine read_model
 
@@ -183,22 +184,24 @@ contains
    end subroutine read_in_trial
 
    !> The inline matrices, or the refusal of them beside a model file.
-   subroutine read_matrices(reader, is_inline, n_dof, raw)
+   subroutine read_matrices(reader, is_inline, n_dof, raw, needed)
       type(reader_type), intent(inout) :: reader
       logical, intent(in) :: is_inline
       !> Dofs of the model file on entry.
       integer, intent(inout) :: n_dof
       type(file_model_type), intent(inout) :: raw
+      !> Not beside a file whose source is missing: that is said, and is enough.
+      logical, intent(in) :: needed
       real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
       integer :: n_file
 
       n_file = n_dof
-      call bind_order(reader, n_dof, is_inline)
+      call bind_order(reader, n_dof, needed)
       if (.not. is_inline .and. n_dof /= n_file) then
          call reader%refuse('model', 'n_dof', '= '//to_text(n_dof)//': the model has '// &
                             to_text(n_file)//' dofs; remove n_dof')
       end if
-      call bind_matrices(reader, is_inline, mass, stiffness, damping)
+      call bind_matrices(reader, needed, mass, stiffness, damping)
       call take('mass', mass, raw%mass)
       call take('stiffness', stiffness, raw%stiffness)
       call take('damping', damping, raw%damping)

@@ -190,6 +190,22 @@ def test_bar_on_a_terminal(fw_run):
     assert "\r[" in shown and "3/3" in shown
 
 
+def test_progress_over_a_parameter_shows_it(fw_run):
+    fw_run.write("&model n_dof = 1 mass = 1 stiffness = 1 damping = 0.1 /\n&load cosine = 1 /\n"
+                 "&sweep parameter = 'load%harmonic_scale' start = 1 end = 2 n_points = 3 "
+                 "frequency = 0.5 /\n")
+    done = fw_run("case.nml")
+    assert done.returncode == 0, done.stderr
+    assert "point 2 of 3: load%harmonic_scale 1.5," in done.stderr
+
+
+def test_a_file_without_its_source_is_one_fault(fw_run):
+    fw_run.write("&model file = 'model.h5' /\n&sweep start = 1 end = 2 n_points = 3 /\n")
+    done = fw_run("case.nml")
+    assert done.returncode == 3
+    assert done.stderr.count("error") == 1 and "give source = " in done.stderr, done.stderr
+
+
 def test_status_of_a_run_that_does_not_converge(fw_run):
     done = fw_run("--set", "solver%max_iterations=1", "--set", "solver%tolerance=1e-300",
                   "--set", "solver%fallback=F", "case.nml")
