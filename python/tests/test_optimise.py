@@ -66,6 +66,16 @@ def test_where_all_sticks_the_load_changes_nothing() -> None:
     assert not flat.converged and "does not depend on the parameters" in flat.word
 
 
+@pytest.mark.parametrize("instants", [64, 256])
+def test_slopes_of_instants_are_doubted(instants: int) -> None:
+    """They jump where a switch passes an instant, without a corner of the response."""
+    case = jenkins(harmonics={"n_harmonics": 3, "n_time": instants, "sampling": "uniform"})
+    found = fw.optimise(case, minimise="max_amplitude", over="contact%normal_load",
+                        bounds=(0.05, 5.0), start=0.3)
+    assert not found.word.startswith("optimum at a corner:")
+    assert any(text.startswith("derivatives of instants") for text in found.remarks)
+
+
 def test_several_parameters() -> None:
     """Two that are at no bound: the slopes vanish, and neighbours are higher."""
     case = rubbing(sweep={"start": 0.9, "end": 2.2, "n_points": 53})

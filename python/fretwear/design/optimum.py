@@ -14,6 +14,7 @@ from ..errors import ConvergenceError, InputError
 from .objectives import Evaluation, Objective, new_objective
 from .one_parameter import descend
 from .parameters import Bounds, Unknowns, bound_pairs
+from .peak_values import OF_INSTANTS
 
 __all__ = ["Optimum", "as_case", "optimise", "several"]
 
@@ -251,6 +252,9 @@ class _Search:
             span = float(self._high[0] - self._low[0])
             descend(self._asked_one, float(scaled[0]), float(self._low[0]), float(self._high[0]),
                     min(_FIRST_STEP, 0.25 * span), self._tolerance)
+            if any(remark.startswith(OF_INSTANTS) for remark in self._best().found.remarks):
+                return ("optimum at a corner, or near one: contact is decided at instants, whose "
+                        "slopes leave out that switches move; sampling = 'events' tells which")
             return ("optimum at a corner: the slope jumps from one sign to the other, as where "
                     "another peak becomes the highest")
         # scipy's own tests are left to the last: they stop on the value, or wait for its noise.

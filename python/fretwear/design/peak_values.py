@@ -15,6 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from .._native import namelist_values
 from ..analyses import run
 from ..case import Case
 from ..errors import ConvergenceError
@@ -23,7 +24,7 @@ from ..result import Result
 from ..steps import Steps
 from .parameters import differentiated, has_parts
 
-__all__ = ["PeakValues", "peak_values"]
+__all__ = ["OF_INSTANTS", "PeakValues", "peak_values"]
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +39,8 @@ _TIED = 1e-3
 _MOST_WINDOWS = 12
 #: Rows from which the peak is come back to, and how near they have to be to the sweep's own.
 _APPROACH, _SAME = 4, 1e-5
+#: How the remark begins that slopes are those of contact at instants.
+OF_INSTANTS = "derivatives of instants"
 #: Residual of the solver, so that derivatives are good for an optimum to 1e-6.
 _TOLERANCE = 1e-11
 
@@ -97,7 +100,7 @@ def peak_values(case: Case, keys: Sequence[str], quantity: str, others: Sequence
     quantities = [quantity, *(other for other in others if other != "omega")]
     with Steps(differentiated(tight, keys, quantities)) as steps:
         solver = _Solver(steps, keys, quantities, column)
-        remarks = [*swept.remarks]
+        remarks = [*swept.remarks, *_doubts(swept)]
         windows = []
         for start, width in guesses:
             _approach(solver, swept, quantity, column, start)
@@ -109,6 +112,15 @@ def peak_values(case: Case, keys: Sequence[str], quantity: str, others: Sequence
     value, derivative = window.at_peak(quantity, keys, quantities)
     return PeakValues(value["omega"], value, derivative, swept.n_points + solver.solved,
                       tuple(remarks))
+
+
+def _doubts(swept: Result) -> list[str]:
+    """The remark that `&sensitivity` makes where contact is decided at instants."""
+    law = namelist_values(swept.namelist)["contact%law"]
+    if not swept.n_pairs or swept.attributes["sampling"] != "uniform" or law == ["regularised"]:
+        return []
+    return [f"{OF_INSTANTS}: contact is decided at instants, and slopes leave out that switches "
+            "move; take harmonics%sampling = 'events'"]
 
 
 def _tolerance(case: Case) -> float:
