@@ -46,7 +46,7 @@ HEADLINES = (
     Headline("17 harmonics against one, 16 pairs", "scaling",
              r"H = 1 takes \S+ ms, (\S+) times less \(target at most (\d+): (\w+); (\d+) in",
              "{0} times the time ({3} in the paper)", "at most {1}: {2}"),
-    Headline("Growth with the pairs, exponent at 768 pairs", "scaling",
+    Headline("Growth with the harmonics, exponent at 768 pairs", "scaling",
              r"\| 768 \| ([\d.]+) \| [^\n]*?\| 1: (\w+)", "{0}", "1: {1}"),
     Headline("Distance from the floor of what a sweep must compute", "limit",
              r"at most (\S+) times the floor; (\w+)(?: in (\d+ of \d+) cases, (\S+) times)?",

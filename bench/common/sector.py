@@ -14,7 +14,7 @@ from bench.common.oscillators import two_dof
 
 __all__ = ["COARSE", "FAST", "HARMONICS", "LARGEST_LU", "PAIRS", "THREADED", "Crossing",
            "PointTime", "Sweep", "ThreadTimes", "case", "measure_crossing", "measure_points",
-           "measure_sweeps", "measure_threads", "near_peak", "sector_file"]
+           "measure_sweeps", "measure_threads", "model_file", "near_peak", "sector_file"]
 
 HARMONICS = (1, 3, 7, 17)
 PAIRS = (16, 48)
@@ -164,6 +164,11 @@ def cross(bench: Bench, name: str, n_harmonics: int, groups: Groups) -> Crossing
     return Crossing(name, n_harmonics, left, times["lu"], times["krylov"])
 
 
+def model_file(pairs: int, folder: Path, coarse: Mapping[str, int] | None = None) -> Path:
+    """Where a generated model is kept."""
+    return folder / f"sector_{pairs}{'_coarse' if coarse else ''}.h5"
+
+
 def sector_file(pairs: int, folder: Path, coarse: Mapping[str, int] | None = None) -> Path:
     """The model with so many pairs, generated where it is no example.
 
@@ -172,7 +177,7 @@ def sector_file(pairs: int, folder: Path, coarse: Mapping[str, int] | None = Non
     example = ROOT / "example" / "blade_sector" / f"sector_{pairs}.h5"
     if example.exists() and not coarse:
         return example
-    path = folder / f"sector_{pairs}{'_coarse' if coarse else ''}.h5"
+    path = model_file(pairs, folder, coarse)
     if not path.exists():
         options = [f"--{key}={value}" for key, value in (coarse or {}).items()]
         subprocess.run([sys.executable, "-m", "fretwear.sector", "--pairs", str(pairs), "-q",

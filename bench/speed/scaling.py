@@ -17,12 +17,14 @@ import numpy as np
 from scipy.linalg import eigh
 
 from bench.common.measure import Bench, Cost, Groups, Run
-from bench.common.sector import COARSE, FAST, case, sector_file
+from bench.common.sector import COARSE, FAST, case, model_file, sector_file
 from bench.speed.small import SmallCase, measure_small
 
 __all__ = ["Measured", "Scaling", "Threads", "measure_scaling"]
 
 PAIRS = (16, 48, 96, 192, 384, 768)
+#: Measured as well where its model is there: generating it takes half an hour.
+MORE_PAIRS = 1536
 HARMONICS = (1, 3, 7, 17, 31)
 #: Most unknowns that are measured: beyond, a frequency takes minutes.
 MOST_UNKNOWNS = 41000
@@ -98,7 +100,7 @@ class Scaling:
 def measure_scaling(bench: Bench, step: Callable[[str], None], other: Bench | None = None
                     ) -> Scaling:
     """All of it; the other program, where there is one, up to OTHER_HARMONICS harmonics."""
-    sizes = PAIRS[:2] if bench.quick else PAIRS
+    sizes = PAIRS[:2] if bench.quick else sizes_there(bench.folder)
     rows = []
     for pairs in sizes:
         step(f"{pairs} pairs")
@@ -110,6 +112,11 @@ def measure_scaling(bench: Bench, step: Callable[[str], None], other: Bench | No
     threads = measure_two_threads(bench)
     step("a small case")
     return Scaling(rows, paper, threads, measure_small(bench, other))
+
+
+def sizes_there(folder: Path) -> tuple[int, ...]:
+    """All sizes, the largest one where its model has been generated."""
+    return PAIRS + ((MORE_PAIRS,) if model_file(MORE_PAIRS, folder, COARSE).exists() else ())
 
 
 def measure_two_threads(bench: Bench) -> list[Threads]:

@@ -16,6 +16,7 @@ from bench.common.sector import COARSE
 from bench.speed.scaling import (
     FEWEST_POINTS,
     HARMONICS,
+    MORE_PAIRS,
     MOST_POINTS,
     MOST_UNKNOWNS,
     N_TIME,
@@ -61,8 +62,9 @@ def write_scaling(images: Path, found: Scaling) -> str:
         f"tip force 0.5 N, `n_time = {N_TIME}`, `linear = 'krylov'`, one thread; {MOST_POINTS} "
         f"frequencies around the peak, {SPACING:g} Hz apart ({FEWEST_POINTS} above {SMALL} "
         f"unknowns). Sizes of more than {MOST_UNKNOWNS} unknowns are left out: a frequency takes "
-        "minutes. Steps, iterations and times are means of a frequency, times in processor "
-        "seconds without the first frequency, which starts from the linear solution; "
+        f"minutes; {MORE_PAIRS} pairs are measured where their model has been generated. Steps, "
+        "iterations and times are means of a frequency, times in processor seconds without the "
+        "first frequency, which starts from the linear solution; "
         f"up to {SMALL} unknowns medians of {REPEATS} runs. "
         "Set-up is everything that is done once: reading the model, modes, room. Memory is "
         "the peak of the process; a real matrix of the order of the unknowns would take the "
