@@ -45,6 +45,8 @@ Progress = Callable[[str, int, int], None]
 
 # Right-hand sides treated at once: fine flanks have thousands, each as long as the full model.
 _BLOCK = 64
+# Columns or rows of dense products: few, and the basis would come from memory for each few.
+_WIDE = 512
 # A pivot that elimination leaves at this share of its diagonal entry is round-off.
 _SINGULAR = 1e-12
 # Relative displacements of which so little is their own are combinations of the others.
@@ -55,9 +57,9 @@ _ATTACHED = 1e-12
 _KAPPA_RATIO = 1e3
 
 
-def _blocks(n: int) -> list[slice]:
+def _blocks(n: int, width: int = _BLOCK) -> list[slice]:
     """Consecutive blocks of n columns."""
-    return [slice(k, min(k + _BLOCK, n)) for k in range(0, n, _BLOCK)]
+    return [slice(k, min(k + width, n)) for k in range(0, n, width)]
 
 
 class Bonded:
@@ -113,8 +115,10 @@ class Bonded:
         _check_independent(self._compliance)
         self._inverse = la.cho_factor(self._compliance)
         # In place: two arrays of this size would be most of the memory.
-        for rows in _blocks(len(flexible)):
-            flexible[rows] = la.cho_solve(self._inverse, flexible[rows].conj().T).conj().T
+        for rows in _blocks(len(flexible), _WIDE):
+            # Without the test for NaN, which reads the whole factor for every block.
+            flexible[rows] = la.cho_solve(self._inverse, flexible[rows].conj().T,
+                                          check_finite=False).conj().T
         self.constraint_modes: Floats = flexible
 
     def contact_stiffness(self) -> Floats:
@@ -188,9 +192,12 @@ class Reduction:
     def matrix(self, full: Matrix) -> Floats:
         """T^T A T of a symmetric matrix (n, n), symmetric to the last bit."""
         product = np.empty((self.basis.shape[1],) * 2, dtype=self.basis.dtype)
-        for block in _blocks(len(product)):
-            product[:, block] = self.basis.conj().T @ (full @ self.basis[:, block])
-        return 0.5 * (product + product.conj().T)
+        for block in _blocks(len(product), _WIDE):
+            below = slice(block.start, None)
+            product[below, block] = self.basis[:, below].conj().T @ (full @ self.basis[:, block])
+            product[block, block] = 0.5 * (product[block, block] + product[block, block].conj().T)
+            product[block, below] = product[below, block].conj().T
+        return product
 
     def load(self, full: Floats) -> Floats:
         """T^T f of loads (n,) or (n, k)."""
