@@ -77,6 +77,9 @@ class Bonded:
         stiffness itself, or digits are lost in S^-1 - kappa I.
     progress : callable, optional
         Told how far the work is.
+    spare : int
+        Columns kept free behind the shapes, so that modes and attachment vectors join them
+        without a copy of it all.
 
     Attributes
     ----------
@@ -91,14 +94,17 @@ class Bonded:
     """
 
     def __init__(self, stiffness: sp.csr_array, contact: sp.csr_array, kappa: float,
-                 progress: Progress | None = None) -> None:
+                 progress: Progress | None = None, spare: int = 0) -> None:
         self.stiffness, self.contact, self.kappa = stiffness, contact, kappa
         augmented = sp.csc_matrix(stiffness + kappa * (contact.conj().T @ contact))
-        _check_memory(len(augmented.indptr) - 1, contact.shape[0], augmented.dtype.itemsize)
+        n = len(augmented.indptr) - 1
+        _check_memory(n, contact.shape[0], augmented.dtype.itemsize * (1 if spare else 2))
         if progress:
             progress("factors", 0, 1)
         self._factors = _factor(augmented)
-        flexible = np.empty(contact.shape[::-1], dtype=augmented.dtype, order="F")
+        room = np.empty((n, contact.shape[0] + spare), dtype=augmented.dtype, order="F")
+        self._room: Floats | None = room if spare else None
+        flexible = room[:, :contact.shape[0]]
         blocks = _blocks(contact.shape[0])
 
         def answer(block: slice) -> None:
@@ -114,7 +120,7 @@ class Bonded:
         self._compliance = 0.5 * (compliance + compliance.conj().T)
         _check_independent(self._compliance)
         self._inverse = la.cho_factor(self._compliance)
-        # In place: two arrays of this size would be most of the memory.
+        # In place: another array of this size would be most of the memory.
         for rows in _blocks(len(flexible), _WIDE):
             # Without the test for NaN, which reads the whole factor for every block.
             flexible[rows] = la.cho_solve(self._inverse, flexible[rows].conj().T,
@@ -126,6 +132,16 @@ class Bonded:
         n = self.contact.shape[0]
         inverse = la.cho_solve(self._inverse, np.eye(n))
         return 0.5 * (inverse + inverse.conj().T) - self.kappa * np.eye(n)
+
+    def shapes_with(self, *others: Floats) -> Floats:
+        """The shapes with other columns (n, k) behind them, the first time in the spare ones."""
+        columns = np.hstack(others)
+        last = self.contact.shape[0] + columns.shape[1]
+        if self._room is None or last > self._room.shape[1] or columns.dtype != self._room.dtype:
+            return np.hstack((self.constraint_modes, columns))
+        room, self._room = self._room, None
+        room[:, self.contact.shape[0]:last] = columns
+        return room[:, :last]
 
     def solve(self, load: Floats) -> Floats:
         """Static displacement of the bonded structure under loads (n,) or (n, k)."""
@@ -255,7 +271,7 @@ def bonded_basis(bonded: Bonded, mass: sp.csr_array, loads: Floats, n_modes: int
     rest, diagonal = _attachments(bonded, mass, loads, shapes)
     stiffness = la.block_diag(bonded.contact_stiffness(),
                               np.diag(np.concatenate((omega**2, diagonal))))
-    return Reduction(np.hstack((bonded.constraint_modes, shapes, rest)), stiffness, omega)
+    return Reduction(bonded.shapes_with(shapes, rest), stiffness, omega)
 
 
 def reduce(mass: Matrix, stiffness: Matrix, contact: Matrix, *, damping: Matrix | None = None,
@@ -307,7 +323,7 @@ def reduce(mass: Matrix, stiffness: Matrix, contact: Matrix, *, damping: Matrix 
     forces = _columns(loads, n, "loads")
     attached = forces if attachments is None else _columns(attachments, n, "attachments")
     if bonded is None:
-        bonded = _bonded(stiff, rows, kappa, progress)
+        bonded = _bonded(stiff, rows, kappa, progress, n_modes + attached.shape[1])
     reduction = bonded_basis(bonded, masses, attached, n_modes)
     return ReducedSystem(
         reduction.matrix(masses), reduction.stiffness,
@@ -352,25 +368,26 @@ def _gram(vectors: Floats, matrix: sp.csr_array) -> Floats:
 
 
 def _bonded(stiffness: sp.csr_array, contact: sp.csr_array, kappa: float | None,
-            progress: Progress | None) -> Bonded:
+            progress: Progress | None, spare: int) -> Bonded:
     """Factored structure; kappa is improved once where the guess costs digits."""
     if kappa is not None:
-        return Bonded(stiffness, contact, kappa, progress)
+        return Bonded(stiffness, contact, kappa, progress, spare)
     # Stiffness that the rows meet when nothing else moves: of the order of the contact stiffness,
     # and above it.
     size, met = (np.asarray(contact.conj().multiply(rows).sum(axis=1)).ravel().real
                  for rows in (contact, contact @ stiffness))
     guess = float(np.median(met / size**2))
-    bonded = Bonded(stiffness, contact, guess, progress)
+    bonded = Bonded(stiffness, contact, guess, progress, spare)
     found = float(np.median(np.diag(bonded.contact_stiffness()).real))
     if 0.0 < found < guess / _KAPPA_RATIO:
-        return Bonded(stiffness, contact, found, progress)
+        del bonded  # as large as the next one
+        return Bonded(stiffness, contact, found, progress, spare)
     return bonded
 
 
 def _check_memory(n: int, n_contact: int, size: int) -> None:
-    """Refuse what cannot be held: the shapes once, and the basis that they are copied into."""
-    needed, there = 2.0 * n * n_contact * size, _memory()
+    """Refuse what cannot be held, `size` bytes for each number of the shapes."""
+    needed, there = float(n) * n_contact * size, _memory()
     if needed > there:
         raise InputError(f"{n_contact} contact coordinates of {n} degrees of freedom need "
                          f"{needed / 1e9:.1f} GB, and this machine has {there / 1e9:.1f} GB; take "

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from fretwear._progress import stages
 from fretwear.errors import InputError
-from fretwear.reduction import ReducedSystem, reduce
+from fretwear.reduction import Bonded, ReducedSystem, reduce
 
 # Dense algebra with the full stiffness: round-off times its condition number of some 1e4.
 ROUND_OFF = 1e-9
@@ -99,6 +99,18 @@ def test_dense_and_sparse_matrices_and_any_kappa_give_the_same(loads: np.ndarray
             scale = np.abs(getattr(reference, name)).max()
             assert getattr(other, name) == pytest.approx(getattr(reference, name),
                                                          abs=KAPPA * scale)
+
+
+def test_a_factored_structure_serves_twice(loads: np.ndarray) -> None:
+    """Columns kept behind the shapes are one basis's; the next one has columns of its own."""
+    k, _, rows = two_bodies()
+    bonded = Bonded(sp.csr_array(k), sp.csr_array(rows), 3e3, spare=N_MODES + 2)
+    first = reduced(loads, bonded=bonded)
+    kept = first.reduction.basis.copy()
+    fewer = reduced(loads[:, :1], bonded=bonded)
+    assert np.array_equal(first.reduction.basis, kept)
+    assert fewer.reduction.basis[:, :-1] == pytest.approx(kept[:, :fewer.mass.shape[0] - 1],
+                                                         abs=ROUND_OFF)
 
 
 def test_soft_joint_of_stiff_parts_keeps_its_digits() -> None:

@@ -147,7 +147,8 @@ def build_full(parameters: SectorParameters, progress: Progress | None = None) -
         stiffness = sp.csr_array(stiffness + parameters.retention.retention * (lock.T @ lock))
     # The stiffness of an elastic half-space under a patch is of this order.
     kappa = parameters.material.young * np.sqrt(rows.area.mean())
-    bonded = Bonded(stiffness, contact, kappa, progress)
+    # One attachment vector: that of the tip.
+    bonded = Bonded(stiffness, contact, kappa, progress, parameters.discretisation.n_modes + 1)
     in_plane = np.array([1.0, 1.0, 0.0])
     centrifugal = ((scalar_mass @ assembly.nodes.T) * in_plane).ravel()[free]
     static = np.zeros(3 * assembly.n_nodes)
