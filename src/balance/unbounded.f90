@@ -24,6 +24,11 @@ contains
       integer :: h, k, m
 
       m = system%problem%structure%n_coordinates
+      ! Most solutions are so far from it that the norms of the matrices tell.
+      lost = .false.
+      if (allocated(system%problem%structure%norms)) then
+         if (epsilon(1.0_wp)*largest_cancelling(system, m, x) <= limit*system%reference) return
+      end if
       square = 0.0_wp
       do h = 1, system%problem%fourier%n_retained
          if (system%problem%fourier%harmonic(h) == 0) cycle
@@ -32,6 +37,26 @@ contains
       end do
       lost = .not. epsilon(1.0_wp)*sqrt(square) <= limit*system%reference
    end function is_lost_in_round_off
+
+   !> A bound of the same sum: |A q| <= |A| |q| with the Frobenius norms of K and M.
+   pure real(wp) function largest_cancelling(system, m, x) result(bound)
+      type(balance_state), intent(in) :: system
+      integer, intent(in) :: m
+      real(wp), intent(in) :: x(m, *)
+      integer :: h, k, n
+
+      bound = 0.0_wp
+      associate (structure => system%problem%structure, state => system%structure_state)
+         do h = 1, size(structure%harmonic)
+            n = structure%harmonic(h)
+            if (n == 0) cycle
+            k = structure%column(h)
+            bound = hypot(bound, norm2(x(:, k:k + 1))*(structure%norms(1, h) + &
+                                 n*abs(cmplx(n*state%omega**2, state%omega*state%self_excitation, &
+                                             wp))*structure%norms(2, h)))
+         end do
+      end associate
+   end function largest_cancelling
 
    !> Square of the norm of (|K| + (n omega)^2 |M|) |q| for one harmonic.
    pure real(wp) function cancelling(system, h, cosine, sine) result(square)

@@ -15,11 +15,29 @@ contains
       self%n_observed = self%n_alike*size(model%observe_matrix, 1)
       call find_bases(model, relative, omega_range, self, error)
       if (allocated(error)) return
+      call find_norms(self)
       call self%means%take(model, relative, means, error)
       if (allocated(error)) return
       call self%ring%plan(self%n_slots, self%n_alike)
       call self%observed_ring%plan(size(model%observe_matrix, 1), self%n_alike)
    end procedure new_all_sectors
+
+   !> Norms of K and M, of which `magnitudes` takes the largest of each entry over the nodal
+   !> diameters: no larger than all of them together.
+   pure subroutine find_norms(self)
+      type(all_sectors), intent(inout) :: self
+      real(wp) :: squares(2)
+      integer :: h, k
+
+      squares = 0.0_wp
+      do k = 1, size(self%basis)
+         squares = squares + self%basis(k)%norms()**2
+      end do
+      allocate (self%norms(2, size(self%harmonic)))
+      do h = 1, size(self%harmonic)
+         self%norms(:, h) = sqrt(squares)
+      end do
+   end subroutine find_norms
 
    !> A basis for each nodal diameter, with coordinates at places that all share.
    subroutine find_bases(model, relative, omega_range, self, error)

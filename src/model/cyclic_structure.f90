@@ -101,8 +101,20 @@ contains
       self%n_observed = size(model%observe_matrix, 1)
       call find_bases(model, relative, omega_range, keeps_first, self, error)
       if (allocated(error)) return
+      call find_norms(self)
       call self%means%take(model, relative, means, error)
    end subroutine new_cyclic_structure
+
+   !> Norms of K and M of the harmonics.
+   pure subroutine find_norms(self)
+      type(cyclic_structure), intent(inout) :: self
+      integer :: h
+
+      allocate (self%norms(2, size(self%harmonic)))
+      do h = 1, size(self%harmonic)
+         self%norms(:, h) = self%basis(self%basis_of(h))%norms()
+      end do
+   end subroutine find_norms
 
    !> A basis for each nodal diameter in use, with coordinates at places that all share.
    subroutine find_bases(model, relative, omega_range, keeps_first, self, error)

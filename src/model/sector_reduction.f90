@@ -59,6 +59,7 @@ module fw_sector_reduction
       procedure :: transform
       procedure :: pushes_free_mode
       procedure :: has_whirl
+      procedure :: norms
    end type sector_reduction
 
    !> As of fw_reduction, with the same reasons.
@@ -289,6 +290,15 @@ contains
 
       has_whirl = allocated(self%coriolis) .or. allocated(self%aero)
    end function has_whirl
+
+   !> Frobenius norms of K and M of the coordinates.
+   pure function norms(self)
+      class(sector_reduction), intent(in) :: self
+      real(wp) :: norms(2)
+
+      norms = [norm2(abs(self%blocks(:self%n_coordinates, :, 1))), &
+               norm2(abs(self%blocks(:self%n_coordinates, :, 2)))]
+   end function norms
 
    subroutine fill_blocks(matrix, block, self)
       complex(wp), intent(in) :: matrix(:, :)

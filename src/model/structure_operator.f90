@@ -53,6 +53,9 @@ module fw_structure_operator
       !> Harmonics in use and the columns of their coefficients (n_retained).
       integer, allocatable :: harmonic(:), column(:)
       integer :: n_coefficients = 0
+      !> Frobenius norms of K and M of each harmonic, which bound what `magnitudes` sums up
+      !> (2, n_retained); only of structures that do not change.
+      real(wp), allocatable :: norms(:, :)
       !> Whether the Z_n are symmetric, and the procedures of the whole field answer: those from
       !> `whole_size` on.
       logical :: knows_field = .false.

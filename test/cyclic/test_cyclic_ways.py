@@ -109,3 +109,20 @@ def test_frequencies_of_a_plain_structure(tmp_path):
     found = read(tmp_path / "case.h5")
     exact = np.sqrt(np.linalg.eigvalsh([[2.0, -1.0], [-1.0, 3.0]]))
     assert np.allclose(found["modes/closed"], [exact])
+
+
+@pytest.mark.parametrize("mistuned", [False, True])
+def test_resonance_without_damping(tmp_path, mistuned):
+    """Where nothing limits a mode amplitudes are round-off of the stiffness, and no answer; next to
+    it, at amplitudes of 1e7, they are one."""
+    omega = float(np.sqrt(2.0))
+    groups = {"cyclic": {"n_sectors": 3, "engine_order": 1, "mistuned": mistuned},
+              "model": {"n_dof": 1, "mass": [1.0], "stiffness": [2.0]},
+              "load": {"cosine": [1.0]},
+              "contact": {"n_pairs": 1, "side_1": [0, 0, 1], "law": "penalty", "mu": 0.0,
+                          "gap": 1e30, "normal_stiffness": 1.0},
+              "harmonics": {"n_harmonics": 2},
+              "sweep": {"frequencies": [omega * (1.0 - 1e-8), omega], "refine": False}}
+    run(tmp_path, groups, status=4)
+    found = read(tmp_path / "case.h5")
+    assert list(found["converged"]) == [True, False]
