@@ -12,11 +12,11 @@ module floor_system
    use, intrinsic :: iso_c_binding, only: c_long
    use fw_correction, only: march_turn_1d
    use fw_correction, only: march_turn_2d
-   use fw_correction_derivative, only: march_derivative
    use fw_error, only: error_type
    use fw_force_law, only: pair_mixed
    use fw_balance_state, only: balance_state
    use fw_balance_state, only: new_balance_state
+   use fw_instant_sum, only: instant_sum
    use fw_kinds, only: sp
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
@@ -26,6 +26,7 @@ module floor_system
    use fw_linalg, only: complex_lu_type
    use fw_plain_structure, only: plain_structure
    use fw_preconditioner_lu, only: preconditioner_lu_type
+   use fw_two_directions, only: turn_derivative
    implicit none (type, external)
    private
 
@@ -68,7 +69,9 @@ module floor_system
       ! Scratch of the floor.
       real(wp), allocatable :: mu(:), x(:, :), margin(:), pressure(:)
       real(wp), allocatable :: values(:, :, :), force(:, :, :)
-      real(wp), allocatable :: rows(:, :, :, :), dx(:, :, :), y(:, :), jacobian(:, :)
+      type(turn_derivative) :: turn
+      type(instant_sum) :: sums
+      real(wp), allocatable :: y(:, :), jacobian(:, :)
       real(wp), allocatable :: basis(:, :), vector(:), weights(:)
       complex(wp), allocatable :: input(:), output(:), coupling(:, :), solved(:, :), square(:, :)
       complex(wp), allocatable :: stiffness(:, :, :)
@@ -115,8 +118,9 @@ contains
       nt = self%problem%fourier%n_time
       allocate (self%x(n, 2), self%margin(n), self%pressure(n), source=0.0_wp)
       allocate (self%values(n, 3, nt), self%force(n, 3, nc), source=0.0_wp)
-      allocate (self%rows(nc, 3, 2, nt), self%dx(nc, 3, 2), self%y(3, nt), source=0.0_wp)
-      allocate (self%jacobian(3*nc, 2*nc), source=0.0_wp)
+      call self%turn%reserve(nc, nt)
+      call self%sums%reserve(self%problem%fourier)
+      allocate (self%y(3, nt), self%jacobian(3*nc, 3*nc), source=0.0_wp)
       allocate (self%basis(m*nc, longest_basis), source=1.0e-3_wp)
       allocate (self%vector(m*nc), self%weights(longest_basis), source=1.0e-3_wp)
       allocate (self%input(m), self%output(m), source=one)
@@ -265,18 +269,14 @@ contains
       type(measured_system), intent(inout) :: self
       integer, intent(in) :: i, nc
       real(wp) :: x(2)
-      integer :: c
 
-      associate (f => self%problem%fourier, contact => self%work(self%problem%forces%pairs))
+      associate (f => self%problem%fourier, present => self%problem%joint%row(:, i) > 0, &
+                 contact => self%work(self%problem%forces%pairs))
          self%y = contact%prediction_time(i, :, :)
-         self%dx = 0.0_wp
          x = contact%x(i, :)
-         call march_derivative(f%n_time, nc, 1, f%synthesis, self%y, self%mu(i), 0.0_wp, &
-                               self%problem%joint%row(:, i) > 0, .true., x, self%rows, self%dx)
-         do c = 1, 2
-            call dgemm('N', 'T', 3*nc, nc, f%n_time, 1.0_wp, self%rows(1, 1, c, 1), 6*nc, &
-                       f%analysis, nc, 0.0_wp, self%jacobian(1, (c - 1)*nc + 1), 3*nc)
-         end do
+         call self%turn%march(f%n_time, nc, 1, f%synthesis, self%y, self%mu(i), 0.0_wp, present, &
+                              .true., x)
+         call self%turn%project(f, present, self%sums, self%jacobian)
       end associate
    end subroutine derive
 

@@ -22,6 +22,8 @@ submodule(fw_balance_state) fw_balance_linear
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
    !> Part of a residual whose effect on a step is far below the tolerance of linear solutions.
    real(wp), parameter :: negligible = 1.0e-9_wp
+   !> Coefficients that a thread adds at a time.
+   integer, parameter :: few_coefficients = 8
    !> Relative residual of a linear solution from which the product of low rank serves.
    real(wp), parameter :: near_enough = 5.0e-5_wp
 
@@ -315,7 +317,8 @@ contains
          end do
          return
       end if
-      !$omp parallel do default(none) shared(work) private(i) schedule(static)
+      ! Mixed pairs, which take longest, stand side by side.
+      !$omp parallel do default(none) shared(work) private(i) schedule(dynamic, 4)
       do i = 1, size(work%state)
          call multiply_one(i)
       end do
@@ -411,8 +414,7 @@ contains
       end associate
    end subroutine gather_inputs
 
-   !> rows = rows + B^T outputs of a law. Elements may share coordinates, so that this stays in one
-   !> thread.
+   !> rows = rows + B^T outputs of a law. Elements may share coordinates: threads share coefficients.
    subroutine add_outputs(self, entry, work, map, n_mapped, rows)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
@@ -420,18 +422,37 @@ contains
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(inout) :: rows(:, :)
-      integer :: i, c, nc
+      integer :: first, nc
 
       nc = self%problem%fourier%n_coefficients
-      do i = 1, size(entry%row, 2)
-         if (work%linear_state(i) == pair_open) cycle
-         do c = 1, size(entry%row, 1)
-            if (entry%row(c, i) == 0) cycle
-            call self%problem%incidence%scatter_row(entry%row(c, i), map, n_mapped, &
-                                                    size(rows, 1), 1.0_wp, &
-                                            work%output((c - 1)*nc + 1:c*nc, i), rows)
-         end do
+      ! Weights that turn take the coefficients of a harmonic together.
+      if (size(entry%row, 2) < pairs_for_threads .or. self%problem%incidence%turns()) then
+         call add_some(1, nc)
+         return
+      end if
+      !$omp parallel do default(none) private(first) shared(nc) schedule(static)
+      do first = 1, nc, few_coefficients
+         call add_some(first, min(first + few_coefficients - 1, nc))
       end do
+      !$omp end parallel do
+
+   contains
+
+      subroutine add_some(first, last)
+         integer, intent(in) :: first, last
+         integer :: c, i
+
+         do i = 1, size(entry%row, 2)
+            if (work%linear_state(i) == pair_open) cycle
+            do c = 1, size(entry%row, 1)
+               if (entry%row(c, i) == 0) cycle
+               call self%problem%incidence%scatter_row( &
+                  entry%row(c, i), map, n_mapped, size(rows, 1), 1.0_wp, &
+                  work%output((c - 1)*nc + first:(c - 1)*nc + last, i), rows(:, first:last))
+            end do
+         end do
+      end subroutine add_some
+
    end subroutine add_outputs
 
 end submodule fw_balance_linear

@@ -24,9 +24,11 @@ submodule(fw_balance_state) fw_balance_preconditioner
          logical, intent(out) :: is_so
       end subroutine are_alike
 
-      !> complex_in in place, of the active coordinates.
-      module subroutine solve_split(self)
+      !> In place, a vector of the active coordinates.
+      module subroutine solve_split(self, na, vector)
          type(balance_state), intent(inout) :: self
+         integer, intent(in) :: na
+         real(wp), intent(inout) :: vector(na, self%problem%fourier%n_coefficients)
       end subroutine solve_split
    end interface
 
@@ -259,10 +261,12 @@ contains
       integer :: h, k, na
 
       na = self%active%n_active
-      call active_to_complex(self, na, vector)
       if (self%preconditioner%is_split) then
-         call solve_split(self)
-      else if (self%problem%structure%n_coordinates < coordinates_for_threads) then
+         call solve_split(self, na, vector)
+         return
+      end if
+      call active_to_complex(self, na, vector)
+      if (self%problem%structure%n_coordinates < coordinates_for_threads) then
          do h = 1, self%problem%fourier%n_retained
             if (h /= self%preconditioner%left_out) call solve_harmonic(self, h)
          end do

@@ -49,7 +49,7 @@ contains
          ! P_0 takes shape in the place of P_1, which follows it.
          do j = merge(0, 1, first_moving(self) == 2), 1
             associate (m => split%moving%matrix, scale => split%moving%scale)
-               m(:na, :na) = cmplx(scale*static(:na, :na), kind=sp)
+               call copy_scaled(na, scale, static, m)
                split%u = cmplx(scale*static(:na, na + 1:), kind=sp)
                terms%n = 0
                do k = 1, self%problem%forces%n_laws
@@ -194,7 +194,22 @@ contains
       end associate
    end subroutine add_term
 
-   !> Column by column, as the matrices lie in memory.
+   !> K of the active coordinates; threads share the columns.
+   subroutine copy_scaled(na, scale, static, m)
+      integer, intent(in) :: na
+      real(wp), intent(in) :: scale, static(:, :)
+      complex(sp), intent(inout) :: m(:, :)
+      integer :: k
+
+      !$omp parallel do default(none) private(k) shared(na, scale, static, m) &
+      !$omp if(na >= coordinates_for_threads)
+      do k = 1, na
+         m(:na, k) = cmplx(scale*static(:na, k), kind=sp)
+      end do
+      !$omp end parallel do
+   end subroutine copy_scaled
+
+   !> Column by column, as the matrices lie in memory; threads share them.
    subroutine subtract_terms(terms, na, static, m, x)
       type(row_terms), intent(in) :: terms
       integer, intent(in) :: na
@@ -203,12 +218,15 @@ contains
       complex(sp), intent(inout) :: m(:, :), x(:, :)
       integer :: e, k
 
+      !$omp parallel do default(none) private(e, k) shared(terms, na, static, m) &
+      !$omp if(na >= coordinates_for_threads)
       do k = 1, na
          do e = 1, terms%n
             m(terms%row(e), k) = m(terms%row(e), k) - &
                                  cmplx(terms%factor(e)*static(terms%source(e), k), kind=sp)
          end do
       end do
+      !$omp end parallel do
       do k = 1, size(x, 2)
          do e = 1, terms%n
             x(terms%row(e), k) = x(terms%row(e), k) - &
@@ -219,26 +237,20 @@ contains
 
    !> Coordinates that the factors do not know are taken as stuck, as `solve_kept` does.
    module procedure solve_split
-      integer :: h, k
+      integer :: k
 
-      associate (in => self%scratch%complex_in, z => self%scratch%complex_out, &
-                 kept => self%preconditioner)
-         z(:kept%n, :) = zero
-         do h = 1, self%problem%fourier%n_retained
-            do k = 1, self%active%n_active
-               if (kept%place(k) > 0) then
-                  z(kept%place(k), h) = in(k, h)
-               else
-                  in(k, h) = in(k, h)/kept%unknown_stiffness(k)
-               end if
-            end do
+      associate (kept => self%preconditioner, fourier => self%problem%fourier)
+         kept%from(:kept%n) = 0
+         do k = 1, na
+            if (kept%place(k) > 0) then
+               kept%from(kept%place(k)) = k
+            else
+               vector(k, :) = vector(k, :)/kept%unknown_stiffness(k)
+            end if
          end do
-         call kept%split%solve(first_moving(self), z)
-         do h = 1, self%problem%fourier%n_retained
-            do k = 1, self%active%n_active
-               if (kept%place(k) > 0) in(k, h) = z(kept%place(k), h)
-            end do
-         end do
+         call kept%split%solve(fourier%harmonic, fourier%column, kept%from(:kept%n), &
+                               self%problem%structure%n_coordinates >= coordinates_for_threads, &
+                               vector)
       end associate
    end procedure solve_split
 

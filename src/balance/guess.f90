@@ -7,6 +7,8 @@ module fw_guess
    use fw_fourier, only: to_real
    use fw_linalg, only: complex_lu_type
    use fw_linalg, only: is_positive_definite
+   use fw_threads, only: coordinates_for_threads
+   use omp_lib, only: omp_get_thread_num
    implicit none (type, external)
    private
 
@@ -180,10 +182,9 @@ contains
       real(wp), intent(out), contiguous :: x(:)
       !> Zero where there is no normal dof, and without a harmonic 0.
       real(wp), intent(out) :: tension(:)
-      complex(wp), allocatable :: q(:, :), force(:)
-      complex(wp), allocatable :: stiffness(:, :)
-      logical :: held(system%problem%structure%n_coordinates)
-      integer :: h, j, m
+      complex(wp), allocatable :: q(:, :)
+      integer :: h, last, m
+      logical :: ended, skipped
 
       if (system%problem%structure%n_alike > 1 .and. .not. system%problem%fits_whole()) then
          call solve_sectors(system, closed, x, tension)
@@ -191,26 +192,53 @@ contains
       end if
       m = system%problem%structure%n_coordinates
       allocate (q(m, system%problem%fourier%n_retained), source=(0.0_wp, 0.0_wp))
-      allocate (stiffness(m, m))
       tension = 0.0_wp
-      do h = 1, system%problem%fourier%n_retained
-         ! A harmonic of many pairs takes tenths of a second; nobody looks at the rest then.
-         if (system%is_interrupted()) exit
-         if (at_rest .and. system%problem%fourier%harmonic(h) > 0) exit
-         call system%problem%structure%block(system%structure_state, h, stiffness)
-         force = system%structure_state%load(:, h)
-         ! Only the vibratory load is raised from zero; the static one acts throughout.
-         if (system%problem%fourier%harmonic(h) > 0) force = system%load_share*force
-         held = .false.
-         call close_pairs(system, closed, h, stiffness, force, held, q(:, h))
-         call solve_free(stiffness, force, held, q(:, h))
-         if (system%problem%fourier%harmonic(h) == 0) then
-            call find_tension(system, [(real(sum(stiffness(j, :)*q(:, h)), wp), &
-                                        j=1, m)], q(:, h), tension)
+      last = system%problem%fourier%n_retained
+      if (at_rest) last = count(system%problem%fourier%harmonic == 0)
+      ended = .false.
+      !$omp parallel do default(none) private(h, skipped) schedule(dynamic) &
+      !$omp shared(system, closed, q, tension, m, last, ended) &
+      !$omp if(m >= coordinates_for_threads .and. last > 1)
+      do h = 1, last
+         ! A harmonic of many pairs takes tenths of a second; nobody looks at the rest then. Only
+         ! one thread asks: others may not call what listens for the end.
+         if (omp_get_thread_num() == 0) then
+            skipped = system%is_interrupted()
+            !$omp atomic write
+            ended = skipped
+         else
+            !$omp atomic read
+            skipped = ended
          end if
+         if (.not. skipped) call solve_harmonic(system, closed, h, q(:, h), tension)
       end do
+      !$omp end parallel do
       call to_real_vector(system, q, x)
    end subroutine linear_solution
+
+   !> One harmonic of it, in a thread of its own.
+   subroutine solve_harmonic(system, closed, h, q, tension)
+      type(balance_state), intent(in) :: system
+      logical, intent(in) :: closed(:)
+      integer, intent(in) :: h
+      complex(wp), intent(inout) :: q(:)
+      !> Set by harmonic 0.
+      real(wp), intent(inout) :: tension(:)
+      complex(wp), allocatable :: force(:), stiffness(:, :)
+      logical :: held(size(q))
+      integer :: j
+
+      allocate (stiffness(size(q), size(q)))
+      call system%problem%structure%block(system%structure_state, h, stiffness)
+      force = system%structure_state%load(:, h)
+      ! Only the vibratory load is raised from zero; the static one acts throughout.
+      if (system%problem%fourier%harmonic(h) > 0) force = system%load_share*force
+      held = .false.
+      call close_pairs(system, closed, h, stiffness, force, held, q)
+      call solve_free(stiffness, force, held, q)
+      if (system%problem%fourier%harmonic(h) > 0) return
+      call find_tension(system, [(real(sum(stiffness(j, :)*q), wp), j=1, size(q))], q, tension)
+   end subroutine solve_harmonic
 
    !> Rigid pairs hold their coordinates (at minus the gap); elastic ones add their stiffness.
    subroutine close_pairs(system, closed, h, stiffness, force, held, q)

@@ -33,6 +33,7 @@ module fw_incidence
       integer, allocatable, private :: harmonic(:), column(:)
    contains
       procedure :: coordinate_of
+      procedure :: turns
       procedure :: weights_of
       procedure :: gather
       procedure :: scatter
@@ -73,6 +74,13 @@ contains
 
       coordinate = self%coordinate(self%first(row))
    end function coordinate_of
+
+   !> Whether weights turn from harmonic to harmonic.
+   pure logical function turns(self)
+      class(incidence_type), intent(in) :: self
+
+      turns = allocated(self%turned)
+   end function turns
 
    !> A row of B in full.
    pure subroutine weights_of(self, row, weights)

@@ -30,6 +30,8 @@ module fw_kept_factors
       !> Place there of each active coordinate, 0 for one that has become active since; prediction
       !> stiffness of those.
       integer, allocatable :: place(:)
+      !> The inverse of it: the active coordinate of each place, 0 for one that has left.
+      integer, allocatable :: from(:)
       real(wp), allocatable :: unknown_stiffness(:)
    contains
       procedure :: reserve
@@ -43,7 +45,8 @@ contains
       integer, intent(in) :: n_coordinates, n_harmonics
 
       allocate (self%harmonic(n_harmonics))
-      allocate (self%coordinate(n_coordinates), self%place(n_coordinates), source=0)
+      allocate (self%coordinate(n_coordinates), self%place(n_coordinates), &
+                self%from(n_coordinates), source=0)
       allocate (self%unknown_stiffness(n_coordinates), source=0.0_wp)
    end subroutine reserve
 

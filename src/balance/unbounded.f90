@@ -3,6 +3,7 @@
 module fw_unbounded
    use fw_kinds, only: wp
    use fw_balance_state, only: balance_state
+   use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
 
@@ -20,7 +21,7 @@ contains
       type(balance_state), intent(in) :: system
       !> Coordinates (n_coordinates * n_coefficients).
       real(wp), intent(in), contiguous :: x(:)
-      real(wp) :: square
+      real(wp) :: squares(system%problem%fourier%n_retained)
       integer :: h, k, m
 
       m = system%problem%structure%n_coordinates
@@ -29,13 +30,16 @@ contains
       if (allocated(system%problem%structure%norms)) then
          if (epsilon(1.0_wp)*largest_cancelling(system, m, x) <= limit*system%reference) return
       end if
-      square = 0.0_wp
-      do h = 1, system%problem%fourier%n_retained
+      squares = 0.0_wp
+      !$omp parallel do default(none) private(h, k) shared(system, x, m, squares) &
+      !$omp if(m >= coordinates_for_threads)
+      do h = 1, size(squares)
          if (system%problem%fourier%harmonic(h) == 0) cycle
          k = (system%problem%fourier%column(h) - 1)*m
-         square = square + cancelling(system, h, x(k + 1:k + m), x(k + m + 1:k + 2*m))
+         squares(h) = cancelling(system, h, x(k + 1:k + m), x(k + m + 1:k + 2*m))
       end do
-      lost = .not. epsilon(1.0_wp)*sqrt(square) <= limit*system%reference
+      !$omp end parallel do
+      lost = .not. epsilon(1.0_wp)*sqrt(sum(squares)) <= limit*system%reference
    end function is_lost_in_round_off
 
    !> A bound of the same sum: |A q| <= |A| |q| with the Frobenius norms of K and M.

@@ -177,7 +177,7 @@ contains
          end do
       else
          !$omp parallel do default(none) shared(self, work, room, n_blocks, fourier) &
-         !$omp private(block) schedule(static)
+         !$omp private(block) schedule(dynamic)
          do block = 1, n_blocks
             call follow_block(self, work, room, fourier, block)
          end do

@@ -1,15 +1,15 @@
 !> The derivative of friction that is decided at instants: rows of the march, projected on the
 !> harmonics pair by pair.
 submodule(fw_friction) fw_friction_derivative
-   use fw_correction_derivative, only: add_start
-   use fw_correction_derivative, only: limit_derivative
-   use fw_correction_derivative, only: march_derivative
+   use fw_instant_sum, only: instant_sum
    use fw_lapack, only: dgemm
    use fw_one_direction, only: condition
    use fw_one_direction, only: follow_one_direction
    use fw_one_direction, only: project_one_direction
    use fw_sampled_turn, only: limit_is_unique
    use fw_slip, only: slip_gradient
+   use fw_two_directions, only: add_start
+   use fw_two_directions, only: turn_derivative
    implicit none (type, external)
 
    !> Distance from the friction cone, as a part of the largest predicted force, that round-off
@@ -22,10 +22,10 @@ submodule(fw_friction) fw_friction_derivative
       !> start (2, 2, n_time), and (1 - that of a turn)^-1.
       real(wp), allocatable :: by_start(:, :, :)
       real(wp) :: inverse(2, 2) = 0.0_wp
-      !> d lambda_t by inputs (coefficient, component), for each tangential component and instant.
-      real(wp), allocatable :: rows(:, :, :, :)
-      !> d x at the end by inputs (coefficient, component, tangential component).
-      real(wp), allocatable :: dx(:, :, :)
+      type(turn_derivative) :: turn
+      type(instant_sum) :: sums
+      !> d lambda_t by inputs, for each tangential component and instant: of paths of slip alone.
+      real(wp), allocatable :: rows(:, :, :)
       real(wp), allocatable :: weight(:, :, :)
       !> Predicted forces (3, n_time).
       real(wp), allocatable :: y(:, :)
@@ -89,6 +89,7 @@ contains
       type(force_workspace), intent(inout) :: work
       type(derivative_room), intent(inout) :: of_pair
 
+      call of_pair%sums%reserve(fourier)
       if (.not. work%measures_slip .and. count(self%present(1:2, i)) == 1) then
          call differentiate_one_direction(self, fourier, room%settled(i), i, work, of_pair)
       else
@@ -129,7 +130,8 @@ contains
                                  of_pair%at, self%present(3, i), 3*nc, &
                                  work%jacobian(place, place, i), &
                                  work%jacobian(2*nc + 1, place, i))
-      call project_normal(work%jacobian(:, :, i), fourier, of_pair%y_n, self%present(3, i))
+      of_pair%sums%wanted = of_pair%y_n < 0.0_wp
+      call project_normal(work%jacobian(:, :, i), fourier, of_pair%sums, self%present(3, i))
    end subroutine differentiate_one_direction
 
    !> Where the march that is differentiated starts: at its limit, where that is the only one.
@@ -173,9 +175,8 @@ contains
       logical :: unique
 
       nc = fourier%n_coefficients
-      ! 6 n_coefficients n_time numbers.
-      if (.not. allocated(of_pair%rows)) then
-         allocate (of_pair%rows(nc, 3, 2, fourier%n_time), of_pair%dx(nc, 3, 2))
+      if (.not. allocated(of_pair%y)) then
+         call of_pair%turn%reserve(nc, fourier%n_time)
          allocate (of_pair%weight(2, 2, nc), of_pair%y(3, fourier%n_time))
       end if
       of_pair%y = work%prediction_time(i, :, :)
@@ -185,9 +186,10 @@ contains
          end do
       end if
       call derive(self, fourier, settled, work, i, of_pair, x, unique)
-      call project(work%jacobian(:, :, i), fourier, of_pair%rows)
-      call project_normal(work%jacobian(:, :, i), fourier, of_pair%y(3, :), self%present(3, i))
-      if (unique) call project_start(work%jacobian(:, :, i), fourier, of_pair%dx, &
+      call of_pair%turn%project(fourier, self%present(:, i), of_pair%sums, work%jacobian(:, :, i))
+      of_pair%sums%wanted = of_pair%y(3, :) < 0.0_wp
+      call project_normal(work%jacobian(:, :, i), fourier, of_pair%sums, self%present(3, i))
+      if (unique) call project_start(work%jacobian(:, :, i), fourier, of_pair%turn%dx, &
                                      of_pair%by_start, of_pair%weight)
       if (.not. work%measures_slip) return
       if (work%rests(i)) then
@@ -195,15 +197,18 @@ contains
          return
       end if
       ! The path of slip needs the rows themselves, not only their projections.
-      if (unique) call add_start(3*nc, fourier%n_time, of_pair%by_start, of_pair%dx, of_pair%rows)
+      if (.not. allocated(of_pair%rows)) allocate (of_pair%rows(3*nc, 2, fourier%n_time))
+      call of_pair%turn%rows_at_instants(nc, fourier%synthesis, self%present(:, i), of_pair%rows)
+      if (unique) call add_start(3*nc, fourier%n_time, of_pair%by_start, of_pair%turn%dx, &
+                                 of_pair%rows)
       call slip_gradient(fourier%n_time, nc, fourier%synthesis, of_pair%y, self%mu(i), &
                          self%present(:, i), self%facts%remembers, x, of_pair%rows, &
                          work%slip_derivative(:, i))
    end subroutine differentiate_rows
 
-   !> Derivative of the friction of a pair at the instants. A limit that is the only one (unique)
-   !> has a derivative of its own, dx, whose part in the rows is left to `project_start`; any other
-   !> carries that of the way to it.
+   !> Derivative of the friction of a pair. A limit that is the only one (unique) has a derivative
+   !> of its own, dx, whose part in the forces is left to `project_start`; any other carries that of
+   !> the way to it.
    subroutine derive(self, fourier, settled, work, pair, of_pair, x, unique)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
@@ -211,7 +216,7 @@ contains
       logical, intent(in) :: settled
       type(force_workspace), intent(in) :: work
       integer, intent(in) :: pair
-      !> Its rows and dx are set, and by_start of a unique limit, from y.
+      !> Its turn is set, and by_start of a unique limit, from y.
       type(derivative_room), intent(inout) :: of_pair
       !> Corrected position at the end of the period.
       real(wp), intent(out) :: x(2)
@@ -219,69 +224,29 @@ contains
 
       call find_start(self, fourier, settled, work, pair, of_pair, x, unique)
       if (unique) then
-         call limit_derivative(fourier%n_time, fourier%n_coefficients, fourier%synthesis, &
-                               of_pair%y, self%mu(pair), touch*work%scale(pair), &
-                               self%present(:, pair), of_pair%inverse, x, of_pair%rows, of_pair%dx)
+         call of_pair%turn%to_limit(fourier%n_time, fourier%n_coefficients, fourier%synthesis, &
+                                    of_pair%y, self%mu(pair), touch*work%scale(pair), &
+                                    self%present(:, pair), of_pair%inverse, x)
       else
          ! From the start once more, with derivatives, as many turns as the march took.
-         of_pair%dx = 0.0_wp
-         call march_derivative(fourier%n_time, fourier%n_coefficients, work%turns(pair), &
-                               fourier%synthesis, of_pair%y, self%mu(pair), 0.0_wp, &
-                               self%present(:, pair), &
-                               self%facts%remembers .or. work%rests(pair), x, of_pair%rows, &
-                               of_pair%dx)
+         call of_pair%turn%march(fourier%n_time, fourier%n_coefficients, work%turns(pair), &
+                                 fourier%synthesis, of_pair%y, self%mu(pair), 0.0_wp, &
+                                 self%present(:, pair), &
+                                 self%facts%remembers .or. work%rests(pair), x)
       end if
    end subroutine derive
 
-   !> From rows at the instants to the transposed derivative between coefficients.
-   subroutine project(jacobian, fourier, rows)
+   !> The blocks whose output is normal: lambda_n = min(y_n, 0), its own where the pair bears.
+   subroutine project_normal(jacobian, fourier, bears, has_normal)
       type(fourier_type), intent(in) :: fourier
       real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
-      real(wp), intent(in) :: rows(3*fourier%n_coefficients, 2, fourier%n_time)
-      integer :: nc, c
-
-      nc = fourier%n_coefficients
-      do c = 1, 2
-         ! (G^T)(:, j) = sum over the instants of rows(:, c, k) analysis(j, k). Rows of one
-         ! direction are every second block of 3 nc: hence the leading dimension.
-         call dgemm('N', 'T', 3*nc, nc, fourier%n_time, 1.0_wp, rows(1, c, 1), 6*nc, &
-                    fourier%analysis, nc, 0.0_wp, jacobian(1, (c - 1)*nc + 1), 3*nc)
-      end do
-   end subroutine project
-
-   !> The blocks whose output is normal.
-   subroutine project_normal(jacobian, fourier, y_n, has_normal)
-      type(fourier_type), intent(in) :: fourier
-      real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
-      real(wp), intent(in) :: y_n(:)
+      type(instant_sum), intent(inout) :: bears
       logical, intent(in) :: has_normal
-      integer :: nc, k, j
-      real(wp) :: factor
-      logical :: closes
 
-      nc = fourier%n_coefficients
-      jacobian(:, 2*nc + 1:) = 0.0_wp
-      if (.not. has_normal) return
-      ! A pair that bears throughout keeps its coefficients; of any other, the instants of the
-      ! rarer state are added up.
-      ! G over all instants is the identity where the transform is exact, so that the fewer of both
-      ! kinds can be summed.
-      closes = 2*count(y_n < 0.0_wp) > fourier%n_time .and. fourier%projects .and. &
-               fourier%n_time > 2*maxval(fourier%harmonic)
-      factor = merge(-1.0_wp, 1.0_wp, closes)
-      do k = 1, fourier%n_time
-         ! lambda_n = min(y_n, 0): G is the sum over closed instants of analysis synthesis, or 1
-         ! less that over the open ones.
-         if ((y_n(k) < 0.0_wp) .eqv. closes) cycle
-         do j = 1, nc
-            jacobian(2*nc + 1:, 2*nc + j) = jacobian(2*nc + 1:, 2*nc + j) + &
-                                            factor*fourier%analysis(j, k)*fourier%synthesis(:, k)
-         end do
-      end do
-      if (.not. closes) return
-      do j = 1, nc
-         jacobian(2*nc + j, 2*nc + j) = jacobian(2*nc + j, 2*nc + j) + 1.0_wp
-      end do
+      associate (nc => fourier%n_coefficients)
+         jacobian(:, 2*nc + 1:) = 0.0_wp
+         if (has_normal) call bears%form(fourier, 3*nc, jacobian(2*nc + 1, 2*nc + 1))
+      end associate
    end subroutine project_normal
 
    !> What the start of a turn adds to the projected rows: of rank two.

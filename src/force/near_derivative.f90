@@ -8,12 +8,14 @@ module fw_near_derivative
    use fw_force_law, only: pair_mixed
    use fw_kinds, only: sp
    use fw_kinds, only: wp
-   use fw_lapack, only: sgemv
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private
 
    public :: near_derivative
+
+   !> Columns are filled up to a multiple of this, the widest vectors.
+   integer, parameter :: lanes = 16
 
    type :: near_derivative
       private
@@ -22,7 +24,7 @@ module fw_near_derivative
       !> Components of each element that exist, and those of them whose force is computed
       !> (n_elements).
       integer, allocatable :: n_inputs(:), n_outputs(:)
-      !> (coefficient and component of the output, then of the input; element).
+      !> (coefficient and component of the input, filled up, then of the output; element).
       real(sp), allocatable :: block(:, :)
    contains
       procedure :: take
@@ -74,35 +76,34 @@ contains
          if (work%always_closed(element)) self%n_outputs(element) = self%n_inputs(element) - 1
       end if
       call copy_block(self%n_coefficients, row, self%n_outputs(element), &
-                      work%jacobian(:, :, element), self%n_outputs(element)*self%n_coefficients, &
-                      self%block(:, element))
+                      work%jacobian(:, :, element), &
+                      padded(self%n_inputs(element)*self%n_coefficients), self%block(:, element))
    end subroutine take_one
 
-   !> Components that exist, turned over: a product then runs down the columns.
+   !> Components that exist, in the order in which they lie: turned over they would take longer to
+   !> copy than products gain.
    pure subroutine copy_block(nc, row, n_outputs, jacobian, n_rows, block)
       integer, intent(in) :: nc, n_outputs, n_rows
       integer, intent(in) :: row(:)
       !> (input, output)
       real(wp), intent(in) :: jacobian(:, :)
       real(sp), intent(inout) :: block(n_rows, *)
-      integer :: c_in, c_out, i, j, to_column, to_row
+      integer :: c_in, c_out, j, to_column, to_row
 
-      to_row = 0
+      to_column = 0
       do c_out = 1, size(row)
          if (row(c_out) == 0) cycle
-         if (to_row == n_outputs*nc) exit
-         to_column = 0
-         do c_in = 1, size(row)
-            if (row(c_in) == 0) cycle
-            do j = 1, nc
-               do i = 1, nc
-                  block(to_row + j, to_column + i) = real(jacobian((c_in - 1)*nc + i, &
-                                                                   (c_out - 1)*nc + j), sp)
-               end do
+         if (to_column == n_outputs*nc) exit
+         do j = 1, nc
+            to_row = 0
+            do c_in = 1, size(row)
+               if (row(c_in) == 0) cycle
+               block(to_row + 1:to_row + nc, to_column + j) = &
+                  real(jacobian((c_in - 1)*nc + 1:c_in*nc, (c_out - 1)*nc + j), sp)
+               to_row = to_row + nc
             end do
-            to_column = to_column + nc
          end do
-         to_row = to_row + nc
+         to_column = to_column + nc
       end do
    end subroutine copy_block
 
@@ -112,7 +113,7 @@ contains
       integer, intent(in) :: row(:)
       integer, intent(in) :: element
       type(force_workspace), intent(inout) :: work
-      real(sp) :: input(self%n_most), output(self%n_most)
+      real(sp) :: input(padded(self%n_most)), output(self%n_most)
       real(wp) :: largest
       integer :: c, nc, n_in, n_out, place
 
@@ -132,8 +133,8 @@ contains
             input(place + 1:place + nc) = real(from((c - 1)*nc + 1:c*nc)/largest, sp)
             place = place + nc
          end do
-         call sgemv('N', n_out, n_in, 1.0_sp, self%block(1, element), n_out, input, 1, &
-                    0.0_sp, output, 1)
+         input(n_in + 1:padded(n_in)) = 0.0_sp
+         call multiply_transposed(padded(n_in), n_out, self%block(1, element), input, output)
          place = 0
          do c = 1, size(row)
             if (row(c) == 0) then
@@ -148,6 +149,49 @@ contains
       end associate
    end subroutine multiply
 
+   !> output = block^T input. BLAS is written for larger blocks.
+   pure subroutine multiply_transposed(n_rows, n_columns, block, input, output)
+      !> A multiple of `lanes`.
+      integer, intent(in) :: n_rows
+      integer, intent(in) :: n_columns
+      real(sp), intent(in) :: block(n_rows, n_columns), input(n_rows)
+      real(sp), intent(inout) :: output(n_columns)
+      real(sp) :: s1, s2, s3, s4
+      integer :: i, j, n_whole
+
+      ! Four columns at a time, so that no sum waits for its last term.
+      n_whole = n_columns - modulo(n_columns, 4)
+      do j = 1, n_whole, 4
+         s1 = 0.0_sp
+         s2 = 0.0_sp
+         s3 = 0.0_sp
+         s4 = 0.0_sp
+         !$omp simd reduction(+: s1, s2, s3, s4)
+         do i = 1, n_rows
+            s1 = s1 + block(i, j)*input(i)
+            s2 = s2 + block(i, j + 1)*input(i)
+            s3 = s3 + block(i, j + 2)*input(i)
+            s4 = s4 + block(i, j + 3)*input(i)
+         end do
+         output(j:j + 3) = [s1, s2, s3, s4]
+      end do
+      do j = n_whole + 1, n_columns
+         s1 = 0.0_sp
+         !$omp simd reduction(+: s1)
+         do i = 1, n_rows
+            s1 = s1 + block(i, j)*input(i)
+         end do
+         output(j) = s1
+      end do
+   end subroutine multiply_transposed
+
+   !> Rows of a column in memory.
+   pure integer function padded(n)
+      integer, intent(in) :: n
+
+      padded = lanes*((n + lanes - 1)/lanes)
+   end function padded
+
    subroutine reserve(self, row, n_coefficients)
       class(near_derivative), intent(inout) :: self
       integer, intent(in) :: row(:, :), n_coefficients
@@ -156,7 +200,8 @@ contains
       self%n_coefficients = n_coefficients
       self%n_most = n_coefficients*maxval(count(row > 0, dim=1))
       allocate (self%n_inputs(size(row, 2)), self%n_outputs(size(row, 2)), source=0)
-      allocate (self%block(self%n_most**2, size(row, 2)))
+      ! What fills up the columns stays zero.
+      allocate (self%block(padded(self%n_most)*self%n_most, size(row, 2)), source=0.0_sp)
    end subroutine reserve
 
 end module fw_near_derivative

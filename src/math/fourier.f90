@@ -14,6 +14,7 @@ module fw_fourier
    use fw_lapack, only: dgemv
    use fw_linalg, only: lu_type
    use fw_fft, only: fft_type, has_fftw
+   use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
 
@@ -22,6 +23,8 @@ module fw_fourier
    !> Rows that are transformed one by one: those of a single pair, of which a direction or two are
    !> mostly zero. A product with three rows takes as long as three with one.
    integer, parameter :: few_rows = 3
+   !> Rows of many that are transformed at a time, and rows from which threads share the blocks.
+   integer, parameter :: block_rows = 48, rows_for_threads = coordinates_for_threads
 
    type :: fourier_type
       !> Retained harmonics, ascending (n_retained); 0 is among them unless only odd ones are.
@@ -196,8 +199,15 @@ contains
             end if
          end do
       else
-         call dgemm('N', 'N', n_rows, self%n_time, self%n_coefficients, 1.0_wp, coefficients, &
-                    n_rows, self%synthesis, self%n_coefficients, 0.0_wp, values, n_rows)
+         ! Whoever does a block: sizes of products decide on their last bits.
+         !$omp parallel do default(none) private(i) shared(self, n_rows, coefficients, values) &
+         !$omp if(n_rows >= rows_for_threads)
+         do i = 1, n_rows, block_rows
+            call dgemm('N', 'N', min(block_rows, n_rows - i + 1), self%n_time, &
+                       self%n_coefficients, 1.0_wp, coefficients(i, 1), n_rows, self%synthesis, &
+                       self%n_coefficients, 0.0_wp, values(i, 1), n_rows)
+         end do
+         !$omp end parallel do
       end if
    end subroutine to_time
 
@@ -223,8 +233,14 @@ contains
             end if
          end do
       else
-         call dgemm('N', 'T', n_rows, self%n_coefficients, self%n_time, 1.0_wp, values, n_rows, &
-                    self%analysis, self%n_coefficients, 0.0_wp, coefficients, n_rows)
+         !$omp parallel do default(none) private(i) shared(self, n_rows, coefficients, values) &
+         !$omp if(n_rows >= rows_for_threads)
+         do i = 1, n_rows, block_rows
+            call dgemm('N', 'T', min(block_rows, n_rows - i + 1), self%n_coefficients, &
+                       self%n_time, 1.0_wp, values(i, 1), n_rows, self%analysis, &
+                       self%n_coefficients, 0.0_wp, coefficients(i, 1), n_rows)
+         end do
+         !$omp end parallel do
       end if
    end subroutine to_coefficients
 

@@ -10,6 +10,7 @@ module fw_krylov
    use fw_interrupt, only: must_end
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
+   use fw_norm, only: norm_of
    use fw_tall_product, only: multiply_transposed
    use fw_tall_product, only: subtract_product
    implicit none (type, external)
@@ -120,7 +121,7 @@ contains
       call self%reserve(size(b))
       x = 0.0_wp
       self%iterations = 0
-      norm = norm2(b)
+      norm = norm_of(b)
       target = tolerance*norm
       converged = norm <= 0.0_wp
       operator%asked = tolerance
@@ -134,7 +135,7 @@ contains
          ! by the residual itself, and its correction is taken back.
          call operator%apply(x, self%product)
          self%basis(:, 1) = b - self%product
-         norm = norm2(self%basis(:, 1))
+         norm = norm_of(self%basis(:, 1))
          converged = norm <= rounding_allowance*target
          if (converged) exit
          ! Less than nothing gained in a whole cycle: another one from here would repeat it.
@@ -197,7 +198,7 @@ contains
          call subtract_product(n, j, self%basis, self%coefficients, self%product)
          self%hessenberg(:j, j) = self%hessenberg(:j, j) + self%coefficients(:j)
       end do
-      self%hessenberg(j + 1, j) = norm2(self%product)
+      self%hessenberg(j + 1, j) = norm_of(self%product)
       ! A product within the span of the basis leaves nothing: x is then exact, and the division
       ! must only not fail.
       self%basis(:, j + 1) = self%product/max(self%hessenberg(j + 1, j), tiny(1.0_wp))

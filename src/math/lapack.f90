@@ -11,7 +11,7 @@ module fw_lapack
 
    public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
-   public :: zggev, sgemv, sgetrf, strsm, strsv, dlaswp, dtrsm
+   public :: zggev, sgemv, sgetrf, strsm, dlaswp, dtrsm
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -128,21 +128,13 @@ module fw_lapack
          integer, intent(out) :: ipiv(*), info
       end subroutine cgetrf
 
-      !> Real factors in single precision, and a triangular solution of one right-hand side.
+      !> Real factors in single precision.
       subroutine sgetrf(m, n, a, lda, ipiv, info)
          import :: sp
          integer, intent(in) :: m, n, lda
          real(sp), intent(inout) :: a(lda, *)
          integer, intent(out) :: ipiv(*), info
       end subroutine sgetrf
-
-      subroutine strsv(uplo, trans, diag, n, a, lda, x, incx)
-         import :: sp
-         character, intent(in) :: uplo, trans, diag
-         integer, intent(in) :: n, lda, incx
-         real(sp), intent(in) :: a(lda, *)
-         real(sp), intent(inout) :: x(*)
-      end subroutine strsv
 
       !> Swap the rows k1 to k2 as the pivots say, forwards for incx = 1.
       subroutine claswp(n, a, lda, k1, k2, ipiv, incx)

@@ -10,10 +10,11 @@ module fw_split_factors
    use fw_lapack, only: cgemm
    use fw_lapack, only: sgetrf
    use fw_lapack, only: strsm
-   use fw_lapack, only: strsv
    use fw_linalg, only: complex_lu_type
+   use fw_panel_solve, only: group_width
    use fw_panel_solve, only: panel_factors
    use fw_preconditioner_lu, only: preconditioner_lu_type
+   use omp_lib, only: omp_get_max_threads
    implicit none (type, external)
    private
 
@@ -28,14 +29,16 @@ module fw_split_factors
       integer :: n = 0, rank = 0
       !> X, then U (n, rank), and V (n, rank).
       complex(sp), allocatable :: u(:, :), v(:, :)
-      !> P_1 as it is solved with; pivots of P_0.
-      type(panel_factors), private :: panels
+      !> P_1 and P_0 as they are solved with; pivots of P_0.
+      type(panel_factors), private :: panels, constant_panels
       integer, allocatable, private :: pivot(:)
       !> T_n (rank, rank, harmonic).
       complex(sp), allocatable, private :: t(:, :, :)
       !> Right-hand sides in single precision (n, harmonics) and their patterns; of harmonic 0 (n).
       complex(sp), allocatable, private :: rhs(:, :), pattern(:, :), turned(:, :)
       real(sp), allocatable, private :: mean(:)
+      !> Scales of the right-hand sides (harmonics).
+      real(wp), allocatable, private :: largest(:)
    contains
       procedure :: reserve
       procedure :: factor
@@ -59,11 +62,11 @@ contains
       self%n = n
       self%rank = rank
       if (allocated(self%u)) deallocate (self%u, self%v, self%t, self%rhs, self%pattern, &
-                                         self%turned, self%mean)
+                                         self%turned, self%mean, self%largest)
       allocate (self%u(n, rank), self%v(n, rank), self%t(rank, rank, n_harmonics))
       allocate (self%rhs(n, n_harmonics), self%pattern(rank, n_harmonics))
       allocate (self%turned(rank, n_harmonics))
-      allocate (self%mean(n))
+      allocate (self%mean(n), self%largest(n_harmonics))
       if (allocated(self%constant)) then
          if (size(self%constant, 1) >= n) return
          deallocate (self%constant, self%pivot)
@@ -89,7 +92,10 @@ contains
       call self%moving%factor()
       !$omp end single
       !$omp end parallel
-      if (first == 2) call mend_pivots(self%constant(:self%n, :self%n))
+      if (first == 2) then
+         call mend_pivots(self%constant(:self%n, :self%n))
+         call self%constant_panels%pack_real(self%n, self%constant, self%pivot)
+      end if
       call self%panels%pack_factors(self%n, self%moving%matrix, self%moving%pivot)
       if (self%rank > 0 .and. size(dynamic, 3) >= first) call find_patterns(self, first, dynamic)
    end subroutine factor
@@ -133,29 +139,140 @@ contains
       end do
    end subroutine find_patterns
 
-   !> Solve in place for all harmonics (n, n_harmonics).
-   subroutine solve(self, first, b)
+   !> Solve in place for all harmonics, real coefficients side by side (any rows, n_coefficients).
+   !> Threads share harmonic 0 and the groups of four others: whoever has harmonic 0, which is the
+   !> lightest, has no more groups than anybody else.
+   subroutine solve(self, harmonic, column, from, threaded, vector)
       class(split_factors), intent(inout) :: self
-      integer, intent(in) :: first
-      complex(wp), intent(inout) :: b(:, :)
-      real(wp) :: largest(size(b, 2))
-      integer :: h, last
+      !> Harmonics and the columns of their coefficients.
+      integer, intent(in) :: harmonic(:), column(:)
+      !> Row of each unknown in the vector, 0 for one that is not there (n).
+      integer, intent(in) :: from(:)
+      logical, intent(in) :: threaded
+      real(wp), intent(inout) :: vector(:, :)
+      integer :: first, n_shares, n_units, share
 
-      last = size(b, 2)
-      do h = 1, last
-         ! To the order of one, because single precision ends at 1e38.
-         largest(h) = max(maxval(abs(real(b(:self%n, h), wp))), &
-                          maxval(abs(aimag(b(:self%n, h)))))
-         if (.not. largest(h) > 0.0_wp) largest(h) = 1.0_wp
-         self%rhs(:, h) = cmplx(b(:self%n, h)/largest(h), kind=sp)
+      if (size(harmonic) == 0) return
+      first = merge(2, 1, harmonic(1) == 0)
+      call self%panels%reserve_groups(size(harmonic) - first + 1)
+      n_units = (size(harmonic) - first + group_width)/group_width + first - 1
+      n_shares = merge(min(n_units, omp_get_max_threads()), 1, threaded)
+      !$omp parallel do default(none) private(share) if(n_shares > 1) &
+      !$omp shared(self, harmonic, column, from, vector, first, n_shares, n_units)
+      do share = 1, n_shares
+         call solve_units(self, harmonic, column, from, first, rounded((share - 1)*n_units) + 1, &
+                          rounded(share*n_units), vector)
       end do
-      if (first == 2) call solve_constant(self, self%rhs(:, 1))
-      if (last >= first) call solve_moving(self, first, last)
-      do h = 1, last
-         ! Of matrices that were scaled: A^-1 = scale (scale A)^-1.
-         b(:self%n, h) = self%moving%scale*largest(h)*cmplx(self%rhs(:, h), kind=wp)
-      end do
+      !$omp end parallel do
+
+   contains
+
+      pure integer function rounded(units)
+         integer, intent(in) :: units
+
+         rounded = (units + n_shares - 1)/n_shares
+      end function rounded
+
    end subroutine solve
+
+   !> Units of work: harmonic 0, where there is one, then groups.
+   subroutine solve_units(self, harmonic, column, from, first, unit_first, unit_last, vector)
+      class(split_factors), intent(inout) :: self
+      integer, intent(in) :: harmonic(:), column(:), from(:)
+      !> As in `factor`.
+      integer, intent(in) :: first
+      integer, intent(in) :: unit_first, unit_last
+      real(wp), intent(inout) :: vector(:, :)
+      integer :: g, g_first, g_last, h, last, h_last
+
+      if (first == 2 .and. unit_first == 1) then
+         call take_harmonic(self, .true., column(1), from, vector, self%largest(1), self%rhs(:, 1))
+         self%mean = real(self%rhs(:, 1), sp)
+         call self%constant_panels%solve_real(self%mean)
+         self%rhs(:, 1) = cmplx(self%mean, kind=sp)
+         call give_harmonic(self, .true., column(1), from, vector, self%largest(1), self%rhs(:, 1))
+      end if
+      g_first = max(unit_first - first + 1, 1)
+      g_last = unit_last - first + 1
+      if (g_first > g_last) return
+      last = size(harmonic)
+      h_last = min(last, first + g_last*group_width - 1)
+      do h = first + (g_first - 1)*group_width, h_last
+         call take_harmonic(self, .false., column(h), from, vector, self%largest(h), self%rhs(:, h))
+      end do
+      call self%panels%solve_groups(g_first, g_last, last - first + 1, self%rhs(:, first:last))
+      if (self%rank > 0) then
+         ! Group by group, whoever does them: sizes of products decide on their last bits.
+         do g = g_first, g_last
+            h = first + (g - 1)*group_width
+            call subtract_group(self, h, min(last, h + group_width - 1))
+         end do
+      end if
+      do h = first + (g_first - 1)*group_width, h_last
+         call give_harmonic(self, .false., column(h), from, vector, self%largest(h), self%rhs(:, h))
+      end do
+   end subroutine solve_units
+
+   !> A right-hand side of the order of one, because single precision ends at 1e38.
+   pure subroutine take_harmonic(self, is_constant, k, from, vector, largest, rhs)
+      class(split_factors), intent(in) :: self
+      logical, intent(in) :: is_constant
+      !> Column of its first coefficient.
+      integer, intent(in) :: k
+      integer, intent(in) :: from(:)
+      real(wp), intent(in) :: vector(:, :)
+      real(wp), intent(out) :: largest
+      complex(sp), intent(out) :: rhs(:)
+      integer :: i, last
+
+      last = merge(k, k + 1, is_constant)
+      largest = 0.0_wp
+      do i = 1, self%n
+         if (from(i) > 0) largest = max(largest, abs(vector(from(i), k)), abs(vector(from(i), last)))
+      end do
+      if (.not. largest > 0.0_wp) largest = 1.0_wp
+      do i = 1, self%n
+         rhs(i) = (0.0_sp, 0.0_sp)
+         if (from(i) == 0) cycle
+         rhs(i) = cmplx(vector(from(i), k)/largest, -vector(from(i), last)/largest, sp)
+      end do
+   end subroutine take_harmonic
+
+   !> Back, and out of the scale of the matrices: A^-1 = scale (scale A)^-1.
+   pure subroutine give_harmonic(self, is_constant, k, from, vector, largest, rhs)
+      class(split_factors), intent(in) :: self
+      logical, intent(in) :: is_constant
+      integer, intent(in) :: k
+      integer, intent(in) :: from(:)
+      real(wp), intent(inout) :: vector(:, :)
+      real(wp), intent(in) :: largest
+      complex(sp), intent(in) :: rhs(:)
+      real(wp) :: factor
+      integer :: i
+
+      factor = self%moving%scale*largest
+      do i = 1, self%n
+         if (from(i) == 0) cycle
+         vector(from(i), k) = factor*real(rhs(i), wp)
+         if (.not. is_constant) vector(from(i), k + 1) = -factor*real(aimag(rhs(i)), wp)
+      end do
+   end subroutine give_harmonic
+
+   !> Of A_n^-1 what the patterns add, of the harmonics of one group.
+   subroutine subtract_group(self, first, last)
+      class(split_factors), intent(inout) :: self
+      integer, intent(in) :: first, last
+      complex(sp), parameter :: one = (1.0_sp, 0.0_sp), zero = (0.0_sp, 0.0_sp)
+      integer :: h
+
+      call cgemm('T', 'N', self%rank, last - first + 1, self%n, one, self%v, self%n, &
+                 self%rhs(1, first), self%n, zero, self%pattern(1, first), self%rank)
+      do h = first, last
+         self%turned(:, h) = matmul(self%t(:, :, h), self%pattern(:, h))
+      end do
+      call cgemm('N', 'N', self%n, last - first + 1, self%rank, -one, self%u, self%n, &
+                 self%turned(1, first), self%rank, one, self%rhs(1, first), self%n)
+   end subroutine subtract_group
 
    !> Right-hand sides of the order of one in place, `n_columns` of a harmonic, one harmonic behind
    !> the other from `first` on; those of harmonic 0 (`is_constant`) are real, and by themselves.
@@ -213,40 +330,5 @@ contains
       call strsm('L', 'U', 'N', 'N', self%n, n_columns, 1.0_sp, self%constant, ld, means, self%n)
       b(:, :n_columns) = cmplx(means, kind=sp)
    end subroutine solve_constants
-
-   !> Harmonic 0, which is real.
-   subroutine solve_constant(self, b)
-      type(split_factors), intent(inout) :: self
-      complex(sp), intent(inout) :: b(:)
-      integer :: i, ld
-
-      ld = size(self%constant, 1)
-      self%mean = real(b, sp)
-      do i = 1, self%n
-         self%mean([i, self%pivot(i)]) = self%mean([self%pivot(i), i])
-      end do
-      call strsv('L', 'N', 'U', self%n, self%constant, ld, self%mean, 1)
-      call strsv('U', 'N', 'N', self%n, self%constant, ld, self%mean, 1)
-      b = cmplx(self%mean, kind=sp)
-   end subroutine solve_constant
-
-   !> All others at once.
-   subroutine solve_moving(self, first, last)
-      type(split_factors), intent(inout) :: self
-      integer, intent(in) :: first, last
-      complex(sp), parameter :: one = (1.0_sp, 0.0_sp), zero = (0.0_sp, 0.0_sp)
-      integer :: h, n_columns
-
-      n_columns = last - first + 1
-      call self%panels%solve(n_columns, self%rhs(:, first:last))
-      if (self%rank == 0) return
-      call cgemm('T', 'N', self%rank, n_columns, self%n, one, self%v, self%n, &
-                 self%rhs(1, first), self%n, zero, self%pattern(1, first), self%rank)
-      do h = first, last
-         self%turned(:, h) = matmul(self%t(:, :, h), self%pattern(:, h))
-      end do
-      call cgemm('N', 'N', self%n, n_columns, self%rank, -one, self%u, self%n, &
-                 self%turned(1, first), self%rank, one, self%rhs(1, first), self%n)
-   end subroutine solve_moving
 
 end module fw_split_factors

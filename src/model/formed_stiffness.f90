@@ -350,6 +350,8 @@ contains
          if (size(self%active) < n) deallocate (self%active)
       end if
       if (.not. allocated(self%active)) allocate (self%active(n))
+      !$omp parallel do collapse(2) default(none) private(h, j, place) &
+      !$omp shared(self, n_active, n_used, used) if(m >= coordinates_for_threads)
       do h = 1, size(self%matrix, 3)
          do j = 1, n_active
             ! One harmonic behind the other, each (n_used, n_active).
@@ -357,6 +359,7 @@ contains
             self%active(place + 1:place + n_used) = self%matrix(used(:n_used), used(j), h)
          end do
       end do
+      !$omp end parallel do
    end subroutine gather
 
    !> product = Z(used, active) v, the first n_used rows of product.

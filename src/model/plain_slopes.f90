@@ -202,15 +202,12 @@ contains
       type(real_products), intent(inout) :: work
       real(wp), intent(in) :: q(*)
       complex(wp), allocatable, intent(out) :: x(:, :)
-      real(wp) :: unused(b%n_coordinates*work%n_coefficients)
-      integer :: h, m
+      integer :: h
 
-      m = b%n_coordinates
       allocate (x(b%n_internal, size(factors%harmonic)))
       ! The products below would be for nothing.
       if (b%n_internal == 0) return
-      call work%multiply_blocks(b, factors, q)
-      call take_rows(m, b%n_internal, work%n_coefficients, work%products, unused, work%modes)
+      call work%multiply_internal(b, factors, q)
       call amplitudes_of(factors%harmonic, factors%column, b%n_internal, work%modes, &
                          b%n_internal, x)
       do h = 1, size(factors%harmonic)

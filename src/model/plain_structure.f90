@@ -42,6 +42,7 @@ module fw_plain_structure
    use fw_structure_operator, only: lay_out_coefficients
    use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
+   use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private
 
@@ -337,14 +338,15 @@ contains
       real(wp), intent(out), contiguous :: matrix(:, :)
       integer :: j
 
-      associate (used => state%used(:state%n_used))
-         do j = 1, state%n_active
-            matrix(:, j) = self%basis%blocks(used, state%used(j), 1)
-         end do
-         do j = 1, self%dynamic%rank
-            matrix(:, state%n_active + j) = self%dynamic%v(used, j)
-         end do
-      end associate
+      !$omp parallel do default(none) private(j) shared(self, state, matrix) &
+      !$omp if(state%n_active >= coordinates_for_threads)
+      do j = 1, state%n_active
+         matrix(:, j) = self%basis%blocks(state%used(:state%n_used), state%used(j), 1)
+      end do
+      !$omp end parallel do
+      do j = 1, self%dynamic%rank
+         matrix(:, state%n_active + j) = self%dynamic%v(state%used(:state%n_used), j)
+      end do
    end subroutine static_block
 
    subroutine dynamic_block(self, state, h, matrix)

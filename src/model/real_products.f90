@@ -58,9 +58,13 @@ module fw_real_products
       procedure :: gather_active
       procedure :: multiply_active
       procedure :: multiply_blocks
+      procedure :: multiply_internal
       procedure :: solve_internal
       procedure :: subtract_modes
    end type real_products
+
+   !> Right-hand sides of a product of the internal modes that a thread takes at a time.
+   integer, parameter :: few_columns = 4
 
 contains
 
@@ -206,21 +210,43 @@ contains
       integer, intent(in) :: n_active, n_used
       real(wp), intent(in) :: columns(n_active + basis%n_internal, n_used, self%n_acting)
       real(wp), intent(in) :: multiples(n_active + basis%n_internal, self%n_acting, *)
-      integer :: b, n_inner
+      integer :: b, k, n, n_inner
 
       n_inner = n_active + basis%n_internal
-      self%modes = 0.0_wp
-      do b = 1, self%n_acting
-         ! The rows of the modes stand below those of the columns.
-         call dgemm('N', 'N', basis%n_internal, self%n_coefficients, n_active, 1.0_wp, &
-                    columns(n_active + 1, 1, b), n_inner, multiples(1, b, 1), &
-                    n_inner*self%n_acting, 1.0_wp, self%modes, basis%n_internal)
+      !$omp parallel do default(none) private(b, k, n) if(n_used >= coordinates_for_threads) &
+      !$omp shared(self, basis, n_active, n_inner, columns, multiples)
+      do k = 1, self%n_coefficients, few_columns
+         n = min(few_columns, self%n_coefficients - k + 1)
+         self%modes(:, k:k + n - 1) = 0.0_wp
+         do b = 1, self%n_acting
+            ! The rows of the modes stand below those of the columns.
+            call dgemm('N', 'N', basis%n_internal, n, n_active, 1.0_wp, &
+                       columns(n_active + 1, 1, b), n_inner, multiples(1, b, k), &
+                       n_inner*self%n_acting, 1.0_wp, self%modes(1, k), basis%n_internal)
+         end do
       end do
+      !$omp end parallel do
    end subroutine multiply_modes
+
+   !> b of the module header in the place of the modes, of all coordinates.
+   subroutine multiply_internal(self, basis, factors, v)
+      class(real_products), intent(inout) :: self
+      type(reduction_type), intent(in) :: basis
+      type(harmonic_factors), intent(in) :: factors
+      !> (n_coordinates, n_coefficients).
+      real(wp), intent(in) :: v(*)
+
+      associate (m => basis%n_coordinates)
+         call place_multiples(factors, m, self%n_acting, 1.0_wp, v, 0, m + basis%n_internal, &
+                              self%multiples)
+         call multiply_modes(self, basis, m, m, basis%blocks, self%multiples)
+      end associate
+   end subroutine multiply_internal
 
    !> sign times k v, -theta v and i s v below `first` rows of each. In real form, of
    !> U = uc - i us: -theta U = -(Re uc + Im us) + i (Re us - Im uc) and i s U = s us + i s uc.
-   pure subroutine place_multiples(factors, n, n_blocks, sign, v, first, n_inner, multiples)
+   !> Threads share the harmonics.
+   subroutine place_multiples(factors, n, n_blocks, sign, v, first, n_inner, multiples)
       type(harmonic_factors), intent(in) :: factors
       integer, intent(in) :: n, n_blocks
       real(wp), intent(in) :: sign
@@ -231,6 +257,8 @@ contains
       real(wp) :: re, im
       integer :: h, k
 
+      !$omp parallel do default(none) private(h, k, re, im) if(n >= coordinates_for_threads) &
+      !$omp shared(factors, n, n_blocks, sign, v, first, n_inner, multiples) schedule(static, 1)
       do h = 1, size(factors%harmonic)
          k = factors%column(h)
          re = real(factors%theta(h), wp)
@@ -245,6 +273,7 @@ contains
                              -factors%s(h), first, n_inner, multiples(1, 1, k + 1))
          end if
       end do
+      !$omp end parallel do
    end subroutine place_multiples
 
    !> One column: k a, re a + im b and s b.

@@ -64,28 +64,35 @@ contains
       call fill_rows(basis, part, n_active, n_used, used, n_active + part%rank, self%rows)
    end subroutine pack_rows
 
-   pure subroutine fill_rows(basis, part, n_active, n_used, used, n_inner, panels)
+   !> Panel by panel; threads share them.
+   subroutine fill_rows(basis, part, n_active, n_used, used, n_inner, panels)
       type(reduction_type), intent(in) :: basis
       type(dynamic_part), intent(in) :: part
       integer, intent(in) :: n_active, n_used, n_inner
       integer, intent(in) :: used(:)
       real(sp), intent(inout) :: panels(panel_height, n_inner, *)
-      integer :: i, j, p
+      integer :: first, i, j, n, p
 
-      ! The last panel may have rows to spare, which stay zero.
-      panels(:, :, panel_count(n_used)) = 0.0_sp
-      do j = 1, n_active
-         do i = 1, n_used
-            p = (i - 1)/panel_height
-            panels(i - p*panel_height, j, p + 1) = real(basis%blocks(used(i), used(j), 1), sp)
+      !$omp parallel do default(none) private(first, i, j, n, p) &
+      !$omp shared(basis, part, n_active, n_used, used, panels) &
+      !$omp if(n_used >= coordinates_for_threads)
+      do p = 1, panel_count(n_used)
+         first = (p - 1)*panel_height
+         n = min(panel_height, n_used - first)
+         ! The last panel may have rows to spare, which stay zero.
+         if (n < panel_height) panels(:, :, p) = 0.0_sp
+         do j = 1, n_active
+            do i = 1, n
+               panels(i, j, p) = real(basis%blocks(used(first + i), used(j), 1), sp)
+            end do
+         end do
+         do j = 1, part%rank
+            do i = 1, n
+               panels(i, n_active + j, p) = real(part%v(used(first + i), j), sp)
+            end do
          end do
       end do
-      do j = 1, part%rank
-         do i = 1, n_used
-            p = (i - 1)/panel_height
-            panels(i - p*panel_height, n_active + j, p + 1) = real(part%v(used(i), j), sp)
-         end do
-      end do
+      !$omp end parallel do
    end subroutine fill_rows
 
    !> product = Z(used, active) v, nearly; n_stored rows of memory.
@@ -99,6 +106,7 @@ contains
       real(wp), intent(inout) :: product(n_stored, *)
       real(wp) :: largest
       integer :: h, n_inner
+      logical :: threaded
 
       n_inner = self%n_active + rank
       if (.not. allocated(self%patterns)) then
@@ -106,8 +114,8 @@ contains
          allocate (self%amplitude(rank, size(factors%harmonic)))
          allocate (self%turned(rank, size(factors%harmonic)))
       end if
-      call dgemm('T', 'N', rank, n_coefficients, self%n_active, 1.0_wp, self%v, self%n_active, v, &
-                 self%n_active, 0.0_wp, self%patterns, rank)
+      threaded = self%n_used >= coordinates_for_threads
+      call find_patterns(self, rank, n_coefficients, threaded, v, largest)
       call amplitudes_of(factors%harmonic, factors%column, rank, self%patterns, rank, &
                          self%amplitude)
       do h = 1, size(factors%harmonic)
@@ -115,32 +123,63 @@ contains
       end do
       call coefficients_of(factors%harmonic, factors%column, rank, rank, self%turned, &
                            self%patterns)
-      ! Single precision ends at 1e38: to the order of one before, in both parts.
-      largest = max(maxval(abs(v)), tiny(1.0_wp))
       call fill_groups(self%n_active, rank, n_inner, n_coefficients, largest, v, self%patterns, &
-                       self%groups)
+                       threaded, self%groups)
       call multiply_panels(self%n_used, n_inner, n_coefficients, self%rows, self%groups, largest, &
-                           self%n_used >= coordinates_for_threads, n_stored, product)
+                           threaded, n_stored, product)
    end subroutine multiply
 
-   !> [v; S V^T v] over the largest entry, in groups of columns.
-   pure subroutine fill_groups(n_active, rank, n_inner, n_columns, largest, v, patterns, groups)
+   !> V^T v, and the largest entry of v. Threads share groups of columns.
+   subroutine find_patterns(self, rank, n_columns, threaded, v, largest)
+      class(split_product), intent(inout) :: self
+      integer, intent(in) :: rank, n_columns
+      logical, intent(in) :: threaded
+      real(wp), intent(in) :: v(self%n_active, n_columns)
+      !> Above zero.
+      real(wp), intent(out) :: largest
+      integer :: k, n
+
+      largest = tiny(1.0_wp)
+      !$omp parallel do default(none) private(k, n) shared(self, rank, n_columns, v) &
+      !$omp reduction(max:largest) if(threaded)
+      do k = 1, n_columns, group_width
+         n = min(group_width, n_columns - k + 1)
+         call dgemm('T', 'N', rank, n, self%n_active, 1.0_wp, self%v, self%n_active, v(1, k), &
+                    self%n_active, 0.0_wp, self%patterns(1, k), rank)
+         largest = max(largest, maxval(abs(v(:, k:k + n - 1))))
+      end do
+      !$omp end parallel do
+   end subroutine find_patterns
+
+   !> [v; S V^T v] over the largest entry, in groups of columns: single precision ends at 1e38.
+   subroutine fill_groups(n_active, rank, n_inner, n_columns, largest, v, patterns, threaded, &
+                          groups)
       integer, intent(in) :: n_active, rank, n_inner, n_columns
       real(wp), intent(in) :: largest, v(n_active, n_columns), patterns(rank, n_columns)
+      logical, intent(in) :: threaded
       real(sp), intent(inout) :: groups(group_width, n_inner, *)
+      real(wp) :: factor
       integer :: g, i, k, p
 
-      groups(:, :, group_count(n_columns)) = 0.0_sp
-      do k = 1, n_columns
-         g = (k - 1)/group_width + 1
-         p = k - (g - 1)*group_width
-         do i = 1, n_active
-            groups(p, i, g) = real(v(i, k)/largest, sp)
-         end do
-         do i = 1, rank
-            groups(p, n_active + i, g) = real(patterns(i, k)/largest, sp)
+      factor = 1.0_wp/largest
+      !$omp parallel do default(none) private(g, i, k, p) if(threaded) &
+      !$omp shared(n_active, rank, n_columns, factor, v, patterns, groups)
+      do g = 1, group_count(n_columns)
+         do p = 1, group_width
+            k = (g - 1)*group_width + p
+            if (k > n_columns) then
+               groups(p, :n_active + rank, g) = 0.0_sp
+               cycle
+            end if
+            do i = 1, n_active
+               groups(p, i, g) = real(factor*v(i, k), sp)
+            end do
+            do i = 1, rank
+               groups(p, n_active + i, g) = real(factor*patterns(i, k), sp)
+            end do
          end do
       end do
+      !$omp end parallel do
    end subroutine fill_groups
 
 end module fw_split_product

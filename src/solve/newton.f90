@@ -2,6 +2,7 @@
 module fw_newton
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
+   use fw_norm, only: norm_of
    use fw_linear_step, only: linear_step_type
    use fw_solver_options, only: solver_options
    use fw_system, only: nonlinear_system
@@ -62,7 +63,7 @@ contains
       call reserve(self, system%n)
       self%linear%kind = self%options%linear
       call system%residual(x, self%r)
-      norm = norm2(self%r)/system%reference
+      norm = norm_of(self%r)/system%reference
       best = norm
       ! Nothing is known of the decrease before the first step.
       forcing = self%loosest
@@ -117,7 +118,7 @@ contains
       do halving = 0, max_halvings
          self%trial = x + fraction*self%step
          call system%residual(self%trial, self%r)
-         trial_norm = norm2(self%r)/system%reference
+         trial_norm = norm_of(self%r)/system%reference
          if (ieee_is_finite(trial_norm) .and. trial_norm < best_norm) then
             best_norm = trial_norm
             best_fraction = fraction
@@ -135,7 +136,7 @@ contains
          call system%residual(self%trial, self%r)
       end if
       x = self%trial
-      norm = norm2(self%r)/system%reference
+      norm = norm_of(self%r)/system%reference
    end subroutine search
 
    !> Vectors of the unknowns; solutions of one system reuse them.
