@@ -30,6 +30,7 @@ module fw_friction
    use fw_settling, only: shakedown_turns
    use fw_slip, only: slip_work
    use fw_threads, only: pairs_for_threads
+   use fw_wave_sums, only: wave_table
    implicit none (type, external)
    private
 
@@ -61,6 +62,10 @@ module fw_friction
       logical, allocatable :: settled(:)
       !> Whether a pair that rests was moved on the way to its rest (n_pairs).
       logical, allocatable :: moved(:)
+      !> Of the harmonics, where the analysis is the projection.
+      type(wave_table) :: waves
+      !> Room for derivatives of one pair after the other, from step to step.
+      class(law_room), allocatable :: derivatives
    end type friction_room
 
    interface
@@ -132,16 +137,15 @@ contains
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(out) :: work
 
+      type(friction_room), allocatable :: room
+
       call work%reserve(self%n_elements, self%n_components, fourier)
-      allocate (work%room, source=new_room(self%n_elements))
+      allocate (room)
+      allocate (room%margin(self%n_elements), source=0.0_wp)
+      allocate (room%settled(self%n_elements), room%moved(self%n_elements), source=.false.)
+      if (fourier%projects .and. self%n_elements > 0) call room%waves%build(fourier)
+      call move_alloc(room, work%room)
    end subroutine reserve
-
-   pure type(friction_room) function new_room(n_pairs) result(room)
-      integer, intent(in) :: n_pairs
-
-      allocate (room%margin(n_pairs), source=0.0_wp)
-      allocate (room%settled(n_pairs), room%moved(n_pairs), source=.false.)
-   end function new_room
 
    subroutine evaluate(self, fourier, work)
       class(friction_law), intent(in) :: self

@@ -6,6 +6,8 @@ submodule(fw_friction) fw_friction_derivative
    use fw_one_direction, only: condition
    use fw_one_direction, only: follow_one_direction
    use fw_one_direction, only: project_one_direction
+   use fw_one_direction, only: project_runs
+   use fw_one_direction, only: run_room
    use fw_sampled_turn, only: limit_is_unique
    use fw_slip, only: slip_gradient
    use fw_two_directions, only: add_start
@@ -17,7 +19,7 @@ submodule(fw_friction) fw_friction_derivative
    real(wp), parameter :: touch = 1.0e-10_wp
 
    !> Room for the derivative of one pair.
-   type :: derivative_room
+   type, extends(law_room) :: derivative_room
       !> Of a limit that is the only one: derivative of the position at the instants by that at the
       !> start (2, 2, n_time), and (1 - that of a turn)^-1.
       real(wp), allocatable :: by_start(:, :, :)
@@ -32,6 +34,7 @@ submodule(fw_friction) fw_friction_derivative
       !> Of a pair with one tangential direction: predicted forces, and what follows (n_time).
       real(wp), allocatable :: y_t(:), y_n(:)
       type(condition), allocatable :: at(:)
+      type(run_room) :: runs
    end type derivative_room
 
 contains
@@ -45,7 +48,10 @@ contains
       work%linear_rests = work%rests
       if (.not. any(work%state == pair_mixed)) return
       nc = fourier%n_coefficients
-      if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
+      ! Zero: blocks of components that do not exist stay so.
+      if (.not. allocated(work%jacobian)) then
+         allocate (work%jacobian(3*nc, 3*nc, self%n_elements), source=0.0_wp)
+      end if
       select type (room => work%room)
       type is (friction_room)
          call differentiate_pairs(self, fourier, room, work)
@@ -55,17 +61,23 @@ contains
    subroutine differentiate_pairs(self, fourier, room, work)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
-      type(friction_room), intent(in) :: room
+      type(friction_room), intent(inout) :: room
       type(force_workspace), intent(inout) :: work
-      type(derivative_room) :: of_pairs
+      class(law_room), allocatable :: kept
       type(derivative_room), allocatable :: of_pair
       integer :: i
 
       if (self%n_elements < pairs_for_threads) then
-         do i = 1, self%n_elements
-            if (work%state(i) == pair_mixed) call differentiate_pair(self, fourier, room, i, work, &
-                                                                     of_pairs)
-         end do
+         call move_alloc(room%derivatives, kept)
+         if (.not. allocated(kept)) allocate (derivative_room :: kept)
+         select type (kept)
+         type is (derivative_room)
+            do i = 1, self%n_elements
+               if (work%state(i) == pair_mixed) call differentiate_pair(self, fourier, room, i, &
+                                                                        work, kept)
+            end do
+         end select
+         call move_alloc(kept, room%derivatives)
          return
       end if
       !$omp parallel default(none) shared(self, fourier, room, work) private(i, of_pair)
@@ -91,17 +103,17 @@ contains
 
       call of_pair%sums%reserve(fourier)
       if (.not. work%measures_slip .and. count(self%present(1:2, i)) == 1) then
-         call differentiate_one_direction(self, fourier, room%settled(i), i, work, of_pair)
+         call differentiate_one_direction(self, fourier, room, i, work, of_pair)
       else
          call differentiate_rows(self, fourier, room%settled(i), i, work, of_pair)
       end if
    end subroutine differentiate_pair
 
    !> Of a pair with one tangential direction whose path of slip nobody asks for.
-   subroutine differentiate_one_direction(self, fourier, settled, i, work, of_pair)
+   subroutine differentiate_one_direction(self, fourier, room, i, work, of_pair)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
-      logical, intent(in) :: settled
+      type(friction_room), intent(in) :: room
       integer, intent(in) :: i
       type(force_workspace), intent(inout) :: work
       type(derivative_room), intent(inout) :: of_pair
@@ -113,23 +125,31 @@ contains
       if (.not. allocated(of_pair%at)) then
          allocate (of_pair%at(fourier%n_time), of_pair%y_t(fourier%n_time))
          allocate (of_pair%y_n(fourier%n_time))
+         call of_pair%runs%reserve(room%waves, nc)
       end if
       t = merge(1, 2, self%present(1, i))
       of_pair%y_t = work%prediction_time(i, t, :)
       ! A pair at rest is as of a law with memory, of the prediction with its mean.
       if (work%rests(i)) of_pair%y_t = of_pair%y_t + work%mean(i, t)
       of_pair%y_n = work%prediction_time(i, 3, :)
-      call find_start(self, fourier, settled, work, i, of_pair, x, unique)
-      place = (t - 1)*nc + 1
-      work%jacobian(:, :, i) = 0.0_wp
+      call find_start(self, fourier, room%settled(i), work, i, of_pair, x, unique)
       call follow_one_direction(fourier%n_time, merge(1, work%turns(i), unique), of_pair%y_t, &
                                 of_pair%y_n, self%mu(i), &
                                 merge(touch*work%scale(i), 0.0_wp, unique), &
                                 self%facts%remembers .or. work%rests(i), unique, x(t), of_pair%at)
-      call project_one_direction(fourier%n_time, nc, fourier%synthesis, fourier%analysis, &
-                                 of_pair%at, self%present(3, i), 3*nc, &
-                                 work%jacobian(place, place, i), &
-                                 work%jacobian(2*nc + 1, place, i))
+      place = (t - 1)*nc + 1
+      work%jacobian(place:place + nc - 1, place:place + nc - 1, i) = 0.0_wp
+      if (self%present(3, i)) work%jacobian(2*nc + 1:, place:place + nc - 1, i) = 0.0_wp
+      if (fourier%projects) then
+         call project_runs(room%waves, fourier%n_time, nc, fourier%synthesis, of_pair%at, &
+                           self%present(3, i), 3*nc, of_pair%runs, work%jacobian(place, place, i), &
+                           work%jacobian(2*nc + 1, place, i))
+      else
+         call project_one_direction(fourier%n_time, nc, fourier%synthesis, fourier%analysis, &
+                                    of_pair%at, self%present(3, i), 3*nc, &
+                                    work%jacobian(place, place, i), &
+                                    work%jacobian(2*nc + 1, place, i))
+      end if
       of_pair%sums%wanted = of_pair%y_n < 0.0_wp
       call project_normal(work%jacobian(:, :, i), fourier, of_pair%sums, self%present(3, i))
    end subroutine differentiate_one_direction
@@ -244,7 +264,6 @@ contains
       logical, intent(in) :: has_normal
 
       associate (nc => fourier%n_coefficients)
-         jacobian(:, 2*nc + 1:) = 0.0_wp
          if (has_normal) call bears%form(fourier, 3*nc, jacobian(2*nc + 1, 2*nc + 1))
       end associate
    end subroutine project_normal

@@ -7,16 +7,19 @@
 !>   slip   d lambda_t = -mu e d y_n(k),
 !>   open   d lambda_t = 0.
 !>
-!> Hence the period falls into a few runs of instants, and the projection on the harmonics is a
-!> matrix product for each: no rows at instants are formed.
+!> Hence the period falls into a few runs of instants, whose sums of waves are geometric series: no
+!> rows at instants are formed, and nothing is added up over them. Where the analysis is not the
+!> projection, each run is a matrix product.
 module fw_one_direction
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    use fw_lapack, only: dger
+   use fw_wave_sums, only: wave_sums
+   use fw_wave_sums, only: wave_table
    implicit none (type, external)
    private
 
-   public :: condition, follow_one_direction, project_one_direction
+   public :: condition, follow_one_direction, project_one_direction, project_runs, run_room
 
    integer, parameter :: sticks = 1, slips = 2, opens = 3
 
@@ -27,6 +30,15 @@ module fw_one_direction
       integer :: since = 0
       real(wp) :: pull = 0.0_wp
    end type condition
+
+   !> Room for sums of waves: over all instants of stick, of slip by its pull, and over one run with
+   !> its coefficients (n_coefficients).
+   type :: run_room
+      type(wave_sums) :: stick, slip, one
+      real(wp), allocatable :: weight(:)
+   contains
+      procedure :: reserve
+   end type run_room
 
 contains
 
@@ -107,11 +119,7 @@ contains
 
       first = 1
       do while (first <= n_time)
-         last = first
-         do while (last < n_time)
-            if (.not. continues(at(last), at(last + 1))) exit
-            last = last + 1
-         end do
+         last = end_of_run(n_time, at, first)
          associate (c => at(first))
             if (c%state == sticks) then
                call dgemm('N', 'T', nc, nc, last - first + 1, 1.0_wp, base(1, first), nc, &
@@ -127,6 +135,69 @@ contains
          first = last + 1
       end do
    end subroutine project_one_direction
+
+   !> The same by sums of waves.
+   subroutine project_runs(waves, n_time, nc, base, at, has_normal, n, room, by_tangential, &
+                           by_normal)
+      type(wave_table), intent(in) :: waves
+      integer, intent(in) :: n_time, nc
+      real(wp), intent(in) :: base(nc, n_time)
+      type(condition), intent(in) :: at(n_time)
+      logical, intent(in) :: has_normal
+      integer, intent(in) :: n
+      type(run_room), intent(inout) :: room
+      real(wp), intent(inout) :: by_tangential(n, *), by_normal(n, *)
+      integer :: first, last
+
+      call room%stick%clear()
+      call room%slip%clear()
+      first = 1
+      do while (first <= n_time)
+         last = end_of_run(n_time, at, first)
+         associate (c => at(first))
+            if (c%state == sticks) then
+               call room%one%clear()
+               call room%one%add_run(waves, first, last, 1.0_wp)
+               call room%stick%add_sums(room%one)
+               if (c%since > 0) then
+                  ! The position stands all along the run.
+                  call room%one%analyse(waves, room%weight)
+                  call add_start(nc, c, base, room%weight, has_normal, n, by_tangential, by_normal)
+               end if
+            else if (c%state == slips .and. has_normal) then
+               call room%slip%add_run(waves, first, last, -c%pull)
+            end if
+         end associate
+         first = last + 1
+      end do
+      call room%stick%add_products(waves, n, by_tangential)
+      if (has_normal) call room%slip%add_products(waves, n, by_normal)
+   end subroutine project_runs
+
+   !> Make room for the harmonics of a table.
+   pure subroutine reserve(self, waves, nc)
+      class(run_room), intent(inout) :: self
+      type(wave_table), intent(in) :: waves
+      integer, intent(in) :: nc
+
+      if (allocated(self%weight)) return
+      allocate (self%weight(nc))
+      call self%stick%reserve(waves)
+      call self%slip%reserve(waves)
+      call self%one%reserve(waves)
+   end subroutine reserve
+
+   !> The last instant of the run that starts at `first`.
+   pure integer function end_of_run(n_time, at, first) result(last)
+      integer, intent(in) :: n_time, first
+      type(condition), intent(in) :: at(n_time)
+
+      last = first
+      do while (last < n_time)
+         if (.not. continues(at(last), at(last + 1))) exit
+         last = last + 1
+      end do
+   end function end_of_run
 
    !> Whether two instants, one after the other, belong to one run.
    pure logical function continues(a, b)
@@ -154,8 +225,19 @@ contains
       do k = 1, n_time
          weight = weight + analysis(:, k)
       end do
+      call add_start(nc, c, base, weight, has_normal, n, by_tangential, by_normal)
+   end subroutine take_start
+
+   !> The same with the sum of the analysis over the run.
+   subroutine add_start(nc, c, base, weight, has_normal, n, by_tangential, by_normal)
+      integer, intent(in) :: nc, n
+      type(condition), intent(in) :: c
+      real(wp), intent(in) :: base(nc, *), weight(nc)
+      logical, intent(in) :: has_normal
+      real(wp), intent(inout) :: by_tangential(n, *), by_normal(n, *)
+
       call dger(nc, nc, -1.0_wp, base(1, c%since), 1, weight, 1, by_tangential, n)
       if (has_normal) call dger(nc, nc, -c%pull, base(1, c%since), 1, weight, 1, by_normal, n)
-   end subroutine take_start
+   end subroutine add_start
 
 end module fw_one_direction

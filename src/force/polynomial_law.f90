@@ -8,6 +8,8 @@ module fw_polynomial_law
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
+   use fw_wave_sums, only: wave_sums
+   use fw_wave_sums, only: wave_table
    implicit none (type, external)
    private
 
@@ -25,6 +27,7 @@ module fw_polynomial_law
       !> Harmonics above this one are filtered from the elongations (LaBryer and Attar 2009).
       integer :: highest_harmonic = huge(0)
    contains
+      procedure :: reserve
       procedure :: evaluate
       procedure :: linearize
       procedure :: slope_at
@@ -32,8 +35,13 @@ module fw_polynomial_law
       procedure :: by_parameter
    end type polynomial_law
 
-   !> Slopes at the instants of a block times the base functions there (n_coefficients, block).
    type, extends(law_room) :: polynomial_room
+      !> Slopes at the instants (n_time), and their sums with waves.
+      real(wp), allocatable :: slope(:)
+      type(wave_sums) :: sums
+      type(wave_table) :: waves
+      !> Where these do not serve: slopes at the instants of a block times the base functions there
+      !> (n_coefficients, block).
       real(wp), allocatable :: sloped(:, :)
    end type polynomial_room
 
@@ -65,28 +73,63 @@ contains
       self%facts%further_instants = 2
    end function new_polynomial
 
+   !> A spring has no memory: its derivative is made of sums of waves.
+   subroutine reserve(self, fourier, work)
+      class(polynomial_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(out) :: work
+      type(polynomial_room), allocatable :: room
+
+      call work%reserve(self%n_elements, self%n_components, fourier)
+      allocate (room)
+      if (self%n_elements > 0) then
+         allocate (room%slope(fourier%n_time))
+         if (fourier%projects) then
+            call room%waves%build(fourier)
+            call room%sums%reserve(room%waves)
+         else
+            allocate (room%sloped(fourier%n_coefficients, block))
+         end if
+      end if
+      call move_alloc(room, work%room)
+   end subroutine reserve
+
    !> Forces from the elongations.
    subroutine evaluate(self, fourier, work)
       class(polynomial_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
-      integer :: i, k
+      integer :: i
 
       if (self%n_elements == 0) return
       ! Before the instants: products of what is filtered would fold back into the retained
       ! harmonics.
       call low_pass(self, fourier, work%prediction)
       call fourier%to_time(self%n_elements, work%prediction, work%prediction_time, work%fft)
-      do k = 1, fourier%n_time
-         do i = 1, self%n_elements
-            work%force_time(i, 1, k) = self%coefficient(i)* &
-                                       work%prediction_time(i, 1, k)**self%power(i)
-         end do
+      do i = 1, self%n_elements
+         call raise(self%n_elements, fourier%n_time, work%prediction_time(i, 1, 1), &
+                    self%power(i), self%coefficient(i), self%n_elements, work%force_time(i, 1, 1))
       end do
       call fourier%to_coefficients(self%n_elements, work%force_time, work%force, work%fft)
       ! Every spring has a block in the derivative.
       work%state = pair_mixed
    end subroutine evaluate
+
+   !> values = factor y**power at the instants, each array with a stride of its own. Powers are
+   !> small: products along the instants take less than a power of each number.
+   pure subroutine raise(stride, n_time, y, power, factor, stride_out, values)
+      integer, intent(in) :: stride, n_time, power, stride_out
+      real(wp), intent(in) :: y(stride, *), factor
+      real(wp), intent(inout) :: values(stride_out, *)
+      integer :: k, p
+
+      values(1, :n_time) = factor
+      do p = 1, power
+         do k = 1, n_time
+            values(1, k) = values(1, k)*y(1, k)
+         end do
+      end do
+   end subroutine raise
 
    !> Zero the coefficients above the highest harmonic.
    pure subroutine low_pass(self, fourier, coefficients)
@@ -111,16 +154,14 @@ contains
 
       nc = fourier%n_coefficients
       work%linear_state = work%state
-      if (.not. allocated(work%jacobian)) then
-         allocate (work%jacobian(nc, nc, self%n_elements))
-         allocate (polynomial_room :: work%room)
-      end if
+      if (.not. allocated(work%jacobian)) allocate (work%jacobian(nc, nc, self%n_elements))
       select type (room => work%room)
-      class is (polynomial_room)
-         if (.not. allocated(room%sloped)) allocate (room%sloped(nc, block))
+      type is (polynomial_room)
          do i = 1, self%n_elements
-            call differentiate(self, i, fourier, work%prediction_time(i, 1, :), room%sloped, &
-                               work%jacobian(:, :, i))
+            call raise(self%n_elements, fourier%n_time, work%prediction_time(i, 1, 1), &
+                       self%power(i) - 1, self%coefficient(i)*real(self%power(i), wp), 1, &
+                       room%slope)
+            call differentiate(fourier, room, work%jacobian(:, :, i))
          end do
       end select
       ! Inputs are rows here: what is filtered has no derivative.
@@ -131,23 +172,25 @@ contains
    end subroutine linearize
 
    !> G = analysis diag(slope) synthesis of an element, transposed: the first index is the input.
-   subroutine differentiate(self, element, fourier, y, sloped, gain)
-      class(polynomial_law), intent(in) :: self
-      integer, intent(in) :: element
+   subroutine differentiate(fourier, room, gain)
       type(fourier_type), intent(in) :: fourier
-      !> At the instants.
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(inout), contiguous :: sloped(:, :), gain(:, :)
+      type(polynomial_room), intent(inout) :: room
+      real(wp), intent(inout), contiguous :: gain(:, :)
       integer :: first, k, last, nc
 
       nc = fourier%n_coefficients
       gain = 0.0_wp
+      if (fourier%projects) then
+         call room%sums%of_values(room%waves, room%slope)
+         call room%sums%add_products(room%waves, nc, gain)
+         return
+      end if
       do first = 1, fourier%n_time, block
          last = min(first + block - 1, fourier%n_time)
          do k = first, last
-            sloped(:, k - first + 1) = self%slope_at(element, y(k))*fourier%synthesis(:, k)
+            room%sloped(:, k - first + 1) = room%slope(k)*fourier%synthesis(:, k)
          end do
-         call dgemm('N', 'T', nc, nc, last - first + 1, 1.0_wp, sloped, nc, &
+         call dgemm('N', 'T', nc, nc, last - first + 1, 1.0_wp, room%sloped, nc, &
                     fourier%analysis(:, first:last), nc, 1.0_wp, gain, nc)
       end do
    end subroutine differentiate
