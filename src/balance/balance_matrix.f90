@@ -1,5 +1,6 @@
 !> The matrix of the linear problem of a Newton step, for problems that LU solves: the columns of a
-!> harmonic at a time, and a law with all of them by one matrix product.
+!> harmonic at a time, and a law with all of them by one matrix product. Where every law is a
+!> function of displacements its blocks have their places in the matrix, and nothing is multiplied.
 submodule(fw_balance_state:fw_balance_linear) fw_balance_matrix
    use fw_lapack, only: dgemm
    implicit none (type, external)
@@ -21,6 +22,10 @@ contains
       type(column_room) :: room
       integer :: h, k, n_columns, n_inputs
 
+      if (places_blocks(self)) then
+         call place_blocks(self, matrix)
+         return
+      end if
       n_inputs = 0
       do k = 1, self%problem%forces%n_laws
          n_inputs = max(n_inputs, size(self%work(k)%input, 1))
@@ -36,6 +41,99 @@ contains
          call assemble_harmonic(self, h, room, matrix)
       end do
    end procedure assemble
+
+   !> Whether inputs of the laws are displacements alone, with one weight in all harmonics.
+   pure logical function places_blocks(self)
+      type(balance_state), intent(in) :: self
+      integer :: k
+
+      places_blocks = self%problem%incidence%has_one_weight()
+      do k = 1, self%problem%forces%n_laws
+         ! A case without pairs has a law of pairs all the same.
+         if (self%problem%forces%entry(k)%law%n_elements == 0) cycle
+         associate (p => self%problem%forces%entry(k)%law%prediction)
+            if (p%takes_balance .or. p%has_inertia .or. any(p%order > 0)) places_blocks = .false.
+         end associate
+      end do
+   end function places_blocks
+
+   !> The structure harmonic by harmonic, then the laws element by element.
+   subroutine place_blocks(self, matrix)
+      type(balance_state), intent(in) :: self
+      real(wp), intent(inout), contiguous :: matrix(:, :)
+      complex(wp) :: stiffness(self%active%n_active, self%active%n_active)
+      integer :: h, i, k, na, nc
+
+      na = self%active%n_active
+      nc = self%problem%fourier%n_coefficients
+      matrix(:na*nc, :na*nc) = 0.0_wp
+      do h = 1, self%problem%fourier%n_retained
+         i = (self%problem%fourier%column(h) - 1)*na
+         call self%problem%structure%active_block(self%structure_state, h, stiffness)
+         if (allocated(self%shift)) stiffness = stiffness + self%shift(:na, :na, h)
+         call place_harmonic(na, self%problem%fourier%harmonic(h) == 0, stiffness, i, matrix)
+      end do
+      do k = 1, self%problem%forces%n_laws
+         associate (entry => self%problem%forces%entry(k), work => self%work(k))
+            do i = 1, size(entry%row, 2)
+               if (work%linear_state(i) == pair_open) cycle
+               call place_element(self, entry, work, i, matrix)
+            end do
+         end associate
+      end do
+   end subroutine place_blocks
+
+   !> A complex block as the real one of cosine and sine: (uc, us) of uc - i us.
+   pure subroutine place_harmonic(n, is_constant, block, first, matrix)
+      integer, intent(in) :: n
+      logical, intent(in) :: is_constant
+      complex(wp), intent(in) :: block(n, n)
+      !> Rows and columns before those of the harmonic.
+      integer, intent(in) :: first
+      real(wp), intent(inout), contiguous :: matrix(:, :)
+      integer :: i, j
+
+      do j = 1, n
+         do i = 1, n
+            matrix(first + i, first + j) = real(block(i, j), wp)
+            if (is_constant) cycle
+            matrix(first + n + i, first + j) = -aimag(block(i, j))
+            matrix(first + i, first + n + j) = aimag(block(i, j))
+            matrix(first + n + i, first + n + j) = real(block(i, j), wp)
+         end do
+      end do
+   end subroutine place_harmonic
+
+   !> The derivative of an element, component by component; one that sticks has G = 1.
+   subroutine place_element(self, entry, work, element, matrix)
+      type(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
+      integer, intent(in) :: element
+      real(wp), intent(inout), contiguous :: matrix(:, :)
+      integer :: c, d, na, nc
+
+      na = self%active%n_active
+      nc = self%problem%fourier%n_coefficients
+      do d = 1, size(entry%row, 1)
+         if (entry%row(d, element) == 0) cycle
+         associate (stiffness => entry%law%prediction%stiffness(element, d), &
+                    row_in => entry%row(d, element))
+            if (work%linear_state(element) /= pair_mixed) then
+               call self%problem%incidence%add_diagonal(row_in, self%active%place, na, nc, &
+                                                        stiffness, size(matrix, 1), matrix)
+               cycle
+            end if
+            do c = 1, size(entry%row, 1)
+               if (entry%row(c, element) == 0) cycle
+               call self%problem%incidence%add_coefficients( &
+                  entry%row(c, element), row_in, self%active%place, na, nc, stiffness, &
+                  work%jacobian((d - 1)*nc + 1:d*nc, (c - 1)*nc + 1:c*nc, element), &
+                  size(matrix, 1), matrix)
+            end do
+         end associate
+      end do
+   end subroutine place_element
 
    !> Columns of the coefficients of one harmonic: cosine (or constant), then sine.
    subroutine assemble_harmonic(self, h, room, matrix)

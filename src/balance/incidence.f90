@@ -42,6 +42,9 @@ module fw_incidence
       procedure :: scatter_harmonic
       procedure :: add_block
       procedure :: add_mapped_block
+      procedure :: has_one_weight
+      procedure :: add_coefficients
+      procedure :: add_diagonal
    end type incidence_type
 
 contains
@@ -272,6 +275,73 @@ contains
          end do
       end do
    end subroutine add_mapped_block
+
+   !> Whether the weights of an entry are one real number in all harmonics.
+   pure logical function has_one_weight(self)
+      class(incidence_type), intent(in) :: self
+
+      has_one_weight = .not. allocated(self%turned)
+   end function has_one_weight
+
+   !> matrix = matrix + B^T G k B with the rows of an output and of an input, both mapped, for
+   !> weights that do not turn.
+   pure subroutine add_coefficients(self, row_out, row_in, map, n_mapped, n, stiffness, gain, &
+                                    n_stored, matrix)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row_out, row_in
+      integer, intent(in) :: map(:)
+      !> Places of a coefficient, coefficients, and rows that memory of the matrix has.
+      integer, intent(in) :: n_mapped, n, n_stored
+      real(wp), intent(in) :: stiffness
+      !> (coefficient of the input, of the output)
+      real(wp), intent(in) :: gain(:, :)
+      !> (place, coefficient) both ways: places innermost.
+      real(wp), intent(inout) :: matrix(n_stored, *)
+      real(wp) :: weight
+      integer :: e, f, i, j, place_in, place_out
+
+      do f = self%first(row_in), self%first(row_in + 1) - 1
+         place_in = map(self%coordinate(f))
+         if (place_in == 0 .or. place_in > n_mapped) cycle
+         do e = self%first(row_out), self%first(row_out + 1) - 1
+            place_out = map(self%coordinate(e))
+            if (place_out == 0 .or. place_out > n_mapped) cycle
+            weight = self%weight(e)*self%weight(f)*stiffness
+            do i = 1, n
+               do j = 1, n
+                  associate (entry => matrix((j - 1)*n_mapped + place_out, &
+                                             (i - 1)*n_mapped + place_in))
+                     entry = entry + weight*gain(i, j)
+                  end associate
+               end do
+            end do
+         end do
+      end do
+   end subroutine add_coefficients
+
+   !> The same of a row that sticks: G = 1.
+   pure subroutine add_diagonal(self, row, map, n_mapped, n, stiffness, n_stored, matrix)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped, n, n_stored
+      real(wp), intent(in) :: stiffness
+      real(wp), intent(inout) :: matrix(n_stored, *)
+      integer :: e, f, i, place_in, place_out
+
+      do f = self%first(row), self%first(row + 1) - 1
+         place_in = map(self%coordinate(f))
+         if (place_in == 0 .or. place_in > n_mapped) cycle
+         do e = self%first(row), self%first(row + 1) - 1
+            place_out = map(self%coordinate(e))
+            if (place_out == 0 .or. place_out > n_mapped) cycle
+            do i = 0, (n - 1)*n_mapped, n_mapped
+               matrix(i + place_out, i + place_in) = matrix(i + place_out, i + place_in) &
+                                                     + self%weight(e)*self%weight(f)*stiffness
+            end do
+         end do
+      end do
+   end subroutine add_diagonal
 
    !> target = target + factor w source of one entry, or its conjugate weight, coefficient by
    !> coefficient: w (uc - i us) is the complex amplitude.
