@@ -337,7 +337,7 @@ contains
                 work%linear_state(i) == pair_mixed) then
                call self%near(law)%multiply(entry%row(:, i), i, work)
             else
-               call multiply_derivative_of(work, i)
+               call multiply_derivative_of(entry%row(:, i), work, i)
             end if
          end associate
       end subroutine multiply_one
@@ -352,31 +352,50 @@ contains
                   entry%law%prediction%order(size(entry%row, 1)) == 0
    end function pins_last
 
-   !> Outputs of all elements from their inputs.
-   subroutine multiply_derivative(work)
+   !> Outputs of all elements of a law from their inputs.
+   subroutine multiply_derivative(row, work)
+      !> Row of each component of each element, 0 where there is none.
+      integer, intent(in) :: row(:, :)
       type(force_workspace), intent(inout) :: work
       integer :: i
 
       do i = 1, size(work%state)
-         if (work%linear_state(i) /= pair_open) call multiply_derivative_of(work, i)
+         if (work%linear_state(i) /= pair_open) call multiply_derivative_of(row(:, i), work, i)
       end do
    end subroutine multiply_derivative
 
-   !> output = G input of one element.
-   subroutine multiply_derivative_of(work, element)
+   !> output = G input of one element, between the components that exist.
+   subroutine multiply_derivative_of(row, work, element)
+      integer, intent(in) :: row(:)
       type(force_workspace), intent(inout) :: work
       integer, intent(in) :: element
-      integer :: n
+      integer :: c, first, last, n, nc
 
-      if (work%linear_state(element) == pair_mixed) then
-         n = size(work%input, 1)
-         ! Stored transposed, (input, output): the laws fill it output by output.
-         call dgemv('T', n, n, 1.0_wp, work%jacobian(1, 1, element), n, work%input(1, element), 1, &
-                    0.0_wp, work%output(1, element), 1)
-      else
+      if (work%linear_state(element) /= pair_mixed) then
          ! Stuck throughout: G = 1.
          work%output(:, element) = work%input(:, element)
+         return
       end if
+      ! From the first to the last component that exists: those outside have no forces.
+      first = 1
+      last = 0
+      do c = size(row), 1, -1
+         if (row(c) == 0) cycle
+         first = c
+         last = max(last, c)
+      end do
+      n = size(work%input, 1)
+      nc = n/size(row)
+      first = (first - 1)*nc
+      last = last*nc
+      work%output(:first, element) = 0.0_wp
+      work%output(last + 1:, element) = 0.0_wp
+      if (last == 0) return
+      ! Stored transposed, (input, output): the laws fill it output by output.
+      first = first + 1
+      call dgemv('T', last - first + 1, last - first + 1, 1.0_wp, &
+                 work%jacobian(first, first, element), n, work%input(first, element), 1, 0.0_wp, &
+                 work%output(first, element), 1)
    end subroutine multiply_derivative_of
 
    !> Derivative of the prediction of an element: k B d v, and - B A v where it takes the balance.

@@ -62,7 +62,7 @@ contains
             call inputs_by_point(self, self%problem%forces%entry(k), in_time, m, nc, q, dr, &
                                  self%work(k)%input)
          end associate
-         call multiply_derivative(self%work(k))
+         call multiply_derivative(self%problem%forces%entry(k)%row, self%work(k))
          call add_outputs(self, self%problem%forces%entry(k), self%work(k), &
                           self%problem%incidence%identity, m, dr)
          if (self%problem%forces%entry(k)%law%prediction%has_inertia .and. in_time) then
