@@ -3,10 +3,15 @@ with the same dofs, against annuli of the same sectors as one structure, and aga
 with contact that differs from one to the next.
 
     python -m bench.speed.sectors [--program build/release/fw_run] [--most 9] [--disk disk.h5]
+    python -m bench.speed.sectors --roots --before OTHER [--folder FOLDER] [--pairs 16 48 96]
 
 Engine order 4 of 36 sectors moves as order 1 of 9, 2 of 18. Times are of the processor, of a sweep
 less that of its first point alone, so that reading and the condensation do not count; the smallest
 of several runs. Writes the table between its marks in docs/benchmarks/sectors.md.
+
+With --roots another table: blade roots of more and more pairs in a disk of 47 sectors
+(`bench.common.wave_sector`), by this program and by one of before, by turns. Models are made in
+the folder, which takes minutes for each, unless they stand there.
 """
 
 from __future__ import annotations
@@ -23,12 +28,19 @@ from typing import Any
 import h5py
 import numpy as np
 
+from bench.common.sector import COARSE
+from bench.common.wave_sector import ENGINE_ORDER as ROOT_ORDER
+from bench.common.wave_sector import patterns, wave_file
 from fretwear._namelist import write_namelist
 from fretwear.model_file import write_model_file
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "benchmarks" / "sectors.md"
 BEGIN, END = "<!-- sector cost: begin -->", "<!-- sector cost: end -->"
+ROOT_BEGIN, ROOT_END = "<!-- root cost: begin -->", "<!-- root cost: end -->"
+#: Blade roots: pairs and harmonics, and frequencies through the first bending mode [Hz].
+ROOT_PAIRS, ROOT_HARMONICS = (16, 48, 96), (3, 7)
+ROOT_START, ROOT_SPAN, ROOT_POINTS = 990.0, 40.0, 81
 N_SECTORS, ENGINE_ORDER = 36, 4
 #: Above the resonance of the closed shrouds [Hz], where no maximum is looked for: of the wave, and
 #: of the plain structure, which moves as all sectors alike do.
@@ -149,8 +161,17 @@ def run(program: Path, folder: Path, case: dict[str, dict[str, Any]],
     """Processor time of a sweep [s] and its largest memory [MB]."""
     sweep = {"frequencies": np.linspace(start, start + SPAN, N_POINTS)[:points].tolist(),
              "unit": "Hz"}
-    (folder / "case.nml").write_text(write_namelist(
-        case | {"sweep": case.get("sweep", {}) | sweep}))
+    return execute(program, folder, case | {"sweep": case.get("sweep", {}) | sweep})
+
+
+def spent(program: Path, folder: Path, case: dict[str, dict[str, Any]]) -> float:
+    """Processor time of a run [s]."""
+    return execute(program, folder, case)[0]
+
+
+def execute(program: Path, folder: Path, case: dict[str, dict[str, Any]]) -> tuple[float, float]:
+    """Processor time of a run [s] and its largest memory [MB]."""
+    (folder / "case.nml").write_text(write_namelist(case))
     process = subprocess.Popen([program, "-q", "case.nml"], cwd=folder, env={
         **os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
     memory, done = 0.0, 0
@@ -172,6 +193,57 @@ def memory_of(process: int) -> float:
         return 0.0
     found = [line.split()[1] for line in status.splitlines() if line.startswith("VmHWM")]
     return float(found[0]) / 1024.0 if found else 0.0
+
+
+@dataclass(frozen=True)
+class RootCost:
+    """Of a blade root: patterns in which nodal diameters differ by more than 1 and 0.1 %, Newton
+    steps of a point, and of either program, that of before first, processor time of the first point
+    with all before it [s] and of a later one [ms]."""
+
+    pairs: int
+    n_harmonics: int
+    patterns: tuple[int, int]
+    steps: float
+    first: tuple[float, float]
+    milliseconds: tuple[float, float]
+
+
+def measure_root(before: Path, program: Path, folder: Path, pairs: int, n_harmonics: int
+                 ) -> RootCost:
+    """A sweep and its first point alone, the programs by turns, the smallest of several runs."""
+    model = wave_file(pairs, max(ROOT_HARMONICS), folder, COARSE)
+    case: dict[str, dict[str, Any]] = {
+        "model": {"source": "hdf5", "file": str(model)}, "cyclic": {"engine_order": ROOT_ORDER},
+        "contact": {"law": "dlft", "mu": 0.5}, "load": {"harmonic_scale": 0.5},
+        "harmonics": {"n_harmonics": n_harmonics, "n_time": 128}, "output": {"contact": False},
+        "sweep": {"refine": False, "unit": "Hz", "frequencies": np.linspace(
+            ROOT_START, ROOT_START + ROOT_SPAN, ROOT_POINTS).tolist()}}
+    first = case | {"sweep": case["sweep"] | {"frequencies": [ROOT_START]}}
+    with tempfile.TemporaryDirectory() as place:
+        times = [[(spent(one, Path(place), first), spent(one, Path(place), case))
+                  for one in (before, program)] for _ in range(REPEATS)]
+        with h5py.File(Path(place) / "case.h5") as file:
+            assert file["converged"][:].all()
+            steps = float(np.mean(file["iterations"][1:]))
+    alone, whole = (np.min([[one[i] for one in row] for row in times], axis=0) for i in (0, 1))
+    later = 1e3 * (whole - alone) / (ROOT_POINTS - 1)
+    differs = patterns(model, n_harmonics, 1e-2), patterns(model, n_harmonics, 1e-3)
+    return RootCost(pairs, n_harmonics, differs, steps, (alone[0], alone[1]), (later[0], later[1]))
+
+
+def root_table(costs: list[RootCost]) -> str:
+    lines = ["| pairs | harmonics | unknowns | patterns over 1 % | over 0.1 % | Newton steps "
+             "| ms a point before | now | ratio | s to the end of the first before | now |",
+             "|---|---|---|---|---|---|---|---|---|---|---|"]
+    for row in costs:
+        lines.append(f"| {row.pairs} | {row.n_harmonics} | "
+                     f"{3 * row.pairs * (2 * row.n_harmonics + 1)} | {row.patterns[0]} | "
+                     f"{row.patterns[1]} | {row.steps:.1f} | "
+                     f"{row.milliseconds[0]:.1f} | {row.milliseconds[1]:.1f} | "
+                     f"{row.milliseconds[1] / row.milliseconds[0]:.2f} | "
+                     f"{row.first[0]:.2f} | {row.first[1]:.2f} |")
+    return "\n".join(lines)
 
 
 def measure(program: Path, name: str, case: dict[str, dict[str, Any]], dofs: int, pairs: int,
@@ -253,7 +325,21 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=9, help="sectors of an annulus")
     parser.add_argument("--harmonics", type=int, nargs="+", default=[3, 7, 15])
     parser.add_argument("--page", type=Path, default=PAGE)
+    parser.add_argument("--roots", action="store_true", help="blade roots instead")
+    parser.add_argument("--before", type=Path, help="the program that --roots compares with")
+    parser.add_argument("--folder", type=Path, help="where --roots keeps its models")
+    parser.add_argument("--pairs", type=int, nargs="+", default=list(ROOT_PAIRS))
     arguments = parser.parse_args()
+    if arguments.roots:
+        if arguments.before is None:
+            parser.error("--roots needs --before")
+        with tempfile.TemporaryDirectory() as place:
+            roots = [measure_root(arguments.before.resolve(), arguments.program.resolve(),
+                                  arguments.folder or Path(place), pairs, n)
+                     for pairs in arguments.pairs for n in ROOT_HARMONICS]
+        print(root_table(roots))
+        write(arguments.page, ROOT_BEGIN, ROOT_END, root_table(roots))
+        return
     costs = {}
     for position, n_harmonics in enumerate(arguments.harmonics):
         # Annuli and sectors that differ once: with more harmonics they take minutes.
@@ -261,10 +347,13 @@ def main() -> None:
         costs[n_harmonics] = measure_all(arguments.program.resolve(), arguments.disk, n_harmonics,
                                          most)
         print(table({n_harmonics: costs[n_harmonics]}), flush=True)
-    text = arguments.page.read_text()
-    before, rest = text.split(BEGIN)
-    after = rest.split(END)[1]
-    arguments.page.write_text(f"{before}{BEGIN}\n\n{table(costs)}\n\n{END}{after}")
+    write(arguments.page, BEGIN, END, table(costs))
+
+
+def write(page: Path, begin: str, end: str, found: str) -> None:
+    """A table between its marks."""
+    before, rest = page.read_text().split(begin)
+    page.write_text(f"{before}{begin}\n\n{found}\n\n{end}{rest.split(end)[1]}")
 
 
 if __name__ == "__main__":

@@ -228,7 +228,7 @@ contains
 
       na = self%active%n_active
       roughly = self%nearly .and. self%asked >= near_enough
-      if (roughly .and. self%splits()) then
+      if (roughly .and. (self%splits() .or. self%problem%structure%has_near_product())) then
          call self%problem%structure%multiply_nearly(self%structure_state, vector, &
                                                      self%scratch%active_out)
       else

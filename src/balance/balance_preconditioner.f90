@@ -88,7 +88,7 @@ contains
 
       if (h == self%preconditioner%left_out) return
       call self%fill_harmonic(h, 0, self%preconditioner%harmonic(h))
-      call self%preconditioner%harmonic(h)%factor()
+      call self%preconditioner%harmonic(h)%factor(packs=.true.)
    end subroutine build_harmonic
 
    !> One harmonic: Z_n and the mean of what the forces add to it, scaled for single precision.

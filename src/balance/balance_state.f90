@@ -304,11 +304,19 @@ contains
       self%has_split = problem%structure%split_rank() > 0 .and. self%has_static_laws
       allocate (self%near(problem%forces%n_laws))
       self%has_large_blocks = blocks_are_large(problem)
-      self%nearly = self%has_split .or. self%has_large_blocks
+      self%nearly = offers_nearly(self)
       if (problem%structure%n_alike > 1) call self%preconditioner%reserve_waves( &
          problem%structure%n_slots, problem%structure%n_alike, problem%fourier%n_retained)
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)
    end subroutine new_balance_state
+
+   !> Whether any part of a step has a form that is nearly right and cheaper.
+   pure logical function offers_nearly(self)
+      type(balance_state), intent(in) :: self
+
+      offers_nearly = self%has_split .or. self%has_large_blocks .or. &
+                      self%problem%structure%has_near_product()
+   end function offers_nearly
 
    !> Whether near products and the preconditioner take the structure for one of low rank.
    pure logical function splits(self)
@@ -434,7 +442,8 @@ contains
       call move_alloc(self%structure_state, before)
       call self%problem%structure%new_state(self%structure_state)
       self%structure_state%load_factor = before%load_factor
-      self%nearly = self%problem%structure%split_rank() > 0 .and. self%has_static_laws
+      self%has_split = self%problem%structure%split_rank() > 0 .and. self%has_static_laws
+      self%nearly = offers_nearly(self)
       self%compared_at = -huge(1.0_wp)
       if (before%omega < 0.0_wp) return
       call self%problem%structure%at(self%structure_state, before%omega, before%self_excitation, &

@@ -159,7 +159,7 @@ contains
          b%matrix(:na, na + 1) = cmplx(b%scale*self%column_scale*column(:na), kind=sp)
          b%matrix(na + 1, :na) = cmplx(self%row_scale*row, kind=sp)
          b%matrix(na + 1, na + 1) = (0.0_sp, 0.0_sp)
-         call b%factor()
+         call b%factor(packs=.true.)
       end associate
    end procedure build_preconditioner
 

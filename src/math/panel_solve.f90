@@ -10,6 +10,9 @@
 !> one product with [-L_pp^-1 L_p<, L_pp^-1], which is what a panel holds. Likewise of U, backwards.
 !> Columns do not touch each other: their numbers are the same however threads share them.
 module fw_panel_solve
+   use fw_column_panels, only: multiply_column
+   use fw_column_panels, only: panel_count
+   use fw_column_panels, only: panel_height
    use fw_kinds, only: sp
    use fw_lapack, only: ctrsm
    use omp_lib, only: omp_get_max_threads
@@ -18,8 +21,8 @@ module fw_panel_solve
 
    public :: panel_factors, group_width
 
-   !> Rows of a panel and right-hand sides of a group: their products fill the vector registers.
-   integer, parameter :: panel_height = 16, group_width = 4
+   !> Right-hand sides of a group: products of a panel with them fill the vector registers.
+   integer, parameter :: group_width = 4
 
    type :: panel_factors
       integer, private :: n = 0
@@ -28,8 +31,10 @@ module fw_panel_solve
       real(sp), allocatable, private :: lower(:), upper(:)
       !> Where row i of the permuted right-hand side comes from (n).
       integer, allocatable, private :: source(:)
-      !> Right-hand sides (group_width, 2, rows, groups), and the one of a real matrix (rows).
-      real(sp), allocatable, private :: right(:, :, :, :), column(:)
+      !> Right-hand sides (group_width, 2, rows, groups).
+      real(sp), allocatable, private :: right(:, :, :, :)
+      !> One right-hand side (2, rows), and one of a real matrix (rows).
+      real(sp), allocatable, private :: single(:, :), column(:)
    contains
       procedure :: pack_factors
       procedure :: pack_real
@@ -37,15 +42,10 @@ module fw_panel_solve
       procedure :: solve
       procedure :: solve_groups
       procedure :: solve_real
+      procedure :: solve_one
    end type panel_factors
 
 contains
-
-   pure integer function panel_count(n)
-      integer, intent(in) :: n
-
-      panel_count = (n + panel_height - 1)/panel_height
-   end function panel_count
 
    !> Entries before panel q, of which number r is r panels wide.
    pure integer function entries_before(q)
@@ -212,6 +212,37 @@ contains
       !$omp end parallel do
    end subroutine solve
 
+   !> Solve in place for one right-hand side (n).
+   subroutine solve_one(self, b)
+      class(panel_factors), intent(inout) :: self
+      complex(sp), intent(inout) :: b(:)
+      real(sp) :: tile(panel_height, 2)
+      integer :: first, n_panels, p, q
+
+      n_panels = panel_count(self%n)
+      if (allocated(self%single)) then
+         if (size(self%single, 2) /= n_panels*panel_height) deallocate (self%single)
+      end if
+      if (.not. allocated(self%single)) allocate (self%single(2, n_panels*panel_height))
+      self%single(1, :self%n) = real(b(self%source), sp)
+      self%single(2, :self%n) = aimag(b(self%source))
+      self%single(:, self%n + 1:) = 0.0_sp
+      do p = 1, n_panels
+         first = (p - 1)*panel_height
+         call multiply_column(p*panel_height, self%lower(2*entries_before(p) + 1), &
+                              self%single, tile)
+         self%single(:, first + 1:first + panel_height) = transpose(tile)
+      end do
+      do p = n_panels, 1, -1
+         first = (p - 1)*panel_height
+         q = n_panels - p + 1
+         call multiply_column(q*panel_height, self%upper(2*entries_before(q) + 1), &
+                              self%single(1, first + 1), tile)
+         self%single(:, first + 1:first + panel_height) = transpose(tile)
+      end do
+      b = cmplx(self%single(1, :self%n), self%single(2, :self%n), sp)
+   end subroutine solve_one
+
    !> A run of groups, each panel with all of them: it comes from memory once. Several threads may
    !> do it at the same time, each with groups of its own.
    subroutine solve_groups(self, g_first, g_last, n_columns, b)
@@ -260,13 +291,13 @@ contains
          x(self%n + 1:) = 0.0_sp
          do p = 1, n_panels
             first = (p - 1)*panel_height
-            call multiply_column(p*panel_height, self%lower(entries_before(p) + 1), x, tile)
+            call multiply_real_column(p*panel_height, self%lower(entries_before(p) + 1), x, tile)
             x(first + 1:first + panel_height) = tile
          end do
          do p = n_panels, 1, -1
             first = (p - 1)*panel_height
             q = n_panels - p + 1
-            call multiply_column(q*panel_height, self%upper(entries_before(q) + 1), &
+            call multiply_real_column(q*panel_height, self%upper(entries_before(q) + 1), &
                                  x(first + 1), tile)
             x(first + 1:first + panel_height) = tile
          end do
@@ -275,7 +306,7 @@ contains
    end subroutine solve_real
 
    !> One real panel times one column: four sums, for each has to wait for its last term.
-   pure subroutine multiply_column(n_inner, panel, x, tile)
+   pure subroutine multiply_real_column(n_inner, panel, x, tile)
       integer, intent(in) :: n_inner
       real(sp), intent(in) :: panel(panel_height, n_inner), x(n_inner)
       real(sp), intent(out) :: tile(panel_height)
@@ -294,7 +325,7 @@ contains
          end do
       end do
       tile = (sums(:, 1) + sums(:, 2)) + (sums(:, 3) + sums(:, 4))
-   end subroutine multiply_column
+   end subroutine multiply_real_column
 
    !> Right-hand sides, permuted, into a group; zeros fill it up.
    pure subroutine take_columns(source, b, right)

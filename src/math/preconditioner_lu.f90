@@ -9,6 +9,7 @@ module fw_preconditioner_lu
    use fw_lapack, only: claswp
    use fw_lapack, only: ctrsm
    use fw_lapack, only: ctrsv
+   use fw_panel_solve, only: panel_factors
    implicit none (type, external)
    private
 
@@ -19,6 +20,8 @@ module fw_preconditioner_lu
 
    !> Columns that are factored at a time, and orders from which threads share the others.
    integer, parameter :: block_width = 128, least_shared = 384
+   !> Orders from which a solution with packed factors saves more than packing takes.
+   integer, parameter :: least_packed = 32
 
    !> The storage only grows, so that refactoring does not allocate.
    type :: preconditioner_lu_type
@@ -30,6 +33,9 @@ module fw_preconditioner_lu
       !> A right-hand side in single precision, and the pivots (n).
       complex(sp), allocatable :: rhs(:)
       integer, allocatable :: pivot(:)
+      !> The factors as single right-hand sides are solved with, where there are such.
+      logical, private :: is_packed = .false.
+      type(panel_factors), private :: panels
    contains
       procedure :: reserve
       procedure :: factor
@@ -58,8 +64,10 @@ contains
 
    !> Factor the matrix in place. A pivot of zero, where the matrix is singular, becomes one: what
    !> is left preconditions still, and costs the iterative solver an iteration for each.
-   subroutine factor(self)
+   subroutine factor(self, packs)
       class(preconditioner_lu_type), intent(inout) :: self
+      !> Whether single right-hand sides follow in numbers.
+      logical, intent(in), optional :: packs
       integer :: i, info
 
       if (self%n < least_shared) then
@@ -70,6 +78,9 @@ contains
       do i = 1, self%n
          if (abs(self%matrix(i, i)) < smallest_pivot) self%matrix(i, i) = (1.0_sp, 0.0_sp)
       end do
+      self%is_packed = .false.
+      if (present(packs)) self%is_packed = packs .and. self%n >= least_packed
+      if (self%is_packed) call self%panels%pack_factors(self%n, self%matrix, self%pivot)
    end subroutine factor
 
    !> As cgetrf; the columns beside those that are factored belong to tasks of their own, which the
@@ -121,13 +132,17 @@ contains
 
       largest = max(maxval(abs(real(b, wp))), maxval(abs(aimag(b))))
       if (.not. largest > 0.0_wp) return
-      ! Not cgetrs, which packs the factors anew for a single right-hand side.
-      ld = size(self%matrix, 1)
       ! Single precision ends at 1e38: the entries are brought to the order of one before.
       self%rhs(:self%n) = cmplx(b/largest, kind=sp)
-      call claswp(1, self%rhs, ld, 1, self%n, self%pivot, 1)
-      call ctrsv('L', 'N', 'U', self%n, self%matrix, ld, self%rhs, 1)
-      call ctrsv('U', 'N', 'N', self%n, self%matrix, ld, self%rhs, 1)
+      if (self%is_packed) then
+         call self%panels%solve_one(self%rhs(:self%n))
+      else
+         ! Not cgetrs, which packs the factors anew for a single right-hand side.
+         ld = size(self%matrix, 1)
+         call claswp(1, self%rhs, ld, 1, self%n, self%pivot, 1)
+         call ctrsv('L', 'N', 'U', self%n, self%matrix, ld, self%rhs, 1)
+         call ctrsv('U', 'N', 'N', self%n, self%matrix, ld, self%rhs, 1)
+      end if
       ! x = A^-1 b = scale largest (scale A)^-1 (b/largest).
       b = self%scale*largest*cmplx(self%rhs(:self%n), kind=wp)
    end subroutine solve

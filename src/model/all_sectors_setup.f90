@@ -16,7 +16,7 @@ contains
       call find_bases(model, relative, omega_range, self, error)
       if (allocated(error)) return
       call find_norms(self)
-      call self%means%take(model, relative, means, error)
+      call self%means%take(model, relative, means, self%basis, error)
       if (allocated(error)) return
       call self%ring%plan(self%n_slots, self%n_alike)
       call self%observed_ring%plan(size(model%observe_matrix, 1), self%n_alike)

@@ -36,6 +36,8 @@ module fw_cyclic_structure
 
    !> A mode may stiffen up to this many times the frequency of its stuck motion.
    real(wp), parameter :: reach_of_mode = 2.0_wp
+   !> Coordinates from which copies in single precision pay (bench/speed/sectors.py).
+   integer, parameter :: least_near = 48
    !> More internal modes than any nodal diameter has.
    integer, parameter :: most_modes = 1000000
 
@@ -53,6 +55,8 @@ module fw_cyclic_structure
       procedure :: multiply
       procedure :: restrict
       procedure :: multiply_active
+      procedure :: multiply_nearly
+      procedure :: has_near_product
       procedure :: block => block_of_all
       procedure :: active_block => block_in_use
       procedure :: diagonal
@@ -71,8 +75,9 @@ module fw_cyclic_structure
    type, extends(structure_state) :: cyclic_state
       type(harmonic_point), allocatable :: point(:)
       type(formed_stiffness) :: formed
-      !> Whether rows in use are those of the present frequency.
-      logical :: restricted = .false.
+      !> Whether rows in use are those of the present frequency; whether copies of them are there,
+      !> exact ones and near ones.
+      logical :: restricted = .false., gathered = .false., packed = .false.
    end type cyclic_state
 
 contains
@@ -102,7 +107,7 @@ contains
       call find_bases(model, relative, omega_range, keeps_first, self, error)
       if (allocated(error)) return
       call find_norms(self)
-      call self%means%take(model, relative, means, error)
+      call self%means%take(model, relative, means, self%basis, error)
    end subroutine new_cyclic_structure
 
    !> Norms of K and M of the harmonics.
@@ -327,7 +332,9 @@ contains
          state%n_used = n_used
          state%used(:n_used) = used(:n_used)
          state%restricted = .true.
-         call state%formed%gather(n_active, n_used, used)
+         ! Copies not before they are asked for: steps mostly need the near ones alone.
+         state%gathered = .false.
+         state%packed = .false.
       end select
    end subroutine restrict
 
@@ -339,10 +346,37 @@ contains
 
       select type (state)
       type is (cyclic_state)
+         if (.not. state%gathered) call state%formed%gather(state%n_active, state%n_used, &
+                                                            state%used)
+         state%gathered = .true.
          call state%formed%multiply_active(self%harmonic, self%column, state%n_active, &
                                            state%n_used, v, self%n_coordinates, product)
       end select
    end subroutine multiply_active
+
+   !> The harmonics have matrices of their own, which differ in more than a few patterns: nothing of
+   !> low rank, but copies in single precision.
+   subroutine multiply_nearly(self, state, v, product)
+      class(cyclic_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      real(wp), intent(in) :: v(*)
+      real(wp), intent(inout) :: product(*)
+
+      select type (state)
+      type is (cyclic_state)
+         if (.not. state%packed) call state%formed%pack_near(state%n_active, state%n_used, &
+                                                             state%used)
+         state%packed = .true.
+         call state%formed%multiply_near(self%harmonic, self%column, state%n_active, &
+                                         state%n_used, v, self%n_coordinates, product)
+      end select
+   end subroutine multiply_nearly
+
+   pure logical function has_near_product(self)
+      class(cyclic_structure), intent(in) :: self
+
+      has_near_product = self%n_coordinates >= least_near
+   end function has_near_product
 
    subroutine block_of_all(self, state, h, matrix)
       class(cyclic_structure), intent(in) :: self

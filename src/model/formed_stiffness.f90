@@ -1,9 +1,14 @@
 !> The condensed stiffness as complex matrices, one a harmonic: formed at a frequency, products by
 !> zgemv. For few coordinates, whose matrices stay in the cache, and for many internal modes.
 module fw_formed_stiffness
+   use fw_column_panels, only: multiply_panels
+   use fw_column_panels, only: pack_columns
+   use fw_column_panels, only: panel_count
+   use fw_column_panels, only: panel_height
    use fw_complex_form, only: amplitudes_of
    use fw_complex_form, only: coefficients_of
    use fw_internal_block, only: internal_block
+   use fw_kinds, only: sp
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    use fw_lapack, only: zgemm
@@ -27,12 +32,17 @@ module fw_formed_stiffness
       !> product serves them. It, and its rows and columns in use.
       logical, private :: is_static = .false.
       real(wp), allocatable, private :: static(:, :), static_active(:)
+      !> Rows and columns in use in single precision, for what only has to be near, one harmonic
+      !> behind the other.
+      real(sp), allocatable, private :: near(:)
    contains
       procedure :: reserve
       procedure :: form
       procedure :: multiply
       procedure :: gather
       procedure :: multiply_active
+      procedure :: pack_near
+      procedure :: multiply_near
    end type formed_stiffness
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
@@ -384,5 +394,55 @@ contains
       call multiply_harmonics(self, size(harmonic), n_used, n_active, self%active)
       call coefficients_of(harmonic, column, n_used, m, self%output, product)
    end subroutine multiply_active
+
+   !> Copy the rows and columns in use for `multiply_near`.
+   subroutine pack_near(self, n_active, n_used, used)
+      class(formed_stiffness), intent(inout) :: self
+      integer, intent(in) :: n_active, n_used
+      !> As of `gather`.
+      integer, intent(in) :: used(:)
+      integer :: h, n, n_harmonics
+
+      n = near_size(n_active, n_used)
+      n_harmonics = size(self%matrix, 3)
+      if (allocated(self%near)) then
+         if (size(self%near) < n*n_harmonics) deallocate (self%near)
+      end if
+      if (.not. allocated(self%near)) allocate (self%near(n*n_harmonics))
+      !$omp parallel do default(none) private(h) shared(self, n, n_active, n_used, used) &
+      !$omp shared(n_harmonics) if(size(self%matrix, 1) >= coordinates_for_threads)
+      do h = 1, n_harmonics
+         call pack_columns(self%matrix(:, :, h), n_active, used(:n_used), self%near((h - 1)*n + 1))
+      end do
+      !$omp end parallel do
+   end subroutine pack_near
+
+   !> Numbers of a harmonic.
+   pure integer function near_size(n_active, n_used)
+      integer, intent(in) :: n_active, n_used
+
+      near_size = panel_height*2*n_active*panel_count(n_used)
+   end function near_size
+
+   !> As `multiply_active`, in single precision.
+   subroutine multiply_near(self, harmonic, column, n_active, n_used, v, m, product)
+      class(formed_stiffness), intent(inout) :: self
+      integer, intent(in) :: harmonic(:), column(:)
+      integer, intent(in) :: n_active, n_used, m
+      real(wp), intent(in) :: v(n_active, *)
+      real(wp), intent(inout) :: product(m, *)
+      integer :: h, n
+
+      n = near_size(n_active, n_used)
+      call amplitudes_of(harmonic, column, n_active, v, m, self%input)
+      !$omp parallel do default(none) private(h) shared(self, n, n_active, n_used, harmonic) &
+      !$omp if(size(self%matrix, 1) >= coordinates_for_threads)
+      do h = 1, size(harmonic)
+         call multiply_panels(n_used, n_active, self%near((h - 1)*n + 1), self%input(:, h), &
+                              self%output(:, h))
+      end do
+      !$omp end parallel do
+      call coefficients_of(harmonic, column, n_used, m, self%output, product)
+   end subroutine multiply_near
 
 end module fw_formed_stiffness

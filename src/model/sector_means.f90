@@ -37,17 +37,19 @@ module fw_sector_means
 
 contains
 
-   subroutine take(self, model, relative, means, error)
+   subroutine take(self, model, relative, means, bases, error)
       class(sector_means), intent(out) :: self
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
       !> means_none, means_static or means_split.
       integer, intent(in) :: means
+      !> Of nodal diameters that are condensed already.
+      type(sector_reduction), intent(in) :: bases(:)
       type(error_type), allocatable, intent(out) :: error
 
       if (means >= means_static) call take_static(model, relative, self, error)
       if (allocated(error)) return
-      if (means == means_split) call take_all(model, relative, self, error)
+      if (means == means_split) call take_all(model, relative, bases, self, error)
    end subroutine take
 
    subroutine take_static(model, relative, self, error)
@@ -88,14 +90,15 @@ contains
    end function share_of
 
    !> Bases of all nodal diameters.
-   subroutine take_all(model, relative, self, error)
+   subroutine take_all(model, relative, bases, self, error)
       type(model_type), intent(in) :: model
       type(cyclic_relative), intent(in) :: relative
+      type(sector_reduction), intent(in) :: bases(:)
       type(sector_means), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(nodal_matrices) :: nodal
       integer, allocatable :: slot(:)
-      integer :: j, k, n
+      integer :: i, j, k, n
 
       n = model%cyclic%n_sectors/2 + 1
       allocate (self%all(n), self%share(n), self%place(relative%n_coordinates, n))
@@ -103,19 +106,41 @@ contains
       self%place = 0
       do k = 0, n - 1
          if (.not. model%cyclic%holds(k)) cycle
-         call sector_at(model, k, nodal, error)
-         if (.not. allocated(error)) then
-            call self%all(k + 1)%find_modes(k, nodal, relative%at(k + 1), error)
-         end if
-         if (allocated(error)) return
          slot = relative%slots(k)
-         call self%all(k + 1)%transform(nodal, [(j, j=1, size(slot))], size(slot))
+         i = as_it_is(bases, k, slot)
+         if (i > 0) then
+            self%all(k + 1) = bases(i)
+         else
+            call sector_at(model, k, nodal, error)
+            if (.not. allocated(error)) then
+               call self%all(k + 1)%find_modes(k, nodal, relative%at(k + 1), error)
+            end if
+            if (allocated(error)) return
+            call self%all(k + 1)%transform(nodal, [(j, j=1, size(slot))], size(slot))
+         end if
          self%share(k + 1) = share_of(model, k)
          do j = 1, size(slot)
             if (slot(j) > 0) self%place(slot(j), k + 1) = j
          end do
       end do
    end subroutine take_all
+
+   !> The basis of a nodal diameter, with its own coordinates in their order and no kept mode; 0 for
+   !> none.
+   pure integer function as_it_is(bases, k, slot) result(place)
+      type(sector_reduction), intent(in) :: bases(:)
+      integer, intent(in) :: k, slot(:)
+      integer :: i, j
+
+      place = 0
+      do j = 1, size(bases)
+         if (bases(j)%nodal_diameter /= k .or. bases(j)%n_coordinates /= size(slot)) cycle
+         if (size(bases(j)%kept) > 0) cycle
+         if (any(slot /= [(i, i=1, size(slot))])) cycle
+         place = j
+         return
+      end do
+   end function as_it_is
 
    !> 0 where it was not asked for.
    pure real(wp) function static_stiffness(self, coordinate)

@@ -248,25 +248,60 @@ contains
       integer, intent(in) :: first, last
       logical, intent(in) :: adjoint
       complex(wp), intent(inout) :: z(:, :)
-      complex(wp) :: c
-      integer :: i, j
+      real(wp) :: side
+      integer :: j, n
 
-      c = cmplx(0.0_wp, point%s, wp)
+      n = last - first + 1
+      ! The conjugates of the blocks act, but not of the factors.
+      side = merge(-1.0_wp, 1.0_wp, point%conjugated .neqv. adjoint)
       associate (b => basis%blocks)
          do j = 1, basis%n_coordinates
-            do i = first, last
-               if (point%conjugated .neqv. adjoint) then
-                  z(i - first + 1, j) = point%k*conjg(b(i, j, 1)) - point%theta*conjg(b(i, j, 2))
-                  if (basis%n_blocks == 3) z(i - first + 1, j) = z(i - first + 1, j) + &
-                     c*conjg(b(i, j, 3))
-               else
-                  z(i - first + 1, j) = point%k*b(i, j, 1) - point%theta*b(i, j, 2)
-                  if (basis%n_blocks == 3) z(i - first + 1, j) = z(i - first + 1, j) + c*b(i, j, 3)
-               end if
-            end do
+            call combine(n, point%k, side*point%k, point%theta, side, b(first, j, 1), &
+                         b(first, j, 2), z(:, j))
+            if (basis%n_blocks == 3) call add_damping(n, point%s, side, b(first, j, 3), z(:, j))
          end do
       end associate
    end subroutine combine_rows
+
+   !> k K - theta M of a column, by parts: these loops are run through at every frequency.
+   pure subroutine combine(n, k, k_side, theta, side, stiffness, mass, z)
+      integer, intent(in) :: n
+      !> k, and times the side.
+      real(wp), intent(in) :: k, k_side
+      complex(wp), intent(in) :: theta
+      !> -1 for the conjugates of the blocks.
+      real(wp), intent(in) :: side
+      complex(wp), intent(in) :: stiffness(n), mass(n)
+      complex(wp), intent(out) :: z(n)
+      real(wp) :: re, im, re_side, im_side
+      integer :: i
+
+      re = real(theta, wp)
+      im = aimag(theta)
+      re_side = side*re
+      im_side = side*im
+      do i = 1, n
+         z(i) = cmplx(k*real(stiffness(i), wp) - re*real(mass(i), wp) + im_side*aimag(mass(i)), &
+                      k_side*aimag(stiffness(i)) - re_side*aimag(mass(i)) - im*real(mass(i), wp), &
+                      wp)
+      end do
+   end subroutine combine
+
+   !> z = z + i s C.
+   pure subroutine add_damping(n, s, side, damping, z)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: s, side
+      complex(wp), intent(in) :: damping(n)
+      complex(wp), intent(inout) :: z(n)
+      real(wp) :: s_side
+      integer :: i
+
+      s_side = side*s
+      do i = 1, n
+         z(i) = cmplx(real(z(i), wp) - s_side*aimag(damping(i)), &
+                      aimag(z(i)) + s*real(damping(i), wp), wp)
+      end do
+   end subroutine add_damping
 
    !> Add i s G, and in harmonics above 0 the stiffness of the air, of a part of the rows and
    !> columns of coordinates and internal modes; of a derivative (k = 0) the air has none.

@@ -87,6 +87,7 @@ module fw_structure_operator
       procedure :: field_work
       procedure :: split_rank
       procedure :: multiply_nearly
+      procedure :: has_near_product
       procedure :: static_block
       procedure :: dynamic_block
       procedure :: wave_block
@@ -400,6 +401,15 @@ contains
 
       call self%multiply_active(state, v, product)
    end subroutine multiply_nearly
+
+   !> Whether `multiply_nearly` is a product of its own although nothing of low rank is known.
+   pure logical function has_near_product(self)
+      class(structure_operator), intent(in) :: self
+
+      has_near_product = .false.
+      associate (unused => self)
+      end associate
+   end function has_near_product
 
    !> [K V] of the rows in use: active columns of K, then all of V (n_used, n_active + rank).
    subroutine static_block(self, state, matrix)

@@ -1,0 +1,96 @@
+!> A complex matrix in single precision times one column, many times over. The matrix is packed into
+!> panels of rows, real beside imaginary parts, in the order in which a product reads them: BLAS
+!> takes several times as long for a column, and twice that in double precision. The last panel is
+!> filled up with zeros.
+module fw_column_panels
+   use fw_kinds, only: sp
+   use fw_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: panel_height, panel_count, multiply_column, pack_columns, multiply_panels
+
+   !> Rows of a panel: their sums fill the vector registers.
+   integer, parameter :: panel_height = 16
+
+contains
+
+   !> Panels of so many rows.
+   pure integer function panel_count(n_rows)
+      integer, intent(in) :: n_rows
+
+      panel_count = (n_rows + panel_height - 1)/panel_height
+   end function panel_count
+
+   !> One panel times the column; its sums stay in registers.
+   pure subroutine multiply_column(n_inner, panel, right, tile)
+      integer, intent(in) :: n_inner
+      !> Real and imaginary parts in the second dimension, in the first of the column.
+      real(sp), intent(in) :: panel(panel_height, 2, n_inner), right(2, n_inner)
+      real(sp), intent(out) :: tile(panel_height, 2)
+      !> Four sums, so that none waits for another.
+      real(sp), dimension(panel_height) :: re_re, im_im, re_im, im_re
+      integer :: i, j
+
+      re_re = 0.0_sp
+      im_im = 0.0_sp
+      re_im = 0.0_sp
+      im_re = 0.0_sp
+      do j = 1, n_inner
+         !$omp simd
+         do i = 1, panel_height
+            re_re(i) = re_re(i) + panel(i, 1, j)*right(1, j)
+            im_im(i) = im_im(i) + panel(i, 2, j)*right(2, j)
+            re_im(i) = re_im(i) + panel(i, 1, j)*right(2, j)
+            im_re(i) = im_re(i) + panel(i, 2, j)*right(1, j)
+         end do
+      end do
+      tile(:, 1) = re_re - im_im
+      tile(:, 2) = re_im + im_re
+   end subroutine multiply_column
+
+   !> Pack rows and columns of a matrix.
+   pure subroutine pack_columns(matrix, n_columns, rows, panels)
+      complex(wp), intent(in) :: matrix(:, :)
+      !> Numbers of the rows; the first n_columns of them are those of the columns.
+      integer, intent(in) :: n_columns, rows(:)
+      real(sp), intent(inout) :: panels(panel_height, 2, n_columns, *)
+      integer :: i, j, p
+
+      panels(:, :, :, panel_count(size(rows))) = 0.0_sp
+      do j = 1, n_columns
+         do p = 1, panel_count(size(rows))
+            associate (first => (p - 1)*panel_height)
+               do i = 1, min(panel_height, size(rows) - first)
+                  panels(i, 1, j, p) = real(matrix(rows(first + i), rows(j)), sp)
+                  panels(i, 2, j, p) = real(aimag(matrix(rows(first + i), rows(j))), sp)
+               end do
+            end associate
+         end do
+      end do
+   end subroutine pack_columns
+
+   !> product = matrix column.
+   pure subroutine multiply_panels(n_rows, n_columns, panels, column, product)
+      integer, intent(in) :: n_rows, n_columns
+      real(sp), intent(in) :: panels(panel_height, 2, n_columns, *)
+      complex(wp), intent(in) :: column(n_columns)
+      complex(wp), intent(inout) :: product(n_rows)
+      real(sp) :: right(2, n_columns), tile(panel_height, 2)
+      real(wp) :: largest
+      integer :: first, n, p
+
+      ! Single precision ends at 1e38: to the order of one before.
+      largest = max(maxval(abs(real(column, wp))), maxval(abs(aimag(column))))
+      if (.not. largest > 0.0_wp) largest = 1.0_wp
+      right(1, :) = real(real(column, wp)/largest, sp)
+      right(2, :) = real(aimag(column)/largest, sp)
+      do p = 1, panel_count(n_rows)
+         first = (p - 1)*panel_height
+         n = min(panel_height, n_rows - first)
+         call multiply_column(n_columns, panels(1, 1, 1, p), right, tile)
+         product(first + 1:first + n) = largest*cmplx(tile(:n, 1), tile(:n, 2), wp)
+      end do
+   end subroutine multiply_panels
+
+end module fw_column_panels
