@@ -181,7 +181,8 @@ contains
              '/'//to_text(n_points)
    end function bar_text
 
-   !> Frequency, or parameter of a sweep, and amplitude of a point; of wear the cycles and the largest depth.
+   !> Frequency, or parameter of a sweep, and amplitude of a point; of wear the cycles and the
+   !> largest depth.
    function state_of(self, point) result(text)
       class(progress_type), intent(in) :: self
       type(point_type), intent(in) :: point

@@ -433,7 +433,8 @@ contains
       end associate
    end subroutine gather_inputs
 
-   !> rows = rows + B^T outputs of a law. Elements may share coordinates: threads share coefficients.
+   !> rows = rows + B^T outputs of a law. Elements may share coordinates: threads share the
+   !> coefficients.
    subroutine add_outputs(self, entry, work, map, n_mapped, rows)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry

@@ -1,5 +1,5 @@
-!> The Euclidean norm of vectors that are formed at every iteration. That of the language scales every
-!> entry against overflow, which takes as long as a division for each.
+!> The Euclidean norm of vectors that are formed at every iteration. That of the language scales
+!> every entry against overflow, which takes as long as a division for each.
 module fw_norm
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp

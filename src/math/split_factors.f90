@@ -228,7 +228,8 @@ contains
       last = merge(k, k + 1, is_constant)
       largest = 0.0_wp
       do i = 1, self%n
-         if (from(i) > 0) largest = max(largest, abs(vector(from(i), k)), abs(vector(from(i), last)))
+         if (from(i) == 0) cycle
+         largest = max(largest, abs(vector(from(i), k)), abs(vector(from(i), last)))
       end do
       if (.not. largest > 0.0_wp) largest = 1.0_wp
       do i = 1, self%n
