@@ -144,7 +144,7 @@ contains
          report%residual = self%best_residual
       end if
       ! Forces and states of this very point: the last trial may have been another.
-      call system%residual(self%x, self%r)
+      if (.not. (report%converged .and. self%method%stands)) call system%residual(self%x, self%r)
       point%omega = request%omega
       point%place = request%place()
       point%load_scale = case%model%harmonic_scale*system%vibratory_factor()

@@ -47,6 +47,8 @@ module fw_solution
       logical :: unbounded = .false.
       !> A solution was refused because its friction is ripple.
       logical :: rippled = .false.
+      !> The system was evaluated last at the very solution that converged.
+      logical :: stands = .false.
       !> Why the last pseudo-time solution failed.
       character(:), allocatable :: message
    contains
@@ -90,6 +92,12 @@ contains
       call formulation%from_coefficients(x, unknowns)
       call solve_system(self, solved, unknowns, report)
       call formulation%to_coefficients(unknowns, x)
+      ! Newton's method evaluates what it accepts last; other solvers, and formulations with unknowns
+      ! of their own, may have been elsewhere.
+      self%stands = report%converged .and. self%kind /= solver_powell .and. &
+                    self%kind /= solver_kinsol .and. &
+                    self%newton%options%jacobian /= jacobian_difference
+      if (self%stands) self%stands = all(abs(unknowns - x) <= 0.0_wp)
       if (report%converged) call refuse_unreal(self, system, x, report)
    end subroutine solve
 
@@ -157,6 +165,7 @@ contains
       type(flow_system) :: flow
       real(wp), allocatable :: whole_x(:)
 
+      self%stands = .false.
       report%interrupted = system%is_interrupted()
       if (report%interrupted) return
       if (.not. allocated(self%whole)) then
