@@ -292,35 +292,44 @@ contains
       end do
    end subroutine peak_angles
 
-   !> u at n_grid angles of a period, a multiple of 4, and one beyond each end. Of all angles at
-   !> once, so that a processor turns several waves by one instruction.
+   !> u at n_grid angles of a period, a multiple of 4, and one beyond each end. Cosines are even and
+   !> sines odd: half of the angles serve for all. These at once, so that a processor turns several
+   !> waves by one instruction.
    pure subroutine evaluate_grid(coefficients, n_grid, grid)
       real(wp), intent(in) :: coefficients(:)
       integer, intent(in) :: n_grid
       real(wp), intent(out) :: grid(0:n_grid + 1)
-      real(wp), dimension(0:n_grid - 1) :: turn_c, turn_s, c, s
+      !> Waves, and the sums of cosines and of sines.
+      real(wp), dimension(0:n_grid/2) :: turn_c, turn_s, c, s, even, odd
       real(wp) :: before
-      integer :: k, n, quarter
+      integer :: half, k, n, quarter
 
       quarter = n_grid/4
+      half = n_grid/2
       do k = 0, quarter - 1
          turn_c(k) = cos(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
          turn_s(k) = sin(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
       end do
-      do k = quarter, n_grid - 1
+      do k = quarter, half
          turn_c(k) = -turn_s(k - quarter)
          turn_s(k) = turn_c(k - quarter)
       end do
       c = 1.0_wp
       s = 0.0_wp
-      grid = coefficients(1)
+      even = coefficients(1)
+      odd = 0.0_wp
       do n = 1, (size(coefficients) - 1)/2
-         do k = 0, n_grid - 1
+         do k = 0, half
             before = c(k)
             c(k) = before*turn_c(k) - s(k)*turn_s(k)
             s(k) = before*turn_s(k) + s(k)*turn_c(k)
-            grid(k) = grid(k) + coefficients(2*n)*c(k) + coefficients(2*n + 1)*s(k)
+            even(k) = even(k) + coefficients(2*n)*c(k)
+            odd(k) = odd(k) + coefficients(2*n + 1)*s(k)
          end do
+      end do
+      grid(:half) = even + odd
+      do k = half + 1, n_grid - 1
+         grid(k) = even(n_grid - k) - odd(n_grid - k)
       end do
       grid(n_grid:) = grid(:1)
    end subroutine evaluate_grid
