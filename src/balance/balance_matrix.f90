@@ -47,7 +47,7 @@ contains
       type(balance_state), intent(in) :: self
       integer :: k
 
-      places_blocks = self%problem%incidence%has_one_weight()
+      places_blocks = .not. self%problem%incidence%turns()
       do k = 1, self%problem%forces%n_laws
          ! A case without pairs has a law of pairs all the same.
          if (self%problem%forces%entry(k)%law%n_elements == 0) cycle

@@ -42,7 +42,6 @@ module fw_incidence
       procedure :: scatter_harmonic
       procedure :: add_block
       procedure :: add_mapped_block
-      procedure :: has_one_weight
       procedure :: add_coefficients
       procedure :: add_diagonal
    end type incidence_type
@@ -275,13 +274,6 @@ contains
          end do
       end do
    end subroutine add_mapped_block
-
-   !> Whether the weights of an entry are one real number in all harmonics.
-   pure logical function has_one_weight(self)
-      class(incidence_type), intent(in) :: self
-
-      has_one_weight = .not. allocated(self%turned)
-   end function has_one_weight
 
    !> matrix = matrix + B^T G k B with the rows of an output and of an input, both mapped, for
    !> weights that do not turn.
