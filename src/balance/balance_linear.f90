@@ -22,8 +22,8 @@ submodule(fw_balance_state) fw_balance_linear
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
    !> Part of a residual whose effect on a step is far below the tolerance of linear solutions.
    real(wp), parameter :: negligible = 1.0e-9_wp
-   !> Coefficients that a thread adds at a time.
-   integer, parameter :: few_coefficients = 8
+   !> Coefficients that a thread adds at a time, and numbers from which threads pay for that.
+   integer, parameter :: few_coefficients = 8, entries_for_threads = 8000
    !> Relative residual of a linear solution from which the product of low rank serves.
    real(wp), parameter :: near_enough = 5.0e-5_wp
 
@@ -446,7 +446,7 @@ contains
 
       nc = self%problem%fourier%n_coefficients
       ! Weights that turn take the coefficients of a harmonic together.
-      if (size(entry%row, 2) < pairs_for_threads .or. self%problem%incidence%turns()) then
+      if (size(entry%row)*nc < entries_for_threads .or. self%problem%incidence%turns()) then
          call add_some(1, nc)
          return
       end if

@@ -65,6 +65,9 @@ module fw_real_products
 
    !> Right-hand sides of a product of the internal modes that a thread takes at a time.
    integer, parameter :: few_columns = 4
+   !> Complex entries of vectors from which threads share their harmonics: fewer are done sooner
+   !> than threads are called.
+   integer, parameter :: entries_for_threads = 4000
 
 contains
 
@@ -257,7 +260,8 @@ contains
       real(wp) :: re, im
       integer :: h, k
 
-      !$omp parallel do default(none) private(h, k, re, im) if(n >= coordinates_for_threads) &
+      !$omp parallel do default(none) private(h, k, re, im) &
+      !$omp if(n*size(factors%harmonic) >= entries_for_threads) &
       !$omp shared(factors, n, n_blocks, sign, v, first, n_inner, multiples) schedule(static, 1)
       do h = 1, size(factors%harmonic)
          k = factors%column(h)

@@ -20,6 +20,10 @@ module fw_split_product
 
    public :: split_product
 
+   !> Entries of vectors from which threads share their columns: fewer are done sooner than threads
+   !> are called.
+   integer, parameter :: entries_for_threads = 8000
+
    type :: split_product
       !> S_n (rank, rank, n_retained).
       complex(wp), allocatable :: dynamic(:, :, :)
@@ -106,7 +110,7 @@ contains
       real(wp), intent(inout) :: product(n_stored, *)
       real(wp) :: largest
       integer :: h, n_inner
-      logical :: threaded
+      logical :: threaded, shares_columns
 
       n_inner = self%n_active + rank
       if (.not. allocated(self%patterns)) then
@@ -115,7 +119,8 @@ contains
          allocate (self%turned(rank, size(factors%harmonic)))
       end if
       threaded = self%n_used >= coordinates_for_threads
-      call find_patterns(self, rank, n_coefficients, threaded, v, largest)
+      shares_columns = threaded .and. size(v) >= entries_for_threads
+      call find_patterns(self, rank, n_coefficients, shares_columns, v, largest)
       call amplitudes_of(factors%harmonic, factors%column, rank, self%patterns, rank, &
                          self%amplitude)
       do h = 1, size(factors%harmonic)
@@ -124,7 +129,7 @@ contains
       call coefficients_of(factors%harmonic, factors%column, rank, rank, self%turned, &
                            self%patterns)
       call fill_groups(self%n_active, rank, n_inner, n_coefficients, largest, v, self%patterns, &
-                       threaded, self%groups)
+                       shares_columns, self%groups)
       call multiply_panels(self%n_used, n_inner, n_coefficients, self%rows, self%groups, largest, &
                            threaded, n_stored, product)
    end subroutine multiply
