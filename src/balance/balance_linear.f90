@@ -33,14 +33,13 @@ contains
    module procedure linearize
       integer :: k
 
+      self%alteration = 0.0_wp
       do k = 1, self%problem%forces%n_laws
          if (size(self%work(k)%state) == 0) cycle
          associate (entry => self%problem%forces%entry(k))
             call entry%law%linearize(self%problem%fourier, self%work(k))
-            if (self%nearly .and. self%has_large_blocks) then
-               call self%near(k)%take(entry%row, pins_last(entry), self%work(k))
-            end if
          end associate
+         call self%take_near(k)
       end do
       call choose_active(self)
       call self%problem%structure%restrict(self%structure_state, self%active%n_active, &
@@ -48,6 +47,17 @@ contains
       n_linear = self%active%n_active*self%problem%fourier%n_coefficients
       self%active%n_linear = n_linear
    end procedure linearize
+
+   module procedure take_near
+
+      if (present(alteration)) self%alteration = alteration
+      if (.not. (self%nearly .and. self%has_large_blocks)) return
+      associate (entry => self%problem%forces%entry(law))
+         ! Who keeps normal components that always bear in the problem may have changed their rows.
+         call self%near(law)%take(entry%row, pins_last(entry) .and. self%pins_normals, &
+                                  self%work(law))
+      end associate
+   end procedure take_near
 
    !> Sort the coordinates into active, used and solved at once.
    !> `used` lists the active ones, then those that are held but whose rows of A are needed; `place`

@@ -64,6 +64,7 @@ contains
       ! It knows all that are active now; place_kept finds those of later steps in it.
       self%preconditioner%place(:self%active%n_active) = [(h, h=1, self%active%n_active)]
       self%preconditioner%shifted = allocated(self%shift)
+      self%preconditioner%alteration = self%alteration
    end procedure build_preconditioner
 
    pure logical function by_waves(self)
@@ -155,7 +156,8 @@ contains
 
       ! A shift belongs to one step of pseudo-time.
       preconditioner_fits = self%preconditioner%n > 0 .and. .not. &
-                            (allocated(self%shift) .or. self%preconditioner%shifted)
+                            (allocated(self%shift) .or. self%preconditioner%shifted) .and. &
+                            abs(self%preconditioner%alteration - self%alteration) <= 0.0_wp
       if (.not. preconditioner_fits) return
       n_known = count(self%preconditioner%place(:self%active%n_active) > 0)
       ! Those that joined, n_active - n_known, and those that left, n - n_known.

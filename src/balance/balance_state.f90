@@ -70,6 +70,9 @@ module fw_balance_state
       complex(wp), allocatable :: shift(:, :, :)
       !> Let normal components that always bear leave the linear problem.
       logical :: pins_normals = .true.
+      !> Who changes the derivatives of laws after `linearize` marks them by a number: factors of
+      !> other numbers do not fit. 0: as the laws left them.
+      real(wp), private :: alteration = 0.0_wp
       !> Whether the inputs of the laws are displacements alone, the same in all harmonics.
       logical, private :: has_static_laws = .false.
       !> Whether the structure is nearly one at rest and a low rank.
@@ -109,6 +112,7 @@ module fw_balance_state
       procedure :: n_turns
       procedure :: residual
       procedure :: linearize
+      procedure :: take_near
       procedure :: reduce
       procedure :: expand
       procedure :: apply
@@ -155,6 +159,16 @@ module fw_balance_state
          class(balance_state), intent(inout) :: self
          integer, intent(out) :: n_linear
       end subroutine linearize
+
+      !> Take over the derivative of a law for near products, where there are any: part of
+      !> `linearize`, and for who changes what that has left in the workspace of the law, marked by
+      !> a number (`alteration`).
+      module subroutine take_near(self, law, alteration)
+         class(balance_state), intent(inout) :: self
+         !> Its number.
+         integer, intent(in) :: law
+         real(wp), intent(in), optional :: alteration
+      end subroutine take_near
 
       module subroutine reduce(self, r, rhs)
          class(balance_state), intent(inout) :: self

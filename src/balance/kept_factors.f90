@@ -27,6 +27,8 @@ module fw_kept_factors
       integer :: left_out = 0
       !> Whether they were built with a shift.
       logical :: shifted = .false.
+      !> What the derivative was altered by then (fw_balance_state).
+      real(wp) :: alteration = 0.0_wp
       !> Place there of each active coordinate, 0 for one that has become active since; prediction
       !> stiffness of those.
       integer, allocatable :: place(:)

@@ -28,6 +28,8 @@ module fw_finer_wear
    !> Part of the rate of a pair that twice the harmonics leave, below which the pair slips for want
    !> of harmonics: where few are enough it changes by some hundredths.
    real(wp), parameter :: hardly = 0.5_wp
+   !> Relative residual of linear solutions from the solution with fewer harmonics.
+   real(wp), parameter :: guess_forcing = 1.0e-2_wp
    !> States that are looked at: each costs a solution with twice the harmonics.
    integer, parameter :: most_states = 24
 
@@ -37,8 +39,8 @@ module fw_finer_wear
       type(wear_system), private :: system
       type(wear_stepper), private :: stepper
       integer, private :: n_states = 0
-      !> What was found: the first pair that slips only with H harmonics, the cycle, how many such
-      !> states; of a steady state, whether a pair still wears.
+      !> What was found: the first pair that slips only with H harmonics, the cycle, whether there
+      !> is such a state (1); of a steady state, whether a pair still wears.
       integer, private :: pair = 0, n_found = 0
       real(wp), private :: cycles = 0.0_wp
       logical, private :: still_wears = .false.
@@ -65,14 +67,14 @@ contains
       logical :: known
       integer :: i
 
-      if (.not. any(slipping) .or. self%n_states >= most_states) return
+      ! One is enough to be said.
+      if (.not. any(slipping) .or. self%n_states >= most_states .or. self%n_found > 0) return
       call solve(self, case, march, system, state, rate, known)
       if (.not. known) return
       i = findloc(slipping .and. state%rate > matters*maxval(state%rate) .and. &
                   rate < hardly*state%rate, .true., dim=1)
       if (i == 0) return
-      self%n_found = self%n_found + 1
-      if (self%n_found > 1) return
+      self%n_found = 1
       self%pair = i
       self%cycles = state%cycles
    end subroutine look
@@ -144,6 +146,8 @@ contains
                            case%wear%law == wear_energy, self%system)
       self%stepper = new_wear_stepper(march%options, march%stepper%pseudo_scheme, &
                                       self%level%solver%method%newton)
+      ! The guess is that of other harmonics: first steps from there need not be exact.
+      self%stepper%newton%loosest = guess_forcing
    end subroutine build
 
    !> What a run that is continued has to know.

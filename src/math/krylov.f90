@@ -71,7 +71,13 @@ module fw_krylov
       !> Rotations (restart); norm of the residual in their coordinates and the small unknowns
       !> (restart + 1).
       real(wp), allocatable :: cosine(:), sine(:), rhs(:), coefficients(:)
+      !> First direction of the last solution (n), and its number of directions where they all are
+      !> of one cycle, else 0: what `start_alike` needs.
+      real(wp), allocatable, private :: first(:)
+      integer, private :: n_directions = 0
    contains
+      procedure :: start_alike
+      procedure :: forget
       procedure :: reserve
       procedure :: solve
    end type gmres_type
@@ -85,11 +91,11 @@ contains
 
       if (allocated(self%basis)) then
          if (size(self%basis, 1) == n) return
-         deallocate (self%basis, self%hessenberg, self%direction, self%product, &
+         deallocate (self%basis, self%hessenberg, self%direction, self%product, self%first, &
                      self%cosine, self%sine, self%rhs, self%coefficients)
       end if
       allocate (self%basis(n, self%restart + 1), self%hessenberg(self%restart + 1, self%restart))
-      allocate (self%direction(n), self%product(n), self%cosine(self%restart))
+      allocate (self%direction(n), self%product(n), self%first(n), self%cosine(self%restart))
       allocate (self%sine(self%restart), self%rhs(self%restart + 1))
       allocate (self%coefficients(self%restart + 1))
    end subroutine reserve
@@ -121,6 +127,7 @@ contains
       call self%reserve(size(b))
       x = 0.0_wp
       self%iterations = 0
+      self%n_directions = 0
       norm = norm_of(b)
       target = tolerance*norm
       converged = norm <= 0.0_wp
@@ -130,6 +137,8 @@ contains
          if (operator%is_interrupted()) exit
          before = norm
          call build_cycle(self, operator, norm, target, used)
+         ! Of later cycles the first direction is one of many: they are not kept.
+         self%n_directions = merge(used, 0, self%iterations == used)
          call add_correction(self, operator, used, x)
          ! The rotations know the residual of a regular problem only: a singular one is noticed
          ! by the residual itself, and its correction is taken back.
@@ -152,6 +161,45 @@ contains
       operator%asked = 0.0_wp
    end subroutine solve
 
+   !> The operator or its preconditioner is another one from here on.
+   pure subroutine forget(self)
+      class(gmres_type), intent(inout) :: self
+
+      self%n_directions = 0
+   end subroutine forget
+
+   !> The best x among the directions of the last solution, which was of the same operator with the
+   !> same preconditioner: right-hand sides that are alike have most of their solution there. b
+   !> becomes what x leaves of it; both stay as they are where it leaves more.
+   subroutine start_alike(self, operator, b, x)
+      class(gmres_type), intent(inout) :: self
+      class(linear_operator), intent(inout) :: operator
+      real(wp), intent(inout), contiguous :: b(:)
+      !> Zero on entry.
+      real(wp), intent(inout), contiguous :: x(:)
+      real(wp) :: upper
+      integer :: i, n
+
+      n = self%n_directions
+      if (n == 0) return
+      if (size(b) /= size(self%first)) return
+      ! The residual took its place.
+      self%basis(:, 1) = self%first
+      call multiply_transposed(size(b), n + 1, self%basis, b, self%rhs)
+      do i = 1, n
+         upper = self%cosine(i)*self%rhs(i) + self%sine(i)*self%rhs(i + 1)
+         self%rhs(i + 1) = -self%sine(i)*self%rhs(i) + self%cosine(i)*self%rhs(i + 1)
+         self%rhs(i) = upper
+      end do
+      call add_correction(self, operator, n, x)
+      call operator%apply(x, self%product)
+      if (norm_of(b - self%product) < norm_of(b)) then
+         b = b - self%product
+      else
+         x = 0.0_wp
+      end if
+   end subroutine start_alike
+
    !> Arnoldi's process with Givens rotations, until the target or the restart length.
    subroutine build_cycle(self, operator, norm, target, used)
       !> basis(:, 1) holds the residual on entry, not yet normalised.
@@ -164,6 +212,7 @@ contains
       integer :: j
 
       self%basis(:, 1) = self%basis(:, 1)/norm
+      self%first = self%basis(:, 1)
       self%rhs = 0.0_wp
       self%rhs(1) = norm
       used = 0

@@ -42,6 +42,8 @@ module fw_augmented_system
       logical, private :: is_bordered = .false.
       !> Whether the inner system offered what is nearly right when this one was made of it.
       logical, private :: offers_nearly = .false.
+      !> Precision that was asked of the last product of the linear problem; 0 before the first.
+      real(wp) :: last_asked = 0.0_wp
       !> Scratch (n_extra), (inner%n).
       real(wp), allocatable, private :: unit(:), adjusted(:)
       !> The two parts of a vector (inner%n, 1), (n_extra, 1).
@@ -240,6 +242,7 @@ contains
       self%inner%reduced = self%reduced
       call self%choose()
       self%inner%reduced = reduced
+      self%last_asked = 0.0_wp
       n_linear = self%n_linear_inner + self%n_linear_extra
    end subroutine linearize
 
@@ -271,17 +274,19 @@ contains
       self%adjusted = r(:n)
       call self%settle(r(n + 1:), solution(k + 1:), self%adjusted)
       call self%inner%expand(self%adjusted, solution(:k), step(:n))
-      call self%expand_extra(r(n + 1:), solution(k + 1:), step(n + 1:))
+      call self%expand_extra(r(n + 1:), solution(:k), solution(k + 1:), step(n + 1:))
    end subroutine expand
 
    !> Steps of all further unknowns from those in the linear problem; where some leave it, an
    !> extension knows theirs.
-   subroutine expand_extra(self, g, solution, dz)
+   subroutine expand_extra(self, g, v, solution, dz)
       class(augmented_system), intent(inout) :: self
       real(wp), intent(in) :: g(:), solution(:)
+      !> Steps of the inner system in the linear problem, which was reduced last.
+      real(wp), intent(in), contiguous :: v(:)
       real(wp), intent(out) :: dz(:)
 
-      associate (unused => self, unused_conditions => g)
+      associate (unused => self, unused_conditions => g, unused_step => v)
       end associate
       dz = solution
    end subroutine expand_extra
@@ -319,6 +324,7 @@ contains
 
       self%inner%asked = self%asked
       self%inner%nearly = self%nearly
+      if (self%asked > 0.0_wp) self%last_asked = self%asked
    end subroutine pass_precision
 
    subroutine strengthen_inner(self, is_stronger)

@@ -26,6 +26,9 @@ module fw_linear_step
    real(wp), parameter :: kept_factor = 1.3_wp
    integer, parameter :: kept_excess = 4
 
+   !> Relative residual of a solution that takes an iteration or two, whose rate tells nothing.
+   real(wp), parameter :: loosest = 0.3_wp
+
    !> Iterations from which on a stronger preconditioner is taken, where the system has one.
    integer, parameter :: too_many = 30
 
@@ -106,6 +109,7 @@ contains
       integer :: n
 
       call system%linearize(n)
+      call self%gmres%forget()
       call reserve(self, n)
       done = .true.
       self%factored = .false.
@@ -130,6 +134,7 @@ contains
       class(nonlinear_system), intent(inout) :: system
 
       call system%build_preconditioner()
+      call self%gmres%forget()
       self%preconditioners = self%preconditioners + 1
       self%kept = .false.
    end subroutine build
@@ -183,13 +188,17 @@ contains
    end subroutine iterate
 
    !> step = -J^-1 r with the derivative that was prepared.
-   subroutine solve_prepared(self, system, r, tolerance, step, done)
+   subroutine solve_prepared(self, system, r, tolerance, step, done, scale, is_alike)
       class(linear_step_type), intent(inout) :: self
       class(nonlinear_system), intent(inout) :: system
       real(wp), intent(in), contiguous :: r(:)
       real(wp), intent(in) :: tolerance
       real(wp), intent(out), contiguous :: step(:)
       logical, intent(out) :: done
+      !> Norm of a right-hand side that the tolerance is meant of, where it is larger than its own.
+      real(wp), intent(in), optional :: scale
+      !> The right-hand side resembles the last one, which was of the same derivative.
+      logical, intent(in), optional :: is_alike
       integer :: n
 
       n = size(self%rhs)
@@ -197,7 +206,7 @@ contains
       call system%reduce(r, self%rhs)
       self%solution = 0.0_wp
       if (n > 0 .and. .not. self%factored) then
-         call iterate(self, system, tolerance, done)
+         call iterate_from_start(self, system, tolerance, done, scale, is_alike)
          if (.not. done .and. self%kind /= linear_krylov .and. n <= lu_possible_up_to) then
             if (self%lu_follows .and. .not. system%is_interrupted()) then
                call factor(self, system, n, done)
@@ -216,6 +225,38 @@ contains
       ! Steps of the rows that left the problem are added, and stand in the right-hand side already.
       call system%expand(r, self%solution, step)
    end subroutine solve_prepared
+
+   !> `iterate` for what the start leaves, as far as the tolerance asks for it.
+   subroutine iterate_from_start(self, system, tolerance, done, scale, is_alike)
+      type(linear_step_type), intent(inout) :: self
+      class(nonlinear_system), intent(inout) :: system
+      real(wp), intent(in) :: tolerance
+      logical, intent(out) :: done
+      real(wp), intent(in), optional :: scale
+      logical, intent(in), optional :: is_alike
+      real(wp), allocatable :: start(:), whole(:)
+      real(wp) :: target, norm
+      logical :: starts
+
+      target = norm2(self%rhs)
+      if (present(scale)) target = max(target, scale)
+      target = tolerance*target
+      starts = .false.
+      if (present(is_alike)) starts = is_alike
+      if (starts) then
+         allocate (start(size(self%rhs)), source=0.0_wp)
+         whole = self%rhs
+         system%asked = tolerance
+         call self%gmres%start_alike(system, self%rhs, start)
+         system%asked = 0.0_wp
+      end if
+      norm = norm2(self%rhs)
+      done = norm <= target
+      if (.not. done) call iterate(self, system, min(loosest, target/norm), done)
+      if (.not. starts) return
+      self%solution = self%solution + start
+      self%rhs = whole
+   end subroutine iterate_from_start
 
    !> LU of the whole remaining matrix (n, n).
    subroutine factor(self, system, n, done)

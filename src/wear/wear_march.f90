@@ -257,7 +257,7 @@ contains
       type(wear_state), intent(out) :: after
       integer, intent(out) :: iterations
       type(wear_step_report) :: report
-      real(wp) :: cycles, error
+      real(wp) :: cycles, error, missed(2)
       type(wear_state) :: before
       integer :: halvings, n_inaccurate
       logical :: held(size(state%rate)), refined
@@ -268,13 +268,16 @@ contains
       iterations = 0
       halvings = 0
       n_inaccurate = 0
+      missed = 0.0_wp
       cycles = next_step(self, system, state)
       if (self%options%max_depth_step > 0.0_wp) self%stepper%max_depth_step = depth_step(self, &
                                                                                       system, state)
       do
-         call self%stepper%advance(system, before, cycles, after, report)
+         call self%stepper%advance(system, before, cycles, after, report, refuses=.true.)
          iterations = iterations + report%iterations
-         if (report%converged) call confirm(self, system, after, report, iterations)
+         if (report%converged .and. .not. report%is_refused) then
+            call confirm(self, system, after, report, iterations)
+         end if
          if (system%is_interrupted()) return
          if (.not. report%converged) then
             halvings = halvings + 1
@@ -290,8 +293,11 @@ contains
             self%next_cycles = cycles
             cycle
          end if
-         call judge_onset(self, system, before, held, cycles, after, report, iterations, refined)
-         if (system%is_interrupted()) return
+         refined = .false.
+         if (.not. report%is_refused) then
+            call judge_onset(self, system, before, held, cycles, after, report, iterations, refined)
+            if (system%is_interrupted()) return
+         end if
          if (refined) then
             call confirm(self, system, after, report, iterations)
             exit
@@ -300,7 +306,7 @@ contains
          error = maxval(abs(report%error))/ &
                  max(maxval(after%x(system%n_vibration() + 1:)), tiny(1.0_wp))
          ! Whether the step is taken or refused, the next one has this length.
-         call adapt(self, cycles, error)
+         call adapt(self, cycles, error, missed)
          if (error <= self%options%tolerance()) then
             call self%touch%pass(system, after, cycles, error/self%options%tolerance(), &
                                  self%next_cycles)
@@ -308,6 +314,7 @@ contains
          end if
          call self%touch%retry(system, after, cycles, error/self%options%tolerance(), &
                                self%next_cycles)
+         missed = [cycles, error]
          n_inaccurate = n_inaccurate + 1
          self%gave_up = n_inaccurate > max_inaccurate
          if (self%gave_up) then
@@ -538,15 +545,20 @@ contains
    end function depth_step
 
    !> The step that the error allows next.
-   subroutine adapt(self, cycles, error)
+   subroutine adapt(self, cycles, error, missed)
       type(wear_march), intent(inout) :: self
       real(wp), intent(in) :: cycles, error
-      real(wp) :: factor
-      integer :: exponent
+      !> Cycles and error of the try before, which missed the tolerance; 0 where there was none.
+      real(wp), intent(in) :: missed(2)
+      real(wp) :: factor, exponent
 
       ! The power of the step that the estimate goes with; halve_steps counts on the same.
-      exponent = max(2, self%stepper%order)
-      if (self%options%scheme == wear_explicit) exponent = 2
+      exponent = real(max(2, self%stepper%order), wp)
+      if (self%options%scheme == wear_explicit) exponent = 2.0_wp
+      ! Across a kink, as where a pair opens, it goes with less, which a second miss tells.
+      if (cycles < missed(1) .and. error > self%options%tolerance()) then
+         exponent = min(exponent, max(1.0_wp, log(missed(2)/error)/log(missed(1)/cycles)))
+      end if
       factor = largest_growth
       if (error > 0.0_wp) factor = safety*(self%options%tolerance()/error)**(1.0_wp/exponent)
       self%next_cycles = cycles*min(largest_growth, max(smallest_shrink, factor))

@@ -38,7 +38,7 @@ contains
    subroutine rosenbrock_step(system, linear, tolerance, x, cycles, x_after, error, n_solved, done)
       type(wear_system), intent(inout) :: system
       type(linear_step_type), intent(inout) :: linear
-      !> Relative residual of the linear solutions.
+      !> Residual of the linear solutions, over the right-hand side of the first.
       real(wp), intent(in) :: tolerance
       real(wp), intent(in), contiguous :: x(:)
       real(wp), intent(in) :: cycles
@@ -48,10 +48,12 @@ contains
       integer, intent(out) :: n_solved
       logical, intent(out) :: done
       real(wp) :: u(size(x), n_stages), r(size(x))
+      real(wp) :: scale
       integer :: i, n
 
       n = system%n_vibration()
       n_solved = 0
+      scale = 0.0_wp
       u = 0.0_wp
       error = 0.0_wp
       call system%begin_step(x(n + 1:), gamma*cycles)
@@ -66,7 +68,10 @@ contains
          end if
          r(n + 1:) = -gamma*system%force_of_depth(cycles*system%rate + &
                                                   matmul(u(n + 1:, :), c(i, :)))
-         call linear%solve_prepared(system, r, tolerance, u(:, i), done)
+         ! Errors of all stages weigh alike in the step, however small its later ones are. The
+         ! second differs from the first in what the first has worn.
+         call linear%solve_prepared(system, r, tolerance, u(:, i), done, scale, is_alike=i == 2)
+         if (i == 1 .and. done) scale = norm2(linear%rhs)
          n_solved = n_solved + 1
       end do
       x_after = x + matmul(u, weight)

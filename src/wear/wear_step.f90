@@ -34,6 +34,8 @@ module fw_wear_step
 
    type :: wear_step_report
       logical :: converged = .false.
+      !> Less accurate than was asked for, and left as it was found: not in equilibrium.
+      logical :: is_refused = .false.
       integer :: iterations = 0
       !> Estimate of the error of the depths (n_pairs) [length]; zero where the scheme has none.
       real(wp), allocatable :: error(:)
@@ -52,6 +54,8 @@ module fw_wear_step
       type(tableau_type), private :: tableau
       !> Estimate the error; the explicit scheme then advances with the corrected depths.
       logical, private :: controls_error = .false.
+      !> Error of a step over the largest depth.
+      real(wp), private :: tolerance = huge(1.0_wp)
       real(wp), allocatable, private :: r(:), step(:)
    contains
       procedure :: advance
@@ -65,6 +69,8 @@ module fw_wear_step
    !> The same of a step of high order, whose stages mend what the solutions before them left; above
    !> the lag its depths are not to be trusted.
    real(wp), parameter :: stage_tolerance = 1.0e-3_wp, farthest_lag = 0.3_wp
+   !> What linear solutions may leave, as a part of the error that a step may have.
+   real(wp), parameter :: noise = 0.3_wp
    integer, parameter :: max_corrections = 5
    !> A pseudo-time step may exceed the growth of the depth that was aimed at by this factor.
    real(wp), parameter :: depth_allowance = 1.5_wp
@@ -86,6 +92,7 @@ contains
       ! The linearly implicit schemes have no Newton's method to judge a solution.
       self%newton%linear%lu_follows = .true.
       self%controls_error = options%controls_error()
+      if (self%controls_error) self%tolerance = options%tolerance()
       self%order = options%order
       if (self%order == 0) self%order = automatic_order(options)
       self%pseudo_scheme = pseudo_scheme
@@ -107,21 +114,26 @@ contains
 
    !> From a state to one that many cycles later. Where it does not converge, `after` is undefined
    !> and the system stands anywhere.
-   subroutine advance(self, system, before, cycles, after, report)
+   subroutine advance(self, system, before, cycles, after, report, refuses)
       class(wear_stepper), intent(inout) :: self
       type(wear_system), intent(inout) :: system
       type(wear_state), intent(in) :: before
       real(wp), intent(in) :: cycles
       type(wear_state), intent(out) :: after
       type(wear_step_report), intent(out) :: report
+      !> Whether a step that misses the tolerance may be left as it is (default: no).
+      logical, intent(in), optional :: refuses
+      logical :: may_refuse
 
+      may_refuse = .false.
+      if (present(refuses)) may_refuse = refuses
       allocate (report%error(size(before%rate)), source=0.0_wp)
       select case (self%scheme)
       case (wear_explicit)
          call explicit_step(self, system, before, cycles, after, report)
       case (wear_pseudo_time)
          if (self%pseudo_scheme == scheme_rosenbrock) then
-            call high_order_step(self, system, before, cycles, after, report)
+            call high_order_step(self, system, before, cycles, may_refuse, after, report)
          else
             call linear_step(self, system, before, cycles, after, report)
          end if
@@ -287,22 +299,35 @@ contains
    end subroutine linear_step
 
    !> Rosenbrock's method; the depths of a step that overshoots are its error estimate's business.
-   subroutine high_order_step(self, system, before, cycles, after, report)
+   subroutine high_order_step(self, system, before, cycles, may_refuse, after, report)
       type(wear_stepper), intent(inout) :: self
       type(wear_system), intent(inout) :: system
       type(wear_state), intent(in) :: before
       real(wp), intent(in) :: cycles
+      !> Leave a step that misses the tolerance as it is.
+      logical, intent(in) :: may_refuse
       type(wear_state), intent(out) :: after
       type(wear_step_report), intent(inout) :: report
       type(solver_report) :: solution
+      real(wp) :: grown, tolerance
+      integer :: n
       logical :: done
 
+      n = system%n_vibration()
       allocate (after%x(system%n))
-      call rosenbrock_step(system, self%newton%linear, stage_tolerance, before%x, cycles, &
+      ! What the solutions leave has to be small beside the error that the step may have.
+      grown = max(cycles*maxval(before%rate), tiny(1.0_wp))
+      tolerance = min(stage_tolerance, max(tight_forcing, noise*self%tolerance* &
+                                           (maxval(before%x(n + 1:)) + grown)/grown))
+      call rosenbrock_step(system, self%newton%linear, tolerance, before%x, cycles, &
                            after%x, report%error, report%iterations, done)
       if (.not. done) return
       call self%evaluate(system, after)
-      report%converged = after%residual <= largest_lag
+      if (may_refuse .and. ieee_is_finite(after%residual)) then
+         ! What its error refuses need not come to equilibrium first.
+         report%is_refused = maxval(abs(report%error)) > self%tolerance*maxval(after%x(n + 1:))
+      end if
+      report%converged = after%residual <= largest_lag .or. report%is_refused
       if (report%converged .or. .not. after%residual <= farthest_lag) return
       ! Its depths are as good as its estimate says: back to the equilibrium at these, which keeps
       ! the order and is far cheaper than the stages of an implicit step.
