@@ -33,6 +33,12 @@ contains
    module procedure linearize
       integer :: k
 
+      if (abs(self%alteration) > 0.0_wp) then
+         ! Laws write what their forces depend on, and leave the zeros of all else as they are.
+         associate (work => self%work(self%problem%forces%pairs))
+            if (allocated(work%jacobian)) work%jacobian = 0.0_wp
+         end associate
+      end if
       self%alteration = 0.0_wp
       do k = 1, self%problem%forces%n_laws
          if (size(self%work(k)%state) == 0) cycle
