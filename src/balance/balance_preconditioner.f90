@@ -63,8 +63,8 @@ contains
          self%active%used(:self%active%n_active)
       ! It knows all that are active now; place_kept finds those of later steps in it.
       self%preconditioner%place(:self%active%n_active) = [(h, h=1, self%active%n_active)]
-      self%preconditioner%shifted = allocated(self%shift)
-      self%preconditioner%alteration = self%alteration
+      ! A shift belongs to one step of pseudo-time: its factors serve no other.
+      self%preconditioner%alteration = merge(huge(1.0_wp), self%alteration, allocated(self%shift))
    end procedure build_preconditioner
 
    pure logical function by_waves(self)
@@ -154,9 +154,7 @@ contains
    module procedure preconditioner_fits
       integer :: n_known
 
-      ! A shift belongs to one step of pseudo-time.
-      preconditioner_fits = self%preconditioner%n > 0 .and. .not. &
-                            (allocated(self%shift) .or. self%preconditioner%shifted) .and. &
+      preconditioner_fits = self%preconditioner%n > 0 .and. .not. allocated(self%shift) .and. &
                             abs(self%preconditioner%alteration - self%alteration) <= 0.0_wp
       if (.not. preconditioner_fits) return
       n_known = count(self%preconditioner%place(:self%active%n_active) > 0)

@@ -25,9 +25,7 @@ module fw_kept_factors
       integer, allocatable :: coordinate(:)
       !> A harmonic whose factors another system has, bordered (its place); 0 for none.
       integer :: left_out = 0
-      !> Whether they were built with a shift.
-      logical :: shifted = .false.
-      !> What the derivative was altered by then (fw_balance_state).
+      !> What the derivative was altered by then (fw_balance_state); huge with a shift.
       real(wp) :: alteration = 0.0_wp
       !> Place there of each active coordinate, 0 for one that has become active since; prediction
       !> stiffness of those.
