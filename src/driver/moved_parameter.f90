@@ -29,7 +29,7 @@ module fw_moved_parameter
    implicit none (type, external)
    private
 
-   public :: moved_parameter, new_moved_parameter, renew_laws
+   public :: moved_parameter, new_moved_parameter
 
    type, extends(parameter_mover) :: moved_parameter
       !> As in fw_parameters.

@@ -92,8 +92,8 @@ contains
       call formulation%from_coefficients(x, unknowns)
       call solve_system(self, solved, unknowns, report)
       call formulation%to_coefficients(unknowns, x)
-      ! Newton's method evaluates what it accepts last; other solvers, and formulations with unknowns
-      ! of their own, may have been elsewhere.
+      ! Newton's method evaluates what it accepts last; other solvers, and formulations with
+      ! unknowns of their own, may have been elsewhere.
       self%stands = report%converged .and. self%kind /= solver_powell .and. &
                     self%kind /= solver_kinsol .and. &
                     self%newton%options%jacobian /= jacobian_difference

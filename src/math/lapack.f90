@@ -11,7 +11,7 @@ module fw_lapack
 
    public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
-   public :: zggev, sgemv, sgetrf, strsm, dlaswp, dtrsm
+   public :: zggev, sgetrf, strsm, dlaswp, dtrsm
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -39,15 +39,6 @@ module fw_lapack
          real(wp), intent(in) :: alpha, beta, a(lda, *), x(*)
          real(wp), intent(inout) :: y(*)
       end subroutine dgemv
-
-      !> As dgemv in single precision.
-      subroutine sgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
-         import :: sp
-         character, intent(in) :: trans
-         integer, intent(in) :: m, n, lda, incx, incy
-         real(sp), intent(in) :: alpha, beta, a(lda, *), x(*)
-         real(sp), intent(inout) :: y(*)
-      end subroutine sgemv
 
       !> As dgemm for complex matrices; 'C' is the conjugate transpose.
       subroutine zgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
