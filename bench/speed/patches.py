@@ -2,6 +2,7 @@
 unworn joint, by the schemes that a user would choose.
 
     python -m bench.speed.patches [--program build/release/fw_run] [--seconds 900] [--threads 2]
+        [--schemes 1 2 3]
 
 The case is that of the wear runs of bench/common/wear_runs.py; the model is generated into
 build/bench where it is not there yet. A run that has not ended after so many seconds is stopped,
@@ -71,10 +72,12 @@ def main() -> None:
     parser.add_argument("--program", type=Path, default=ROOT / "build" / "release" / "fw_run")
     parser.add_argument("--seconds", type=float, default=900.0, help="after which a run is stopped")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--schemes", type=int, nargs="+", default=[1, 2, 3],
+                        help="numbers of those to measure: order 1, Rosenbrock, explicit")
     options = parser.parse_args()
     bench = Bench(options.program.resolve(), ROOT / "build" / "bench")
     lines = []
-    for name, scheme in SCHEMES:
+    for name, scheme in (SCHEMES[number - 1] for number in options.schemes):
         lines.append(measure(bench, name, scheme, options.threads, options.seconds))
         print(lines[-1], flush=True)
     write(lines)

@@ -23,7 +23,8 @@ from bench.speed.small import SmallCase, measure_small
 __all__ = ["Measured", "Scaling", "Threads", "measure_scaling"]
 
 PAIRS = (16, 48, 96, 192, 384, 768)
-#: Measured as well where its model is there: generating it takes half an hour.
+#: Measured as well where its model is there, which takes half an hour to generate; without the
+#: other program, whose set-up takes minutes.
 MORE_PAIRS = 1536
 HARMONICS = (1, 3, 7, 17, 31)
 #: Most unknowns that are measured: beyond, a frequency takes minutes.
@@ -104,7 +105,8 @@ def measure_scaling(bench: Bench, step: Callable[[str], None], other: Bench | No
     rows = []
     for pairs in sizes:
         step(f"{pairs} pairs")
-        rows += [measure_size(bench, pairs, n, other=other if n <= OTHER_HARMONICS else None)
+        beside = other if pairs < MORE_PAIRS else None
+        rows += [measure_size(bench, pairs, n, other=beside if n <= OTHER_HARMONICS else None)
                  for n in HARMONICS[:2 if bench.quick else None]
                  if unknowns_of(pairs, n) <= MOST_UNKNOWNS]
     paper = [measure_size(bench, PAIRS[0], n, PAPER_TIME) for n in PAPER_HARMONICS]

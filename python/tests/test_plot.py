@@ -115,8 +115,11 @@ def test_the_loop_encloses_the_dissipation(coarse: Result) -> None:
 def test_the_pairs_drawn_dissipate_most(coarse: Result) -> None:
     figure = plot_hysteresis(coarse)
     names = [axes.get_title().split(",")[0] for axes in figure.axes if axes.get_visible()]
-    order = np.argsort(-coarse.dissipation[coarse.peak()], kind="stable")[:6]  # pairs that tie
-    assert names == [f"pair {pair + 1}" for pair in sorted(order)]
+    drawn = [int(name.split()[1]) - 1 for name in names]
+    loss = coarse.dissipation[coarse.peak()]
+    # Pairs that stick are left with round-off, which has no order.
+    assert len(drawn) == 6 and drawn == sorted(drawn)
+    assert set(np.flatnonzero(loss > 1e-9 * loss.max())) <= set(drawn)
     with pytest.raises(InputError, match="pair 9: there are 8, counted from 1"):
         plot_hysteresis(coarse, pairs=[8])
 

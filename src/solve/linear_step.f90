@@ -115,7 +115,8 @@ contains
       self%factored = .false.
       if (n > 0) then
          self%n_problems = self%n_problems + 1
-         self%share_skipped = self%share_skipped + 1.0_wp - real(n, wp)/real(system%n, wp)
+         self%share_skipped = self%share_skipped + 1.0_wp - &
+                              real(n + system%n_eliminated, wp)/real(system%n, wp)
          if (self%kind == linear_lu .or. (self%kind == linear_auto .and. n <= lu_up_to)) then
             call factor(self, system, n, done)
          else

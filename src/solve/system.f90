@@ -20,6 +20,8 @@ module fw_system
       !> n_linear = n, unknowns and equations keep their order, `apply` multiplies with the whole
       !> derivative, `reduce` returns -r and `expand` the solution.
       logical :: reduced = .true.
+      !> Unknowns that `linearize` has eliminated: they are worked on, not skipped.
+      integer :: n_eliminated = 0
    contains
       procedure(evaluate_residual), deferred :: residual
       procedure(prepare_derivative), deferred :: linearize

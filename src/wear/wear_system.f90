@@ -257,6 +257,7 @@ contains
       self%vibration%pins_normals = .false.
       call self%vibration%linearize(self%n_linear_inner)
       self%n_linear_extra = 0
+      self%n_eliminated = 0
       self%pivot = 0.0_wp
       associate (pairs => self%vibration%problem%forces%pairs)
          do i = 1, self%n_extra
@@ -267,7 +268,10 @@ contains
                self%pivot(i) = 0.0_wp
                self%n_linear_extra = self%n_linear_extra + 1
                self%wearing(self%n_linear_extra) = i
-            else if (self%vibration%problem%joint%row(3, i) > 0) then
+               cycle
+            end if
+            self%n_eliminated = self%n_eliminated + 1
+            if (self%vibration%problem%joint%row(3, i) > 0) then
                call eliminate(self, i, self%vibration%work(pairs)%jacobian(:, :, i))
             end if
          end do
