@@ -49,6 +49,9 @@ module fw_point_solver
    integer, parameter :: fallback_steps = 60, max_flow_failures = 2
    !> Unknowns up to which pseudo-time comes before a raised load on the way to a first point.
    integer, parameter :: flow_first_up_to = 4000
+   !> Unknowns from which two halvings of the step come before pseudo-time as well: a few solutions,
+   !> where a flow factors matrices of all coordinates.
+   integer, parameter :: steps_first_from = 1000
    !> Points that fail in a row after which a sweep spends less on a point: it has gone where no
    !> solution exists, or where none is found in this way. After 4, 8, 16, .. of them it looks
    !> again: a sweep that begins where nothing is found comes to where something is.
@@ -224,7 +227,8 @@ contains
       call from_free_guess(self, system, request%place(), report, iterations)
    end subroutine reach
 
-   !> Ways that cost many solutions: pseudo-time, then smaller steps of the frequency or the load.
+   !> Ways that cost many solutions: pseudo-time, then smaller steps of the frequency or the load,
+   !> of which a few come first where there are many unknowns.
    subroutine by_other_ways(self, case, system, omega, report, iterations, error)
       class(point_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -244,6 +248,12 @@ contains
       end if
       ! No flow has been derived for the whole of cyclic structures.
       if (self%flow_failures < max_flow_failures .and. .not. case%model%cyclic%is_cyclic) then
+         if (self%known%kept > 0 .and. size(self%x) > steps_first_from) then
+            call approach(self, system, omega, max_halvings - 1, report, iterations, error)
+            if (allocated(error)) return
+            if (report%converged) self%served_by = served_by_smaller_steps
+            if (.not. goes_on(self, report, iterations)) return
+         end if
          call by_flow(self, case, pseudo_time_options(max_steps=fallback_steps), system, omega, &
                       report, iterations, error)
          if (allocated(error)) return

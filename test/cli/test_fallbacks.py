@@ -46,6 +46,16 @@ def test_a_tolerance_below_round_off_is_blamed(fw_run) -> None:
         assert (file["residual"][:] < 1e-12).all()
 
 
+def test_smaller_steps_before_pseudo_time_where_unknowns_are_many(fw_run) -> None:
+    """Steps of the sweep too large for five iterations: 1,488 unknowns."""
+    done = fw_run("-q", "-o", "case.h5", "--set", "solver%max_iterations=5", "--set",
+                  "harmonics%n_harmonics=15", "--set", "sweep%n_points=5",
+                  "--set", "sweep%continuation='natural'", EXAMPLE / "frf.nml")
+    assert done.returncode == 0, done.stderr
+    served = _served_by(fw_run.directory / "case.h5")
+    assert "smaller steps" in served and "pseudo-time" not in served
+
+
 def test_branches_say_so(fw_run) -> None:
     done = fw_run("-q", "-o", "case.h5", "--set", "sweep%continuation='arclength'", "case.nml")
     assert done.returncode == 0, done.stderr
