@@ -542,7 +542,7 @@ contains
       end if
       if (start == 0) return
       call self%strategy%recall(self%samples%item(start)%at%memory)
-      request = point_request(omega=omega, fallback=.false.)
+      request = point_request(omega=omega, by_newton=.true.)
       if (case%sweep%refine) request = new_request(case, omega)
       request%fallback = .false.
       request%interrupt => self%interrupt

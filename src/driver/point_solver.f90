@@ -33,6 +33,7 @@ module fw_point_solver
    use fw_strategy, only: point_request
    use fw_solver_options, only: pseudo_time_options
    use fw_solver_options, only: solver_kinsol
+   use fw_solver_options, only: solver_newton
    use fw_solver_options, only: solver_powell
    use fw_solver_options, only: solver_pseudo_time
    use fw_text, only: to_text
@@ -131,9 +132,11 @@ contains
       if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)
       if (allocated(error)) return
       tolerance = self%method%newton%options%tolerance
+      if (request%by_newton) self%method%kind = solver_newton
       self%method%newton%options%tolerance = max(tolerance, request%tolerance)
       call reach(self, case, system, request, report, point%iterations, error)
       self%method%newton%options%tolerance = tolerance
+      self%method%kind = case%solver%kind
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return
       if (self%out_of_work .and. .not. report%converged) then
@@ -203,7 +206,7 @@ contains
       integer, intent(inout) :: iterations
       type(error_type), allocatable, intent(out) :: error
 
-      if (case%solver%kind == solver_pseudo_time) then
+      if (self%method%kind == solver_pseudo_time) then
          call by_flow(self, case, case%pseudo_time, system, request%place(), report, iterations, &
                       error)
          return

@@ -28,6 +28,8 @@ module fw_strategy
       real(wp) :: amplitude = 0.0_wp
       !> Look for other ways where the first fails.
       logical :: fallback = .true.
+      !> By Newton's method, whatever the case asks for: between solved points it needs a few steps.
+      logical :: by_newton = .false.
       !> Floquet multipliers; contact forces, states and energies; histories over the period.
       logical :: stability = .false., contact = .false., histories = .false.
       !> One period of the pairs that dissipate most.

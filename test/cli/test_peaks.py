@@ -1,4 +1,5 @@
 """The peak that a sweep of few points reports is the true one, or it says that it may not be."""
+import re
 import subprocess
 
 import h5py
@@ -94,6 +95,25 @@ def test_rows_stay_those_that_were_asked_for(tmp_path):
     expected = 2.0 * groups["model"]["modal_damping"] * omega[best]
     assert width[best] == pytest.approx(expected, rel=0.02)
     assert np.hypot(*coefficients[best, 1:3]) == pytest.approx(amplitude[best], rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["powell", "kinsol", "pseudo_time"])
+def test_peaks_are_solved_by_newton_whatever_solves_the_rows(tmp_path, kind):
+    groups, _ = peak_family.linear(2)
+    run(tmp_path, groups)
+    with h5py.File(tmp_path / "case.h5") as file:
+        expected = file["peak/amplitude"][:]
+    write_namelist(tmp_path / "case.nml", groups | {"solver": {"kind": kind}})
+    summary = subprocess.run([PROGRAM, "case.nml"], cwd=tmp_path, capture_output=True, text=True,
+                             check=True).stdout
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert file["peak/amplitude"][:] == pytest.approx(expected, rel=1e-6)
+        served = {file["served_by"].attrs["names"][code] for code in file["served_by"][:]}
+    assert kind.replace("_", "-") in served
+    points, iterations = map(int, re.search(r"peaks +(\d+) more points, (\d+)",
+                                            summary).groups())
+    # A linear structure takes Newton's method one step.
+    assert iterations <= points
 
 
 @pytest.mark.parametrize("static", [0.0, 100.0])
