@@ -15,6 +15,9 @@ module fw_linalg
    use fw_lapack, only: dsygvd
    use fw_lu_in_parts, only: factor_in_parts
    use fw_lu_in_parts, only: whole_up_to
+   use fw_small_lu, only: factor_small
+   use fw_small_lu, only: small_up_to
+   use fw_small_lu, only: solve_small
    implicit none (type, external)
    private
 
@@ -73,6 +76,10 @@ contains
       class(interrupt_type), pointer, intent(in), optional :: interrupt
       integer :: info
 
+      if (self%n <= small_up_to) then
+         call factor_small(self%n, size(self%matrix, 1), self%matrix, self%pivot, singular)
+         return
+      end if
       if (self%n > whole_up_to .and. present(interrupt)) then
          call factor_in_parts(self%n, self%matrix, size(self%matrix, 1), self%pivot, singular, &
                               interrupt)
@@ -88,7 +95,12 @@ contains
       real(wp), intent(inout), contiguous :: b(:)
       integer :: info
 
-      call dgetrs('N', self%n, 1, self%matrix, size(self%matrix, 1), self%pivot, b, size(b), info)
+      if (self%n <= small_up_to) then
+         call solve_small(self%n, size(self%matrix, 1), self%matrix, self%pivot, b)
+      else
+         call dgetrs('N', self%n, 1, self%matrix, size(self%matrix, 1), self%pivot, b, size(b), &
+                     info)
+      end if
    end subroutine solve_real
 
    !> Solve in place with the transposed matrix (n).
