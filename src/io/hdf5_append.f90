@@ -82,6 +82,7 @@ module fw_hdf5_append
    contains
       procedure :: create
       procedure :: is_created
+      procedure :: place
       procedure :: skip
       procedure :: copy_rows
       procedure :: permute
@@ -161,6 +162,17 @@ contains
 
       is_created = self%id >= 0
    end function is_created
+
+   !> The file as seen from the dataset, which is '.' there: for its attributes.
+   pure function place(self, file) result(at)
+      class(growing_dataset), intent(in) :: self
+      type(hdf5_file), intent(in) :: file
+      type(hdf5_file) :: at
+
+      at = file
+      at%id = self%id
+      at%path = file%path//self%name
+   end function place
 
    !> Leave n rows at their fill value.
    !> As rows of points that do not have this result.

@@ -2,7 +2,8 @@
 !> written only).
 !>
 !> An attribute is named by its object, an absolute name ('/' is the file), and its own name.
-!> Messages have both, and the path of the file.
+!> Messages have both, and the path of the file. Many of one dataset take less time where the file
+!> stands at that (`growing_dataset%place`): the object is '.' then.
 module fw_hdf5_attribute
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_c_binding, only: c_ptr
@@ -166,10 +167,12 @@ contains
 
       type_id = new_string_type()
       call new_attribute(file, object, name, dims, type_id, id, error)
+      if (.not. allocated(error)) then
+         call put_strings(id, type_id, .true., strings, status)
+         call h5aclose_f(id, ignored)
+      end if
       call h5tclose_f(type_id, ignored)
       if (allocated(error)) return
-      call put_strings(id, .true., strings, status)
-      call h5aclose_f(id, ignored)
       if (status < 0) call attribute_failure(file, object, name, 'cannot be written', error)
    end subroutine put_attribute
 
@@ -267,12 +270,14 @@ contains
       integer(hid_t) :: space
       integer :: status, ignored
 
-      ! HDF5 cannot change the type or the shape of an attribute.
-      if (has_attribute(file, object, name)) then
-         call h5adelete_by_name_f(file%id, object, name, status)
-      end if
       space = new_space(dims)
       call h5acreate_by_name_f(file%id, object, name, type_id, space, id, status)
+      ! HDF5 cannot change the type or the shape of an attribute. Few are there already: none is
+      ! asked for.
+      if (status < 0) then
+         call h5adelete_by_name_f(file%id, object, name, status)
+         call h5acreate_by_name_f(file%id, object, name, type_id, space, id, status)
+      end if
       call h5sclose_f(space, ignored)
       if (status < 0) call attribute_failure(file, object, name, 'cannot be created', error)
    end subroutine new_attribute

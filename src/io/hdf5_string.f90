@@ -150,14 +150,15 @@ contains
    end subroutine get_fixed
 
    !> Write strings to an open dataset or attribute whose type is that of new_string_type.
-   subroutine put_strings(id, is_attribute, strings, status)
-      integer(hid_t), intent(in) :: id
+   subroutine put_strings(id, type_id, is_attribute, strings, status)
+      !> The dataset or attribute, and the type.
+      integer(hid_t), intent(in) :: id, type_id
       logical, intent(in) :: is_attribute
       type(string_type), intent(in) :: strings(:)
       integer, intent(out) :: status
       character(kind=c_char), allocatable, target :: buffer(:)
       type(c_ptr), target :: texts(size(strings))
-      integer(hid_t) :: type_id, transfer_list
+      integer(hid_t) :: transfer_list
       integer :: i, j, at, ignored
 
       ! All strings in one buffer, each with its null, and addresses into it.
@@ -171,7 +172,6 @@ contains
          at = at + len(strings(i)%text) + 1
          buffer(at - 1) = c_null_char
       end do
-      type_id = new_string_type()
       if (is_attribute) then
          call h5awrite_f(id, type_id, c_loc(texts), status)
       else
@@ -181,7 +181,6 @@ contains
          call h5dwrite_f(id, type_id, c_loc(texts), status, xfer_prp=transfer_list)
          call h5pclose_f(transfer_list, ignored)
       end if
-      call h5tclose_f(type_id, ignored)
    end subroutine put_strings
 
    !> Read to an address with a type of memory.

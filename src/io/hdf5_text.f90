@@ -110,11 +110,13 @@ contains
       space = new_space(dims)
       call new_dataset(file, name, type_id, space, id, error)
       call h5sclose_f(space, ignored)
-      call h5tclose_f(type_id, ignored)
-      if (allocated(error)) return
       status = 0
       ! An empty list is a dataset all the same.
-      if (size(strings) > 0) call put_strings(id, .false., strings, status)
+      if (size(strings) > 0 .and. .not. allocated(error)) then
+         call put_strings(id, type_id, .false., strings, status)
+      end if
+      call h5tclose_f(type_id, ignored)
+      if (allocated(error)) return
       call h5dclose_f(id, ignored)
       if (status < 0) call dataset_failure(file, name, 'cannot be written (disk full?)', error)
    end subroutine write_strings

@@ -114,15 +114,15 @@ contains
       if (i <= size(labels)) call write_label(file, labels(i), unit_system, error)
    end subroutine label_dataset
 
-   !> The same of a quantity of the points.
-   subroutine label_quantity(file, quantity, unit_system, error)
-      type(hdf5_file), intent(in) :: file
+   !> The same of a quantity of the points, where the file stands at its dataset.
+   subroutine label_quantity(place, quantity, unit_system, error)
+      type(hdf5_file), intent(in) :: place
       type(quantity_type), intent(in) :: quantity
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
 
-      call write_label(file, label_type('/'//quantity%name, quantity%unit, quantity%dimensions, &
-                                        quantity%long_name), unit_system, error)
+      call write_label(place, label_type('.', quantity%unit, quantity%dimensions, &
+                                         quantity%long_name), unit_system, error)
    end subroutine label_quantity
 
    !> No attribute `units` where the unit is not known: a blank one would say that there is none.

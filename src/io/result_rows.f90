@@ -248,24 +248,25 @@ contains
       integer, intent(in) :: expected
       type(error_type), allocatable, intent(out) :: error
       type(string_type) :: words(size(served_words))
-      character(:), allocatable :: name
+      type(hdf5_file) :: place
       integer :: i
 
-      name = '/'//trim(self%quantity%name)
-      call self%dataset%create(file, name, self%quantity%kind_of, self%row_shape, error, expected)
+      call self%dataset%create(file, '/'//trim(self%quantity%name), self%quantity%kind_of, &
+                               self%row_shape, error, expected)
       if (allocated(error)) return
       self%dataset%waits = .true.
-      call label_quantity(file, self%quantity, case%model%unit_system, error)
+      place = self%dataset%place(file)
+      call label_quantity(place, self%quantity, case%model%unit_system, error)
       if (allocated(error)) return
       if (self%quantity%names_parameter) then
-         call write_attribute(file, name, 'name', trim(parameter_words(case%over%number)), error)
+         call write_attribute(place, '.', 'name', trim(parameter_words(case%over%number)), error)
       end if
       if (allocated(error) .or. .not. self%quantity%is_served_by) return
       do i = 1, size(words)
          ! Places count from 0.
          words(i)%text = trim(served_words(i - 1))
       end do
-      call write_attribute(file, name, 'names', words, error)
+      call write_attribute(place, '.', 'names', words, error)
    end subroutine create_column
 
    !> Create a dataset after the first points, whose rows stay unknown.
