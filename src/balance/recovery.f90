@@ -292,44 +292,48 @@ contains
       end do
    end subroutine peak_angles
 
-   !> u at n_grid angles of a period, a multiple of 4, and one beyond each end. Cosines are even and
-   !> sines odd: half of the angles serve for all. These at once, so that a processor turns several
-   !> waves by one instruction.
+   !> u at n_grid angles of a period, a multiple of 8, and one beyond each end. Cosines are even and
+   !> sines odd, and waves of odd numbers turn their signs in the second quarter: a quarter of the
+   !> angles serves for all. These at once, so that a processor turns several waves by one
+   !> instruction.
    pure subroutine evaluate_grid(coefficients, n_grid, grid)
       real(wp), intent(in) :: coefficients(:)
       integer, intent(in) :: n_grid
       real(wp), intent(out) :: grid(0:n_grid + 1)
-      !> Waves, and the sums of cosines and of sines.
-      real(wp), dimension(0:n_grid/2) :: turn_c, turn_s, c, s, even, odd
+      !> Waves, and the sums of cosines and of sines, of even and of odd numbers.
+      real(wp), dimension(0:n_grid/4) :: turn_c, turn_s, c, s
+      real(wp), dimension(0:n_grid/4, 0:1) :: cosines, sines
       real(wp) :: before
-      integer :: half, k, n, quarter
+      integer :: half, k, n, parity, quarter
 
       quarter = n_grid/4
       half = n_grid/2
-      do k = 0, quarter - 1
+      do k = 0, quarter/2
          turn_c(k) = cos(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
          turn_s(k) = sin(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
-      end do
-      do k = quarter, half
-         turn_c(k) = -turn_s(k - quarter)
-         turn_s(k) = turn_c(k - quarter)
+         turn_c(quarter - k) = turn_s(k)
+         turn_s(quarter - k) = turn_c(k)
       end do
       c = 1.0_wp
       s = 0.0_wp
-      even = coefficients(1)
-      odd = 0.0_wp
+      cosines(:, 0) = coefficients(1)
+      cosines(:, 1) = 0.0_wp
+      sines = 0.0_wp
       do n = 1, (size(coefficients) - 1)/2
-         do k = 0, half
+         parity = modulo(n, 2)
+         do k = 0, quarter
             before = c(k)
             c(k) = before*turn_c(k) - s(k)*turn_s(k)
             s(k) = before*turn_s(k) + s(k)*turn_c(k)
-            even(k) = even(k) + coefficients(2*n)*c(k)
-            odd(k) = odd(k) + coefficients(2*n + 1)*s(k)
+            cosines(k, parity) = cosines(k, parity) + coefficients(2*n)*c(k)
+            sines(k, parity) = sines(k, parity) + coefficients(2*n + 1)*s(k)
          end do
       end do
-      grid(:half) = even + odd
-      do k = half + 1, n_grid - 1
-         grid(k) = even(n_grid - k) - odd(n_grid - k)
+      do k = 0, quarter
+         grid(half - k) = cosines(k, 0) - cosines(k, 1) + sines(k, 1) - sines(k, 0)
+         grid(half + k) = cosines(k, 0) - cosines(k, 1) - sines(k, 1) + sines(k, 0)
+         grid(k) = cosines(k, 0) + cosines(k, 1) + sines(k, 1) + sines(k, 0)
+         grid(n_grid - k) = cosines(k, 0) + cosines(k, 1) - sines(k, 1) - sines(k, 0)
       end do
       grid(n_grid:) = grid(:1)
    end subroutine evaluate_grid
