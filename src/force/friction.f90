@@ -164,10 +164,14 @@ contains
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
       type(friction_room), intent(inout) :: room
+      logical :: wanted(3)
       integer :: n_blocks, block, k
 
+      do k = 1, size(wanted)
+         wanted(k) = any(self%present(k, :))
+      end do
       call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time, &
-                           work%fft)
+                           work%fft, wanted)
       do k = 1, fourier%n_time
          ! Gap, wear and constant loads: means that are no part of the coefficients.
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
@@ -187,7 +191,8 @@ contains
          end do
          !$omp end parallel do
       end if
-      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft)
+      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft, &
+                                   wanted)
       call classify(room, work)
       if (work%measures_slip) then
          ! The march has ended where it started, so one more turn over the same prediction is the

@@ -87,11 +87,15 @@ contains
       class(regularised_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
       type(force_workspace), intent(inout) :: work
+      logical :: wanted(3)
       integer :: i, k
 
       if (self%n_elements == 0) return
+      do k = 1, size(wanted)
+         wanted(k) = any(self%present(k, :))
+      end do
       call fourier%to_time(3*self%n_elements, work%prediction, work%prediction_time, &
-                           work%fft)
+                           work%fft, wanted)
       do k = 1, fourier%n_time
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
@@ -100,7 +104,8 @@ contains
                work%force_time, work%pressure)
       call work%measure_scale()
       work%turns = 1
-      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft)
+      call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft, &
+                                   wanted)
       do i = 1, self%n_elements
          ! Never stuck: every pair that bears at some instant has a block in the derivative.
          work%state(i) = pair_open

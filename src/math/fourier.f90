@@ -10,6 +10,7 @@ module fw_fourier
    use fw_kinds, only: pi
    use fw_complex_form, only: amplitudes_of
    use fw_complex_form, only: coefficients_of
+   use fw_folded_waves, only: folded_waves
    use fw_lapack, only: dgemm
    use fw_lapack, only: dgemv
    use fw_linalg, only: lu_type
@@ -44,7 +45,10 @@ module fw_fourier
       integer :: fft_rows = 0
       !> The analysis is the projection, not a collocation.
       logical :: projects = .true.
+      !> The same waves for transforms of single rows.
+      type(folded_waves), private :: waves
    contains
+      procedure :: row_to_time
       procedure :: to_time
       procedure :: to_coefficients
       procedure :: differentiate
@@ -83,6 +87,7 @@ contains
          self%n_coefficients = self%n_coefficients + merge(1, 2, self%harmonic(i) == 0)
       end do
       call fill_operators(self)
+      call self%waves%build(self%harmonic, self%column, n_time)
    end function new_fourier
 
    !> Angles are reduced in integer arithmetic, so that high harmonics keep full precision, and all
@@ -178,71 +183,139 @@ contains
    end function fft_serves
 
    !> Values (n_rows, n_time) at the instants from coefficients (n_rows, n_coefficients).
-   subroutine to_time(self, n_rows, coefficients, values, fft)
+   subroutine to_time(self, n_rows, coefficients, values, fft, wanted)
       class(fourier_type), intent(in) :: self
       integer, intent(in) :: n_rows
       real(wp), intent(in) :: coefficients(n_rows, *)
       real(wp), intent(inout) :: values(n_rows, *)
       type(fft_type), intent(inout), optional :: fft
-      integer :: i
+      !> Parts of the rows, as long as each other, that are not zero throughout (default: all).
+      logical, intent(in), optional :: wanted(:)
+      integer :: first, i, last, part
 
       if (fft_serves(n_rows, fft)) then
          call fft%synthesise(self%harmonic, self%column, coefficients, values)
-      else if (n_rows <= few_rows) then
-         do i = 1, n_rows
-            if (all(abs(coefficients(i, :self%n_coefficients)) <= 0.0_wp)) then
-               values(i, :self%n_time) = 0.0_wp
-            else
-               call dgemv('T', self%n_coefficients, self%n_time, 1.0_wp, self%synthesis, &
-                          self%n_coefficients, coefficients(i, 1), n_rows, 0.0_wp, values(i, 1), &
-                          n_rows)
-            end if
-         end do
-      else
-         ! Whoever does a block: sizes of products decide on their last bits.
-         !$omp parallel do default(none) private(i) shared(self, n_rows, coefficients, values) &
-         !$omp if(n_rows >= rows_for_threads)
-         do i = 1, n_rows, block_rows
-            call dgemm('N', 'N', min(block_rows, n_rows - i + 1), self%n_time, &
-                       self%n_coefficients, 1.0_wp, coefficients(i, 1), n_rows, self%synthesis, &
-                       self%n_coefficients, 0.0_wp, values(i, 1), n_rows)
-         end do
-         !$omp end parallel do
+         return
       end if
+      do part = 1, n_parts(wanted)
+         call rows_of(n_rows, part, wanted, first, last)
+         if (is_idle(part, wanted)) then
+            values(first:last, :self%n_time) = 0.0_wp
+         else if (last - first < few_rows) then
+            do i = first, last
+               if (all(abs(coefficients(i, :self%n_coefficients)) <= 0.0_wp)) then
+                  values(i, :self%n_time) = 0.0_wp
+               else
+                  call self%waves%synthesise(n_rows, coefficients(i, 1), n_rows, values(i, 1))
+               end if
+            end do
+         else
+            ! Whoever does a block: sizes of products decide on their last bits.
+            !$omp parallel do default(none) private(i) if(last - first >= rows_for_threads) &
+            !$omp shared(self, n_rows, first, last, coefficients, values)
+            do i = first, last, block_rows
+               call dgemm('N', 'N', min(block_rows, last - i + 1), self%n_time, &
+                          self%n_coefficients, 1.0_wp, coefficients(i, 1), n_rows, &
+                          self%synthesis, self%n_coefficients, 0.0_wp, values(i, 1), n_rows)
+            end do
+            !$omp end parallel do
+         end if
+      end do
    end subroutine to_time
 
    !> Coefficients (n_rows, n_coefficients) of values (n_rows, n_time) at the instants.
-   subroutine to_coefficients(self, n_rows, values, coefficients, fft)
+   subroutine to_coefficients(self, n_rows, values, coefficients, fft, wanted)
       class(fourier_type), intent(in) :: self
       integer, intent(in) :: n_rows
       real(wp), intent(in) :: values(n_rows, *)
       real(wp), intent(inout) :: coefficients(n_rows, *)
       type(fft_type), intent(inout), optional :: fft
-      integer :: i
+      !> Parts of the rows that vary, as in to_time; of the others the first value is taken.
+      logical, intent(in), optional :: wanted(:)
+      integer :: first, i, last, part
 
       if (self%projects .and. fft_serves(n_rows, fft)) then
          call fft%analyse(self%harmonic, self%column, values, coefficients)
-      else if (n_rows <= few_rows) then
-         do i = 1, n_rows
-            if (all(abs(values(i, :self%n_time)) <= 0.0_wp)) then
-               coefficients(i, :self%n_coefficients) = 0.0_wp
-            else
-               call dgemv('N', self%n_coefficients, self%n_time, 1.0_wp, self%analysis, &
-                          self%n_coefficients, values(i, 1), n_rows, 0.0_wp, coefficients(i, 1), &
-                          n_rows)
-            end if
-         end do
-      else
-         !$omp parallel do default(none) private(i) shared(self, n_rows, coefficients, values) &
-         !$omp if(n_rows >= rows_for_threads)
-         do i = 1, n_rows, block_rows
-            call dgemm('N', 'T', min(block_rows, n_rows - i + 1), self%n_coefficients, &
-                       self%n_time, 1.0_wp, values(i, 1), n_rows, self%analysis, &
-                       self%n_coefficients, 0.0_wp, coefficients(i, 1), n_rows)
-         end do
-         !$omp end parallel do
+         return
       end if
+      do part = 1, n_parts(wanted)
+         call rows_of(n_rows, part, wanted, first, last)
+         if (self%projects .and. is_idle(part, wanted)) then
+            coefficients(first:last, :self%n_coefficients) = 0.0_wp
+            if (self%has_constant()) coefficients(first:last, 1) = values(first:last, 1)
+         else if (last - first < few_rows) then
+            do i = first, last
+               if (all(abs(values(i, :self%n_time)) <= 0.0_wp)) then
+                  coefficients(i, :self%n_coefficients) = 0.0_wp
+               else
+                  call analyse_row(self, n_rows, values(i, 1), coefficients(i, 1))
+               end if
+            end do
+         else
+            !$omp parallel do default(none) private(i) if(last - first >= rows_for_threads) &
+            !$omp shared(self, n_rows, first, last, coefficients, values)
+            do i = first, last, block_rows
+               call dgemm('N', 'T', min(block_rows, last - i + 1), self%n_coefficients, &
+                          self%n_time, 1.0_wp, values(i, 1), n_rows, self%analysis, &
+                          self%n_coefficients, 0.0_wp, coefficients(i, 1), n_rows)
+            end do
+            !$omp end parallel do
+         end if
+      end do
    end subroutine to_coefficients
+
+   !> Values of one row (n_time) from its coefficients.
+   pure subroutine row_to_time(self, coefficients, values)
+      class(fourier_type), intent(in) :: self
+      real(wp), intent(in) :: coefficients(self%n_coefficients)
+      real(wp), intent(inout) :: values(self%n_time)
+
+      call self%waves%synthesise(1, coefficients, 1, values)
+   end subroutine row_to_time
+
+   !> One row of values by the projection, or by collocation.
+   subroutine analyse_row(self, stride, values, coefficients)
+      type(fourier_type), intent(in) :: self
+      integer, intent(in) :: stride
+      real(wp), intent(in) :: values(stride, *)
+      real(wp), intent(inout) :: coefficients(stride, *)
+
+      if (self%projects) then
+         associate (mean => 1.0_wp/real(self%n_time, wp))
+            call self%waves%analyse(stride, values, 2.0_wp*mean, mean, stride, coefficients)
+         end associate
+      else
+         call dgemv('N', self%n_coefficients, self%n_time, 1.0_wp, self%analysis, &
+                    self%n_coefficients, values, stride, 0.0_wp, coefficients, stride)
+      end if
+   end subroutine analyse_row
+
+   !> Parts that the rows of an array fall into.
+   pure integer function n_parts(wanted)
+      logical, intent(in), optional :: wanted(:)
+
+      n_parts = 1
+      if (present(wanted)) n_parts = size(wanted)
+   end function n_parts
+
+   !> Whether nothing of a part varies.
+   pure logical function is_idle(part, wanted)
+      integer, intent(in) :: part
+      logical, intent(in), optional :: wanted(:)
+
+      is_idle = .false.
+      if (present(wanted)) is_idle = .not. wanted(part)
+   end function is_idle
+
+   !> The rows of a part.
+   pure subroutine rows_of(n_rows, part, wanted, first, last)
+      integer, intent(in) :: n_rows, part
+      logical, intent(in), optional :: wanted(:)
+      integer, intent(out) :: first, last
+
+      last = part*(n_rows/n_parts(wanted))
+      first = last - n_rows/n_parts(wanted) + 1
+   end subroutine rows_of
 
    !> Coefficients of du/dtau from those of u (n_rows, n_coefficients).
    pure subroutine differentiate(self, n_rows, coefficients, derivative)

@@ -18,12 +18,12 @@
 module fw_wave_sums
    use fw_fourier, only: fourier_type
    use fw_kinds, only: pi
+   use fw_folded_waves, only: folded_waves
    use fw_kinds, only: wp
-   use fw_lapack, only: dgemv
    implicit none (type, external)
    private
 
-   public :: wave_table, wave_sums
+   public :: add_wave_products, wave_table, wave_sums
 
    type :: wave_table
       !> Waves 1, cos, sin, cos 2, .. up to twice the highest harmonic.
@@ -34,6 +34,8 @@ module fw_wave_sums
       real(wp), allocatable, private :: geometric(:, :)
       !> Harmonics and their columns (n_retained).
       integer, allocatable, private :: harmonic(:), column(:)
+      !> The same waves for sums of values at all instants.
+      type(folded_waves), private :: folded
    contains
       procedure :: build
    end type wave_table
@@ -89,6 +91,8 @@ contains
          angle = pi*real(modulo(p, self%n_time), wp)/real(self%n_time, wp)
          self%geometric(:, p) = [-0.5_wp, -0.5_wp*cos(angle)/sin(angle)]
       end do
+      call self%folded%build([(p, p=0, 2*self%highest)], [1, (2*p, p=1, 2*self%highest)], &
+                             self%n_time)
    end subroutine build
 
    !> Room for the sums with the waves of a table.
@@ -111,13 +115,12 @@ contains
    end subroutine clear
 
    !> s = values at the instants.
-   subroutine of_values(self, table, values)
+   pure subroutine of_values(self, table, values)
       class(wave_sums), intent(inout) :: self
       type(wave_table), intent(in) :: table
       real(wp), intent(in), contiguous :: values(:)
 
-      call dgemv('N', table%n_waves, table%n_time, 1.0_wp, table%wave, table%n_waves, values, 1, &
-                 0.0_wp, self%sums, 1)
+      call table%folded%analyse(1, values, 1.0_wp, 1.0_wp, 1, self%sums)
    end subroutine of_values
 
    !> s = s + factor at the instants first..last.
@@ -173,8 +176,7 @@ contains
       !> Leading dimension.
       integer, intent(in) :: n
       real(wp), intent(inout) :: products(n, *)
-      real(wp) :: weight
-      integer :: a, b, i, j, m, nb, p
+      integer :: p
 
       self%cosine(0) = self%sums(1)
       self%sine(0) = 0.0_wp
@@ -184,28 +186,73 @@ contains
          self%sine(p) = self%sums(2*p + 1)
          self%sine(-p) = -self%sums(2*p + 1)
       end do
-      associate (c => self%cosine, s => self%sine)
-         do b = 1, size(table%harmonic)
-            nb = table%harmonic(b)
-            j = table%column(b)
-            ! Weights of the analysis are 2/n_time, of the constant half of it; and half of the sum.
-            weight = merge(0.5_wp, 1.0_wp, nb == 0)/real(table%n_time, wp)
-            do a = 1, size(table%harmonic)
-               m = table%harmonic(a)
-               i = table%column(a)
-               products(i, j) = products(i, j) + weight*(c(m - nb) + c(m + nb))
-               if (m > 0) products(i + 1, j) = products(i + 1, j) + weight*(s(m + nb) + s(m - nb))
-            end do
-            if (nb == 0) cycle
-            do a = 1, size(table%harmonic)
-               m = table%harmonic(a)
-               i = table%column(a)
-               products(i, j + 1) = products(i, j + 1) + weight*(s(m + nb) - s(m - nb))
-               if (m > 0) products(i + 1, j + 1) = products(i + 1, j + 1) + &
-                                                   weight*(c(m - nb) - c(m + nb))
-            end do
-         end do
-      end associate
+      ! Weights of the analysis are 2/n_time; and half of the sums.
+      call add_wave_products(size(table%harmonic), table%harmonic, table%column, 2*table%highest, &
+                             1.0_wp/real(table%n_time, wp), self%cosine, self%sine, n, products)
    end subroutine add_products
+
+   !> products(i, j) = products(i, j) + factor times the sums of two waves each, by the sums and
+   !> differences of their numbers; half of it where the second wave is the constant.
+   pure subroutine add_wave_products(n_harmonics, harmonic, column, most, factor, cosine, sine, n, &
+                                     products)
+      !> Harmonics, evenly spaced from the first one or from 0 on, and their columns, of which one
+      !> follows the other.
+      integer, intent(in) :: n_harmonics, harmonic(n_harmonics), column(n_harmonics)
+      !> Largest number of a wave, and leading dimension.
+      integer, intent(in) :: most, n
+      real(wp), intent(in) :: factor
+      !> Sums with the waves -most..most: those of cosines even, of sines odd.
+      real(wp), intent(in) :: cosine(-most:most), sine(-most:most)
+      real(wp), intent(inout) :: products(n, *)
+      real(wp) :: weight
+      integer :: above, below, first, h, j, n_pairs, nb, step
+
+      if (n_harmonics == 0) return
+      ! The first harmonic that is not the constant.
+      first = merge(2, 1, harmonic(1) == 0)
+      n_pairs = n_harmonics - first + 1
+      step = 1
+      if (n_harmonics > 1) step = harmonic(2) - harmonic(1)
+      do h = 1, n_harmonics
+         nb = harmonic(h)
+         j = column(h)
+         weight = merge(0.5_wp, 1.0_wp, nb == 0)*factor
+         if (first == 2) then
+            products(1, j) = products(1, j) + 2.0_wp*weight*cosine(nb)
+            if (nb > 0) products(1, j + 1) = products(1, j + 1) + 2.0_wp*weight*sine(nb)
+         end if
+         if (n_pairs == 0) cycle
+         above = harmonic(first) + nb
+         below = harmonic(first) - nb
+         call add_pairs(n_pairs, step, weight, weight, cosine(above), cosine(below), sine(above), &
+                        sine(below), products(column(first), j))
+         if (nb > 0) call add_pairs(n_pairs, step, weight, -weight, sine(above), sine(below), &
+                                    cosine(below), cosine(above), products(column(first), j + 1))
+      end do
+   end subroutine add_wave_products
+
+   !> rows = rows + a weight times some sums of waves and another one times others, which go from
+   !> harmonic to harmonic by a step, 1 or 2.
+   pure subroutine add_pairs(n, step, weight, other, a, b, c, d, rows)
+      integer, intent(in) :: n, step
+      real(wp), intent(in) :: weight, other
+      !> Of the cosines of the rows a and b, of the sines c and d.
+      real(wp), intent(in) :: a(*), b(*), c(*), d(*)
+      real(wp), intent(inout) :: rows(2, n)
+      integer :: i
+
+      ! Known strides let a processor take several rows by one instruction.
+      if (step == 1) then
+         do i = 1, n
+            rows(1, i) = rows(1, i) + (weight*a(i) + other*b(i))
+            rows(2, i) = rows(2, i) + (weight*c(i) + other*d(i))
+         end do
+      else
+         do i = 1, n
+            rows(1, i) = rows(1, i) + (weight*a(2*i - 1) + other*b(2*i - 1))
+            rows(2, i) = rows(2, i) + (weight*c(2*i - 1) + other*d(2*i - 1))
+         end do
+      end if
+   end subroutine add_pairs
 
 end module fw_wave_sums

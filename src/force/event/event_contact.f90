@@ -87,6 +87,7 @@ contains
          call self%pair(i)%reserve(maxval(fourier%harmonic), fourier%n_time, fourier%n_coefficients)
          self%pair(i)%curves%mu = mu(i)
          self%pair(i)%rubs = self%direction(i) > 0
+         self%pair(i)%presses = self%has_normal(i)
          self%pair(i)%remembers = remembers
       end do
       allocate (self%batch(fourier%n_coefficients, 6, self%n_pairs), source=0.0_wp)
@@ -114,14 +115,7 @@ contains
       logical :: may_rest
 
       may_rest = present(mean)
-      ! Values and slopes of all pairs at the instants in one product; planar pairs, which look at
-      ! nodes and Gauss points of their own instead, take part for the sake of one call.
-      if (.not. all(self%is_planar)) then
-         call fill_batch(self, fourier, prediction)
-         call dgemm('T', 'N', fourier%n_time, 6*self%n_pairs, fourier%n_coefficients, 1.0_wp, &
-                    fourier%synthesis, fourier%n_coefficients, self%batch, &
-                    fourier%n_coefficients, 0.0_wp, self%samples, fourier%n_time)
-      end if
+      if (.not. all(self%is_planar)) call fill_batch(self, fourier, prediction)
       ! Not a parallel region where it does not pay: one of a single thread costs more than a pair.
       if (self%n_pairs < pairs_for_threads) then
          do i = 1, self%n_pairs
@@ -156,6 +150,12 @@ contains
             x(i, :) = self%planar(i)%z_end
             return
          end if
+         ! Values and slopes at the instants; those of a component that does not exist are zero.
+         do c = 1, 6
+            if (c <= 3 .and. self%direction(i) == 0) cycle
+            if (c > 3 .and. .not. self%has_normal(i)) cycle
+            call fourier%row_to_time(self%batch(:, c, i), self%samples(:, c, i))
+         end do
          call evaluate_pair(self%pair(i), fourier, self%batch(:, :, i), self%samples(:, :, i), &
                             offset(i), x_start(i, max(1, self%direction(i))), &
                             may_rest, at_rest(max(1, self%direction(i))), self%rests(i))

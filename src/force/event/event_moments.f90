@@ -12,6 +12,7 @@
 module fw_event_moments
    use fw_kinds, only: pi
    use fw_kinds, only: wp
+   use fw_wave_sums, only: add_wave_products
    implicit none (type, external)
    private
 
@@ -162,27 +163,12 @@ contains
       !> Harmonic numbers and columns of the retained coefficients (fourier_type).
       integer, intent(in) :: n_retained, harmonic(n_retained), column(n_retained)
       !> (n_coefficients, n_coefficients), added to.
-      real(wp), intent(inout) :: gram(:, :)
-      real(wp) :: share
-      integer :: a, b, i, j, k, o
+      real(wp), intent(inout), contiguous :: gram(:, :)
 
-      do b = 1, n_retained
-         k = harmonic(b)
-         o = column(b)
-         share = 0.5_wp/pi*factor
-         ! Half for the constant as output, as in `project`.
-         if (k == 0) share = 0.5_wp*share
-         do a = 1, n_retained
-            j = harmonic(a)
-            i = column(a)
-            gram(i, o) = gram(i, o) + share*(self%cosine(k - j) + self%cosine(k + j))
-            if (j > 0) gram(i + 1, o) = gram(i + 1, o) + share*(self%sine(k + j) - self%sine(k - j))
-            if (k == 0) cycle
-            gram(i, o + 1) = gram(i, o + 1) + share*(self%sine(k + j) + self%sine(k - j))
-            if (j > 0) gram(i + 1, o + 1) = gram(i + 1, o + 1) + &
-                                            share*(self%cosine(k - j) - self%cosine(k + j))
-         end do
-      end do
+      ! 1/2 of the products of waves, 1/pi of the coefficients; half of it for the constant as
+      ! output, as in `project`.
+      call add_wave_products(n_retained, harmonic, column, 2*self%degree, 0.5_wp/pi*factor, &
+                             self%cosine, self%sine, size(gram, 1), gram)
    end subroutine add_gram
 
 end module fw_event_moments

@@ -31,8 +31,9 @@ module fw_event_pair
       type(path_type) :: path
       !> Whether the tangential prediction is that of the velocity-level law.
       logical :: remembers = .true.
-      !> Whether there is a tangential direction.
+      !> Whether there are a tangential direction and a normal one.
       logical :: rubs = .true.
+      logical :: presses = .true.
       !> Sets of stick, forward less backward slip, contact, and stick weighted by z.
       !> As weights: 1 on stick, 1 and -1 on forward and backward slip, 1 on contact, z on stick.
       type(moments_type) :: stick, slip, contact, held
@@ -191,11 +192,20 @@ contains
       normal = 0.0_wp
       tangential = 0.0_wp
       associate (c => self%curves)
-         call self%contact%project(-1.0_wp, c%normal, n_retained, harmonic, column, normal)
+         ! Of a normal force that is constant only the means of the sets are wanted.
+         if (c%steady) then
+            call add_means(self%contact, -c%normal(0, 1), n_retained, harmonic, column, normal)
+         else
+            call self%contact%project(-1.0_wp, c%normal, n_retained, harmonic, column, normal)
+         end if
          if (.not. self%rubs) return
          ! T = P - z on stick, +-mu N on slip: three projections and the mean of z over the sticks.
          call self%stick%project(1.0_wp, c%tangential, n_retained, harmonic, column, tangential)
-         call self%slip%project(c%mu, c%normal, n_retained, harmonic, column, tangential)
+         if (c%steady) then
+            call add_means(self%slip, c%mu*c%normal(0, 1), n_retained, harmonic, column, tangential)
+         else
+            call self%slip%project(c%mu, c%normal, n_retained, harmonic, column, tangential)
+         end if
          call add_means(self%held, -1.0_wp, n_retained, harmonic, column, tangential)
       end associate
    end subroutine force
@@ -259,11 +269,12 @@ contains
       by_tangential = 0.0_wp
       by_normal = 0.0_wp
       normal = 0.0_wp
-      call self%contact%add_gram(1.0_wp, n_retained, harmonic, column, normal)
+      if (self%presses) call self%contact%add_gram(1.0_wp, n_retained, harmonic, column, normal)
       if (.not. self%rubs) return
       call self%stick%add_gram(1.0_wp, n_retained, harmonic, column, by_tangential)
       ! Q = -mu y_n.
-      call self%slip%add_gram(-self%curves%mu, n_retained, harmonic, column, by_normal)
+      if (self%presses) call self%slip%add_gram(-self%curves%mu, n_retained, harmonic, column, &
+                                                by_normal)
       do j = 1, self%path%n_segments
          ! A z that was not set within the turn (stuck throughout) is that of the start: it depends
          ! on no input.
@@ -274,6 +285,7 @@ contains
          call waves_at(self, self%path%set_at(j), n_retained, harmonic, column)
          do k = 1, size(self%integral)
             by_tangential(:, k) = by_tangential(:, k) - self%integral(k)*self%origin
+            if (.not. self%presses) cycle
             ! z = P - Q (or P + Q): dz/dQ is the weight, and dQ = -mu dy_n.
             by_normal(:, k) = by_normal(:, k) + &
                               (self%curves%mu*self%path%weight(j)*self%integral(k))*self%origin
