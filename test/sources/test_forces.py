@@ -39,7 +39,8 @@ def test_nothing_outside_names_a_kernel_of_the_events() -> None:
 
 
 def test_the_events_know_no_law_and_no_balance() -> None:
-    allowed = {"fw_fourier", "fw_kinds", "fw_lapack", "fw_settling", "fw_threads"} | kernels()
+    allowed = {"fw_fourier", "fw_kinds", "fw_lapack", "fw_settling", "fw_threads",
+               "fw_wave_sums"} | kernels()
     for path in EVENTS.glob("*.f90"):
         assert uses(path) - {INTERFACE} <= allowed, path.name
 
