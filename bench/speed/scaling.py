@@ -32,8 +32,10 @@ MOST_UNKNOWNS = 41000
 N_TIME = 128
 #: Instants and harmonics of the paper's table.
 PAPER_TIME, PAPER_HARMONICS = 105, (1, 17)
-#: Pairs and harmonics that two threads are measured on, and how often each is run.
-THREADED_PAIRS, THREADED_HARMONICS, THREADED_RUNS = (48, 96, 192, 384), (3, 7, 17), 3
+#: Pairs and harmonics that two threads are measured on, and how often each is run: up to SMALL
+#: unknowns a run takes a tenth of a second, and more of them are needed.
+THREADED_PAIRS, THREADED_HARMONICS = (48, 96, 192, 384), (3, 7, 17)
+THREADED_RUNS, MORE_RUNS = 3, 15
 #: Most harmonics that the other program is measured on: what it took longest for.
 OTHER_HARMONICS = 17
 #: Friction moves the peak from the stuck frequency by this share of it.
@@ -131,8 +133,9 @@ def measure_two_threads(bench: Bench) -> list[Threads]:
             if unknowns_of(pairs, n) > MOST_UNKNOWNS:
                 continue
             groups = groups_of(bench, pairs, n, FEWEST_POINTS)[0]
+            repeats = MORE_RUNS if unknowns_of(pairs, n) <= SMALL else THREADED_RUNS
             runs = [[bench.run(groups, threads).seconds.mean() for threads in (1, 2)]
-                    for _ in range(1 if bench.quick else THREADED_RUNS)]
+                    for _ in range(1 if bench.quick else repeats)]
             rows.append(Threads(pairs, n, *(float(min(times)) for times in zip(*runs))))
     return rows
 

@@ -17,6 +17,7 @@ from bench.speed.scaling import (
     FEWEST_POINTS,
     HARMONICS,
     MORE_PAIRS,
+    MORE_RUNS,
     MOST_POINTS,
     MOST_UNKNOWNS,
     N_TIME,
@@ -114,8 +115,10 @@ def two_threads(rows: list[Threads]) -> list[str]:
     if not rows:
         return []
     return ["### Two threads", "",
-            f"Wall time of a frequency, the fastest of {THREADED_RUNS} runs each by turns. Target: "
-            f"{WANTED_THREADS:g} times from 96 pairs on, never slower by more than 2 %.", "",
+            f"Wall time of a frequency, the fastest of {THREADED_RUNS} runs each by turns "
+            f"({MORE_RUNS} up to {SMALL} unknowns). Joints of fewer than 64 pairs stay in one "
+            f"thread. Target: {WANTED_THREADS:g} times from 96 pairs on, never slower by more than "
+            "2 %.", "",
             *table(("pairs", "H", "one thread [ms]", "two [ms]", "times"),
                    ((r.pairs, r.n_harmonics, f"{1e3 * r.one:.3g}", f"{1e3 * r.two:.3g}",
                      f"{r.one / r.two:.2f}") for r in rows)), ""]
