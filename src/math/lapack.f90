@@ -11,7 +11,8 @@ module fw_lapack
 
    public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
-   public :: zggev, sgetrf, strsm, dlaswp, dtrsm
+   public :: zggev, sgetrf, strsm, dlaswp, dtrsm, dtrmm, dsyrk, dpocon, dsygst
+   public :: dsyevr
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -180,6 +181,48 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine zgetrs
 
+      !> b = alpha op(a) b ('L'), or b op(a) ('R'), with a triangular.
+      subroutine dtrmm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+         import :: wp
+         implicit none (type, external)
+         character, intent(in) :: side, uplo, transa, diag
+         integer, intent(in) :: m, n, lda, ldb
+         real(wp), intent(in) :: alpha, a(lda, *)
+         real(wp), intent(inout) :: b(ldb, *)
+      end subroutine dtrmm
+
+      !> c = alpha a a^T + beta c ('N'), or a^T a ('T'); one triangle of it.
+      subroutine dsyrk(uplo, trans, n, k, alpha, a, lda, beta, c, ldc)
+         import :: wp
+         implicit none (type, external)
+         character, intent(in) :: uplo, trans
+         integer, intent(in) :: n, k, lda, ldc
+         real(wp), intent(in) :: alpha, beta, a(lda, *)
+         real(wp), intent(inout) :: c(ldc, *)
+      end subroutine dsyrk
+
+      !> Estimate of the reciprocal condition from a Cholesky factor and the 1-norm of the matrix.
+      subroutine dpocon(uplo, n, a, lda, anorm, rcond, work, iwork, info)
+         import :: wp
+         implicit none (type, external)
+         character, intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         real(wp), intent(in) :: a(lda, *), anorm
+         real(wp), intent(out) :: rcond, work(*)
+         integer, intent(out) :: iwork(*), info
+      end subroutine dpocon
+
+      !> itype 1: a = inv(L) a inv(L^T) with the Cholesky factor L in b; one triangle of it.
+      subroutine dsygst(itype, uplo, n, a, lda, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: itype, n, lda, ldb
+         character, intent(in) :: uplo
+         real(wp), intent(inout) :: a(lda, *)
+         real(wp), intent(in) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dsygst
+
       !> Cholesky factor, in place; info > 0: the matrix is not positive definite.
       subroutine dpotrf(uplo, n, a, lda, info)
          import :: wp
@@ -189,6 +232,20 @@ module fw_lapack
          real(wp), intent(inout) :: a(lda, *)
          integer, intent(out) :: info
       end subroutine dpotrf
+
+      !> Eigenpairs of a symmetric matrix with values in (vl, vu] (range 'V'), in ascending order, by
+      !> relatively robust representations; a is spoilt.
+      subroutine dsyevr(jobz, range, uplo, n, a, lda, vl, vu, il, iu, abstol, m, w, z, ldz, &
+                        isuppz, work, lwork, iwork, liwork, info)
+         import :: wp
+         implicit none (type, external)
+         character, intent(in) :: jobz, range, uplo
+         integer, intent(in) :: n, lda, il, iu, ldz, lwork, liwork
+         real(wp), intent(in) :: vl, vu, abstol
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: m, isuppz(*), iwork(*), info
+         real(wp), intent(out) :: w(*), z(ldz, *), work(*)
+      end subroutine dsyevr
 
       !> Eigenpairs of a symmetric matrix in ascending order, by divide and conquer; vectors in
       !> place of a. It needs workspace of order 2 n**2 in return for its speed.

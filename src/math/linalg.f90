@@ -11,8 +11,12 @@ module fw_linalg
    use fw_lapack, only: zgetrf
    use fw_lapack, only: zgetrs
    use fw_lapack, only: ztrsv
+   use fw_lapack, only: dpotrf
    use fw_lapack, only: dsyevd
+   use fw_lapack, only: dsyevr
+   use fw_lapack, only: dsygst
    use fw_lapack, only: dsygvd
+   use fw_lapack, only: dtrsm
    use fw_lu_in_parts, only: factor_in_parts
    use fw_lu_in_parts, only: whole_up_to
    use fw_small_lu, only: factor_small
@@ -22,7 +26,7 @@ module fw_linalg
    private
 
    public :: lu_type, complex_lu_type, solve_symmetric_eigen, diagonalize, &
-             is_positive_definite
+             solve_symmetric_above, is_positive_definite
 
    !> LU factors of a real matrix. The storage only grows, so that refactoring does not allocate.
    type :: lu_type
@@ -213,6 +217,48 @@ contains
                   iwork, size(iwork), info)
       done = info == 0
    end subroutine solve_symmetric_eigen
+
+   !> The same for the eigenvalues above a bound alone: what takes vectors of all, which is most of
+   !> the work, is left out.
+   subroutine solve_symmetric_above(a, b, least, values, vectors, done)
+      !> Symmetric matrices (n, n), B positive definite.
+      real(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp), intent(in) :: least
+      !> Eigenvalues (m) in ascending order, and vectors x with x^T B x = 1 in columns (n, m).
+      real(wp), intent(out), allocatable :: values(:), vectors(:, :)
+      logical, intent(out) :: done
+      real(wp), allocatable :: factor(:, :), standard(:, :), found(:), shapes(:, :), work(:)
+      integer, allocatable :: iwork(:), support(:)
+      real(wp) :: highest, room(1)
+      integer :: n, m, j, info, iroom(1)
+
+      n = size(a, 1)
+      factor = b
+      standard = a
+      m = 0
+      call dpotrf('L', n, factor, n, info)
+      if (info == 0) call dsygst(1, 'L', n, standard, n, factor, n, info)
+      done = info == 0
+      if (.not. done) return
+      do j = 2, n
+         standard(:j - 1, j) = standard(j, :j - 1)
+      end do
+      ! No eigenvalue is above any norm.
+      highest = maxval(sum(abs(standard), dim=1))
+      allocate (found(n), shapes(n, n), support(2*max(1, n)))
+      if (least < highest) then
+         call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, shapes, &
+                     n, support, room, -1, iroom, -1, info)
+         allocate (work(int(room(1))), iwork(iroom(1)))
+         call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, shapes, &
+                     n, support, work, size(work), iwork, size(iwork), info)
+         done = info == 0
+         if (.not. done) return
+      end if
+      values = found(:m)
+      vectors = shapes(:, :m)
+      call dtrsm('L', 'L', 'T', 'N', n, m, 1.0_wp, factor, n, vectors, n)
+   end subroutine solve_symmetric_above
 
    !> Eigenvalues of a symmetric matrix in ascending order; the matrix becomes its eigenvectors.
    subroutine diagonalize(matrix, values, purpose, error)

@@ -2,6 +2,7 @@
 !> dofs, and a stiffness that holds the structure only in part, are no exceptions.
 module fw_modes
    use fw_kinds, only: wp
+   use fw_linalg, only: solve_symmetric_above
    use fw_linalg, only: solve_symmetric_eigen
    implicit none (type, external)
    private
@@ -24,6 +25,9 @@ module fw_modes
    real(wp), parameter :: least_width = 1.0e-6_wp
    !> Shifts that are tried, in parts of K over M.
    real(wp), parameter :: shift_trials(*) = [0.0_wp, 1.0e-3_wp, 1.0_wp]
+   !> Dofs from which modes beyond the range are not computed, and what keeps one at its end.
+   integer, parameter :: above_from = 100
+   real(wp), parameter :: beyond = 1.0_wp - 1.0e-9_wp
    !> Eigenvalues below this part of the largest are massless directions: round-off.
    real(wp), parameter :: massless = 1.0e-13_wp
 
@@ -50,7 +54,12 @@ contains
       allocate (in_range(0))
       do trial = 1, size(shift_trials)
          shift = shift_trials(trial)*norm2(stiffness)/max(norm2(mass), tiny(1.0_wp))
-         call solve_symmetric_eigen(mass, stiffness + shift*mass, theta, shapes, done)
+         if (size(mass, 1) < above_from) then
+            call solve_symmetric_eigen(mass, stiffness + shift*mass, theta, shapes, done)
+         else
+            call solve_symmetric_above(mass, stiffness + shift*mass, &
+                                       beyond/(range(2)**2 + shift), theta, shapes, done)
+         end if
          if (done) exit
       end do
       if (.not. done) return

@@ -10,6 +10,8 @@ module fw_reduction
    use fw_linalg, only: solve_symmetric_eigen
    use fw_model, only: model_type
    use fw_relative, only: relative_type
+   use fw_sparse_rows, only: new_sparse_rows
+   use fw_sparse_rows, only: sparse_rows
    implicit none (type, external)
    private
 
@@ -175,6 +177,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: shift_trials(*) = [0.0_wp, 1.0e-3_wp, 1.0_wp, 1.0e3_wp]
       real(wp), allocatable :: k(:, :), m(:, :), modes(:, :), k_iq(:, :)
+      type(sparse_rows) :: coordinates
       real(wp) :: shift
       integer :: trial
       logical :: done
@@ -200,7 +203,8 @@ contains
       if (trial > 1) return
       ! Static constraint modes: K_iq vanishes, and Z_r(0) is exact.
       ! K_ii = 1 in these modes: x = -K_iq q is the static answer to q.
-      k_iq = congruence(t_i, model%stiffness, t_q)
+      coordinates = new_sparse_rows(t_q)
+      k_iq = transpose(coordinates%times_transposed(product_of(model%stiffness, t_i)))
       t_q = t_q - product_of(t_i, k_iq)
    end subroutine internal_modes
 
@@ -210,6 +214,7 @@ contains
       real(wp), intent(in) :: t_q(:, :), t_i(:, :)
       type(reduction_type), intent(inout) :: self
       real(wp), allocatable :: loads(:, :), damping(:, :)
+      type(sparse_rows) :: coordinates
       integer :: j
 
       self%n_coordinates = size(t_q, 2)
@@ -220,9 +225,11 @@ contains
       allocate (self%blocks(self%n_coordinates + self%n_internal, self%n_coordinates, &
                             self%n_blocks))
       allocate (self%coupling(self%n_internal, self%n_blocks, self%n_coordinates))
-      call fill_blocks(model%stiffness, t_q, t_i, 1, self)
-      call fill_blocks(model%mass, t_q, t_i, 2, self)
-      if (self%n_blocks == 3) call fill_blocks(model%damping, t_q, t_i, 3, self)
+      ! The dofs of the pairs are few of the coordinates each, those between them few.
+      coordinates = new_sparse_rows(t_q)
+      call fill_blocks(model%stiffness, coordinates, t_i, 1, self)
+      call fill_blocks(model%mass, coordinates, t_i, 2, self)
+      if (self%n_blocks == 3) call fill_blocks(model%damping, coordinates, t_i, 3, self)
       damping = congruence(t_i, model%damping, t_i)
       self%c_i = [(damping(j, j), j=1, self%n_internal)]
       ! What is left off the diagonal decides.
@@ -246,14 +253,18 @@ contains
 
    !> T_q^T A T_q over T_i^T A T_q, A being K (block 1), M (2) or C (3).
    subroutine fill_blocks(matrix, t_q, t_i, block, self)
-      real(wp), intent(in) :: matrix(:, :), t_q(:, :), t_i(:, :)
+      real(wp), intent(in) :: matrix(:, :)
+      type(sparse_rows), intent(in) :: t_q
+      real(wp), intent(in) :: t_i(:, :)
       integer, intent(in) :: block
       type(reduction_type), intent(inout) :: self
+      real(wp), allocatable :: half(:, :)
       integer :: m
 
       m = self%n_coordinates
-      self%blocks(:m, :, block) = congruence(t_q, matrix, t_q)
-      self%coupling(:, block, :) = congruence(t_i, matrix, t_q)
+      half = t_q%times_left(matrix)
+      self%blocks(:m, :, block) = t_q%times_transposed(half)
+      self%coupling(:, block, :) = transposed_product_of(t_i, half)
       self%blocks(m + 1:, :, block) = self%coupling(:, block, :)
    end subroutine fill_blocks
 
@@ -370,16 +381,20 @@ contains
    function congruence(a, b, c) result(value)
       real(wp), intent(in) :: a(:, :), b(:, :), c(:, :)
       real(wp), allocatable :: value(:, :)
-      real(wp), allocatable :: half(:, :)
-      integer :: n
 
-      n = size(b, 1)
-      half = product_of(b, c)
-      allocate (value(size(a, 2), size(c, 2)))
-      if (size(value) == 0) return
-      call dgemm('T', 'N', size(a, 2), size(c, 2), n, 1.0_wp, a, n, half, n, 0.0_wp, &
-                 value, size(a, 2))
+      value = transposed_product_of(a, product_of(b, c))
    end function congruence
+
+   !> a^T b.
+   function transposed_product_of(a, b) result(value)
+      real(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp), allocatable :: value(:, :)
+
+      allocate (value(size(a, 2), size(b, 2)))
+      if (size(value) == 0) return
+      call dgemm('T', 'N', size(a, 2), size(b, 2), size(a, 1), 1.0_wp, a, size(a, 1), &
+                 b, size(b, 1), 0.0_wp, value, size(a, 2))
+   end function transposed_product_of
 
    !> a b.
    function product_of(a, b) result(value)
