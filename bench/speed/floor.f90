@@ -27,6 +27,7 @@ module floor_system
    use fw_plain_structure, only: plain_structure
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_two_directions, only: turn_derivative
+   use fw_wave_sums, only: wave_table
    implicit none (type, external)
    private
 
@@ -71,6 +72,7 @@ module floor_system
       real(wp), allocatable :: values(:, :, :), force(:, :, :)
       type(turn_derivative) :: turn
       type(instant_sum) :: sums
+      type(wave_table) :: waves
       real(wp), allocatable :: y(:, :), jacobian(:, :)
       real(wp), allocatable :: basis(:, :), vector(:), weights(:)
       complex(wp), allocatable :: input(:), output(:), coupling(:, :), solved(:, :), square(:, :)
@@ -120,6 +122,7 @@ contains
       allocate (self%values(n, 3, nt), self%force(n, 3, nc), source=0.0_wp)
       call self%turn%reserve(nc, nt)
       call self%sums%reserve(self%problem%fourier)
+      call self%waves%build(self%problem%fourier)
       allocate (self%y(3, nt), self%jacobian(3*nc, 3*nc), source=0.0_wp)
       allocate (self%basis(m*nc, longest_basis), source=1.0e-3_wp)
       allocate (self%vector(m*nc), self%weights(longest_basis), source=1.0e-3_wp)
@@ -276,7 +279,7 @@ contains
          x = contact%x(i, :)
          call self%turn%march(f%n_time, nc, 1, f%synthesis, self%y, self%mu(i), 0.0_wp, present, &
                               .true., x)
-         call self%turn%project(f, present, self%sums, self%jacobian)
+         call self%turn%project(f, self%waves, present, self%sums, self%jacobian)
       end associate
    end subroutine derive
 

@@ -105,7 +105,7 @@ contains
       if (.not. work%measures_slip .and. count(self%present(1:2, i)) == 1) then
          call differentiate_one_direction(self, fourier, room, i, work, of_pair)
       else
-         call differentiate_rows(self, fourier, room%settled(i), i, work, of_pair)
+         call differentiate_rows(self, fourier, room, i, work, of_pair)
       end if
    end subroutine differentiate_pair
 
@@ -151,7 +151,8 @@ contains
                                     work%jacobian(2*nc + 1, place, i))
       end if
       of_pair%sums%wanted = of_pair%y_n < 0.0_wp
-      call project_normal(work%jacobian(:, :, i), fourier, of_pair%sums, self%present(3, i))
+      call project_normal(work%jacobian(:, :, i), fourier, room%waves, of_pair%sums, &
+                          self%present(3, i))
    end subroutine differentiate_one_direction
 
    !> Where the march that is differentiated starts: at its limit, where that is the only one.
@@ -183,10 +184,10 @@ contains
    end subroutine find_start
 
    !> Of any pair, by the rows of the march.
-   subroutine differentiate_rows(self, fourier, settled, i, work, of_pair)
+   subroutine differentiate_rows(self, fourier, room, i, work, of_pair)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
-      logical, intent(in) :: settled
+      type(friction_room), intent(in) :: room
       integer, intent(in) :: i
       type(force_workspace), intent(inout) :: work
       type(derivative_room), intent(inout) :: of_pair
@@ -205,10 +206,12 @@ contains
             of_pair%y(c, :) = of_pair%y(c, :) + work%mean(i, c)
          end do
       end if
-      call derive(self, fourier, settled, work, i, of_pair, x, unique)
-      call of_pair%turn%project(fourier, self%present(:, i), of_pair%sums, work%jacobian(:, :, i))
+      call derive(self, fourier, room%settled(i), work, i, of_pair, x, unique)
+      call of_pair%turn%project(fourier, room%waves, self%present(:, i), of_pair%sums, &
+                                work%jacobian(:, :, i))
       of_pair%sums%wanted = of_pair%y(3, :) < 0.0_wp
-      call project_normal(work%jacobian(:, :, i), fourier, of_pair%sums, self%present(3, i))
+      call project_normal(work%jacobian(:, :, i), fourier, room%waves, of_pair%sums, &
+                          self%present(3, i))
       if (unique) call project_start(work%jacobian(:, :, i), fourier, of_pair%turn%dx, &
                                      of_pair%by_start, of_pair%weight)
       if (.not. work%measures_slip) return
@@ -257,14 +260,16 @@ contains
    end subroutine derive
 
    !> The blocks whose output is normal: lambda_n = min(y_n, 0), its own where the pair bears.
-   subroutine project_normal(jacobian, fourier, bears, has_normal)
+   subroutine project_normal(jacobian, fourier, waves, bears, has_normal)
       type(fourier_type), intent(in) :: fourier
+      type(wave_table), intent(in) :: waves
       real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
       type(instant_sum), intent(inout) :: bears
       logical, intent(in) :: has_normal
 
       associate (nc => fourier%n_coefficients)
-         if (has_normal) call bears%form(fourier, 3*nc, jacobian(2*nc + 1, 2*nc + 1))
+         if (has_normal) call bears%form(fourier, waves, 3*nc, &
+                                        jacobian(2*nc + 1, 2*nc + 1))
       end associate
    end subroutine project_normal
 

@@ -1,11 +1,13 @@
 !> Derivatives of forces that are those of their prediction at some instants and nothing at the
 !> others: the sum over these instants of synthesis analysis^T, as a block between coefficients.
-!> Over all instants it is the identity where the transform is exact, so that the fewer of both
-!> kinds can be summed.
+!> Where the analysis is the projection, a run of instants is a geometric series of waves
+!> (fw_wave_sums); else it is a product over the instants.
 module fw_instant_sum
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
+   use fw_wave_sums, only: wave_sums
+   use fw_wave_sums, only: wave_table
    implicit none (type, external)
    private
 
@@ -14,7 +16,9 @@ module fw_instant_sum
    type :: instant_sum
       !> The instants that count (n_time).
       logical, allocatable :: wanted(:)
-      !> Base functions and weights of those that are summed (n_coefficients, n_time).
+      !> Of a projection.
+      type(wave_sums), private :: sums
+      !> Else base functions and weights of those that are summed (n_coefficients, n_time).
       real(wp), allocatable, private :: base(:, :), weights(:, :)
    contains
       procedure :: reserve
@@ -29,36 +33,58 @@ contains
 
       if (allocated(self%wanted)) return
       allocate (self%wanted(fourier%n_time), source=.false.)
+      if (fourier%projects) return
       allocate (self%base(fourier%n_coefficients, fourier%n_time))
       allocate (self%weights(fourier%n_coefficients, fourier%n_time))
    end subroutine reserve
 
    !> The transposed block (input, output), of the instants that are wanted.
-   subroutine form(self, fourier, n_stored, block)
+   subroutine form(self, fourier, waves, n_stored, block)
       class(instant_sum), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
+      !> Of its harmonics, where the analysis is the projection.
+      type(wave_table), intent(in) :: waves
       !> Rows of the matrix that the block belongs to.
       integer, intent(in) :: n_stored
       real(wp), intent(inout) :: block(n_stored, *)
-      integer :: j, k, n, nc
-      logical :: by_others
+      integer :: k, n, nc
 
       nc = fourier%n_coefficients
-      by_others = 2*count(self%wanted) > fourier%n_time .and. fourier%projects .and. &
-                  fourier%n_time > 2*maxval(fourier%harmonic)
+      if (fourier%projects) then
+         call self%sums%reserve(waves)
+         call add_runs(self, waves)
+         block(:nc, :nc) = 0.0_wp
+         call self%sums%add_products(waves, n_stored, block)
+         return
+      end if
       n = 0
       do k = 1, fourier%n_time
-         if (self%wanted(k) .eqv. by_others) cycle
+         if (.not. self%wanted(k)) cycle
          n = n + 1
          self%base(:, n) = fourier%synthesis(:, k)
          self%weights(:, n) = fourier%analysis(:, k)
       end do
-      call dgemm('N', 'T', nc, nc, n, merge(-1.0_wp, 1.0_wp, by_others), self%base, nc, &
-                 self%weights, nc, 0.0_wp, block, n_stored)
-      if (.not. by_others) return
-      do j = 1, nc
-         block(j, j) = block(j, j) + 1.0_wp
-      end do
+      call dgemm('N', 'T', nc, nc, n, 1.0_wp, self%base, nc, self%weights, nc, 0.0_wp, block, &
+                 n_stored)
    end subroutine form
+
+   !> The sums of the waves over the wanted instants, run by run.
+   pure subroutine add_runs(self, waves)
+      type(instant_sum), intent(inout) :: self
+      type(wave_table), intent(in) :: waves
+      integer :: first, last
+
+      call self%sums%clear()
+      first = 1
+      do while (first <= size(self%wanted))
+         last = first
+         do while (last < size(self%wanted))
+            if (self%wanted(last + 1) .neqv. self%wanted(first)) exit
+            last = last + 1
+         end do
+         if (self%wanted(first)) call self%sums%add_run(waves, first, last, 1.0_wp)
+         first = last + 1
+      end do
+   end subroutine add_runs
 
 end module fw_instant_sum

@@ -22,6 +22,8 @@ module fw_two_directions
    use fw_instant_sum, only: instant_sum
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
+   use fw_wave_sums, only: wave_sums
+   use fw_wave_sums, only: wave_table
    implicit none (type, external)
    private
 
@@ -38,6 +40,8 @@ module fw_two_directions
       integer, allocatable, private :: state(:), vector(:)
       !> (mu p/|d|) n and -mu e of instants of slip (2, n_time).
       real(wp), allocatable, private :: turning(:, :), pull(:, :)
+      !> Scratch (n_time).
+      real(wp), allocatable, private :: weight(:)
       !> w of instants of slip, dx of runs of stick (inputs, n_vectors).
       integer, private :: n_vectors = 0
       real(wp), allocatable, private :: vectors(:, :)
@@ -45,6 +49,8 @@ module fw_two_directions
       !> of instants of slip (n_coefficients or twice as many, n_time); a block between
       !> coefficients.
       real(wp), allocatable, private :: weights(:, :), chosen(:, :), factors(:, :), square(:, :)
+      !> Of pull, where the analysis is the projection.
+      type(wave_sums), private :: pulled
    contains
       procedure :: reserve
       procedure :: march
@@ -63,7 +69,7 @@ contains
       if (allocated(self%dx)) return
       allocate (self%dx(3*n_coef, 2), source=0.0_wp)
       allocate (self%state(n_time), self%vector(n_time), source=0)
-      allocate (self%turning(2, n_time), self%pull(2, n_time), source=0.0_wp)
+      allocate (self%turning(2, n_time), self%pull(2, n_time), self%weight(n_time), source=0.0_wp)
       ! Runs of stick are fewer than the instants that part them, and take two vectors each.
       allocate (self%vectors(3*n_coef, 2*n_time + 2), self%weights(2*n_coef, 2*n_time + 2))
       allocate (self%chosen(n_coef, n_time), self%factors(2*n_coef, n_time))
@@ -206,13 +212,15 @@ contains
    end subroutine to_limit
 
    !> The transposed derivative between coefficients whose outputs are tangential.
-   subroutine project(self, fourier, present, sums, jacobian)
+   subroutine project(self, fourier, waves, present, sums, jacobian)
       class(turn_derivative), intent(inout) :: self
       type(fourier_type), intent(in) :: fourier
+      !> Of its harmonics, where the analysis is the projection.
+      type(wave_table), intent(in) :: waves
       type(instant_sum), intent(inout) :: sums
       logical, intent(in) :: present(3)
       real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
-      integer :: c, k, n, nc, v
+      integer :: c, k, nc, v
 
       nc = fourier%n_coefficients
       associate (a => fourier%analysis, weights => self%weights)
@@ -232,23 +240,12 @@ contains
          end do
          call dgemm('N', 'T', 3*nc, 2*nc, self%n_vectors, 1.0_wp, self%vectors, 3*nc, weights, &
                     2*nc, 0.0_wp, jacobian, 3*nc)
-         if (present(3)) then
-            n = 0
-            do k = 1, fourier%n_time
-               if (self%state(k) /= slips) cycle
-               n = n + 1
-               self%chosen(:, n) = fourier%synthesis(:, k)
-               self%factors(:nc, n) = self%pull(1, k)*a(:, k)
-               self%factors(nc + 1:, n) = self%pull(2, k)*a(:, k)
-            end do
-            if (n > 0) call dgemm('N', 'T', nc, 2*nc, n, 1.0_wp, self%chosen, nc, self%factors, &
-                                  2*nc, 1.0_wp, jacobian(2*nc + 1, 1), 3*nc)
-         end if
       end associate
+      if (present(3)) call project_pull(self, fourier, waves, jacobian)
       ! In stick the prediction itself.
       sums%wanted = self%state == sticks
       if (.not. any(sums%wanted)) return
-      call sums%form(fourier, nc, self%square)
+      call sums%form(fourier, waves, nc, self%square)
       do c = 1, 2
          if (.not. present(c)) cycle
          associate (first => (c - 1)*nc + 1, last => c*nc)
@@ -256,6 +253,40 @@ contains
          end associate
       end do
    end subroutine project
+
+   !> Of slip, the part of the normal prediction: mu e dp.
+   subroutine project_pull(self, fourier, waves, jacobian)
+      class(turn_derivative), intent(inout) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(wave_table), intent(in) :: waves
+      real(wp), intent(inout) :: jacobian(3*fourier%n_coefficients, 3*fourier%n_coefficients)
+      integer :: c, k, n, nc
+
+      nc = fourier%n_coefficients
+      if (.not. any(self%state == slips)) return
+      if (fourier%projects) then
+         call self%pulled%reserve(waves)
+         do c = 1, 2
+            ! A weight at each instant: its sums with the waves make the block.
+            self%weight = merge(self%pull(c, :), 0.0_wp, self%state == slips)
+            call self%pulled%of_values(waves, self%weight)
+            call self%pulled%add_products(waves, 3*nc, jacobian(2*nc + 1, (c - 1)*nc + 1))
+         end do
+         return
+      end if
+      n = 0
+      associate (a => fourier%analysis)
+         do k = 1, fourier%n_time
+            if (self%state(k) /= slips) cycle
+            n = n + 1
+            self%chosen(:, n) = fourier%synthesis(:, k)
+            self%factors(:nc, n) = self%pull(1, k)*a(:, k)
+            self%factors(nc + 1:, n) = self%pull(2, k)*a(:, k)
+         end do
+      end associate
+      call dgemm('N', 'T', nc, 2*nc, n, 1.0_wp, self%chosen, nc, self%factors, 2*nc, 1.0_wp, &
+                 jacobian(2*nc + 1, 1), 3*nc)
+   end subroutine project_pull
 
    !> d lambda_t / d inputs at the instants (inputs, tangential component, instant).
    pure subroutine rows_at_instants(self, n_coef, base, present, rows)
