@@ -13,6 +13,9 @@ module fw_recovery
    public :: observe, observed_coefficients, recover_point, recover_histories
    public :: largest_magnitude, carry_solution, peak_angles
 
+   !> Angles of the grid on which peaks are looked for, over those of the highest wave.
+   integer, parameter :: points_per_wave = 16
+
 contains
 
    !> Fill a point from the solution x, where the system was evaluated last; with_contact adds
@@ -25,10 +28,12 @@ contains
       integer, intent(in) :: n_harmonics
       logical, intent(in) :: with_contact
       type(point_type), intent(inout) :: point
+      real(wp), allocatable :: waves(:, :)
       integer :: i
 
       call observed_coefficients(system, x, n_harmonics, point%coefficients)
-      point%amplitude = [(largest_magnitude(point%coefficients(:, i)), &
+      waves = grid_waves(n_harmonics)
+      point%amplitude = [(largest_on(point%coefficients(:, i), waves), &
                           i=1, system%problem%structure%n_observed)]
       associate (pairs => system%problem%forces%pairs)
          i = system%problem%forces%entry(pairs)%law%instants_wanted(system%work(pairs))
@@ -219,7 +224,14 @@ contains
    pure real(wp) function largest_magnitude(coefficients) result(largest)
       !> Mean, then cosine and sine of each harmonic (2H+1).
       real(wp), intent(in) :: coefficients(:)
-      integer, parameter :: points_per_wave = 16, newton_steps = 4
+
+      largest = largest_on(coefficients, grid_waves((size(coefficients) - 1)/2))
+   end function largest_magnitude
+
+   !> The same with the first waves on the grid, which many quantities share.
+   pure real(wp) function largest_on(coefficients, waves) result(largest)
+      real(wp), intent(in) :: coefficients(:), waves(0:, :)
+      integer, parameter :: newton_steps = 4
       real(wp) :: value, slope, curvature, tau, spacing, step, on_grid
       integer :: k, i, n_grid, n_harmonics
       real(wp), allocatable :: grid(:)
@@ -228,7 +240,7 @@ contains
       n_grid = points_per_wave*max(1, n_harmonics)
       spacing = 2.0_wp*pi/real(n_grid, wp)
       allocate (grid(0:n_grid + 1))
-      call evaluate_grid(coefficients, n_grid, grid)
+      call evaluate_grid(coefficients, n_grid, waves, grid)
       on_grid = maxval(abs(grid))
       largest = on_grid
       do k = 1, n_grid
@@ -246,7 +258,7 @@ contains
          call evaluate(coefficients, tau, value, slope, curvature)
          largest = max(largest, abs(value))
       end do
-   end function largest_magnitude
+   end function largest_on
 
    !> Where |u(tau)| is largest, as largest_magnitude finds it, and where a second peak is as high;
    !> of more than two the first and the last.
@@ -257,7 +269,7 @@ contains
       integer, intent(out) :: n_peaks
       !> Angles of the peaks and signs of u there.
       real(wp), intent(out) :: angle(2), side(2)
-      integer, parameter :: points_per_wave = 16, newton_steps = 8
+      integer, parameter :: newton_steps = 8
       !> Peaks that differ by less are alike: beyond it one of the two decides.
       real(wp), parameter :: alike = 1.0e-9_wp
       real(wp) :: value, slope, curvature, tau, spacing
@@ -268,7 +280,7 @@ contains
       spacing = 2.0_wp*pi/real(n_grid, wp)
       largest = largest_magnitude(coefficients)
       allocate (grid(0:n_grid + 1))
-      call evaluate_grid(coefficients, n_grid, grid)
+      call evaluate_grid(coefficients, n_grid, grid_waves((size(coefficients) - 1)/2), grid)
       n_peaks = 0
       angle = 0.0_wp
       side = 0.0_wp
@@ -292,28 +304,43 @@ contains
       end do
    end subroutine peak_angles
 
+   !> Cosine and sine of the angles of a quarter of the grid (0:n_grid/4, 2).
+   pure function grid_waves(n_harmonics) result(waves)
+      integer, intent(in) :: n_harmonics
+      real(wp), allocatable :: waves(:, :)
+      real(wp) :: angle
+      integer :: k, quarter
+
+      quarter = points_per_wave*max(1, n_harmonics)/4
+      allocate (waves(0:quarter, 2))
+      do k = 0, quarter/2
+         angle = 0.5_wp*pi*real(k, wp)/real(quarter, wp)
+         ! Cosines of the one half are the sines of the other.
+         waves(k, 1) = cos(angle)
+         waves(k, 2) = sin(angle)
+         waves(quarter - k, 1) = waves(k, 2)
+         waves(quarter - k, 2) = waves(k, 1)
+      end do
+   end function grid_waves
+
    !> u at n_grid angles of a period, a multiple of 8, and one beyond each end. Cosines are even and
    !> sines odd, and waves of odd numbers turn their signs in the second quarter: a quarter of the
    !> angles serves for all. These at once, so that a processor turns several waves by one
    !> instruction.
-   pure subroutine evaluate_grid(coefficients, n_grid, grid)
+   pure subroutine evaluate_grid(coefficients, n_grid, waves, grid)
       real(wp), intent(in) :: coefficients(:)
       integer, intent(in) :: n_grid
+      !> Cosine and sine of the angles of the first quarter.
+      real(wp), intent(in) :: waves(0:n_grid/4, 2)
       real(wp), intent(out) :: grid(0:n_grid + 1)
       !> Waves, and the sums of cosines and of sines, of even and of odd numbers.
-      real(wp), dimension(0:n_grid/4) :: turn_c, turn_s, c, s
+      real(wp), dimension(0:n_grid/4) :: c, s
       real(wp), dimension(0:n_grid/4, 0:1) :: cosines, sines
       real(wp) :: before
       integer :: half, k, n, parity, quarter
 
       quarter = n_grid/4
       half = n_grid/2
-      do k = 0, quarter/2
-         turn_c(k) = cos(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
-         turn_s(k) = sin(2.0_wp*pi*real(k, wp)/real(n_grid, wp))
-         turn_c(quarter - k) = turn_s(k)
-         turn_s(quarter - k) = turn_c(k)
-      end do
       c = 1.0_wp
       s = 0.0_wp
       cosines(:, 0) = coefficients(1)
@@ -323,8 +350,8 @@ contains
          parity = modulo(n, 2)
          do k = 0, quarter
             before = c(k)
-            c(k) = before*turn_c(k) - s(k)*turn_s(k)
-            s(k) = before*turn_s(k) + s(k)*turn_c(k)
+            c(k) = before*waves(k, 1) - s(k)*waves(k, 2)
+            s(k) = before*waves(k, 2) + s(k)*waves(k, 1)
             cosines(k, parity) = cosines(k, parity) + coefficients(2*n)*c(k)
             sines(k, parity) = sines(k, parity) + coefficients(2*n + 1)*s(k)
          end do

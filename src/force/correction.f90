@@ -19,6 +19,9 @@ module fw_correction
 
    !> Pairs that are marched one by one: below, vectors of pairs are too short to pay.
    integer, parameter :: few_pairs = 3
+   !> Pairs of a full block, which a caller marches together: with their number known, what belongs
+   !> to them stays in registers.
+   integer, parameter :: full_block = 8
 
 contains
 
@@ -34,8 +37,7 @@ contains
       real(wp), intent(inout) :: margin(n_pairs), pressure(n_pairs)
       !> lambda holds the turn that ended at x (default: no): what repeats it need not be marched.
       logical, intent(in), optional :: again
-      integer :: i, k
-      real(wp) :: p, d, limit, force
+      integer :: i
       logical :: is_again
 
       if (last - first < few_pairs) then
@@ -47,24 +49,51 @@ contains
          end do
          return
       end if
+      do i = first, last, full_block
+         if (i + full_block - 1 <= last) then
+            call march_block(full_block, n_pairs, n_time, mu(i), y(i, 1, 1), x(i, 1), &
+                             lambda(i, 1, 1), margin(i), pressure(i))
+         else
+            call march_block(last - i + 1, n_pairs, n_time, mu(i), y(i, 1, 1), x(i, 1), &
+                             lambda(i, 1, 1), margin(i), pressure(i))
+         end if
+      end do
+   end subroutine march_turn_1d
+
+   !> The same turn of n pairs side by side, at most a full block.
+   pure subroutine march_block(n, n_pairs, n_time, mu, y, x, lambda, margin, pressure)
+      integer, intent(in) :: n, n_pairs, n_time
+      real(wp), intent(in) :: mu(n), y(n_pairs, 3, *)
+      real(wp), intent(inout) :: x(n), lambda(n_pairs, 3, *), margin(n), pressure(n)
+      real(wp), dimension(full_block) :: least, lowest, place, rough
+      real(wp) :: p, d, limit, force
+      integer :: i, k
+
+      rough(:n) = mu
+      place(:n) = x
+      least(:n) = margin
+      lowest(:n) = pressure
       do k = 1, n_time
          !$omp simd private(p, d, limit, force)
-         do i = first, last
+         do i = 1, n
             p = max(-y(i, 3, k), 0.0_wp)
-            limit = mu(i)*p
-            d = y(i, 1, k) - x(i, 1)
+            limit = rough(i)*p
+            d = y(i, 1, k) - place(i)
             ! Onto a disc of one dimension: a clamp, in which stick and open are no cases of their
             ! own.
             force = max(-limit, min(limit, d))
             ! x stays to the last bit where the pair sticks, so that stick wears nothing.
-            x(i, 1) = merge(x(i, 1), y(i, 1, k) - force, abs(d) <= limit)
+            place(i) = merge(place(i), y(i, 1, k) - force, abs(d) <= limit)
             lambda(i, 1, k) = force
             lambda(i, 3, k) = -p
-            margin(i) = min(margin(i), limit - abs(d))
-            pressure(i) = min(pressure(i), p)
+            least(i) = min(least(i), limit - abs(d))
+            lowest(i) = min(lowest(i), p)
          end do
       end do
-   end subroutine march_turn_1d
+      x = place(:n)
+      margin = least(:n)
+      pressure = lowest(:n)
+   end subroutine march_block
 
    !> The same turn of one pair. Stick and slip last for many instants, so that a processor foresees
    !> which of them comes: in slip it need not wait for the position before, as the clamp has to.

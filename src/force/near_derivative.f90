@@ -16,6 +16,8 @@ module fw_near_derivative
 
    !> Columns are filled up to a multiple of this, the widest vectors.
    integer, parameter :: lanes = 16
+   !> Inputs of an element for which room of a fixed size serves, which needs no allocation.
+   integer, parameter :: usual = 256
 
    type :: near_derivative
       private
@@ -113,7 +115,24 @@ contains
       integer, intent(in) :: row(:)
       integer, intent(in) :: element
       type(force_workspace), intent(inout) :: work
-      real(sp) :: input(padded(self%n_most)), output(self%n_most)
+      real(sp) :: usual_input(usual), usual_output(usual)
+      real(sp), allocatable :: input(:), output(:)
+
+      if (self%n_most <= usual) then
+         call multiply_in(self, row, element, usual_input, usual_output, work)
+      else
+         allocate (input(padded(self%n_most)), output(self%n_most))
+         call multiply_in(self, row, element, input, output, work)
+      end if
+   end subroutine multiply
+
+   pure subroutine multiply_in(self, row, element, input, output, work)
+      class(near_derivative), intent(in) :: self
+      integer, intent(in) :: row(:)
+      integer, intent(in) :: element
+      !> Room.
+      real(sp), intent(inout), contiguous :: input(:), output(:)
+      type(force_workspace), intent(inout) :: work
       real(wp) :: largest
       integer :: c, nc, n_in, n_out, place
 
@@ -130,7 +149,7 @@ contains
          place = 0
          do c = 1, size(row)
             if (row(c) == 0) cycle
-            input(place + 1:place + nc) = real(from((c - 1)*nc + 1:c*nc)/largest, sp)
+            input(place + 1:place + nc) = real(from((c - 1)*nc + 1:c*nc)*(1.0_wp/largest), sp)
             place = place + nc
          end do
          input(n_in + 1:padded(n_in)) = 0.0_sp
@@ -147,7 +166,7 @@ contains
             end if
          end do
       end associate
-   end subroutine multiply
+   end subroutine multiply_in
 
    !> output = block^T input. BLAS is written for larger blocks.
    pure subroutine multiply_transposed(n_rows, n_columns, block, input, output)

@@ -13,7 +13,6 @@
 module fw_one_direction
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_lapack, only: dger
    use fw_wave_sums, only: wave_sums
    use fw_wave_sums, only: wave_table
    implicit none (type, external)
@@ -236,8 +235,22 @@ contains
       logical, intent(in) :: has_normal
       real(wp), intent(inout) :: by_tangential(n, *), by_normal(n, *)
 
-      call dger(nc, nc, -1.0_wp, base(1, c%since), 1, weight, 1, by_tangential, n)
-      if (has_normal) call dger(nc, nc, -c%pull, base(1, c%since), 1, weight, 1, by_normal, n)
+      call add_outer(nc, -1.0_wp, base(1, c%since), weight, n, by_tangential)
+      if (has_normal) call add_outer(nc, -c%pull, base(1, c%since), weight, n, by_normal)
    end subroutine add_start
+
+   !> block = block + factor a b^T. For few coefficients a call of BLAS takes longer.
+   pure subroutine add_outer(nc, factor, a, b, n, block)
+      integer, intent(in) :: nc, n
+      real(wp), intent(in) :: factor, a(nc), b(nc)
+      real(wp), intent(inout) :: block(n, nc)
+      integer :: i, j
+
+      do j = 1, nc
+         do i = 1, nc
+            block(i, j) = block(i, j) + (factor*b(j))*a(i)
+         end do
+      end do
+   end subroutine add_outer
 
 end module fw_one_direction
