@@ -23,7 +23,7 @@ module fw_damping
    !> matrix stays well below, a physical mass or stiffness ratio well above.
    real(wp), parameter :: rank_tolerance = 1.0e-12_wp
    !> Reciprocal condition of the scaled M above which it has no massless direction; its factor keeps
-   !> more digits than its eigenvectors do (1e-13 against 1e-8 at a condition of 1e9, test_setup).
+   !> more digits than its eigenvectors do.
    real(wp), parameter :: least_condition = 1.0e-11_wp
 
 contains
