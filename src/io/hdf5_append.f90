@@ -11,6 +11,7 @@ module fw_hdf5_append
    use, intrinsic :: iso_c_binding, only: c_f_pointer
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_c_binding, only: c_ptr
+   use, intrinsic :: iso_c_binding, only: c_size_t
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
    use, intrinsic :: ieee_arithmetic, only: ieee_value
    use fw_error, only: error_type
@@ -98,6 +99,18 @@ module fw_hdf5_append
       procedure :: drain
       procedure, private :: append_raw
    end type growing_dataset
+
+   interface
+      !> Of C: bytes of one array to another.
+      function copy_memory(to, from, n) bind(c, name='memcpy') result(address)
+         import :: c_int8_t, c_ptr, c_size_t
+         implicit none (type, external)
+         integer(c_int8_t), intent(out) :: to(*)
+         integer(c_int8_t), intent(in) :: from(*)
+         integer(c_size_t), intent(in), value :: n
+         type(c_ptr) :: address
+      end function copy_memory
+   end interface
 
 contains
 
@@ -395,8 +408,9 @@ contains
       class(growing_dataset), intent(inout) :: self
       type(hdf5_file), intent(in) :: file
       integer, intent(in) :: dims(:)
-      integer(c_int8_t), intent(in) :: bytes(:)
+      integer(c_int8_t), intent(in), contiguous :: bytes(:)
       type(error_type), allocatable, intent(out) :: error
+      type(c_ptr) :: ignored
       integer :: n
 
       n = size(self%row)
@@ -415,7 +429,8 @@ contains
       if (product(self%row) > 0) then
          n = size(bytes)
          if (.not. allocated(self%waiting)) allocate (self%waiting(n*self%most_waiting))
-         self%waiting(self%n_waiting*n + 1:(self%n_waiting + 1)*n) = bytes
+         ! A loop over bytes takes ten times as long.
+         ignored = copy_memory(self%waiting(self%n_waiting*n + 1), bytes, int(n, c_size_t))
          self%n_waiting = self%n_waiting + 1
       end if
       if (.not. self%waits) call self%drain(file, error)

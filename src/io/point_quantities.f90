@@ -323,13 +323,16 @@ contains
 
    !> The numbers of a point as a row of the result; not allocated where they are not known.
    !> Harmonics that the point does not carry are zero: coefficients run slowest.
-   subroutine row(self, point, case, values)
+   subroutine row(self, point, case, values, usual)
       class(quantity_type), intent(in) :: self
       type(point_type), intent(in) :: point
       type(case_type), intent(in) :: case
       real(wp), allocatable, intent(out) :: values(:)
+      !> Numbers of a whole row, where that is known.
+      integer, intent(in), optional :: usual
       real(wp), allocatable :: carried(:)
       integer :: n
+      logical :: is_whole
 
       if (any(self%sensitivity /= 0)) then
          call find_sensitivity(point, self%sensitivity, carried)
@@ -338,6 +341,12 @@ contains
       end if
       if (.not. allocated(carried)) return
       n = size(carried)
+      is_whole = .false.
+      if (present(usual)) is_whole = n == usual
+      if (is_whole) then
+         call move_alloc(carried, values)
+         return
+      end if
       ! Points with fewer harmonics have shorter rows: those of a result are all alike.
       if (index(self%dimensions, 'coefficient') > 0) n = max(n, product(self%row_shape(case)))
       allocate (values(n), source=0.0_wp)

@@ -158,7 +158,7 @@ contains
 
       do i = 1, size(self%columns)
          associate (column => self%columns(i))
-            call column%quantity%row(point, self%case, values)
+            call column%quantity%row(point, self%case, values, usual=product(column%row_shape))
             if (allocated(values) .and. .not. column%dataset%is_created()) then
                call create_late(column, file, self%case, self%expected, size(values), self%n_rows, &
                                 error)
