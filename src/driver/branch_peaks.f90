@@ -125,26 +125,34 @@ contains
       integer :: i
 
       do i = 1, size(self%crest)
-         if (point%amplitude(i) > self%crest(i)%amplitude) then
-            self%crest(i) = peak_of(point, i)
-         else if (point%amplitude(i) < (1.0_wp - prominent)*self%crest(i)%amplitude) then
+         if (point%amplitude(i) > self%crest(i)%amplitude) self%crest(i) = peak_of(point, i)
+         if (self%crowned(i) > 0) call crown(self, i)
+         ! Last: a row may fall right behind the maximum that was solved for before it.
+         if (point%amplitude(i) < (1.0_wp - prominent)*self%crest(i)%amplitude) then
             self%crest(i) = peak_of(point, i)
             self%crowned(i) = 0
          end if
-         if (self%crowned(i) == 0) cycle
-         associate (peak => self%found(self%crowned(i)), crest => self%crest(i), &
-                    first => self%first_found(i))
-            if (crest%amplitude > (1.0_wp + prominent)*first%amplitude) then
-               ! It was a step on the way up.
-               peak = first
-               self%crowned(i) = 0
-            else if (crest%amplitude > peak%amplitude) then
-               peak = crest
-               peak%found_by = found_row
-            end if
-         end associate
       end do
    end subroutine follow_crest
+
+   !> The crest in place of the maximum found beside it where it is a little higher.
+   subroutine crown(self, i)
+      class(branch_peaks), intent(inout) :: self
+      !> Quantity.
+      integer, intent(in) :: i
+
+      associate (peak => self%found(self%crowned(i)), crest => self%crest(i), &
+                 first => self%first_found(i))
+         if (crest%amplitude > (1.0_wp + prominent)*first%amplitude) then
+            ! It was a step on the way up.
+            peak = first
+            self%crowned(i) = 0
+         else if (crest%amplitude > peak%amplitude) then
+            peak = crest
+            peak%found_by = found_row
+         end if
+      end associate
+   end subroutine crown
 
    !> Change of the amplitudes along the branch (n_observed).
    pure function rise_of(point) result(rise)

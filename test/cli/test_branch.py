@@ -195,6 +195,8 @@ LOCKED = [(3, 1.0, 37, 0.3811), (3, 1.0, 41, 0.3811), (3, 0.5, 41, 0.3592), (1, 
 # turns with the round-off of the processor. Of five, three or more have done so on each that was
 # tried; the others end in words.
 FEWEST_LOCKED = 2
+# Into the sharp turns; downwards, as the example goes, all of them end well.
+UPWARDS = ("--set", "sweep%start=990", "--set", "sweep%end=1012")
 # Corners between 128 instants roughen the branch by 1.3e-4 of its height; rows stand apart.
 ROUGH = 1e-3
 
@@ -205,7 +207,7 @@ def test_the_lock_carries_the_branch_on(fw_run) -> None:
     for harmonics, load, n_points, peak in LOCKED:
         done = fw_run("-o", "locked.h5", "--set", f"sweep%n_points={n_points}", "--set",
                       f"harmonics%n_harmonics={harmonics}", "--set",
-                      f"load%harmonic_scale={load}", case)
+                      f"load%harmonic_scale={load}", *UPWARDS, case)
         if done.returncode == 4:
             assert "branch: " in done.stderr + done.stdout
             continue
@@ -264,13 +266,13 @@ def test_no_branch_comes_back_along_itself_without_a_word(fw_run, monkeypatch, k
     for harmonics, load, n_points, _ in LOCKED:
         done = fw_run("-o", "locked.h5", "--set", f"sweep%n_points={n_points}", "--set",
                       f"harmonics%n_harmonics={harmonics}", "--set",
-                      f"load%harmonic_scale={load}", case)
+                      f"load%harmonic_scale={load}", *UPWARDS, case)
         words = done.stderr + done.stdout
         assert "closed on itself" not in words
         ends.append(done.returncode == 0)
         if done.returncode:
             assert "turned back on itself" in words or "no continuation was found at" in words
-    assert sum(ends) >= len(LOCKED) - 1
+    assert sum(ends) >= FEWEST_LOCKED
 
 
 def test_a_branch_whose_time_is_over_says_so(fw_run) -> None:

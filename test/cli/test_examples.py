@@ -49,9 +49,9 @@ NUMBERS = {
                             ("omega", None, Ellipsis, 0.996488, 1e-6)],
     "blade_sector/frf.nml": [("amplitude", None, 0, 0.8830621, 1e-6)],
     "blade_sector/frf_stuck.nml": [("amplitude", None, 0, 1.6722078, 1e-6)],
-    # Where pairs begin to slip jumps between 128 instants, which roughens the branch; which of its
-    # corners is the highest turns with round-off: 0.38081 to 0.38114 with five kernels of OpenBLAS.
-    "blade_sector/frf_2000rpm.nml": [("peak/amplitude", None, Ellipsis, 0.38097, 2e-3)],
+    # Where pairs begin to slip jumps between 128 instants, which roughens the branch: which of its
+    # corners is the highest may turn with round-off.
+    "blade_sector/frf_2000rpm.nml": [("peak/amplitude", None, Ellipsis, 0.381145, 1e-3)],
     "blade_sector/frf_48.nml": [("amplitude", None, 0, 0.9286232, 1e-6)],
     # The number of tolerance = 1e-12; damping is a thousandth of the forces that balance to 1e-8.
     "blade_sector/mode.nml": [("mode/damping_ratio", None, Ellipsis, 9.48072086e-4, 1e-5)],

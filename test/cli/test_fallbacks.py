@@ -70,7 +70,8 @@ def test_sweep_of_the_locked_blade(fw_run, harmonics: int, load: float) -> None:
     along its slot. Every point converges."""
     done = fw_run("-q", "-o", "locked.h5", "--set", "sweep%continuation='natural'",
                   "--set", f"harmonics%n_harmonics={harmonics}",
-                  "--set", f"load%harmonic_scale={load}", EXAMPLE / "frf_2000rpm.nml")
+                  "--set", f"load%harmonic_scale={load}", "--set", "sweep%start=990",
+                  "--set", "sweep%end=1012", EXAMPLE / "frf_2000rpm.nml")
     assert done.returncode == 0, done.stderr
     with h5py.File(fw_run.directory / "locked.h5") as file:
         assert file["converged"][:].all() and len(file["omega"]) == 41
