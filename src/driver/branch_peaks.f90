@@ -55,6 +55,9 @@ module fw_branch_peaks
       ! none): where pairs begin to slip corners stand a little above what is solved for.
       type(peak_type), allocatable, private :: crest(:)
       integer, allocatable, private :: crowned(:)
+      ! Number of that row, and whether the amplitude rose to it.
+      integer, allocatable, private :: crest_row(:)
+      logical, allocatable, private :: risen(:)
       ! That maximum as it was found.
       type(peak_type), allocatable, private :: first_found(:)
    contains
@@ -100,6 +103,8 @@ contains
          self%crest = [(peak_of(point, i), i=1, size(point%amplitude))]
          self%first_found = self%crest
          allocate (self%crowned(size(point%amplitude)), source=0)
+         allocate (self%crest_row(size(point%amplitude)), source=1)
+         allocate (self%risen(size(point%amplitude)), source=.false.)
          return
       end if
       do i = 1, size(point%amplitude)
@@ -125,15 +130,35 @@ contains
       integer :: i
 
       do i = 1, size(self%crest)
-         if (point%amplitude(i) > self%crest(i)%amplitude) self%crest(i) = peak_of(point, i)
+         if (point%amplitude(i) > self%crest(i)%amplitude) then
+            self%crest(i) = peak_of(point, i)
+            self%crest_row(i) = self%n_rows
+            self%risen(i) = .true.
+         end if
          if (self%crowned(i) > 0) call crown(self, i)
          ! Last: a row may fall right behind the maximum that was solved for before it.
-         if (point%amplitude(i) < (1.0_wp - prominent)*self%crest(i)%amplitude) then
-            self%crest(i) = peak_of(point, i)
-            self%crowned(i) = 0
-         end if
+         if (point%amplitude(i) >= (1.0_wp - prominent)*self%crest(i)%amplitude) cycle
+         if (self%risen(i) .and. self%crowned(i) == 0 .and. &
+             point%amplitude(i) > negligible*maxval(point%amplitude)) call note_corner(self, i)
+         self%crest(i) = peak_of(point, i)
+         self%crest_row(i) = self%n_rows
+         self%risen(i) = .false.
+         self%crowned(i) = 0
       end do
    end subroutine follow_crest
+
+   !> A crest behind which the amplitude falls though it rises at both rows: a corner between them.
+   subroutine note_corner(self, i)
+      class(branch_peaks), intent(inout) :: self
+      !> Quantity.
+      integer, intent(in) :: i
+      type(peak_type) :: peak
+
+      peak = self%crest(i)
+      peak%found_by = found_unresolved
+      self%found = [self%found, peak]
+      self%place = [self%place, self%crest_row(i)]
+   end subroutine note_corner
 
    !> The crest in place of the maximum found beside it where it is a little higher.
    subroutine crown(self, i)
@@ -253,11 +278,12 @@ contains
       type(point_type), intent(in) :: first
       type(peak_type), allocatable, intent(out) :: peaks(:)
       type(peak_type) :: peak
-      integer :: i, k
+      integer :: i, k, before
 
       allocate (peaks(0))
       if (self%n_rows < 2) return
       do i = 1, size(self%row(1)%amplitude)
+         before = 0
          if (self%row(1)%rise(i) < 0.0_wp .and. first%amplitude(i) > 0.0_wp) then
             peak = peak_of(first, i)
             peak%found_by = found_bound
@@ -268,7 +294,14 @@ contains
             if (.not. stands_out(self, k)) cycle
             peak = self%found(k)
             peak%bandwidth = width_of(self, k)
-            peaks = [peaks, peak]
+            ! Of two corners of one top the higher stays.
+            if (is_one_top(self, before, k)) then
+               if (peak%amplitude <= self%found(before)%amplitude) cycle
+               peaks(size(peaks)) = peak
+            else
+               peaks = [peaks, peak]
+            end if
+            before = k
          end do
          if (self%row(self%n_rows)%rise(i) > 0.0_wp) then
             peak = peak_of(self%last, i)
@@ -299,6 +332,22 @@ contains
          end do
       end do
    end function stands_out
+
+   !> Whether the amplitude stays near two maxima from one to the other; not where there is no first.
+   pure logical function is_one_top(self, first, second)
+      class(branch_peaks), intent(in) :: self
+      integer, intent(in) :: first, second
+      real(wp) :: floor
+      integer :: i, j
+
+      is_one_top = first > 0
+      if (.not. is_one_top) return
+      i = self%found(first)%observed
+      floor = (1.0_wp - prominent)*min(self%found(first)%amplitude, self%found(second)%amplitude)
+      do j = self%place(first) + 1, self%place(second)
+         is_one_top = is_one_top .and. self%row(j)%amplitude(i) >= floor
+      end do
+   end function is_one_top
 
    !> Width at half of the power of the vibration [rad/s], below 0 where the branch does not fall so
    !> far; between rows as in fw_peak_rules.
