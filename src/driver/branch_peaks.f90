@@ -333,7 +333,7 @@ contains
       end do
    end function stands_out
 
-   !> Whether the amplitude stays near two maxima from one to the other; not where there is no first.
+   !> Whether the amplitude stays near two maxima from one to the other; never of one alone.
    pure logical function is_one_top(self, first, second)
       class(branch_peaks), intent(in) :: self
       integer, intent(in) :: first, second

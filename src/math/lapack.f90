@@ -9,7 +9,7 @@ module fw_lapack
    implicit none (type, external)
    private
 
-   public :: dgemm, dgemv, dger, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
+   public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
    public :: zggev, sgetrf, strsm, dlaswp, dtrsm, dtrmm, dsyrk, dpocon, dsygst
    public :: dsyevr
@@ -23,14 +23,6 @@ module fw_lapack
          real(wp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
          real(wp), intent(inout) :: c(ldc, *)
       end subroutine dgemm
-
-      !> A = alpha x y^T + A.
-      pure subroutine dger(m, n, alpha, x, incx, y, incy, a, lda)
-         import :: wp
-         integer, intent(in) :: m, n, incx, incy, lda
-         real(wp), intent(in) :: alpha, x(*), y(*)
-         real(wp), intent(inout) :: a(lda, *)
-      end subroutine dger
 
       !> y = alpha op(a) x + beta y; with beta = 0 the old y is never read, and may be undefined.
       subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
@@ -233,8 +225,8 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dpotrf
 
-      !> Eigenpairs of a symmetric matrix with values in (vl, vu] (range 'V'), in ascending order, by
-      !> relatively robust representations; a is spoilt.
+      !> Eigenpairs of a symmetric matrix with values in (vl, vu] (range 'V'), in ascending order,
+      !> by relatively robust representations; a is spoilt.
       subroutine dsyevr(jobz, range, uplo, n, a, lda, vl, vu, il, iu, abstol, m, w, z, ldz, &
                         isuppz, work, lwork, iwork, liwork, info)
          import :: wp

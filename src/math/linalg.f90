@@ -247,11 +247,11 @@ contains
       highest = maxval(sum(abs(standard), dim=1))
       allocate (found(n), shapes(n, n), support(2*max(1, n)))
       if (least < highest) then
-         call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, shapes, &
-                     n, support, room, -1, iroom, -1, info)
+         call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, &
+                     shapes, n, support, room, -1, iroom, -1, info)
          allocate (work(int(room(1))), iwork(iroom(1)))
-         call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, shapes, &
-                     n, support, work, size(work), iwork, size(iwork), info)
+         call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, &
+                     shapes, n, support, work, size(work), iwork, size(iwork), info)
          done = info == 0
          if (.not. done) return
       end if

@@ -22,8 +22,8 @@ module fw_damping
    !> Eigenvalues below this share of the largest count as zero: round-off of an order 1000
    !> matrix stays well below, a physical mass or stiffness ratio well above.
    real(wp), parameter :: rank_tolerance = 1.0e-12_wp
-   !> Reciprocal condition of the scaled M above which it has no massless direction; its factor keeps
-   !> more digits than its eigenvectors do.
+   !> Reciprocal condition of the scaled M above which it has no massless direction; its factor
+   !> keeps more digits than its eigenvectors do.
    real(wp), parameter :: least_condition = 1.0e-11_wp
 
 contains
