@@ -139,7 +139,7 @@ contains
          ! Last: a row may fall right behind the maximum that was solved for before it.
          if (point%amplitude(i) >= (1.0_wp - prominent)*self%crest(i)%amplitude) cycle
          if (self%risen(i) .and. self%crowned(i) == 0 .and. &
-             point%amplitude(i) > negligible*maxval(point%amplitude)) call note_corner(self, i)
+             self%crest(i)%amplitude > negligible*maxval(point%amplitude)) call note_corner(self, i)
          self%crest(i) = peak_of(point, i)
          self%crest_row(i) = self%n_rows
          self%risen(i) = .false.

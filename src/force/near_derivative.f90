@@ -142,7 +142,8 @@ contains
       associate (from => work%input(:, element), to => work%output(:, element))
          ! To the order of one, because single precision ends at 1e38.
          largest = maxval(abs(from))
-         if (.not. largest > 0.0_wp) then
+         ! Its reciprocal is to be finite.
+         if (.not. largest > tiny(1.0_wp)) then
             to = 0.0_wp
             return
          end if

@@ -225,8 +225,8 @@ module fw_lapack
          integer, intent(out) :: info
       end subroutine dpotrf
 
-      !> Eigenpairs of a symmetric matrix with values in (vl, vu] (range 'V'), in ascending order,
-      !> by relatively robust representations; a is spoilt.
+      !> Eigenpairs of a symmetric matrix with values in (vl, vu] (range 'V'), in ascending order; a
+      !> is spoilt.
       subroutine dsyevr(jobz, range, uplo, n, a, lda, vl, vu, il, iu, abstol, m, w, z, ldz, &
                         isuppz, work, lwork, iwork, liwork, info)
          import :: wp

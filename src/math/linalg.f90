@@ -4,6 +4,7 @@ module fw_linalg
    use fw_error, only: error_type
    use fw_error, only: fatal_error
    use fw_error, only: status_failure
+   use fw_floating_point, only: floating_point_scope
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgetrf
@@ -229,6 +230,7 @@ contains
       logical, intent(out) :: done
       real(wp), allocatable :: factor(:, :), standard(:, :), found(:), shapes(:, :), work(:)
       integer, allocatable :: iwork(:), support(:)
+      type(floating_point_scope) :: scope
       real(wp) :: highest, room(1)
       integer :: n, m, j, info, iroom(1)
 
@@ -243,15 +245,18 @@ contains
       do j = 2, n
          standard(:j - 1, j) = standard(j, :j - 1)
       end do
-      ! No eigenvalue is above any norm.
-      highest = maxval(sum(abs(standard), dim=1))
+      ! No eigenvalue is above any norm, but for round-off.
+      highest = (1.0_wp + n*epsilon(1.0_wp))*maxval(sum(abs(standard), dim=1))
       allocate (found(n), shapes(n, n), support(2*max(1, n)))
       if (least < highest) then
+         ! LAPACK tries there, by a division by zero, what the processor does with infinities.
+         call scope%enter()
          call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, &
                      shapes, n, support, room, -1, iroom, -1, info)
          allocate (work(int(room(1))), iwork(iroom(1)))
          call dsyevr('V', 'V', 'L', n, standard, n, least, highest, 0, 0, 0.0_wp, m, found, &
                      shapes, n, support, work, size(work), iwork, size(iwork), info)
+         call scope%leave()
          done = info == 0
          if (.not. done) return
       end if

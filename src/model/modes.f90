@@ -54,12 +54,11 @@ contains
       allocate (in_range(0))
       do trial = 1, size(shift_trials)
          shift = shift_trials(trial)*norm2(stiffness)/max(norm2(mass), tiny(1.0_wp))
-         if (size(mass, 1) < above_from) then
-            call solve_symmetric_eigen(mass, stiffness + shift*mass, theta, shapes, done)
-         else
-            call solve_symmetric_above(mass, stiffness + shift*mass, &
-                                       beyond/(range(2)**2 + shift), theta, shapes, done)
-         end if
+         done = size(mass, 1) >= above_from .and. range(2) > 0.0_wp
+         if (done) call solve_symmetric_above(mass, stiffness + shift*mass, &
+                                              beyond/(range(2)**2 + shift), theta, shapes, done)
+         if (.not. done) call solve_symmetric_eigen(mass, stiffness + shift*mass, theta, shapes, &
+                                                    done)
          if (done) exit
       end do
       if (.not. done) return
