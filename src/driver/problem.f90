@@ -58,10 +58,11 @@ module fw_problem
    use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
    use fw_wear_options, only: follow_range
+   use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private
 
-   public :: build_system
+   public :: build_system, threads_for
 
    !> Instants at least where the events decide and instants only isolate them.
    integer, parameter :: fewest_for_events = 8
@@ -69,6 +70,16 @@ module fw_problem
    integer, parameter :: few_pairs = 16
 
 contains
+
+   !> Threads of a run: one where forces at instants of so few pairs are not worth sharing, whatever
+   !> is allowed. A pair by events takes far longer.
+   pure integer function threads_for(case) result(n)
+      type(case_type), intent(in) :: case
+
+      n = case%threads
+      if (case%harmonics%n_time > 0 .and. &
+          case%contact%n_pairs*case%model%cyclic%n_solved() < pairs_for_threads) n = 1
+   end function threads_for
 
    !> Build the problem of a case, and a state of it at the first frequency of its sweep.
    subroutine build_system(case, problem, system, error, keep_all, of_level, forces, held)

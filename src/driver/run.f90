@@ -16,6 +16,7 @@ module fw_run
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
    use fw_problem, only: build_system
+   use fw_problem, only: threads_for
    use fw_remarks, only: remark_input
    use fw_restart_file, only: read_restart
    use fw_restart_file, only: restart_type
@@ -51,7 +52,7 @@ contains
       if (allocated(error)) return
       if (allocated(case%restart)) call read_restart(case%restart, case, restart, error)
       if (allocated(error)) return
-      call threads%enter(case%threads)
+      call threads%enter(threads_for(case))
       if (case%analysis == analysis_mode) then
          call check_mode_case(case, error)
       else if (case%analysis /= analysis_modes) then
@@ -99,7 +100,7 @@ contains
       if (allocated(error)) return
       ! Behind the file, before the first product: results must not depend on the threads of the
       ! host.
-      call threads%enter(case%threads)
+      call threads%enter(threads_for(case))
       summary = new_summary(case)
       if (case%analysis /= analysis_modes) call remark_input(case, summary%remarks)
       if (case%analysis == analysis_modes) then

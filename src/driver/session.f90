@@ -34,6 +34,7 @@ module fw_session
    use fw_text, only: string_type
    use fw_text, only: to_text
    use fw_text_list, only: append
+   use fw_problem, only: threads_for
    use fw_threads, only: thread_scope
    implicit none (type, external)
    private
@@ -291,7 +292,7 @@ contains
       call forget_system(self)
       call self%points%clear()
       allocate (self%strategy)
-      call threads%enter(self%case%threads)
+      call threads%enter(threads_for(self%case))
       call self%strategy%start(self%case, error)
       call threads%leave()
       if (allocated(error)) call forget_system(self)
@@ -347,7 +348,7 @@ contains
       observer%stop_requested = .false.
       recorder%list => self%points
       recorder%observer => observer
-      call threads%enter(self%case%threads)
+      call threads%enter(threads_for(self%case))
       call self%strategy%solve_in_time(self%case, new_request(self%case, omega, observer), point, &
                                        error)
       call threads%leave()
