@@ -57,8 +57,8 @@ module fw_problem
    use fw_structure_operator, only: structure_operator
    use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
+   use fw_threads, only: coordinates_for_threads
    use fw_wear_options, only: follow_range
-   use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private
 
@@ -71,14 +71,14 @@ module fw_problem
 
 contains
 
-   !> Threads of a run: one where forces at instants of so few pairs are not worth sharing, whatever
-   !> is allowed. A pair by events takes far longer.
+   !> Threads of a run: one where so few relative coordinates are not worth sharing, whatever is
+   !> allowed.
    pure integer function threads_for(case) result(n)
       type(case_type), intent(in) :: case
 
       n = case%threads
-      if (case%harmonics%n_time > 0 .and. &
-          case%contact%n_pairs*case%model%cyclic%n_solved() < pairs_for_threads) n = 1
+      if ((3*case%contact%n_pairs + case%springs%n_springs)*case%model%cyclic%n_solved() < &
+          coordinates_for_threads) n = 1
    end function threads_for
 
    !> Build the problem of a case, and a state of it at the first frequency of its sweep.

@@ -24,6 +24,7 @@ module fw_session
    use fw_one_level, only: one_level
    use fw_read_case, only: case_input
    use fw_read_case, only: read_input
+   use fw_problem, only: threads_for
    use fw_run, only: check_case
    use fw_run, only: run_case
    use fw_session_points, only: point_list
@@ -34,7 +35,6 @@ module fw_session
    use fw_text, only: string_type
    use fw_text, only: to_text
    use fw_text_list, only: append
-   use fw_problem, only: threads_for
    use fw_threads, only: thread_scope
    implicit none (type, external)
    private
