@@ -59,6 +59,7 @@ module fw_harmonics_options
       integer :: doublings = 0
    contains
       procedure :: bind_keys
+      procedure :: with_harmonics
    end type harmonics_options
 
 contains
@@ -98,5 +99,20 @@ contains
                          below(1.0_wp), only="method = 'hbm', natural sweeps and points"), &
                      self%accuracy)
    end subroutine bind_keys
+
+   !> The same options with another highest harmonic, and with instants that are enough for it:
+   !> those that are given may be too few for more harmonics, and hdhb has no choice of them.
+   pure function with_harmonics(self, n_harmonics) result(options)
+      class(harmonics_options), intent(in) :: self
+      integer, intent(in) :: n_harmonics
+      type(harmonics_options) :: options
+
+      options = self
+      options%n_harmonics = n_harmonics
+      if (options%method == method_hdhb) options%n_time = 0
+      do while (options%n_time > 0 .and. options%n_time <= 2*n_harmonics)
+         options%n_time = 2*options%n_time
+      end do
+   end function with_harmonics
 
 end module fw_harmonics_options

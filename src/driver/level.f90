@@ -102,8 +102,7 @@ contains
       type(held_basis), intent(inout), optional :: held
 
       if (self%is_built) return
-      self%harmonics = case%harmonics
-      self%harmonics%n_harmonics = n_harmonics
+      self%harmonics = case%harmonics%with_harmonics(n_harmonics)
       if (present(doublings)) self%harmonics%doublings = doublings
       call build_system(case, self%problem, self%system, error, of_level=self%harmonics, held=held)
       if (allocated(error)) return

@@ -350,3 +350,21 @@ def test_worn_file_is_never_overwritten(worn):
     message = run(folder, point, "-o", "worn.h5", status=3).stderr
     assert "which this run reads" in message
     assert read(folder / "worn.h5")["wear/depth"].tobytes() == old["wear/depth"].tobytes()
+
+
+@pytest.mark.parametrize("method", ["hbm", "hdhb"])
+def test_few_instants_that_are_given_serve_more_harmonics_too(tmp_path, method):
+    """A run looks at its states with twice the harmonics as well: the instants that are given were
+    too few for these, and transforms wrote behind their room."""
+    case = {"case": {"analysis": "wear"},
+            "model": {"n_dof": 1, "mass": 1.0, "stiffness": 1.0, "damping": 0.04},
+            "contact": {"n_pairs": 1, "law": "penalty", "tangential_stiffness": 1.0,
+                        "side_1": [1, 0, 0], "mu": 1.0, "normal_load": 0.5, "area": 1.0},
+            "load": {"cosine": 1.0},
+            "harmonics": {"method": method, "n_harmonics": 20, "n_time": 41},
+            "sweep": {"start": 1.0}, "wear": {"coefficient": 1e-6, "n_cycles": 100}}
+    coarse = result(tmp_path, case)["wear/depth"][-1, 0]
+    instants = {"method": "hbm", "n_time": 1024}
+    fine = result(tmp_path, merged(case, {"harmonics": instants}))["wear/depth"][-1, 0]
+    # An instant more or less of slip.
+    assert coarse == pytest.approx(fine, rel=0.1)
