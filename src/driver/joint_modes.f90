@@ -15,8 +15,7 @@ module fw_joint_modes
    public :: joint_mode_type, find_joint_modes, held_stiffness, most_dofs
    public :: state_free, state_sliding, state_stuck
 
-   !> What the joint does, in the order of the constants.
-   character(*), parameter :: state_words(*) = [character(7) :: 'free', 'sliding', 'stuck']
+   !> What the joint does.
    integer, parameter :: state_free = 1, state_sliding = 2, state_stuck = 3
 
    type, extends(mode_type) :: joint_mode_type

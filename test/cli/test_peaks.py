@@ -81,6 +81,27 @@ def test_two_peaks_side_by_side_are_not_taken_for_one(tmp_path, seed, true):
     assert remark or peak == pytest.approx(true, rel=peak_family.RIGHT)
 
 
+def test_the_mode_of_a_free_joint_is_looked_for_between_rows_that_half_slip(tmp_path):
+    """The joint sticks at the row below the mode and slips for three quarters of the period at the
+    one above; at its resonance it is as good as free. The other maximum shows in the rows."""
+    case = {"model": {"n_dof": 3, "modal_damping": 0.0248,
+                      "mass": [1.984, 0.3678, -0.1706, 0.3678, 1.15, -0.05411, -0.1706, -0.05411,
+                               1.084],
+                      "stiffness": [1.276, -0.3433, 0.5373, -0.3433, 2.177, -1.885, 0.5373,
+                                    -1.885, 4.539]},
+            "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 0], "mu": 0.3,
+                        "normal_load": 1.129, "tangential_stiffness": 1.276},
+            "load": {"cosine": [-0.7676, 0.5611, -2.764]}, "harmonics": {"n_harmonics": 3},
+            "sweep": {"start": 0.1, "end": 2.0, "n_points": 6}, "solver": {"tolerance": 1e-10}}
+    highest = []
+    for n_points in (6, 951):
+        run(tmp_path, merged(case, {"sweep": {"n_points": n_points}}))
+        with h5py.File(tmp_path / "case.h5") as file:
+            peaks = file["peak"]
+            highest.append(peaks["amplitude"][:][peaks["observed"][:] == 0].max())
+    assert highest[0] == pytest.approx(highest[1], rel=peak_family.RIGHT)
+
+
 def test_rows_stay_those_that_were_asked_for(tmp_path):
     groups, _ = peak_family.linear(1)
     sweep = groups["sweep"]
