@@ -100,7 +100,11 @@ contains
       self%n_rows = n
       if (n == 1) then
          self%last = point
-         self%crest = [(peak_of(point, i), i=1, size(point%amplitude))]
+         ! One by one: gfortran 12 does not free the coefficients of an array of results.
+         allocate (self%crest(size(point%amplitude)))
+         do i = 1, size(point%amplitude)
+            self%crest(i) = peak_of(point, i)
+         end do
          self%first_found = self%crest
          allocate (self%crowned(size(point%amplitude)), source=0)
          allocate (self%crest_row(size(point%amplitude)), source=1)

@@ -148,8 +148,11 @@ contains
       real(wp) :: high, ratio, y(size(self%y, 1))
 
       onset = ieee_value(1.0_wp, ieee_quiet_nan)
-      if (any(self%rest > share_change .and. self%rest < 1.0_wp - share_change)) onset = 0.0_wp
-      if (onset == 0.0_wp .or. .not. self%departed) return
+      if (any(self%rest > share_change .and. self%rest < 1.0_wp - share_change)) then
+         onset = 0.0_wp
+         return
+      end if
+      if (.not. self%departed) return
       onset = self%low(1)
       if (self%n_low == 0) return
       high = self%high

@@ -34,7 +34,9 @@ module fw_branch_retrace
    type :: branch_trail
       logical :: has_turned = .false.
       integer, private :: n = 0, n_since = 0
-      type(branch_point), private :: point(most_kept), since(most_kept)
+      type(branch_point), private :: point(most_kept)
+      ! Allocatable to be freed: CONTRIBUTING, Style in short.
+      type(branch_point), allocatable, private :: since(:)
    contains
       procedure :: keep
       procedure :: forget
@@ -59,6 +61,7 @@ contains
          call append(self%point, self%n, point)
          return
       end if
+      if (.not. allocated(self%since)) allocate (self%since(most_kept))
       call append(self%since, self%n_since, point)
       if (metric%chord(self%point(self%n), point) <= 2.0_wp*furthest) return
       self%n = self%n_since

@@ -41,7 +41,9 @@ module fw_continuation
       !> Whether it ended because x runs away while p stays.
       logical :: runs_away = .false.
       ! Where the branch began, and the point after a fold that waits.
-      type(branch_point) :: first, waiting
+      type(branch_point) :: first
+      ! Allocatable to be freed: CONTRIBUTING, Style in short.
+      type(branch_point), allocatable :: waiting
       logical :: waits = .false.
       integer :: n_points = 0, n_constant = 0
       ! The last points, and how far p has been.

@@ -44,10 +44,9 @@ module fw_predictor_corrector
       type(branch_point) :: here
       type(step_history) :: history
       real(wp) :: ds = 0.0_wp
-      !> Resonances about `here`, and about the point that is tried.
+      !> Resonances about `here`, and about the point that is tried, where they were looked for.
       type(near_response) :: near
-      type(near_response), private :: near_ahead
-      logical, private :: knows_ahead = .false.
+      type(near_response), allocatable, private :: near_ahead
       integer, private :: n_failed = 0
    contains
       procedure :: shorten_until_taken
@@ -148,7 +147,7 @@ contains
       logical :: done, far
 
       shortening = halved
-      self%knows_ahead = .false.
+      call self%forget_ahead()
       guess = ahead%y
       guess_p = ahead%p
       call self%corrector%correct(system, self%here, max(self%ds, corner), ahead, error)
@@ -253,8 +252,8 @@ contains
       end if
       if (shortening < 1.0_wp) return
       ! While the system stands there.
+      if (.not. allocated(self%near_ahead)) allocate (self%near_ahead)
       call self%near_ahead%find(self%corrector, system, ahead, x_scale_at(self, ahead))
-      self%knows_ahead = .true.
       if (corner_error <= allowed_error) return
       ! The estimate of a corner may be a false alarm: one correction there tells. One that lies
       ! where neither a smooth curve nor a single corner has it stands for several of them.
@@ -351,7 +350,7 @@ contains
          call metric%normalize(self%here)
          self%ds = max(growth*self%ds, min(corner, largest_growth*self%ds))
       end associate
-      if (self%knows_ahead) then
+      if (allocated(self%near_ahead)) then
          self%near = self%near_ahead
       else
          call self%near%find(self%corrector, system, self%here, x_scale_at(self, self%here))
@@ -363,7 +362,7 @@ contains
    pure subroutine forget_ahead(self)
       class(predictor_corrector), intent(inout) :: self
 
-      self%knows_ahead = .false.
+      if (allocated(self%near_ahead)) deallocate (self%near_ahead)
    end subroutine forget_ahead
 
    !> No step beyond what p and x may change, nor over a resonance.
