@@ -16,6 +16,7 @@ submodule(fw_balance_state) fw_balance_linear
    use fw_input_rates, only: turn_row
    use fw_lapack, only: dgemv
    use fw_lapack, only: zgemv
+   use fw_march_derivative, only: elements_of_group
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
 
@@ -26,6 +27,8 @@ submodule(fw_balance_state) fw_balance_linear
    integer, parameter :: few_coefficients = 8, entries_for_threads = 8000
    !> Relative residual of a linear solution from which the product of low rank serves.
    real(wp), parameter :: near_enough = 5.0e-5_wp
+   !> Of a product in single precision, relative to its largest entry.
+   real(wp), parameter :: single_round_off = 1.0e-6_wp
 
 contains
 
@@ -42,6 +45,8 @@ contains
       self%alteration = 0.0_wp
       do k = 1, self%problem%forces%n_laws
          if (size(self%work(k)%state) == 0) cycle
+         ! Steps that only have to be near mostly do without blocks of marched derivatives.
+         self%work(k)%may_wait = self%nearly .and. self%has_large_blocks
          associate (entry => self%problem%forces%entry(k))
             call entry%law%linearize(self%problem%fourier, self%work(k))
          end associate
@@ -61,7 +66,7 @@ contains
       associate (entry => self%problem%forces%entry(law))
          ! Who keeps normal components that always bear in the problem may have changed their rows.
          call self%near(law)%take(entry%row, pins_last(entry) .and. self%pins_normals, &
-                                  self%work(law))
+                                  present(alteration), self%work(law))
       end associate
    end procedure take_near
 
@@ -176,23 +181,55 @@ contains
       integer, intent(in) :: m, nc
       real(wp), intent(in) :: r(m, nc)
       real(wp), intent(out) :: rhs(self%active%n_active, nc)
+      logical :: nearly
+
+      call negate_active(self, m, nc, r, rhs)
+      if (self%active%n_active == m .or. self%active%n_active == 0) return
+      if (pinned_are_solved(self, m, nc, r)) return
+      nearly = self%nearly .and. self%asked >= near_enough
+      call subtract_pinned(self, m, nc, nearly, rhs)
+      if (.not. nearly) return
+      ! What single precision leaves is to be far below what is asked for: not where static loads
+      ! make pinned coordinates take steps beside which the rest is small.
+      associate (product => self%scratch%active_out(:self%active%n_active, :))
+         if (single_round_off*maxval(abs(product)) <= 0.1_wp*self%asked*maxval(abs(rhs))) return
+      end associate
+      call negate_active(self, m, nc, r, rhs)
+      call subtract_pinned(self, m, nc, .false., rhs)
+   end subroutine reduce_shaped
+
+   !> rhs = -r of the active rows.
+   pure subroutine negate_active(self, m, nc, r, rhs)
+      type(balance_state), intent(in) :: self
+      integer, intent(in) :: m, nc
+      real(wp), intent(in) :: r(m, nc)
+      real(wp), intent(out) :: rhs(self%active%n_active, nc)
       integer :: k
 
       do k = 1, nc
          ! J_aa v_a = -r_a - J_ap v_p, with a the active and p the pinned coordinates.
          rhs(:, k) = -r(self%active%used(:self%active%n_active), k)
       end do
-      if (self%active%n_active == m .or. self%active%n_active == 0) return
-      if (pinned_are_solved(self, m, nc, r)) return
-      ! J_ap v_p as `apply` forms it: Z_r v of the rows in use first, then what the forces add.
+   end subroutine negate_active
+
+   !> rhs = rhs - J_ap v_p, with the pinned steps in self%balance.
+   subroutine subtract_pinned(self, m, nc, nearly, rhs)
+      type(balance_state), intent(inout) :: self
+      integer, intent(in) :: m, nc
+      !> With the derivatives of the laws in single precision.
+      logical, intent(in) :: nearly
+      real(wp), intent(inout) :: rhs(self%active%n_active, nc)
+      integer :: k
+
+      ! As `apply` forms it: Z_r v of the rows in use first, then what the forces add.
       call self%problem%structure%multiply(self%structure_state, self%balance, self%scratch%product)
       do k = 1, nc
          self%scratch%active_out(:self%active%n_used, k) = &
             self%scratch%product(self%active%used(:self%active%n_used), k)
       end do
-      call add_forces(self, self%problem%incidence%identity, m, self%balance, .false.)
+      call add_forces(self, self%problem%incidence%identity, m, self%balance, nearly)
       rhs = rhs - self%scratch%active_out(:self%active%n_active, :)
-   end subroutine reduce_shaped
+   end subroutine subtract_pinned
 
    !> Whether what is left of the pinned rows is nothing to the others: so it is from the second
    !> step on.
@@ -296,6 +333,7 @@ contains
       logical, intent(in) :: roughly
       integer :: k
 
+      if (.not. roughly) call self%form_jacobians()
       ! Two passes: outputs of the laws without the balance are in active_out before the others
       ! take their inputs from it.
       do k = 1, self%problem%forces%n_laws
@@ -325,38 +363,71 @@ contains
       real(wp), intent(in) :: vector(n_mapped, *)
       logical, intent(in) :: roughly
       type(force_workspace), intent(inout) :: work
-      integer :: i
+      logical :: nearly
+      integer :: i, n_groups
 
+      nearly = roughly .and. self%has_large_blocks
+      n_groups = 0
+      if (nearly) n_groups = self%near(law)%n_groups(work)
       if (size(work%state) < pairs_for_threads) then
+         do i = 1, n_groups
+            call multiply_marched(i)
+         end do
          do i = 1, size(work%state)
             call multiply_one(i)
          end do
          return
       end if
+      !$omp parallel default(none) shared(work, n_groups) private(i)
+      !$omp do schedule(dynamic)
+      do i = 1, n_groups
+         call multiply_marched(i)
+      end do
+      !$omp end do nowait
       ! Mixed pairs, which take longest, stand side by side.
-      !$omp parallel do default(none) shared(work) private(i) schedule(dynamic, 4)
+      !$omp do schedule(dynamic, 4)
       do i = 1, size(work%state)
          call multiply_one(i)
       end do
-      !$omp end parallel do
+      !$omp end do
+      !$omp end parallel
 
    contains
+
+      subroutine multiply_marched(group)
+         integer, intent(in) :: group
+         integer :: element, j
+
+         do j = 1, elements_of_group
+            element = self%near(law)%element_of(group, j, work)
+            if (element > 0) call gather(element)
+         end do
+         call self%near(law)%multiply_group(group, work)
+      end subroutine multiply_marched
 
       subroutine multiply_one(i)
          integer, intent(in) :: i
 
          if (work%linear_state(i) == pair_open) return
+         if (n_groups > 0) then
+            if (self%near(law)%is_marched(i, work)) return
+         end if
+         call gather(i)
          associate (entry => self%problem%forces%entry(law))
-            call gather_inputs(self, entry, i, map, n_mapped, vector, work%linear_rests(i), &
-                               self%scratch%active_out, work%input(:, i))
-            if (roughly .and. self%has_large_blocks .and. &
-                work%linear_state(i) == pair_mixed) then
+            if (nearly .and. work%linear_state(i) == pair_mixed) then
                call self%near(law)%multiply(entry%row(:, i), i, work)
             else
                call multiply_derivative_of(entry%row(:, i), work, i)
             end if
          end associate
       end subroutine multiply_one
+
+      subroutine gather(i)
+         integer, intent(in) :: i
+
+         call gather_inputs(self, self%problem%forces%entry(law), i, map, n_mapped, vector, &
+                            work%linear_rests(i), self%scratch%active_out, work%input(:, i))
+      end subroutine gather
 
    end subroutine multiply_element
 

@@ -22,6 +22,7 @@ contains
       type(column_room) :: room
       integer :: h, k, n_columns, n_inputs
 
+      call self%form_jacobians()
       if (places_blocks(self)) then
          call place_blocks(self, matrix)
          return

@@ -38,6 +38,7 @@ contains
    module procedure build_preconditioner
       integer :: h
 
+      call self%form_jacobians()
       self%preconditioner%is_split = self%splits() .and. .not. allocated(self%shift)
       if (.not. (self%preconditioner%is_split .or. allocated(self%shift) .or. by_waves(self))) then
          if (self%active%n_active >= alike_from .and. self%preconditioner%left_out == 0 .and. &

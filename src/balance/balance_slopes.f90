@@ -55,6 +55,7 @@ contains
       real(wp), intent(inout) :: dr(m, nc)
       integer :: k
 
+      call self%form_jacobians()
       do k = 1, self%problem%forces%n_laws
          associate (p => self%problem%forces%entry(k)%law%prediction)
             ! Inputs of any other law depend on q alone, and q is held.

@@ -64,7 +64,8 @@ module fw_balance_state
       type(moving_parameter) :: moved
       !> Of a response whose load is what `set_parameter` moves: the parameter that it goes along
       !> (`set_place`); the frequency where none is given.
-      type(moving_parameter) :: along
+      ! Allocatable to be freed: CONTRIBUTING, Style in short.
+      type(moving_parameter), allocatable :: along
       !> What a step of pseudo-time adds to the derivative, P/h, outside of the contact laws
       !> (n_coordinates, n_coordinates, n_retained); only allocated during such a step.
       complex(wp), allocatable :: shift(:, :, :)
@@ -92,6 +93,7 @@ module fw_balance_state
    contains
       procedure :: set_parameter
       procedure :: set_place
+      procedure :: goes_along
       procedure :: set_frequency
       procedure :: set_load_factors
       procedure :: vibratory_factor
@@ -112,6 +114,7 @@ module fw_balance_state
       procedure :: n_turns
       procedure :: residual
       procedure :: linearize
+      procedure :: form_jacobians
       procedure :: take_near
       procedure :: reduce
       procedure :: expand
@@ -324,6 +327,17 @@ contains
       call self%scratch%reserve(m, problem%fourier%n_retained, nc)
    end subroutine new_balance_state
 
+   !> The blocks of laws that `linearize` has left to whoever reads them.
+   subroutine form_jacobians(self)
+      class(balance_state), intent(inout) :: self
+      integer :: k
+
+      do k = 1, self%problem%forces%n_laws
+         if (.not. self%work(k)%waits) cycle
+         call self%problem%forces%entry(k)%law%form_jacobian(self%problem%fourier, self%work(k))
+      end do
+   end subroutine form_jacobians
+
    !> Whether any part of a step has a form that is nearly right and cheaper.
    pure logical function offers_nearly(self)
       type(balance_state), intent(in) :: self
@@ -379,7 +393,7 @@ contains
       real(wp), intent(in) :: place
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. allocated(self%along%mover)) then
+      if (.not. self%goes_along()) then
          call self%set_frequency(place, error)
          return
       end if
@@ -387,6 +401,14 @@ contains
       if (allocated(error)) return
       call self%set_point(self%frequency(), 0.0_wp, error)
    end subroutine set_place
+
+   !> Whether the path of a response whose load is found goes over a parameter.
+   pure logical function goes_along(self)
+      class(balance_state), intent(in) :: self
+
+      goes_along = .false.
+      if (allocated(self%along)) goes_along = allocated(self%along%mover)
+   end function goes_along
 
    !> Let a mover do it, which is no part of the state meanwhile.
    subroutine move(self, parameter, value, error)
@@ -416,7 +438,7 @@ contains
       class(balance_state), intent(in) :: other
       type(error_type), allocatable, intent(out) :: error
 
-      if (allocated(self%along%mover) .and. allocated(other%along%mover)) then
+      if (self%goes_along() .and. other%goes_along()) then
          call move(self, self%along, other%along%value, error)
          if (allocated(error)) return
       end if

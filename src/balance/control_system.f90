@@ -149,7 +149,7 @@ contains
       n = self%state%n
       associate (s => self%state%problem%structure, f => self%state%problem%fourier)
          allocate (slope(s%n_observed, f%n_retained))
-         if (allocated(self%state%along%mover)) then
+         if (self%state%goes_along()) then
             call self%state%along%mover%derive(self%state, self%state%along%value, x(:n), dr(:n), &
                                                slope)
          else

@@ -225,58 +225,98 @@ contains
       !> Set by harmonic 0.
       real(wp), intent(inout) :: tension(:)
       complex(wp), allocatable :: force(:), stiffness(:, :)
-      logical :: held(size(q))
+      logical :: held(size(q)), is_idle
       integer :: j
 
-      allocate (stiffness(size(q), size(q)))
-      call system%problem%structure%block(system%structure_state, h, stiffness)
+      held = .false.
+      call hold_pairs(system, closed, h, held, q)
       force = system%structure_state%load(:, h)
       ! Only the vibratory load is raised from zero; the static one acts throughout.
       if (system%problem%fourier%harmonic(h) > 0) force = system%load_share*force
-      held = .false.
-      call close_pairs(system, closed, h, stiffness, force, held, q)
+      ! Nothing moves, or nothing makes it move: no matrix is formed. Elastic pairs that are closed
+      ! may press at rest.
+      if (any(abs(q) > 0.0_wp)) then
+         is_idle = .false.
+      else if (system%problem%fourier%harmonic(h) > 0) then
+         is_idle = all(held) .or. .not. any(abs(force) > 0.0_wp)
+      else
+         is_idle = all(held)
+      end if
+      if (is_idle) then
+         if (system%problem%fourier%harmonic(h) == 0) then
+            call find_tension(system, [(0.0_wp, j=1, size(q))], q, tension)
+         end if
+         return
+      end if
+      allocate (stiffness(size(q), size(q)))
+      call system%problem%structure%block(system%structure_state, h, stiffness)
+      call add_pairs(system, closed, h, stiffness, force)
       call solve_free(stiffness, force, held, q)
       if (system%problem%fourier%harmonic(h) > 0) return
       call find_tension(system, [(real(sum(stiffness(j, :)*q), wp), j=1, size(q))], q, tension)
    end subroutine solve_harmonic
 
-   !> Rigid pairs hold their coordinates (at minus the gap); elastic ones add their stiffness.
-   subroutine close_pairs(system, closed, h, stiffness, force, held, q)
+   !> Rigid pairs hold their coordinates, at minus the gap.
+   subroutine hold_pairs(system, closed, h, held, q)
       type(balance_state), intent(in) :: system
       logical, intent(in) :: closed(:)
       integer, intent(in) :: h
-      !> Of one harmonic: (n_coordinates, n_coordinates) and (n_coordinates).
-      complex(wp), intent(inout) :: stiffness(:, :), force(:), q(:)
-      !> Coordinates of rigid closed pairs, whose values stand in q; with elastic pairs none is
-      !> held.
+      !> Coordinates of closed pairs, whose values stand in q.
       logical, intent(inout) :: held(:)
+      complex(wp), intent(inout) :: q(:)
       integer :: i, c, j, row
-      real(wp) :: gap
-      complex(wp) :: slope
 
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
+         if (.not. law%prediction%takes_balance) return
          do i = 1, size(closed)
             if (.not. closed(i)) cycle
             do c = 1, 3
                row = system%problem%joint%row(c, i)
                if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
-               gap = 0.0_wp
-               if (c == 3 .and. system%problem%fourier%harmonic(h) == 0) then
-                  gap = law%prediction%gap(i) + system%depth(i)
-               end if
-               if (law%prediction%takes_balance) then
-                  j = system%problem%incidence%coordinate_of(row)
-                  held(j) = .true.
-                  q(j) = -gap
-               else
-                  slope = elastic_slope(system, law, i, c, system%problem%fourier%harmonic(h))
-                  call system%problem%incidence%scatter_harmonic(row, h, -slope*gap, force)
-                  call system%problem%incidence%add_block(row, h, slope, stiffness)
-               end if
+               j = system%problem%incidence%coordinate_of(row)
+               held(j) = .true.
+               q(j) = -gap_of(system, h, i, c)
             end do
          end do
       end associate
-   end subroutine close_pairs
+   end subroutine hold_pairs
+
+   !> Elastic pairs add their stiffness; none of their coordinates is held.
+   subroutine add_pairs(system, closed, h, stiffness, force)
+      type(balance_state), intent(in) :: system
+      logical, intent(in) :: closed(:)
+      integer, intent(in) :: h
+      !> Of one harmonic: (n_coordinates, n_coordinates) and (n_coordinates).
+      complex(wp), intent(inout) :: stiffness(:, :), force(:)
+      integer :: i, c, row
+      complex(wp) :: slope
+
+      associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
+         if (law%prediction%takes_balance) return
+         do i = 1, size(closed)
+            if (.not. closed(i)) cycle
+            do c = 1, 3
+               row = system%problem%joint%row(c, i)
+               if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
+               slope = elastic_slope(system, law, i, c, system%problem%fourier%harmonic(h))
+               call system%problem%incidence%scatter_harmonic( &
+                  row, h, -slope*gap_of(system, h, i, c), force)
+               call system%problem%incidence%add_block(row, h, slope, stiffness)
+            end do
+         end do
+      end associate
+   end subroutine add_pairs
+
+   !> What a component of a pair has to close in a harmonic: its gap, in the static normal one.
+   pure real(wp) function gap_of(system, h, pair, component) result(gap)
+      type(balance_state), intent(in) :: system
+      integer, intent(in) :: h, pair, component
+
+      gap = 0.0_wp
+      if (component /= 3 .or. system%problem%fourier%harmonic(h) /= 0) return
+      gap = system%problem%forces%entry(system%problem%forces%pairs)%law%prediction%gap(pair) + &
+            system%depth(pair)
+   end function gap_of
 
    !> Force of an elastic pair about its position at rest over the amplitude of its displacement in
    !> a harmonic n: each derivative by tau is a factor i n.

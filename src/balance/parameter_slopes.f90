@@ -376,6 +376,7 @@ contains
       real(wp) :: change(size(slope%residual, 1), size(slope%residual, 2))
       integer :: c, i, nc
 
+      call state%form_jacobians()
       nc = size(change, 2)
       change = slope%residual
       associate (entry => state%problem%forces%entry(state%problem%forces%pairs), &

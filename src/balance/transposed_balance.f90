@@ -54,6 +54,7 @@ contains
       real(wp) :: weight(m, nc)
       integer :: k
 
+      call state%form_jacobians()
       product = 0.0_wp
       weight = vector
       do k = 1, state%problem%forces%n_laws
@@ -77,6 +78,7 @@ contains
       real(wp) :: weight(size(product, 1), size(product, 2))
       integer :: c, i, nc
 
+      call state%form_jacobians()
       nc = size(product, 2)
       weight = 0.0_wp
       associate (entry => state%problem%forces%entry(state%problem%forces%pairs), &

@@ -402,14 +402,14 @@ contains
       middle = 0.5_wp*(self%known%place(1) + omega)
       call from_guesses(self, system, middle, report, iterations, error)
       if (allocated(error)) return
-      if (depth < max_halvings .and. goes_on(self, report, iterations)) then
+      if (halves_again(self, depth, report, iterations)) then
          call approach(self, system, middle, depth + 1, report, iterations, error)
          if (allocated(error)) return
       end if
       if (report%converged) then
          call from_guesses(self, system, omega, report, iterations, error)
          if (allocated(error)) return
-         if (depth < max_halvings .and. goes_on(self, report, iterations)) then
+         if (halves_again(self, depth, report, iterations)) then
             call approach(self, system, omega, depth + 1, report, iterations, error)
             if (allocated(error)) return
          end if
@@ -417,6 +417,18 @@ contains
       ! Left at the frequency that was asked for.
       if (.not. report%converged) call system%set_parameter(omega, error)
    end subroutine approach
+
+   !> Whether half of the way is tried. In two statements: `goes_on` notes why not, and the compiler
+   !> may leave out what stands behind .and., or not.
+   logical function halves_again(self, depth, report, iterations)
+      class(point_solver), intent(inout) :: self
+      integer, intent(in) :: depth
+      type(solver_report), intent(in) :: report
+      integer, intent(in) :: iterations
+
+      halves_again = depth < max_halvings
+      if (halves_again) halves_again = goes_on(self, report, iterations)
+   end function halves_again
 
    !> Extrapolation along the sweep, the last solution, all stuck.
    subroutine try_guesses(self, system, omega, report, iterations)

@@ -139,6 +139,7 @@ contains
          load = new_moved_parameter(case, harmonic_scale, .false.)
          call move_alloc(load, system%moved%mover)
          if (allocated(mover)) then
+            allocate (system%along)
             call move_alloc(mover, system%along%mover)
             call system%set_place(case%over%start, error)
             if (allocated(error)) return

@@ -124,7 +124,7 @@ contains
       type(balance_state), intent(in) :: system
       type(model_type) :: model
 
-      if (allocated(system%along%mover)) then
+      if (system%goes_along()) then
          select type (mover => system%along%mover)
          type is (moved_parameter)
             model = mover%case%model

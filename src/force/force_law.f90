@@ -13,6 +13,7 @@ module fw_force_law
    use fw_fft, only: fft_type
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
+   use fw_march_derivative, only: march_derivative
    implicit none (type, external)
    private
 
@@ -118,6 +119,12 @@ module fw_force_law
       !> Transposed derivative of the force by the input of each mixed element:
       !> (coefficient, component) of the input, then of the output, element.
       real(wp), allocatable :: jacobian(:, :, :)
+      !> The same of many harmonics as a march, for products that only have to be near: of laws that
+      !> have it, where it pays.
+      type(march_derivative), allocatable :: march
+      !> Whether `linearize` may leave the jacobian to `form_jacobian`, and whether it has: nobody
+      !> has it until then.
+      logical :: may_wait = .false., waits = .false.
       !> Inputs and outputs of a product with the derivative (coefficient and component, element).
       real(wp), allocatable :: input(:, :), output(:, :)
       !> Sliding under pressure over the period [force**2] (n_elements), and its derivative by the
@@ -155,6 +162,7 @@ module fw_force_law
       procedure :: set_offset
       procedure(evaluate_interface), deferred :: evaluate
       procedure(linearize_interface), deferred :: linearize
+      procedure :: form_jacobian
       procedure :: sample
       procedure :: coefficients
       procedure :: tail
@@ -251,6 +259,17 @@ contains
       allocate (self%prediction%stiffness(n, self%n_components), source=0.0_wp)
       allocate (self%prediction%gap(n), self%prediction%load(n), source=0.0_wp)
    end subroutine take_elements
+
+   !> What `linearize` has left to whoever needs the jacobian: nothing of most laws.
+   subroutine form_jacobian(self, fourier, work)
+      class(force_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      work%waits = .false.
+      associate (unused => self, unused_too => fourier)
+      end associate
+   end subroutine form_jacobian
 
    !> The constant part of the inputs, before evaluations.
    pure subroutine set_offset(self, depth, work)

@@ -42,6 +42,9 @@ module fw_friction
    !> Turns after which the limit of a march is looked for by Newton's method. One direction needs
    !> one; a random sample with two needed 4 at most, pairs of a blade root that creep thousands.
    integer, parameter :: plain_turns = 4
+   !> Pairs from which derivatives are marched, and how many products of a march are as fast as one
+   !> of a block, which waits for memory (python -m bench.run scaling).
+   integer, parameter :: pairs_of_march = 32, march_over_block = 4
 
    type, extends(pair_law) :: friction_law
    contains
@@ -50,6 +53,7 @@ module fw_friction
       procedure :: reserve
       procedure :: evaluate
       procedure :: linearize
+      procedure :: form_jacobian
       procedure :: fractions
       procedure :: located
    end type friction_law
@@ -66,6 +70,8 @@ module fw_friction
       type(wave_table) :: waves
       !> Room for derivatives of one pair after the other, from step to step.
       class(law_room), allocatable :: derivatives
+      !> The jacobian of before, while that of now waits.
+      real(wp), allocatable :: jacobian(:, :, :)
    end type friction_room
 
    interface
@@ -75,6 +81,11 @@ module fw_friction
          type(fourier_type), intent(in) :: fourier
          type(force_workspace), intent(inout) :: work
       end subroutine linearize
+      module subroutine form_jacobian(self, fourier, work)
+         class(friction_law), intent(in) :: self
+         type(fourier_type), intent(in) :: fourier
+         type(force_workspace), intent(inout) :: work
+      end subroutine form_jacobian
    end interface
 
 contains
@@ -144,8 +155,29 @@ contains
       allocate (room%margin(self%n_elements), source=0.0_wp)
       allocate (room%settled(self%n_elements), room%moved(self%n_elements), source=.false.)
       if (fourier%projects .and. self%n_elements > 0) call room%waves%build(fourier)
+      if (march_pays(self, fourier)) then
+         allocate (work%march)
+         call work%march%reserve(fourier%synthesis, fourier%analysis, self%n_elements)
+      end if
       call move_alloc(room, work%room)
    end subroutine reserve
+
+   !> Whether products with the derivative take less as a march than with blocks between all
+   !> coefficients: of many harmonics, and of more pairs than whose blocks a cache holds.
+   pure logical function march_pays(self, fourier)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      integer :: n_inputs
+
+      march_pays = self%facts%remembers .and. self%two_directions .and. &
+                   self%n_elements >= pairs_of_march
+      if (.not. march_pays) return
+      ! Products of a coefficient: with those of both tangential outputs, or with all instants, of
+      ! inputs and of outputs.
+      n_inputs = merge(3, 2, any(self%present(3, :)))
+      march_pays = march_over_block*2*n_inputs*fourier%n_coefficients >= &
+                   (n_inputs + 2)*fourier%n_time
+   end function march_pays
 
    subroutine evaluate(self, fourier, work)
       class(friction_law), intent(in) :: self

@@ -3,6 +3,9 @@
 submodule(fw_friction) fw_friction_derivative
    use fw_instant_sum, only: instant_sum
    use fw_lapack, only: dgemm
+   use fw_march_derivative, only: march_derivative
+   use fw_march_derivative, only: numbers_of_instant
+   use fw_memory, only: allocate_zeros
    use fw_one_direction, only: condition
    use fw_one_direction, only: follow_one_direction
    use fw_one_direction, only: project_one_direction
@@ -31,6 +34,10 @@ submodule(fw_friction) fw_friction_derivative
       real(wp), allocatable :: weight(:, :, :)
       !> Predicted forces (3, n_time).
       real(wp), allocatable :: y(:, :)
+      !> Whether the pair bears at the instants.
+      logical, allocatable :: bears(:)
+      !> What a march keeps of the instants (numbers_of_instant, n_time).
+      real(wp), allocatable :: numbers(:, :)
       !> Of a pair with one tangential direction: predicted forces, and what follows (n_time).
       real(wp), allocatable :: y_t(:), y_n(:)
       type(condition), allocatable :: at(:)
@@ -42,21 +49,116 @@ contains
    ! The state that the derivative belongs to stays beside it: rows of stuck pairs leave the
    ! problem.
    module procedure linearize
-      integer :: nc
+      logical :: marched(self%n_elements)
 
       work%linear_state = work%state
       work%linear_rests = work%rests
-      if (.not. any(work%state == pair_mixed)) return
-      nc = fourier%n_coefficients
-      ! Zero: blocks of components that do not exist stay so.
-      if (.not. allocated(work%jacobian)) then
-         allocate (work%jacobian(3*nc, 3*nc, self%n_elements), source=0.0_wp)
+      work%waits = .false.
+      if (allocated(work%march)) then
+         marched = work%state == pair_mixed .and. &
+                   (work%measures_slip .or. all(self%present(1:2, :), dim=1))
+         call work%march%choose(marched)
+         work%waits = work%may_wait .and. .not. work%measures_slip .and. &
+                      all(marched .or. work%state /= pair_mixed)
       end if
+      if (.not. any(work%state == pair_mixed)) work%waits = .false.
       select type (room => work%room)
       type is (friction_room)
-         call differentiate_pairs(self, fourier, room, work)
+         call make_room(self, fourier, room, work)
+         if (any(work%state == pair_mixed)) call differentiate_pairs(self, fourier, room, work)
       end select
+      if (allocated(work%march)) call arrange(work%march)
    end procedure linearize
+
+   ! From what the march has kept, because forces may have moved on.
+   module procedure form_jacobian
+
+      if (.not. work%waits) return
+      work%waits = .false.
+      select type (room => work%room)
+      type is (friction_room)
+         call make_room(self, fourier, room, work)
+         call project_pairs(self, fourier, room, work)
+      end select
+   end procedure form_jacobian
+
+   !> The jacobian where somebody is to have it; while it waits it is out of reach, so that nobody
+   !> takes that of before.
+   subroutine make_room(self, fourier, room, work)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(friction_room), intent(inout) :: room
+      type(force_workspace), intent(inout) :: work
+
+      if (work%waits) then
+         if (allocated(work%jacobian)) call move_alloc(work%jacobian, room%jacobian)
+         return
+      end if
+      if (allocated(room%jacobian)) call move_alloc(room%jacobian, work%jacobian)
+      if (allocated(work%jacobian) .or. .not. any(work%linear_state == pair_mixed)) return
+      ! Zero: blocks of components that do not exist stay so.
+      associate (n => 3*fourier%n_coefficients)
+         call allocate_zeros(work%jacobian, [n, n, self%n_elements])
+      end associate
+   end subroutine make_room
+
+   !> The jacobian of pairs that are marched.
+   subroutine project_pairs(self, fourier, room, work)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(friction_room), intent(in) :: room
+      type(force_workspace), intent(inout) :: work
+      type(derivative_room), allocatable :: of_pair
+      integer :: i
+
+      !$omp parallel default(none) shared(self, fourier, room, work) private(i, of_pair) &
+      !$omp if(self%n_elements >= pairs_for_threads)
+      allocate (of_pair)
+      call of_pair%sums%reserve(fourier)
+      call of_pair%turn%reserve(fourier%n_coefficients, fourier%n_time)
+      !$omp do schedule(dynamic)
+      do i = 1, self%n_elements
+         associate (place => work%march%place_of(i))
+            if (place == 0) cycle
+            associate (numbers => work%march%instants(:, :, place))
+               call of_pair%turn%replay(fourier%n_coefficients, fourier%synthesis, numbers, &
+                                        work%march%starts(:, :, place), self%present(:, i))
+               of_pair%bears = numbers(numbers_of_instant, :) > 0.0_wp
+               call project_pair(self, fourier, room, i, of_pair, work)
+            end associate
+         end associate
+      end do
+      !$omp end do
+      !$omp end parallel
+   end subroutine project_pairs
+
+   !> The block of a pair from the derivative of its last turn.
+   subroutine project_pair(self, fourier, room, i, of_pair, work)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(friction_room), intent(in) :: room
+      integer, intent(in) :: i
+      type(derivative_room), intent(inout) :: of_pair
+      type(force_workspace), intent(inout) :: work
+
+      call of_pair%turn%project(fourier, room%waves, self%present(:, i), of_pair%sums, &
+                                work%jacobian(:, :, i))
+      of_pair%sums%wanted = of_pair%bears
+      call project_normal(work%jacobian(:, :, i), fourier, room%waves, of_pair%sums, &
+                          self%present(3, i))
+   end subroutine project_pair
+
+   !> Groups of pairs that are marched side by side, shared by threads.
+   subroutine arrange(march)
+      type(march_derivative), intent(inout) :: march
+      integer :: group
+
+      !$omp parallel do default(none) shared(march) private(group) if(march%n_groups() > 2)
+      do group = 1, march%n_groups()
+         call march%arrange(group)
+      end do
+      !$omp end parallel do
+   end subroutine arrange
 
    subroutine differentiate_pairs(self, fourier, room, work)
       class(friction_law), intent(in) :: self
@@ -206,12 +308,14 @@ contains
             of_pair%y(c, :) = of_pair%y(c, :) + work%mean(i, c)
          end do
       end if
+      of_pair%bears = of_pair%y(3, :) < 0.0_wp
       call derive(self, fourier, room%settled(i), work, i, of_pair, x, unique)
-      call of_pair%turn%project(fourier, room%waves, self%present(:, i), of_pair%sums, &
-                                work%jacobian(:, :, i))
-      of_pair%sums%wanted = of_pair%y(3, :) < 0.0_wp
-      call project_normal(work%jacobian(:, :, i), fourier, room%waves, of_pair%sums, &
-                          self%present(3, i))
+      if (allocated(work%march)) then
+         ! Pairs without a tangential direction come here too, and are not marched.
+         if (work%march%place_of(i) > 0) call keep_march(self, work, i, of_pair)
+      end if
+      if (work%waits) return
+      call project_pair(self, fourier, room, i, of_pair, work)
       if (unique) call project_start(work%jacobian(:, :, i), fourier, of_pair%turn%dx, &
                                      of_pair%by_start, of_pair%weight)
       if (.not. work%measures_slip) return
@@ -228,6 +332,20 @@ contains
                          self%present(:, i), self%facts%remembers, x, of_pair%rows, &
                          work%slip_derivative(:, i))
    end subroutine differentiate_rows
+
+   !> The last turn, for products that only have to be near.
+   subroutine keep_march(self, work, pair, of_pair)
+      class(friction_law), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      integer, intent(in) :: pair
+      type(derivative_room), intent(inout) :: of_pair
+
+      if (.not. allocated(of_pair%numbers)) allocate (of_pair%numbers(numbers_of_instant, &
+                                                                      size(of_pair%y, 2)))
+      call of_pair%turn%numbers_at(of_pair%numbers)
+      of_pair%numbers(numbers_of_instant, :) = merge(1.0_wp, 0.0_wp, of_pair%bears)
+      call work%march%keep(pair, of_pair%numbers, of_pair%turn%start)
+   end subroutine keep_march
 
    !> Derivative of the friction of a pair. A limit that is the only one (unique) has a derivative
    !> of its own, dx, whose part in the forces is left to `project_start`; any other carries that of

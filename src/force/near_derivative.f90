@@ -28,25 +28,36 @@ module fw_near_derivative
       integer, allocatable :: n_inputs(:), n_outputs(:)
       !> (coefficient and component of the input, filled up, then of the output; element).
       real(sp), allocatable :: block(:, :)
+      !> Whether the law marches what it keeps of it (fw_march_derivative).
+      logical :: marches = .false.
    contains
       procedure :: take
+      procedure :: n_groups
+      procedure :: is_marched
+      procedure :: element_of
       procedure :: multiply
+      procedure :: multiply_group
    end type near_derivative
 
 contains
 
    !> The blocks of the mixed elements, after `linearize`.
-   subroutine take(self, row, pins_last, work)
+   subroutine take(self, row, pins_last, is_altered, work)
       class(near_derivative), intent(inout) :: self
       !> Row of each component of each element, 0 where there is none.
       integer, intent(in) :: row(:, :)
       !> The last component of an element that bears throughout has the derivative 1, and no other
       !> component acts on it (rigid pairs).
       logical, intent(in) :: pins_last
+      !> The blocks are no longer as the law left them.
+      logical, intent(in) :: is_altered
       type(force_workspace), intent(in) :: work
       integer :: i
 
+      self%marches = allocated(work%march) .and. .not. is_altered
       if (.not. allocated(work%jacobian)) return
+      if (.not. any([(work%linear_state(i) == pair_mixed .and. .not. self%is_marched(i, work), &
+                      i=1, size(row, 2))])) return
       call reserve(self, row, size(work%input, 1)/size(row, 1))
       if (size(row, 2) < pairs_for_threads) then
          do i = 1, size(row, 2)
@@ -70,7 +81,7 @@ contains
       type(force_workspace), intent(in) :: work
       integer :: last
 
-      if (work%linear_state(element) /= pair_mixed) return
+      if (work%linear_state(element) /= pair_mixed .or. self%is_marched(element, work)) return
       last = size(row)
       self%n_inputs(element) = count(row > 0)
       self%n_outputs(element) = self%n_inputs(element)
@@ -109,6 +120,43 @@ contains
       end do
    end subroutine copy_block
 
+   !> Groups of elements that are marched together.
+   pure integer function n_groups(self, work)
+      class(near_derivative), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+
+      n_groups = 0
+      if (self%marches) n_groups = work%march%n_groups()
+   end function n_groups
+
+   pure logical function is_marched(self, element, work)
+      class(near_derivative), intent(in) :: self
+      integer, intent(in) :: element
+      type(force_workspace), intent(in) :: work
+
+      is_marched = .false.
+      if (self%marches) is_marched = work%march%place_of(element) > 0
+   end function is_marched
+
+   !> Of a group, 0 behind its last one.
+   pure integer function element_of(self, group, number, work) result(element)
+      class(near_derivative), intent(in) :: self
+      integer, intent(in) :: group, number
+      type(force_workspace), intent(in) :: work
+
+      element = 0
+      if (self%marches) element = work%march%element_of(group, number)
+   end function element_of
+
+   !> output = G input of the elements of a group, nearly.
+   subroutine multiply_group(self, group, work)
+      class(near_derivative), intent(in) :: self
+      integer, intent(in) :: group
+      type(force_workspace), intent(inout) :: work
+
+      if (self%marches) call work%march%multiply(group, work%input, work%output)
+   end subroutine multiply_group
+
    !> output = G input of a mixed element, nearly.
    subroutine multiply(self, row, element, work)
       class(near_derivative), intent(in) :: self
@@ -134,14 +182,18 @@ contains
       real(sp), intent(inout), contiguous :: input(:), output(:)
       type(force_workspace), intent(inout) :: work
       real(wp) :: largest
-      integer :: c, nc, n_in, n_out, place
+      integer :: c, i, nc, n_in, n_out, place
 
       nc = self%n_coefficients
       n_in = nc*self%n_inputs(element)
       n_out = nc*self%n_outputs(element)
       associate (from => work%input(:, element), to => work%output(:, element))
          ! To the order of one, because single precision ends at 1e38.
-         largest = maxval(abs(from))
+         largest = 0.0_wp
+         !$omp simd reduction(max:largest)
+         do i = 1, size(from)
+            largest = max(largest, abs(from(i)))
+         end do
          ! Its reciprocal is to be finite.
          if (.not. largest > tiny(1.0_wp)) then
             to = 0.0_wp

@@ -33,7 +33,9 @@ module fw_one_direction
    !> Room for sums of waves: over all instants of stick, of slip by its pull, and over one run with
    !> its coefficients (n_coefficients).
    type :: run_room
-      type(wave_sums) :: stick, slip, one
+      type(wave_sums) :: stick
+      ! Allocatable to be freed: CONTRIBUTING, Style in short.
+      type(wave_sums), allocatable :: slip, one
       real(wp), allocatable :: weight(:)
    contains
       procedure :: reserve
@@ -180,7 +182,7 @@ contains
       integer, intent(in) :: nc
 
       if (allocated(self%weight)) return
-      allocate (self%weight(nc))
+      allocate (self%weight(nc), self%slip, self%one)
       call self%stick%reserve(waves)
       call self%slip%reserve(waves)
       call self%one%reserve(waves)

@@ -128,7 +128,7 @@ contains
          fastest = max(fastest, norm2(maxval(abs(work%prediction_time(i, 1:2, :)), dim=2)) &
                        /self%slip_speed(i))
       end do
-      n = ceiling(min(instants_of_turn*fastest, real(huge(n)/2, wp)))
+      n = ceiling(min(instants_of_turn*fastest, 0.5_wp*real(huge(n), wp)))
    end function instants_wanted
 
    !> Forces at the instants, and the smallest pressure of each pair.

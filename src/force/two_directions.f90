@@ -35,6 +35,8 @@ module fw_two_directions
    type :: turn_derivative
       !> Derivative of the position, at the start, then at the end (inputs, tangential component).
       real(wp), allocatable :: dx(:, :)
+      !> The same where the last turn starts.
+      real(wp), allocatable :: start(:, :)
       !> Of each instant: its state, and its vector, or the first of two that a run of stick stands
       !> on (0: none, dx = 0).
       integer, allocatable, private :: state(:), vector(:)
@@ -57,6 +59,8 @@ module fw_two_directions
       procedure :: to_limit
       procedure :: project
       procedure :: rows_at_instants
+      procedure :: numbers_at
+      procedure :: replay
    end type turn_derivative
 
 contains
@@ -67,7 +71,7 @@ contains
       integer, intent(in) :: n_coef, n_time
 
       if (allocated(self%dx)) return
-      allocate (self%dx(3*n_coef, 2), source=0.0_wp)
+      allocate (self%dx(3*n_coef, 2), self%start(3*n_coef, 2), source=0.0_wp)
       allocate (self%state(n_time), self%vector(n_time), source=0)
       allocate (self%turning(2, n_time), self%pull(2, n_time), self%weight(n_time), source=0.0_wp)
       ! Runs of stick are fewer than the instants that part them, and take two vectors each.
@@ -91,7 +95,7 @@ contains
       logical, intent(in) :: remembers
       !> Corrected position at the start, then at the end of each turn.
       real(wp), intent(inout) :: x(2)
-      real(wp) :: p, d(2), length
+      real(wp) :: p, d(2), length, normal(2), share, pull(2)
       integer :: turn, k, standing
       logical :: moved
 
@@ -99,6 +103,7 @@ contains
       moved = .false.
       do turn = 1, n_turns
          self%n_vectors = 0
+         if (turn == n_turns) self%start = self%dx
          ! Vectors of the run of stick at work, 0 where dx = 0, -1 where they are not kept yet.
          standing = merge(-1, 0, moved)
          do k = 1, n_time
@@ -115,7 +120,14 @@ contains
                   call open(self, k, n_coef, base(1, k), present)
                   x = y(1:2, k)
                else
-                  call slip(self, k, n_coef, base(1, k), present, mu, p, d/length, length, &
+                  normal(1) = -d(2)/length
+                  normal(2) = d(1)/length
+                  pull(1) = -mu*normal(2)
+                  pull(2) = mu*normal(1)
+                  ! With one direction there is nothing to turn.
+                  share = 0.0_wp
+                  if (present(1) .and. present(2)) share = mu*p/length
+                  call slip(self, k, n_coef, base(1, k), present, normal, share, pull, &
                             turn == n_turns)
                   x = y(1:2, k) - mu*p*d/length
                end if
@@ -157,34 +169,31 @@ contains
    end subroutine open
 
    !> w of an instant, and dx = dy - d lambda.
-   pure subroutine slip(self, k, n_coef, base, present, mu, p, e, length, is_kept)
+   pure subroutine slip(self, k, n_coef, base, present, normal, share, pull, is_kept)
       type(turn_derivative), intent(inout) :: self
       integer, intent(in) :: k, n_coef
-      real(wp), intent(in) :: base(n_coef), mu, p, e(2), length
+      !> n, mu p/|d| and -mu e.
+      real(wp), intent(in) :: base(n_coef), normal(2), share, pull(2)
       logical, intent(in) :: present(3), is_kept
-      real(wp) :: turning(2)
       integer :: c, i, v
 
       v = self%n_vectors + 1
       if (is_kept) self%n_vectors = v
-      turning = 0.0_wp
-      ! Turning of the slip direction; with one direction there is nothing to turn.
-      if (present(1) .and. present(2)) turning = (mu*p/length)*[-e(2), e(1)]
       self%state(k) = slips
       self%vector(k) = v
-      self%turning(:, k) = turning
-      self%pull(:, k) = -mu*e
+      self%turning(:, k) = share*normal
+      self%pull(:, k) = pull
       associate (w => self%vectors(:, v), dx => self%dx, n => n_coef)
          do i = 1, 3*n
-            w(i) = e(2)*dx(i, 1) - e(1)*dx(i, 2)
+            w(i) = -normal(1)*dx(i, 1) - normal(2)*dx(i, 2)
          end do
-         if (present(1)) w(:n) = w(:n) - e(2)*base
-         if (present(2)) w(n + 1:2*n) = w(n + 1:2*n) + e(1)*base
+         if (present(1)) w(:n) = w(:n) + normal(1)*base
+         if (present(2)) w(n + 1:2*n) = w(n + 1:2*n) + normal(2)*base
          do c = 1, 2
-            dx(:, c) = -turning(c)*w
+            dx(:, c) = -self%turning(c, k)*w
             if (present(c)) dx((c - 1)*n + 1:c*n, c) = dx((c - 1)*n + 1:c*n, c) + base
             ! dp = -dy_n where the pair bears.
-            if (present(3)) dx(2*n + 1:, c) = dx(2*n + 1:, c) + mu*e(c)*base
+            if (present(3)) dx(2*n + 1:, c) = dx(2*n + 1:, c) - pull(c)*base
          end do
       end associate
    end subroutine slip
@@ -209,6 +218,7 @@ contains
          self%dx(i, 1) = inverse(1, 1)*first + inverse(1, 2)*self%dx(i, 2)
          self%dx(i, 2) = inverse(2, 1)*first + inverse(2, 2)*self%dx(i, 2)
       end do
+      self%start = self%dx
    end subroutine to_limit
 
    !> The transposed derivative between coefficients whose outputs are tangential.
@@ -314,6 +324,52 @@ contains
          end do
       end do
    end subroutine rows_at_instants
+
+   !> The last turn by few numbers for each instant, see fw_march_derivative, but for whether the
+   !> pair bears.
+   pure subroutine numbers_at(self, numbers)
+      class(turn_derivative), intent(in) :: self
+      !> (numbers_of_instant, n_time)
+      real(wp), intent(inout) :: numbers(:, :)
+      integer :: k
+
+      do k = 1, size(numbers, 2)
+         numbers(:5, k) = 0.0_wp
+         if (self%state(k) == sticks) numbers(1, k) = 1.0_wp
+         if (self%state(k) == slips) numbers(2:5, k) = [self%turning(:, k), self%pull(:, k)]
+      end do
+   end subroutine numbers_at
+
+   !> The last turn once more from such numbers, and from the derivative of its start.
+   pure subroutine replay(self, n_coef, base, numbers, start, present)
+      class(turn_derivative), intent(inout) :: self
+      integer, intent(in) :: n_coef
+      real(wp), intent(in) :: base(:, :), numbers(:, :), start(:, :)
+      logical, intent(in) :: present(3)
+      real(wp) :: share, normal(2)
+      integer :: k, standing
+
+      self%dx = start
+      self%n_vectors = 0
+      standing = -1
+      do k = 1, size(numbers, 2)
+         if (numbers(1, k) > 0.0_wp) then
+            if (standing < 0) call keep_position(self, standing)
+            self%state(k) = sticks
+            self%vector(k) = standing
+            cycle
+         end if
+         standing = -1
+         if (all(abs(numbers(2:5, k)) <= 0.0_wp)) then
+            call open(self, k, n_coef, base(:, k), present)
+            cycle
+         end if
+         share = norm2(numbers(2:3, k))
+         ! Where nothing turns the direction does not matter.
+         normal = numbers(2:3, k)/max(share, tiny(1.0_wp))
+         call slip(self, k, n_coef, base(:, k), present, normal, share, numbers(4:5, k), .true.)
+      end do
+   end subroutine replay
 
    !> Add to rows at a limit what the start of the turn adds.
    pure subroutine add_start(n_inputs, n_time, by_start, dx, rows)

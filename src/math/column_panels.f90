@@ -12,6 +12,8 @@ module fw_column_panels
 
    !> Rows of a panel: their sums fill the vector registers.
    integer, parameter :: panel_height = 16
+   !> Columns for which room of a fixed size serves, which needs no allocation.
+   integer, parameter :: usual = 512
 
 contains
 
@@ -76,21 +78,44 @@ contains
       real(sp), intent(in) :: panels(panel_height, 2, n_columns, *)
       complex(wp), intent(in) :: column(n_columns)
       complex(wp), intent(inout) :: product(n_rows)
-      real(sp) :: right(2, n_columns), tile(panel_height, 2)
+      real(sp) :: usual_room(2, usual)
+      real(sp), allocatable :: room(:, :)
+
+      if (n_columns <= usual) then
+         call multiply_in(n_rows, n_columns, panels, column, usual_room, product)
+      else
+         allocate (room(2, n_columns))
+         call multiply_in(n_rows, n_columns, panels, column, room, product)
+      end if
+   end subroutine multiply_panels
+
+   pure subroutine multiply_in(n_rows, n_columns, panels, column, right, product)
+      integer, intent(in) :: n_rows, n_columns
+      real(sp), intent(in) :: panels(panel_height, 2, n_columns, *)
+      complex(wp), intent(in) :: column(n_columns)
+      !> Room.
+      real(sp), intent(inout) :: right(2, n_columns)
+      complex(wp), intent(inout) :: product(n_rows)
+      real(sp) :: tile(panel_height, 2)
       real(wp) :: largest
-      integer :: first, n, p
+      integer :: first, i, n, p
 
       ! Single precision ends at 1e38: to the order of one before.
-      largest = max(maxval(abs(real(column, wp))), maxval(abs(aimag(column))))
+      largest = 0.0_wp
+      do i = 1, n_columns
+         largest = max(largest, abs(real(column(i), wp)), abs(aimag(column(i))))
+      end do
       if (.not. largest > 0.0_wp) largest = 1.0_wp
-      right(1, :) = real(real(column, wp)/largest, sp)
-      right(2, :) = real(aimag(column)/largest, sp)
+      do i = 1, n_columns
+         right(1, i) = real(real(column(i), wp)/largest, sp)
+         right(2, i) = real(aimag(column(i))/largest, sp)
+      end do
       do p = 1, panel_count(n_rows)
          first = (p - 1)*panel_height
          n = min(panel_height, n_rows - first)
          call multiply_column(n_columns, panels(1, 1, 1, p), right, tile)
          product(first + 1:first + n) = largest*cmplx(tile(:n, 1), tile(:n, 2), wp)
       end do
-   end subroutine multiply_panels
+   end subroutine multiply_in
 
 end module fw_column_panels

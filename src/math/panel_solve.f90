@@ -15,6 +15,7 @@ module fw_panel_solve
    use fw_column_panels, only: panel_height
    use fw_kinds, only: sp
    use fw_lapack, only: ctrsm
+   use fw_lapack, only: strsm
    use omp_lib, only: omp_get_max_threads
    implicit none (type, external)
    private
@@ -76,9 +77,9 @@ contains
       do p = 1, n_panels
          associate (first => (p - 1)*panel_height + 1, last => min(p*panel_height, n), &
                     q => n_panels - p + 1)
-            call pack_lower(n, p, matrix(first:last, :last), 2, p*panel_height, &
+            call pack_lower(n, p, matrix(first:last, :last), p*panel_height, &
                             self%lower(2*entries_before(p) + 1))
-            call pack_upper(n, p, matrix(first:last, first:n), 2, q*panel_height, &
+            call pack_upper(n, p, matrix(first:last, first:n), q*panel_height, &
                             self%upper(2*entries_before(q) + 1))
          end associate
       end do
@@ -102,10 +103,10 @@ contains
       do p = 1, n_panels
          associate (first => (p - 1)*panel_height + 1, last => min(p*panel_height, n), &
                     q => n_panels - p + 1)
-            call pack_lower(n, p, cmplx(matrix(first:last, :last), kind=sp), 1, p*panel_height, &
-                            self%lower(entries_before(p) + 1))
-            call pack_upper(n, p, cmplx(matrix(first:last, first:n), kind=sp), 1, &
-                            q*panel_height, self%upper(entries_before(q) + 1))
+            call pack_real_lower(n, p, matrix(first:last, :last), p*panel_height, &
+                                 self%lower(entries_before(p) + 1))
+            call pack_real_upper(n, p, matrix(first:last, first:n), q*panel_height, &
+                                 self%upper(entries_before(q) + 1))
          end associate
       end do
       !$omp end parallel do
@@ -131,11 +132,11 @@ contains
    end subroutine reserve
 
    !> [-L_pp^-1 L_p<, L_pp^-1].
-   subroutine pack_lower(n, p, strip, n_parts, n_inner, panel)
-      integer, intent(in) :: n, p, n_parts, n_inner
+   subroutine pack_lower(n, p, strip, n_inner, panel)
+      integer, intent(in) :: n, p, n_inner
       !> Rows of the panel up to the end of its diagonal block.
       complex(sp), intent(in) :: strip(:, :)
-      real(sp), intent(inout) :: panel(panel_height, n_parts, n_inner)
+      real(sp), intent(inout) :: panel(panel_height, 2, n_inner)
       complex(sp) :: rows(panel_height, n_inner), diagonal(panel_height, panel_height)
       integer :: i, first, n_rows
 
@@ -150,15 +151,15 @@ contains
       call ctrsm('L', 'L', 'N', 'U', n_rows, n_inner, (1.0_sp, 0.0_sp), &
                  diagonal, panel_height, rows, panel_height)
       panel(:, 1, :) = real(rows, sp)
-      if (n_parts == 2) panel(:, 2, :) = aimag(rows)
+      panel(:, 2, :) = aimag(rows)
    end subroutine pack_lower
 
    !> [U_pp^-1, -U_pp^-1 U_p>]; rows behind the last one stay zero.
-   subroutine pack_upper(n, p, strip, n_parts, n_inner, panel)
-      integer, intent(in) :: n, p, n_parts, n_inner
+   subroutine pack_upper(n, p, strip, n_inner, panel)
+      integer, intent(in) :: n, p, n_inner
       !> Rows of the panel from its diagonal block on.
       complex(sp), intent(in) :: strip(:, :)
-      real(sp), intent(inout) :: panel(panel_height, n_parts, n_inner)
+      real(sp), intent(inout) :: panel(panel_height, 2, n_inner)
       complex(sp) :: rows(panel_height, n_inner), diagonal(panel_height, panel_height)
       integer :: i, first, n_rows
 
@@ -173,8 +174,48 @@ contains
       call ctrsm('L', 'U', 'N', 'N', n_rows, n_inner, (1.0_sp, 0.0_sp), &
                  diagonal, panel_height, rows, panel_height)
       panel(:, 1, :) = real(rows, sp)
-      if (n_parts == 2) panel(:, 2, :) = aimag(rows)
+      panel(:, 2, :) = aimag(rows)
    end subroutine pack_upper
+
+   !> The same of real strips, where they stay.
+   subroutine pack_real_lower(n, p, strip, n_inner, panel)
+      integer, intent(in) :: n, p, n_inner
+      real(sp), intent(in) :: strip(:, :)
+      real(sp), intent(inout) :: panel(panel_height, n_inner)
+      real(sp) :: diagonal(panel_height, panel_height)
+      integer :: i, first, n_rows
+
+      first = (p - 1)*panel_height
+      n_rows = min(panel_height, n - first)
+      panel(n_rows + 1:, :) = 0.0_sp
+      panel(:n_rows, :first) = -strip(:, :first)
+      panel(:, first + 1:) = 0.0_sp
+      do i = 1, n_rows
+         panel(i, first + i) = 1.0_sp
+      end do
+      diagonal(:n_rows, :n_rows) = strip(:, first + 1:)
+      call strsm('L', 'L', 'N', 'U', n_rows, n_inner, 1.0_sp, diagonal, panel_height, panel, &
+                 panel_height)
+   end subroutine pack_real_lower
+
+   subroutine pack_real_upper(n, p, strip, n_inner, panel)
+      integer, intent(in) :: n, p, n_inner
+      real(sp), intent(in) :: strip(:, :)
+      real(sp), intent(inout) :: panel(panel_height, n_inner)
+      real(sp) :: diagonal(panel_height, panel_height)
+      integer :: i, first, n_rows
+
+      first = (p - 1)*panel_height
+      n_rows = min(panel_height, n - first)
+      panel = 0.0_sp
+      panel(:n_rows, panel_height + 1:n - first) = -strip(:, panel_height + 1:)
+      do i = 1, n_rows
+         panel(i, i) = 1.0_sp
+      end do
+      diagonal(:n_rows, :n_rows) = strip(:, :n_rows)
+      call strsm('L', 'U', 'N', 'N', n_rows, n_inner, 1.0_sp, diagonal, panel_height, panel, &
+                 panel_height)
+   end subroutine pack_real_upper
 
    !> Room for so many right-hand sides at once.
    subroutine reserve_groups(self, n_columns)

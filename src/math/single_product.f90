@@ -9,7 +9,7 @@ module fw_single_product
    implicit none (type, external)
    private
 
-   public :: panel_height, group_width, panel_count, group_count, multiply_panels
+   public :: panel_height, group_width, panel_count, group_count, multiply_panels, multiply_tile
 
    !> Rows of a panel and columns of a group: their products fill the vector registers.
    integer, parameter :: panel_height = 16, group_width = 4

@@ -30,7 +30,9 @@ module fw_split_factors
       !> X, then U (n, rank), and V (n, rank).
       complex(sp), allocatable :: u(:, :), v(:, :)
       !> P_1 and P_0 as they are solved with; pivots of P_0.
-      type(panel_factors), private :: panels, constant_panels
+      type(panel_factors), private :: panels
+      ! Allocatable to be freed: CONTRIBUTING, Style in short.
+      type(panel_factors), allocatable, private :: constant_panels
       integer, allocatable, private :: pivot(:)
       !> T_n (rank, rank, harmonic).
       complex(sp), allocatable, private :: t(:, :, :)
@@ -94,6 +96,7 @@ contains
       !$omp end parallel
       if (first == 2) then
          call mend_pivots(self%constant(:self%n, :self%n))
+         if (.not. allocated(self%constant_panels)) allocate (self%constant_panels)
          call self%constant_panels%pack_real(self%n, self%constant, self%pivot)
       end if
       call self%panels%pack_factors(self%n, self%moving%matrix, self%moving%pivot)
@@ -223,19 +226,23 @@ contains
       real(wp), intent(in) :: vector(:, :)
       real(wp), intent(out) :: largest
       complex(sp), intent(out) :: rhs(:)
+      real(wp) :: factor
       integer :: i, last
 
       last = merge(k, k + 1, is_constant)
       largest = 0.0_wp
+      !$omp simd reduction(max:largest)
       do i = 1, self%n
-         if (from(i) == 0) cycle
-         largest = max(largest, abs(vector(from(i), k)), abs(vector(from(i), last)))
+         if (from(i) > 0) largest = max(largest, abs(vector(from(i), k)), &
+                                        abs(vector(from(i), last)))
       end do
-      if (.not. largest > 0.0_wp) largest = 1.0_wp
+      ! Its reciprocal is to be finite.
+      if (.not. largest > tiny(1.0_wp)) largest = 1.0_wp
+      factor = 1.0_wp/largest
       do i = 1, self%n
          rhs(i) = (0.0_sp, 0.0_sp)
          if (from(i) == 0) cycle
-         rhs(i) = cmplx(vector(from(i), k)/largest, -vector(from(i), last)/largest, sp)
+         rhs(i) = cmplx(factor*vector(from(i), k), -factor*vector(from(i), last), sp)
       end do
    end subroutine take_harmonic
 

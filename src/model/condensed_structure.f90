@@ -23,7 +23,9 @@ module fw_condensed_structure
    type, abstract, extends(structure_operator) :: condensed_structure
       type(reduction_type) :: basis
    contains
-      procedure :: recover
+      procedure :: recover => recover_anew
+      procedure :: recover_anew
+      procedure :: recover_by
       procedure :: static_stiffness
       procedure :: split
       procedure :: mass
@@ -47,32 +49,44 @@ module fw_condensed_structure
 
 contains
 
-   subroutine recover(self, state, q, observed)
+   subroutine recover_anew(self, state, q, observed)
       class(condensed_structure), intent(in) :: self
       class(structure_state), intent(inout) :: state
       complex(wp), intent(in), contiguous :: q(:, :)
       complex(wp), intent(out), contiguous :: observed(:, :)
       type(real_products) :: work
-      real(wp) :: coefficients(self%n_coordinates, self%n_coefficients)
-      complex(wp), allocatable :: x(:, :)
-      integer :: h, m, n_failed
+      integer :: n_failed
 
-      m = self%n_coordinates
       call work%reserve(self%basis, size(self%harmonic), self%n_coefficients)
-      call coefficients_of(self%harmonic, self%column, m, m, q, coefficients)
       select type (state)
       class is (condensed_state)
-         ! Rarely asked for (once a point): factors of its own leave those of the state alone.
+         ! Rarely asked for (once a point), where the state has no factors of its own.
          call work%factor(self%basis, state%factors, n_failed)
-         call recover_modes(self%basis, state%factors, state%load_factor, work, coefficients, x)
+         call self%recover_by(state, work, q, observed)
       end select
+   end subroutine recover_anew
+
+   !> The same with D factored in `work`.
+   subroutine recover_by(self, state, work, q, observed)
+      class(condensed_structure), intent(in) :: self
+      class(condensed_state), intent(in) :: state
+      type(real_products), intent(inout) :: work
+      complex(wp), intent(in), contiguous :: q(:, :)
+      complex(wp), intent(out), contiguous :: observed(:, :)
+      real(wp) :: coefficients(self%n_coordinates, self%n_coefficients)
+      complex(wp), allocatable :: x(:, :)
+      integer :: h, m
+
+      m = self%n_coordinates
+      call coefficients_of(self%harmonic, self%column, m, m, q, coefficients)
+      call recover_modes(self%basis, state%factors, state%load_factor, work, coefficients, x)
       do h = 1, size(self%harmonic)
          ! Observed: T_q q + T_i x, with the matrix of observed quantities in both.
          observed(:, h) = matmul(self%basis%observe_q, q(:, h))
          if (self%basis%n_internal == 0) cycle
          observed(:, h) = observed(:, h) + matmul(self%basis%observe_i, x(:, h))
       end do
-   end subroutine recover
+   end subroutine recover_by
 
    !> K_qq - sum K_qi^2/k_i: internal modes give way. Free ones (k_i = 0) do not count: with them
    !> the stiffness would be none.

@@ -185,6 +185,8 @@ contains
       integer :: j, n, pass, first
 
       do pass = 1, 2
+         ! Nothing is left of a structure whose motion adds nothing, such as one without mass.
+         if (size(q, 2) == 0) return
          square = product_of('T', 'N', q, q)
          call diagonalize(square, values, 'patterns of a structure', error)
          if (allocated(error)) return

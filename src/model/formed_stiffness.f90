@@ -30,7 +30,7 @@ module fw_formed_stiffness
       complex(wp), allocatable, private :: input(:, :), output(:, :)
       !> Where neither mass nor damping acts Z_r is one real matrix in all harmonics, and one
       !> product serves them. It, and its rows and columns in use.
-      logical, private :: is_static = .false.
+      logical :: is_static = .false.
       real(wp), allocatable, private :: static(:, :), static_active(:)
       !> Rows and columns in use in single precision, for what only has to be near, one harmonic
       !> behind the other.

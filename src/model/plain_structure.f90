@@ -63,8 +63,10 @@ module fw_plain_structure
       procedure :: active_block => block_in_use
       procedure :: diagonal
       procedure :: derivative
+      procedure :: recover => recover_observed
       procedure :: split_rank
       procedure :: multiply_nearly
+      procedure :: has_near_product
       procedure :: static_block
       procedure :: dynamic_block
    end type plain_structure
@@ -76,7 +78,13 @@ module fw_plain_structure
       type(split_product) :: split
       !> Whether rows in use are those of the present frequency, and real products have them.
       logical :: restricted = .false., gathered = .false.
+      !> Whether formed matrices have them in single precision.
+      logical :: packed = .false.
    end type plain_state
+
+   !> Coordinates from which formed matrices are copied in single precision for steps
+   !> (python -m bench.run scaling, peers).
+   integer, parameter :: least_near = 48
 
    !> Entries of all complex matrices from which real products pay (1 MB, more than the cache of a
    !> core holds), and internal modes for each coordinate up to which they do. Measured on sweeps
@@ -278,10 +286,10 @@ contains
          state%n_used = n_used
          state%used(:n_used) = used(:n_used)
          state%restricted = .true.
+         ! Formed matrices are not copied before a step asks for them: mostly for the near ones.
          state%gathered = .false.
-         if (self%forms_blocks) then
-            call state%formed%gather(n_active, n_used, used)
-         else
+         state%packed = .false.
+         if (.not. self%forms_blocks) then
             if (self%dynamic%rank > 0) call state%split%pack_rows(self%basis, self%dynamic, &
                                             self%n_coefficients, n_active, n_used, used)
          end if
@@ -298,6 +306,9 @@ contains
          select type (state)
          type is (plain_state)
             if (self%forms_blocks) then
+               if (.not. state%gathered) call state%formed%gather(state%n_active, state%n_used, &
+                                                                  state%used)
+               state%gathered = .true.
                call state%formed%multiply_active(self%harmonic, self%column, state%n_active, &
                                                  state%n_used, v, m, product)
             else if (state%n_active == m) then
@@ -327,10 +338,29 @@ contains
 
       select type (state)
       type is (plain_state)
-         call state%split%multiply(self%dynamic%rank, state%factors, v, self%n_coefficients, &
-                                   self%n_coordinates, product)
+         if (.not. self%forms_blocks) then
+            call state%split%multiply(self%dynamic%rank, state%factors, v, self%n_coefficients, &
+                                      self%n_coordinates, product)
+            return
+         end if
+         if (state%formed%is_static) then
+            ! One product for all harmonics costs less than one each in single precision.
+            call self%multiply_active(state, v, product)
+            return
+         end if
+         if (.not. state%packed) call state%formed%pack_near(state%n_active, state%n_used, &
+                                                             state%used)
+         state%packed = .true.
+         call state%formed%multiply_near(self%harmonic, self%column, state%n_active, &
+                                         state%n_used, v, self%n_coordinates, product)
       end select
    end subroutine multiply_nearly
+
+   pure logical function has_near_product(self)
+      class(plain_structure), intent(in) :: self
+
+      has_near_product = self%forms_blocks .and. self%n_coordinates >= least_near
+   end function has_near_product
 
    subroutine static_block(self, state, matrix)
       class(plain_structure), intent(in) :: self
@@ -430,6 +460,23 @@ contains
          end if
       end select
    end function diagonal
+
+   !> Factors of D are at hand where Z_r is not formed.
+   subroutine recover_observed(self, state, q, observed)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(inout) :: state
+      complex(wp), intent(in), contiguous :: q(:, :)
+      complex(wp), intent(out), contiguous :: observed(:, :)
+
+      if (self%forms_blocks) then
+         call self%recover_anew(state, q, observed)
+         return
+      end if
+      select type (state)
+      type is (plain_state)
+         call self%recover_by(state, state%products, q, observed)
+      end select
+   end subroutine recover_observed
 
    !> Formed matrices derive as they round.
    subroutine derivative(self, state, parameter, q, slope)

@@ -23,6 +23,8 @@ module fw_split_product
    !> Entries of vectors from which threads share their columns: fewer are done sooner than threads
    !> are called.
    integer, parameter :: entries_for_threads = 8000
+   !> Columns that are copied together: a line of memory of each is read once.
+   integer, parameter :: columns_at_hand = 16
 
    type :: split_product
       !> S_n (rank, rank, n_retained).
@@ -68,31 +70,35 @@ contains
       call fill_rows(basis, part, n_active, n_used, used, n_active + part%rank, self%rows)
    end subroutine pack_rows
 
-   !> Panel by panel; threads share them.
+   !> A few columns of the matrix at a time, which stay at hand while the panels go through their
+   !> rows; threads share them.
    subroutine fill_rows(basis, part, n_active, n_used, used, n_inner, panels)
       type(reduction_type), intent(in) :: basis
       type(dynamic_part), intent(in) :: part
       integer, intent(in) :: n_active, n_used, n_inner
       integer, intent(in) :: used(:)
       real(sp), intent(inout) :: panels(panel_height, n_inner, *)
-      integer :: first, i, j, n, p
+      integer :: first, i, j, k, n, p
 
-      !$omp parallel do default(none) private(first, i, j, n, p) &
-      !$omp shared(basis, part, n_active, n_used, used, panels) &
+      !$omp parallel do default(none) private(first, i, j, k, n, p) &
+      !$omp shared(basis, part, n_active, n_used, n_inner, used, panels) &
       !$omp if(n_used >= coordinates_for_threads)
-      do p = 1, panel_count(n_used)
-         first = (p - 1)*panel_height
-         n = min(panel_height, n_used - first)
-         ! The last panel may have rows to spare, which stay zero.
-         if (n < panel_height) panels(:, :, p) = 0.0_sp
-         do j = 1, n_active
-            do i = 1, n
-               panels(i, j, p) = real(basis%blocks(used(first + i), used(j), 1), sp)
-            end do
-         end do
-         do j = 1, part%rank
-            do i = 1, n
-               panels(i, n_active + j, p) = real(part%v(used(first + i), j), sp)
+      do k = 1, n_inner, columns_at_hand
+         do p = 1, panel_count(n_used)
+            first = (p - 1)*panel_height
+            n = min(panel_height, n_used - first)
+            do j = k, min(k + columns_at_hand - 1, n_inner)
+               ! The last panel may have rows to spare.
+               panels(n + 1:, j, p) = 0.0_sp
+               if (j <= n_active) then
+                  do i = 1, n
+                     panels(i, j, p) = real(basis%blocks(used(first + i), used(j), 1), sp)
+                  end do
+               else
+                  do i = 1, n
+                     panels(i, j, p) = real(part%v(used(first + i), j - n_active), sp)
+                  end do
+               end if
             end do
          end do
       end do

@@ -204,7 +204,10 @@ contains
 
       n = size(self%rhs)
       done = .true.
+      ! LU solves all the way, whatever is asked for.
+      if (.not. self%factored) system%asked = tolerance
       call system%reduce(r, self%rhs)
+      system%asked = 0.0_wp
       self%solution = 0.0_wp
       if (n > 0 .and. .not. self%factored) then
          call iterate_from_start(self, system, tolerance, done, scale, is_alike)

@@ -37,7 +37,9 @@ module fw_event_planar_force
       !> Shares of stick, slip and open; int N |dz|.
       real(wp) :: share(3) = 0.0_wp, friction_path = 0.0_wp
       !> Sets of stick and contact; stick weighted by z.
-      type(moments_type) :: stick, contact, held(2)
+      type(moments_type) :: stick
+      ! Allocatable to be freed: CONTRIBUTING, Style in short.
+      type(moments_type), allocatable :: contact, held(:)
       !> Tangential forces at the points of the cells times the weights of the quadrature
       !> (n_points, n_cells, 2).
       real(wp), allocatable, private :: node(:, :, :)
@@ -60,6 +62,7 @@ contains
       allocate (self%projected(cells%n_coefficients, 3), source=0.0_wp)
       allocate (self%node(n_points, cells%n_cells, 2), source=0.0_wp)
       call self%stick%reserve(cells%degree)
+      allocate (self%contact, self%held(2))
       call self%contact%reserve(cells%degree)
       call self%held(1)%reserve(cells%degree)
       call self%held(2)%reserve(cells%degree)

@@ -118,6 +118,7 @@ contains
          do s = -1, 1
             call w%rate(s)%reserve(degree, n)
          end do
+         allocate (w%lower, w%upper)
          call w%lower%reserve(degree, n)
          call w%upper%reserve(degree, n)
       end associate

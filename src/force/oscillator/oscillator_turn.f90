@@ -31,7 +31,8 @@ module fw_oscillator_turn
       real(wp), allocatable :: position(:, :, :)
       type(wave_type) :: rate(-1:1)
       !> P - Q (forward) and P + Q (backward).
-      type(wave_type) :: lower, upper
+      ! Allocatable to be freed: CONTRIBUTING, Style in short.
+      type(wave_type), allocatable :: lower, upper
       !> Angles at which Q changes its sign, ascending, and whether it is below zero at 0.
       integer :: n_lifts = 0
       real(wp), allocatable :: lift(:)
