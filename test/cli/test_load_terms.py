@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from cases import merged, read, run
+from project import HAS_EXTENSION
 
 import fretwear
 from fretwear import Case, Model, Result
@@ -141,6 +142,7 @@ def test_parity_follows_the_harmonics(tmp_path):
     assert np.abs(read(tmp_path / "case.h5")["coefficients"][:, 3]).max() > 0.0
 
 
+@pytest.mark.skipif(not HAS_EXTENSION, reason="this build has no extension for Python")
 def test_model_file_and_memory(tmp_path):
     groups = merged(GROUPS, {**CUBIC, "load": {"term_power": 0}})
     run(tmp_path, groups)
@@ -206,6 +208,7 @@ def test_refusals_of_model_files(tmp_path, parts, words):
         assert word in done.stderr
 
 
+@pytest.mark.skipif(not HAS_EXTENSION, reason="this build has no extension for Python")
 def test_displacements_are_recovered(tmp_path):
     """What is not observed follows from the loads of every harmonic."""
     run(tmp_path, merged(GROUPS, {"output": {"observe": [2]}}))

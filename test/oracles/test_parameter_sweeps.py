@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from cases import merged, read, run, write_namelist
-from project import PATIENT, PROGRAM
+from project import HAS_EXTENSION, PATIENT, PROGRAM
 from sensitivity_family import random_case
 
 import fretwear as fw
@@ -307,6 +307,7 @@ def test_what_is_refused(tmp_path, changes, words):
     assert words in done.stderr
 
 
+@pytest.mark.skipif(not HAS_EXTENSION, reason="this build has no extension for Python")
 def test_python(tmp_path):
     model = fw.Model([[1.0]], [[0.05]], [[1.0]], cosine=[1.0],
                      springs=[fw.Spring(side_1=1, coefficient=0.5, power=3)])

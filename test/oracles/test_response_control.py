@@ -9,7 +9,7 @@ import pytest
 from cases import merged, read, run, write_namelist
 from control_family import controlled_case, judged, linear_amplitude
 from limits import limit
-from project import PATIENT, PROGRAM, ROOT
+from project import HAS_EXTENSION, PATIENT, PROGRAM, ROOT
 from sensitivity_family import random_case
 
 import fretwear as fw
@@ -132,6 +132,7 @@ def test_random_branches_satisfy_their_equations(tmp_path, seed):
     assert words["judged"] > 20
 
 
+@pytest.mark.skipif(not HAS_EXTENSION, reason="this build has no extension for Python")
 def test_another_load_of_the_same_amplitude_is_told(tmp_path):
     """Where pairs slip under one load and stick under another: runs under both confirm it."""
     groups = controlled_case(69)
@@ -274,6 +275,7 @@ def test_what_is_refused(tmp_path, changes, words):
     assert words in done.stderr
 
 
+@pytest.mark.skipif(not HAS_EXTENSION, reason="this build has no extension for Python")
 def test_python(tmp_path):
     model = fw.Model([[1.0]], [[0.05]], [[1.0]], cosine=[1.0],
                      springs=[fw.Spring(side_1=1, coefficient=0.5, power=3)])

@@ -10,6 +10,8 @@ SECTOR = EXAMPLE / "blade_sector"
 PROGRAM = (ROOT / os.environ.get("FW_RUN", "build/release/fw_run")).resolve()
 #: Its directory: the libraries, and the compiled part of the Python package.
 BUILD = PROGRAM.parent
+#: Whether it holds that part: builds under sanitizers leave it out.
+HAS_EXTENSION = any(BUILD.glob("python/fretwear/_core.*"))
 #: Threads that spin while they wait starve each other where other tests run at the same time.
 PATIENT = {**os.environ, "OMP_WAIT_POLICY": "passive"}
 
