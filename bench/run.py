@@ -148,7 +148,7 @@ def scaling(job: Job) -> str:
 
 def limit(job: Job) -> str:
     """Where the time goes, against the floor; threads."""
-    return write_limit(measure_limit(job.bench, job.program("floor")))
+    return write_limit(measure_limit(job.bench, job.program("floor"), job.step))
 
 
 def skips(job: Job) -> str:

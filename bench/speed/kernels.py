@@ -24,8 +24,8 @@ PAGE = ROOT / "docs" / "benchmarks" / "kernels.md"
 MARKS = ("<!-- kernels: begin -->", "<!-- kernels: end -->")
 #: From the oldest on: SSE2, SSE4, AVX, AVX2, AVX2, AVX-512, AVX-512.
 KERNELS = ("Prescott", "Nehalem", "Sandybridge", "Haswell", "Zen", "SkylakeX", "Cooperlake")
-#: Runs of each kernel by turns; the fastest counts.
-TURNS = 5
+#: Runs of each kernel by turns, and of sweeps shorter than that [s]; the fastest counts.
+TURNS, MORE_TURNS, SHORT = 5, 25, 0.1
 WANTED = 1.3
 
 
@@ -48,17 +48,35 @@ def runs_with(program: Path, kernel: str) -> bool:
     return done.returncode == 0 and f"kernel {kernel}" in done.stdout
 
 
-def fastest(bench: Bench, groups: Groups, kernels: list[str]) -> list[float]:
-    """Time of all points [s] by each kernel."""
-    least = [float("inf")] * len(kernels)
-    for _ in range(TURNS):
+def fastest(bench: Bench, groups: Groups, kernels: list[str]) -> tuple[list[float], list[int]]:
+    """Time of all points [s] by each kernel, and Newton steps."""
+    least, steps = [float("inf")] * len(kernels), [0] * len(kernels)
+    for turn in range(MORE_TURNS):
+        if turn >= TURNS and min(least) > SHORT:
+            break
         for i, kernel in enumerate(kernels):
             os.environ["OPENBLAS_CORETYPE"] = kernel
-            run = bench.run(groups)
+            run, cost = bench.run_and_weigh(groups)
             if not run.converged.all():
                 raise RuntimeError(f"kernel {kernel}: a point did not converge")
-            least[i] = min(least[i], float(run.seconds.sum()))
-    return least
+            seconds = float(run.seconds.sum())
+            # What other programs took meanwhile; of short sweeps the fastest was alone.
+            least[i] = min(least[i], seconds * (cost.share if seconds > SHORT else 1.0))
+            steps[i] = int(run.iterations.sum())
+    return least, steps
+
+
+def row_of(name: str, times: list[float], steps: list[int]) -> tuple[str, ...]:
+    """Times over the best; where kernels take other paths, with their steps, and judged by them."""
+    best = min(times)
+    cells = [f"{time / best:.2f}" for time in times]
+    of_a_step = times
+    if len(set(steps)) > 1:
+        cells = [f"{cell} ({n})" for cell, n in zip(cells, steps)]
+        of_a_step = [time / n for time, n in zip(times, steps)]
+    worst = max(of_a_step) / min(of_a_step)
+    return (name, *cells, f"{1e3 * best:.3g}", f"{worst:.2f}: "
+            + ("met" if worst < WANTED else "missed"))
 
 
 def main() -> None:
@@ -72,13 +90,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         bench = Bench(program, Path(place))
         for name, groups in cases().items():
-            times = fastest(bench, groups, kernels)
-            best, worst = min(times), max(times)
-            rows.append((name, *(f"{time / best:.2f}" for time in times), f"{1e3 * best:.3g}",
-                         "met" if worst < WANTED * best else "missed"))
+            rows.append(row_of(name, *fastest(bench, groups, kernels)))
             print(*rows[-1], sep=" | ", flush=True)
     write(arguments.page, MARKS, table(
-        ["case", *kernels, "best [ms]", f"at most {WANTED}"], rows))
+        ["case", *kernels, "best [ms]", f"of a step, at most {WANTED}"], rows))
 
 
 if __name__ == "__main__":

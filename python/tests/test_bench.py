@@ -239,7 +239,7 @@ def test_scaling_asks_for_the_coarse_mesh(tmp_path: Path, monkeypatch: pytest.Mo
 def test_the_floor_is_judged_without_what_runs_before_a_sweep() -> None:
     from bench.speed.limit import CONSTRUCTION, Part, floor_part
 
-    parts = [Part("residual", 9, 1.4, 1.0), Part(CONSTRUCTION, 1, 9.0, 0.0)]
+    parts = [Part("residual", 9, 1.2, 1.0), Part(CONSTRUCTION, 1, 9.0, 0.0)]
     assert "met everywhere" in floor_part({(16, 3): parts})
     slow = [Part("residual", 9, 3.0, 1.0), *parts[1:]]
     assert "missed in 1 of 2 cases, 3.00 times at worst" in floor_part({(16, 3): parts,
@@ -275,3 +275,12 @@ def test_targets_are_collected_from_the_parts() -> None:
     lines = targets(parts)
     assert lines[-2] == "| [One](#one) | 0 | 1 | in 2 of 3 cases, 2.25 times at worst |"
     assert lines[-1] == "| [A, B and C](#a-b-and-c) | 1 | 2 | by 1.25 |"
+
+
+def test_kernels_are_compared_by_the_step_where_their_paths_differ() -> None:
+    from bench.speed.kernels import row_of
+
+    assert row_of("same", [1.2, 1.0], [5, 5]) == ("same", "1.20", "1.00", "1e+03", "1.20: met")
+    assert row_of("path", [1.5, 1.0], [6, 5]) == ("path", "1.50 (6)", "1.00 (5)", "1e+03",
+                                                  "1.25: met")
+    assert row_of("slow", [1.5, 1.0], [5, 5])[-1] == "1.50: missed"
