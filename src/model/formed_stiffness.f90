@@ -7,6 +7,8 @@ module fw_formed_stiffness
    use fw_column_panels, only: panel_height
    use fw_complex_form, only: amplitudes_of
    use fw_complex_form, only: coefficients_of
+   use fw_condensed_group, only: condensed_group
+   use fw_condensed_group, only: lanes
    use fw_internal_block, only: internal_block
    use fw_kinds, only: sp
    use fw_kinds, only: wp
@@ -35,6 +37,8 @@ module fw_formed_stiffness
       !> Rows and columns in use in single precision, for what only has to be near, one harmonic
       !> behind the other.
       real(sp), allocatable, private :: near(:)
+      !> Harmonics side by side.
+      type(condensed_group), private :: group
    contains
       procedure :: reserve
       procedure :: form
@@ -52,10 +56,13 @@ module fw_formed_stiffness
 contains
 
    !> Matrices of all harmonics and scratch for their products; copies of rows in use come later.
-   pure subroutine reserve(self, m, n_harmonics)
+   subroutine reserve(self, m, n_harmonics, basis)
       class(formed_stiffness), intent(inout) :: self
       integer, intent(in) :: m, n_harmonics
+      !> Of those who `form`.
+      type(reduction_type), intent(in), optional :: basis
 
+      if (present(basis)) call self%group%reserve(basis, n_harmonics)
       allocate (self%matrix(m, m, n_harmonics), source=zero)
       allocate (self%input(m, n_harmonics), self%output(m, n_harmonics), source=zero)
    end subroutine reserve
@@ -75,7 +82,10 @@ contains
       integer :: h
 
       n_failed = 0
-      if (basis%n_coordinates < coordinates_for_threads) then
+      ! An imaginary part is a damping that excites.
+      if (self%group%serves .and. all(abs(aimag(theta)) <= 0.0_wp)) then
+         call form_groups(self, basis, harmonic, real(theta, wp), s, load, n_failed)
+      else if (basis%n_coordinates < coordinates_for_threads) then
          do h = 1, size(harmonic)
             call form_harmonic(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), &
                                load(:, h), n_failed)
@@ -91,6 +101,30 @@ contains
       end if
       call find_static(self)
    end subroutine form
+
+   !> One group of harmonics after the other.
+   subroutine form_groups(self, basis, harmonic, theta, s, load, n_failed)
+      class(formed_stiffness), intent(inout) :: self
+      type(reduction_type), intent(in) :: basis
+      integer, intent(in) :: harmonic(:)
+      real(wp), intent(in) :: theta(:), s(:)
+      complex(wp), intent(inout) :: load(:, :)
+      integer, intent(inout) :: n_failed
+      complex(wp) :: internal_load(basis%n_internal, lanes)
+      integer :: first, h, last
+
+      do first = 1, size(harmonic), lanes
+         last = min(first + lanes - 1, size(harmonic))
+         do h = first, last
+            load(:, h) = harmonic_load(basis%load_q, basis%waves, harmonic(h), s(h))
+            internal_load(:, h - first + 1) = harmonic_load(basis%load_i, basis%waves, &
+                                                            harmonic(h), s(h))
+         end do
+         call self%group%form(basis, theta(first:last), s(first:last), &
+                              internal_load(:, :last - first + 1), self%matrix(:, :, first:last), &
+                              load(:, first:last), n_failed)
+      end do
+   end subroutine form_groups
 
    !> Whether Z_r is one real matrix in all harmonics, to the last bit.
    subroutine find_static(self)

@@ -148,7 +148,7 @@ contains
       call plain%reserve_loads(m, nh)
       allocate (plain%used(m), source=0)
       if (self%forms_blocks) then
-         call plain%formed%reserve(m, nh)
+         call plain%formed%reserve(m, nh, self%basis)
       else
          call plain%products%reserve(self%basis, nh, self%n_coefficients)
       end if
