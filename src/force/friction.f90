@@ -44,7 +44,7 @@ module fw_friction
    integer, parameter :: plain_turns = 4
    !> Pairs from which derivatives are marched, and how many products of a march are as fast as one
    !> of a block, which waits for memory (python -m bench.run scaling).
-   integer, parameter :: pairs_of_march = 32, march_over_block = 4
+   integer, parameter :: pairs_of_march = 8, march_over_block = 4
 
    type, extends(pair_law) :: friction_law
    contains

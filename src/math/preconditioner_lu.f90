@@ -21,7 +21,7 @@ module fw_preconditioner_lu
    !> Columns that are factored at a time, and orders from which threads share the others.
    integer, parameter :: block_width = 128, least_shared = 384
    !> Orders from which a solution with packed factors saves more than packing takes.
-   integer, parameter :: least_packed = 32
+   integer, parameter :: least_packed = 8
 
    !> The storage only grows, so that refactoring does not allocate.
    type :: preconditioner_lu_type
