@@ -30,7 +30,7 @@ from bench.paper.filtering import measure_filtering, write_filtering
 from bench.paper.methods import measure_methods, write_methods
 from bench.peers.branches import BRANCHES, count_again, measure_branches, write_branches
 from bench.peers.sector_and_chain import measure_peers, write_peers
-from bench.precision.events import measure_events, write_events
+from bench.precision.events import measure_events, write_events, write_pairs
 from bench.precision.integration import measure_integration, write_integration
 from bench.precision.report import write_precision
 from bench.precision.responses import measure_precision
@@ -99,7 +99,8 @@ def precision(job: Job) -> str:
 
 def events(job: Job) -> str:
     """Convergence of events and instants in n_time."""
-    return write_events(job.images, measure_events(job.bench))
+    found = write_events(job.images, measure_events(job.bench))
+    return found + "\n\n" + write_pairs(run_program(job.program("events")))
 
 
 def solvers(job: Job) -> str:

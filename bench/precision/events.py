@@ -14,7 +14,7 @@ from bench.common.layout import COLOURS, sentence, table
 from bench.common.measure import Bench, Floats
 from bench.common.oscillators import Case, jenkins, planar, rigid, two_dof
 
-__all__ = ["Limit", "measure_events", "write_events"]
+__all__ = ["Limit", "measure_events", "write_events", "write_pairs"]
 
 N_HARMONICS = 7
 #: From 4H + 2 on.
@@ -24,6 +24,8 @@ LARGEST_EVENTS = 1024
 SAMPLINGS = ("uniform", "events")
 #: Instants of events that stand for the limit.
 LIMIT = 4096
+#: Time of an evaluation of a pair with two directions at N_HARMONICS [us], and its error.
+PAIR_TARGET, PAIR_ERROR = 50.0, 1e-6
 #: Error of the solutions themselves.
 ROUND_OFF = 1e-11
 
@@ -91,6 +93,33 @@ def write_events(images: Path, limits: list[Limit]) -> str:
         "of its own tolerance, and uniform sampling is of first order.", "",
         "![Distance from the limit against n_time](images/benchmark_events.png)", "",
         *table(["case", "sampling", *(f"n_time = {n}" for n in numbers), "order"], rows)])
+
+
+def write_pairs(rows: list[dict[str, str]]) -> str:
+    """The section on single pairs, from the table of the measuring program: amplitudes that fall
+    with the square of the harmonic, as those of structures do."""
+    shown = [row for row in rows if row["power"] == "2" and int(row["n_harmonics"]) > 1]
+    judged = next(row for row in shown if row["directions"] == "2" and row["sampling"] == "events"
+                  and int(row["n_harmonics"]) == N_HARMONICS)
+    met = (float(judged["from_rest_us"]) <= PAIR_TARGET
+           and float(judged["error"]) <= PAIR_ERROR)
+    return "\n".join([
+        "## Forces of a pair", "",
+        "Processor time of one evaluation [us] for each of 96 random pairs whose amplitudes fall "
+        "with the square of the harmonic: from rest, again from where that ended, and the "
+        "derivative; errors of the forces against events in a period that starts elsewhere, the "
+        "worst pair and the median.", "",
+        *table(["directions", "H", "sampling", "n_time", "from rest [us]", "again [us]",
+                "derivative [us]", "worst error", "median error"],
+               [(row["directions"], row["n_harmonics"], row["sampling"], row["n_time"],
+                 *(f"{float(row[key]):.3g}" for key in ("from_rest_us", "again_us",
+                                                        "linearize_us")),
+                 *(f"{float(row[key]):.1e}" for key in ("error", "median_error")))
+                for row in shown]), "",
+        f"Target: events in two directions at H = {N_HARMONICS} in {PAIR_TARGET:g} us with an "
+        f"error of {PAIR_ERROR:.0e}; {'met' if met else 'missed'} "
+        f"({float(judged['from_rest_us']):.3g} us from rest, {float(judged['again_us']):.3g} us "
+        f"again, {float(judged['error']):.1e})."])
 
 
 def find(limits: list[Limit], name: str, sampling: str, n_time: int) -> Limit | None:
