@@ -3,7 +3,13 @@ module fw_active_set
    implicit none (type, external)
    private
 
-   public :: active_set
+   public :: active_set, element_list
+
+   !> Numbers of elements of a law (the first n of `number`).
+   type :: element_list
+      integer :: n = 0
+      integer, allocatable :: number(:)
+   end type element_list
 
    type :: active_set
       !> Unknowns of the linear problem.

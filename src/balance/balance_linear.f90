@@ -104,8 +104,39 @@ contains
          self%active%place(j) = k
       end do
       self%active%n_used = k
+      do k = 1, self%problem%forces%n_laws
+         call list_acting(self, self%problem%forces%entry(k), self%work(k), self%acting(k))
+      end do
       call place_kept(self)
    end subroutine choose_active
+
+   !> The elements of a law whose forces reach the linear problem: of those that are held throughout
+   !> nothing does.
+   pure subroutine list_acting(self, entry, work, acting)
+      type(balance_state), intent(in) :: self
+      type(force_entry), intent(in) :: entry
+      type(force_workspace), intent(in) :: work
+      type(element_list), intent(inout) :: acting
+      integer :: c, i, n_rows
+      logical :: reaches
+
+      if (.not. allocated(acting%number)) allocate (acting%number(size(work%state)))
+      acting%n = 0
+      ! Forces that do not take the balance count in rows that the others take as well.
+      n_rows = self%active%n_used
+      if (entry%law%prediction%takes_balance) n_rows = self%active%n_active
+      do i = 1, size(work%state)
+         if (work%linear_state(i) == pair_open) cycle
+         reaches = .false.
+         do c = 1, size(entry%row, 1)
+            if (entry%row(c, i) == 0 .or. reaches) cycle
+            reaches = self%problem%incidence%reaches(entry%row(c, i), self%active%place, n_rows)
+         end do
+         if (.not. reaches) cycle
+         acting%n = acting%n + 1
+         acting%number(acting%n) = i
+      end do
+   end subroutine list_acting
 
    !> Coordinates whose rows elements hold, and those of them whose rows of A are needed still.
    subroutine find_held(self, entry, work, held, wanted)
@@ -338,26 +369,28 @@ contains
       ! take their inputs from it.
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))
-            call multiply_element(self, k, map, n_mapped, vector, roughly, work)
+            call multiply_elements(self, k, self%acting(k)%number(:self%acting(k)%n), map, &
+                                   n_mapped, vector, roughly, work)
             if (entry%law%prediction%takes_balance) cycle
-            call add_outputs(self, entry, work, self%active%place, self%active%n_used, &
-                             self%scratch%active_out)
+            call add_outputs(self, entry, work, self%acting(k)%number(:self%acting(k)%n), &
+                             self%active%place, self%active%n_used, self%scratch%active_out)
          end associate
       end do
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))
             if (.not. entry%law%prediction%takes_balance) cycle
-            call add_outputs(self, entry, work, self%active%place, self%active%n_active, &
-                             self%scratch%active_out)
+            call add_outputs(self, entry, work, self%acting(k)%number(:self%acting(k)%n), &
+                             self%active%place, self%active%n_active, self%scratch%active_out)
          end associate
       end do
    end subroutine add_forces
 
    !> Outputs of the derivative of a law for a vector.
-   subroutine multiply_element(self, law, map, n_mapped, vector, roughly, work)
+   subroutine multiply_elements(self, law, acting, map, n_mapped, vector, roughly, work)
       type(balance_state), intent(in) :: self
-      !> Its number.
+      !> Its number, and the elements that count.
       integer, intent(in) :: law
+      integer, intent(in) :: acting(:)
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(in) :: vector(n_mapped, *)
@@ -373,12 +406,12 @@ contains
          do i = 1, n_groups
             call multiply_marched(i)
          end do
-         do i = 1, size(work%state)
-            call multiply_one(i)
+         do i = 1, size(acting)
+            call multiply_one(acting(i))
          end do
          return
       end if
-      !$omp parallel default(none) shared(work, n_groups) private(i)
+      !$omp parallel default(none) shared(acting, n_groups) private(i)
       !$omp do schedule(dynamic)
       do i = 1, n_groups
          call multiply_marched(i)
@@ -386,8 +419,8 @@ contains
       !$omp end do nowait
       ! Mixed pairs, which take longest, stand side by side.
       !$omp do schedule(dynamic, 4)
-      do i = 1, size(work%state)
-         call multiply_one(i)
+      do i = 1, size(acting)
+         call multiply_one(acting(i))
       end do
       !$omp end do
       !$omp end parallel
@@ -408,7 +441,6 @@ contains
       subroutine multiply_one(i)
          integer, intent(in) :: i
 
-         if (work%linear_state(i) == pair_open) return
          if (n_groups > 0) then
             if (self%near(law)%is_marched(i, work)) return
          end if
@@ -429,7 +461,7 @@ contains
                             work%linear_rests(i), self%scratch%active_out, work%input(:, i))
       end subroutine gather
 
-   end subroutine multiply_element
+   end subroutine multiply_elements
 
    !> Whether normal components that bear throughout have the derivative 1 and nothing else.
    pure logical function pins_last(entry)
@@ -520,12 +552,14 @@ contains
       end associate
    end subroutine gather_inputs
 
-   !> rows = rows + B^T outputs of a law. Elements may share coordinates: threads share the
+   !> rows = rows + B^T outputs of elements of a law. They may share coordinates: threads share the
    !> coefficients.
-   subroutine add_outputs(self, entry, work, map, n_mapped, rows)
+   subroutine add_outputs(self, entry, work, elements, map, n_mapped, rows)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       type(force_workspace), intent(in) :: work
+      !> Those that count.
+      integer, intent(in) :: elements(:)
       integer, intent(in) :: map(:)
       integer, intent(in) :: n_mapped
       real(wp), intent(inout) :: rows(:, :)
@@ -533,7 +567,7 @@ contains
 
       nc = self%problem%fourier%n_coefficients
       ! Weights that turn take the coefficients of a harmonic together.
-      if (size(entry%row)*nc < entries_for_threads .or. self%problem%incidence%turns()) then
+      if (size(entry%row, 1)*size(elements)*nc < entries_for_threads .or. self%problem%incidence%turns()) then
          call add_some(1, nc)
          return
       end if
@@ -547,10 +581,10 @@ contains
 
       subroutine add_some(first, last)
          integer, intent(in) :: first, last
-         integer :: c, i
+         integer :: c, i, k
 
-         do i = 1, size(entry%row, 2)
-            if (work%linear_state(i) == pair_open) cycle
+         do k = 1, size(elements)
+            i = elements(k)
             do c = 1, size(entry%row, 1)
                if (entry%row(c, i) == 0) cycle
                call self%problem%incidence%scatter_row( &

@@ -65,12 +65,21 @@ contains
          end associate
          call multiply_derivative(self%problem%forces%entry(k)%row, self%work(k))
          call add_outputs(self, self%problem%forces%entry(k), self%work(k), &
-                          self%problem%incidence%identity, m, dr)
+                          not_open(self%work(k)), self%problem%incidence%identity, m, dr)
          if (self%problem%forces%entry(k)%law%prediction%has_inertia .and. in_time) then
             call add_law_by_frequency(self, self%problem%forces%entry(k), self%work(k), m, nc, dr)
          end if
       end do
    end subroutine derivative_with_forces
+
+   !> The elements that have forces.
+   pure function not_open(work) result(elements)
+      type(force_workspace), intent(in) :: work
+      integer, allocatable :: elements(:)
+      integer :: i
+
+      elements = pack([(i, i=1, size(work%linear_state))], work%linear_state /= pair_open)
+   end function not_open
 
    !> A law with inertia in units of time depends on the frequency by itself: a central difference,
    !> its inputs being held.

@@ -12,6 +12,7 @@ module fw_balance_state
    use fw_kinds, only: wp
    use fw_error, only: error_type
    use fw_active_set, only: active_set
+   use fw_active_set, only: element_list
    use fw_balance_problem, only: balance_problem
    use fw_balance_scratch, only: balance_scratch
    use fw_force_law, only: force_workspace
@@ -86,6 +87,8 @@ module fw_balance_state
       real(wp), private :: compared_at(2) = -huge(1.0_wp)
       !> The linear problem of a step, see fw_balance_linear.
       type(active_set) :: active
+      !> Elements of each law whose forces reach that problem (n_laws).
+      type(element_list), allocatable, private :: acting(:)
       type(kept_factors) :: preconditioner
       !> Derivatives of the laws for products that only have to be near (n_laws).
       type(near_derivative), allocatable, private :: near(:)
@@ -319,7 +322,7 @@ contains
       call self%preconditioner%reserve(m, problem%fourier%n_retained)
       self%has_static_laws = all_are_static(problem)
       self%has_split = problem%structure%split_rank() > 0 .and. self%has_static_laws
-      allocate (self%near(problem%forces%n_laws))
+      allocate (self%near(problem%forces%n_laws), self%acting(problem%forces%n_laws))
       self%has_large_blocks = blocks_are_large(problem)
       self%nearly = offers_nearly(self)
       if (problem%structure%n_alike > 1) call self%preconditioner%reserve_waves( &

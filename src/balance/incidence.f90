@@ -33,6 +33,7 @@ module fw_incidence
       integer, allocatable, private :: harmonic(:), column(:)
    contains
       procedure :: coordinate_of
+      procedure :: reaches
       procedure :: turns
       procedure :: weights_of
       procedure :: gather
@@ -161,6 +162,22 @@ contains
          end do
       end do
    end subroutine scatter
+
+   !> Whether a row has a coordinate with a place in a vector.
+   pure logical function reaches(self, row, map, n_mapped)
+      class(incidence_type), intent(in) :: self
+      integer, intent(in) :: row
+      integer, intent(in) :: map(:)
+      integer, intent(in) :: n_mapped
+      integer :: e
+
+      reaches = .false.
+      do e = self%first(row), self%first(row + 1) - 1
+         associate (place => map(self%coordinate(e)))
+            reaches = reaches .or. (place > 0 .and. place <= n_mapped)
+         end associate
+      end do
+   end function reaches
 
    !> values = factor B q for one row and the first size(values) coefficients.
    pure subroutine gather_row(self, row, map, n_mapped, factor, q, values)
