@@ -24,8 +24,8 @@ submodule(fw_balance_state) fw_balance_linear
    !> Part of a residual whose effect on a step is far below the tolerance of linear solutions.
    real(wp), parameter :: negligible = 1.0e-9_wp
    !> Coefficients that a thread adds at a time, and numbers from which threads pay for that.
-   integer, parameter :: few_coefficients = 8, entries_for_threads = 8000
-   !> Relative residual of a linear solution from which the product of low rank serves.
+   integer, parameter :: few_coefficients = 8, entries_for_threads = 4000
+   !> Relative residual of a linear solution from which products that are nearly right serve.
    real(wp), parameter :: near_enough = 5.0e-5_wp
    !> Of a product in single precision, relative to its largest entry.
    real(wp), parameter :: single_round_off = 1.0e-6_wp
@@ -111,7 +111,8 @@ contains
    end subroutine choose_active
 
    !> The elements of a law whose forces reach the linear problem: of those that are held throughout
-   !> nothing does.
+   !> nothing does. Inputs and outputs of the others are not set by products; wear reads those of
+   !> mixed pairs, which are always among these.
    pure subroutine list_acting(self, entry, work, acting)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
@@ -567,7 +568,8 @@ contains
 
       nc = self%problem%fourier%n_coefficients
       ! Weights that turn take the coefficients of a harmonic together.
-      if (size(entry%row, 1)*size(elements)*nc < entries_for_threads .or. self%problem%incidence%turns()) then
+      if (size(entry%row, 1)*size(elements)*nc < entries_for_threads .or. &
+          self%problem%incidence%turns()) then
          call add_some(1, nc)
          return
       end if

@@ -106,11 +106,15 @@ contains
       class(harmonics_options), intent(in) :: self
       integer, intent(in) :: n_harmonics
       type(harmonics_options) :: options
+      integer :: least
 
       options = self
       options%n_harmonics = n_harmonics
       if (options%method == method_hdhb) options%n_time = 0
-      do while (options%n_time > 0 .and. options%n_time <= 2*n_harmonics)
+      ! Those of `sampling = 'auto'` may come to be located too.
+      least = 2*n_harmonics + 1
+      if (options%sampling /= sampling_uniform) least = instants_per_event_wave*n_harmonics
+      do while (options%n_time > 0 .and. options%n_time < least)
          options%n_time = 2*options%n_time
       end do
    end function with_harmonics

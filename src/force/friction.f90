@@ -42,9 +42,10 @@ module fw_friction
    !> Turns after which the limit of a march is looked for by Newton's method. One direction needs
    !> one; a random sample with two needed 4 at most, pairs of a blade root that creep thousands.
    integer, parameter :: plain_turns = 4
-   !> Pairs from which derivatives are marched, and how many products of a march are as fast as one
-   !> of a block, which waits for memory (python -m bench.run scaling).
-   integer, parameter :: pairs_of_march = 8, march_over_block = 4
+   !> Pairs, and coefficients of a component, from which a march pays; of many pairs, whose blocks
+   !> no cache holds, it does so with fewer. By sweeps of the sector with 16 to 384 pairs: how many
+   !> instants there are does not matter, since forming a block takes as much longer with more.
+   integer, parameter :: pairs_of_march(2) = [8, 96], coefficients_of_march(2) = [27, 15]
 
    type, extends(pair_law) :: friction_law
    contains
@@ -162,21 +163,15 @@ contains
       call move_alloc(room, work%room)
    end subroutine reserve
 
-   !> Whether products with the derivative take less as a march than with blocks between all
-   !> coefficients: of many harmonics, and of more pairs than whose blocks a cache holds.
+   !> Whether steps with derivatives that are marched take less than with blocks between all
+   !> coefficients.
    pure logical function march_pays(self, fourier)
       class(friction_law), intent(in) :: self
       type(fourier_type), intent(in) :: fourier
-      integer :: n_inputs
 
       march_pays = self%facts%remembers .and. self%two_directions .and. &
-                   self%n_elements >= pairs_of_march
-      if (.not. march_pays) return
-      ! Products of a coefficient: with those of both tangential outputs, or with all instants, of
-      ! inputs and of outputs.
-      n_inputs = merge(3, 2, any(self%present(3, :)))
-      march_pays = march_over_block*2*n_inputs*fourier%n_coefficients >= &
-                   (n_inputs + 2)*fourier%n_time
+                   any(self%n_elements >= pairs_of_march .and. &
+                       fourier%n_coefficients >= coefficients_of_march)
    end function march_pays
 
    subroutine evaluate(self, fourier, work)

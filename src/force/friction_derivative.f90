@@ -55,8 +55,9 @@ contains
       work%linear_rests = work%rests
       work%waits = .false.
       if (allocated(work%march)) then
-         marched = work%state == pair_mixed .and. &
-                   (work%measures_slip .or. all(self%present(1:2, :), dim=1))
+         ! Only those who read it are worth a march; wear reads blocks.
+         marched = work%may_wait .and. .not. work%measures_slip .and. &
+                   work%state == pair_mixed .and. all(self%present(1:2, :), dim=1)
          call work%march%choose(marched)
          work%waits = work%may_wait .and. .not. work%measures_slip .and. &
                       all(marched .or. work%state /= pair_mixed)
@@ -312,7 +313,7 @@ contains
       call derive(self, fourier, room%settled(i), work, i, of_pair, x, unique)
       if (allocated(work%march)) then
          ! Pairs without a tangential direction come here too, and are not marched.
-         if (work%march%place_of(i) > 0) call keep_march(self, work, i, of_pair)
+         if (work%march%place_of(i) > 0) call keep_march(work, i, of_pair)
       end if
       if (work%waits) return
       call project_pair(self, fourier, room, i, of_pair, work)
@@ -334,8 +335,7 @@ contains
    end subroutine differentiate_rows
 
    !> The last turn, for products that only have to be near.
-   subroutine keep_march(self, work, pair, of_pair)
-      class(friction_law), intent(in) :: self
+   subroutine keep_march(work, pair, of_pair)
       type(force_workspace), intent(inout) :: work
       integer, intent(in) :: pair
       type(derivative_room), intent(inout) :: of_pair

@@ -51,9 +51,11 @@ contains
       tile(:, 2) = re_im + im_re
    end subroutine multiply_column
 
-   !> Pack rows and columns of a matrix.
-   pure subroutine pack_columns(matrix, n_columns, rows, panels)
+   !> Pack rows and columns of a matrix, times a factor.
+   pure subroutine pack_columns(matrix, factor, n_columns, rows, panels)
       complex(wp), intent(in) :: matrix(:, :)
+      !> Brings the entries to the order of one: single precision ends at 1e38.
+      real(wp), intent(in) :: factor
       !> Numbers of the rows; the first n_columns of them are those of the columns.
       integer, intent(in) :: n_columns, rows(:)
       real(sp), intent(inout) :: panels(panel_height, 2, n_columns, *)
@@ -64,17 +66,18 @@ contains
          do p = 1, panel_count(size(rows))
             associate (first => (p - 1)*panel_height)
                do i = 1, min(panel_height, size(rows) - first)
-                  panels(i, 1, j, p) = real(matrix(rows(first + i), rows(j)), sp)
-                  panels(i, 2, j, p) = real(aimag(matrix(rows(first + i), rows(j))), sp)
+                  panels(i, 1, j, p) = real(factor*real(matrix(rows(first + i), rows(j)), wp), sp)
+                  panels(i, 2, j, p) = real(factor*aimag(matrix(rows(first + i), rows(j))), sp)
                end do
             end associate
          end do
       end do
    end subroutine pack_columns
 
-   !> product = matrix column.
-   pure subroutine multiply_panels(n_rows, n_columns, panels, column, product)
+   !> product = scale matrix column.
+   pure subroutine multiply_panels(n_rows, n_columns, panels, scale, column, product)
       integer, intent(in) :: n_rows, n_columns
+      real(wp), intent(in) :: scale
       real(sp), intent(in) :: panels(panel_height, 2, n_columns, *)
       complex(wp), intent(in) :: column(n_columns)
       complex(wp), intent(inout) :: product(n_rows)
@@ -82,15 +85,16 @@ contains
       real(sp), allocatable :: room(:, :)
 
       if (n_columns <= usual) then
-         call multiply_in(n_rows, n_columns, panels, column, usual_room, product)
+         call multiply_in(n_rows, n_columns, panels, scale, column, usual_room, product)
       else
          allocate (room(2, n_columns))
-         call multiply_in(n_rows, n_columns, panels, column, room, product)
+         call multiply_in(n_rows, n_columns, panels, scale, column, room, product)
       end if
    end subroutine multiply_panels
 
-   pure subroutine multiply_in(n_rows, n_columns, panels, column, right, product)
+   pure subroutine multiply_in(n_rows, n_columns, panels, scale, column, right, product)
       integer, intent(in) :: n_rows, n_columns
+      real(wp), intent(in) :: scale
       real(sp), intent(in) :: panels(panel_height, 2, n_columns, *)
       complex(wp), intent(in) :: column(n_columns)
       !> Room.
@@ -114,7 +118,7 @@ contains
          first = (p - 1)*panel_height
          n = min(panel_height, n_rows - first)
          call multiply_column(n_columns, panels(1, 1, 1, p), right, tile)
-         product(first + 1:first + n) = largest*cmplx(tile(:n, 1), tile(:n, 2), wp)
+         product(first + 1:first + n) = (scale*largest)*cmplx(tile(:n, 1), tile(:n, 2), wp)
       end do
    end subroutine multiply_in
 

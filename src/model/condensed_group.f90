@@ -8,10 +8,13 @@
 !> of which one triangle is computed: less than half of the work of a solution and a product.
 !> Where damping couples no internal modes L = 1.
 !>
-!> Pivots are not needed where D = R + i S with R diagonal and S positive definite, as damping is: a
-!> Schur complement with respect to modes E adds S_kE (R_EE + i S_EE)^-1 S_El, which is at most
-!> sqrt(S_kk S_ll), because (S_EE^(-1/2) R_EE S_EE^(-1/2) + i)^-1 is at most 1. Nothing grows beyond
-!> what is there.
+!> Pivots are not needed where D = R + i S with R diagonal and S positive definite, as damping is
+!> (`is_regular` looks at it): a Schur complement with respect to modes E adds
+!> S_kE (R_EE + i S_EE)^-1 S_El, which is at most sqrt(S_kk S_ll), because
+!> (S_EE^(-1/2) R_EE S_EE^(-1/2) + i)^-1 is at most 1. L may have large entries, but what round-off
+!> follows, |L| |d| |L|^T, is made of differences of such complements and is as small as D. A damping
+!> that excites (an imaginary part of theta) leaves S without a sign, and is for a library.
+!> K, M and C are symmetric.
 module fw_condensed_group
    use fw_hermitian, only: is_regular
    use fw_kinds, only: wp
@@ -23,18 +26,20 @@ module fw_condensed_group
 
    !> Harmonics side by side: the widest vectors.
    integer, parameter :: lanes = 8
-   !> Harmonics from which enough lanes are in use, and numbers of a group up to which it stays in
-   !> the cache of a core (python -m bench.run scaling).
-   integer, parameter :: fewest_harmonics = 4, most_numbers = 65536
+   !> Harmonics from which enough lanes are in use.
+   integer, parameter :: fewest_harmonics = 4
+   !> Numbers of a group up to which it stays in the cache of a core.
+   real(wp), parameter :: most_numbers = 65536.0_wp
 
    type :: condensed_group
       private
       !> Whether structure and size are such that this serves.
       logical, public :: serves = .false.
-      !> Rows of L, real and imaginary part (lane, part, column, row), d^-1 (lane, part, mode), and a
-      !> column (lane, part, mode, 1) twice, of which nobody reads the second.
+      !> Rows of L, real and imaginary part (lane, part, column, row), d^-1 (lane, part, mode), and
+      !> two columns (lane, part, mode, 2), of which nobody reads the second.
       real(wp), allocatable :: lower(:, :, :, :), inverse(:, :, :), column(:, :, :, :)
-      !> y and u of the coordinates, then of the load (lane, part, mode, coordinate); an even number.
+      !> y and u of the coordinates, then of the load, filled up to an even number
+      !> (lane, part, mode, coordinate).
       real(wp), allocatable :: y(:, :, :, :), u(:, :, :, :)
    contains
       procedure :: reserve
@@ -48,12 +53,14 @@ contains
       class(condensed_group), intent(inout) :: self
       type(reduction_type), intent(in) :: basis
       integer, intent(in) :: n_harmonics
+      real(wp) :: n_numbers
       integer :: n_columns
 
       associate (n => basis%n_internal)
          n_columns = 2*((basis%n_coordinates + 2)/2)
-         self%serves = n > 0 .and. n_harmonics >= fewest_harmonics .and. &
-                       4*lanes*n*n_columns <= most_numbers
+         n_numbers = real(4*lanes*n, wp)*n_columns
+         if (allocated(basis%c_ii)) n_numbers = n_numbers + real(2*lanes*n, wp)*n
+         self%serves = n > 0 .and. n_harmonics >= fewest_harmonics .and. n_numbers <= most_numbers
          if (.not. self%serves) return
          if (allocated(basis%c_ii)) then
             self%serves = is_regular(cmplx(basis%c_ii, kind=wp))

@@ -35,8 +35,9 @@ module fw_formed_stiffness
       logical :: is_static = .false.
       real(wp), allocatable, private :: static(:, :), static_active(:)
       !> Rows and columns in use in single precision, for what only has to be near, one harmonic
-      !> behind the other.
+      !> behind the other, each over its largest entry (n_retained).
       real(sp), allocatable, private :: near(:)
+      real(wp), allocatable, private :: near_scale(:)
       !> Harmonics side by side.
       type(condensed_group), private :: group
    contains
@@ -443,13 +444,31 @@ contains
          if (size(self%near) < n*n_harmonics) deallocate (self%near)
       end if
       if (.not. allocated(self%near)) allocate (self%near(n*n_harmonics))
+      if (.not. allocated(self%near_scale)) allocate (self%near_scale(n_harmonics))
       !$omp parallel do default(none) private(h) shared(self, n, n_active, n_used, used) &
       !$omp shared(n_harmonics) if(size(self%matrix, 1) >= coordinates_for_threads)
       do h = 1, n_harmonics
-         call pack_columns(self%matrix(:, :, h), n_active, used(:n_used), self%near((h - 1)*n + 1))
+         self%near_scale(h) = largest_part(self%matrix(:, :, h))
+         call pack_columns(self%matrix(:, :, h), 1.0_wp/self%near_scale(h), n_active, &
+                           used(:n_used), self%near((h - 1)*n + 1))
       end do
       !$omp end parallel do
    end subroutine pack_near
+
+   !> The largest real or imaginary part, 1 of a matrix that is all but zero.
+   pure real(wp) function largest_part(matrix) result(largest)
+      complex(wp), intent(in) :: matrix(:, :)
+      integer :: i, j
+
+      largest = 0.0_wp
+      do j = 1, size(matrix, 2)
+         do i = 1, size(matrix, 1)
+            largest = max(largest, abs(real(matrix(i, j), wp)), abs(aimag(matrix(i, j))))
+         end do
+      end do
+      ! Its reciprocal is to be finite.
+      if (.not. largest > tiny(1.0_wp)) largest = 1.0_wp
+   end function largest_part
 
    !> Numbers of a harmonic.
    pure integer function near_size(n_active, n_used)
@@ -472,8 +491,8 @@ contains
       !$omp parallel do default(none) private(h) shared(self, n, n_active, n_used, harmonic) &
       !$omp if(size(self%matrix, 1) >= coordinates_for_threads)
       do h = 1, size(harmonic)
-         call multiply_panels(n_used, n_active, self%near((h - 1)*n + 1), self%input(:, h), &
-                              self%output(:, h))
+         call multiply_panels(n_used, n_active, self%near((h - 1)*n + 1), self%near_scale(h), &
+                              self%input(:, h), self%output(:, h))
       end do
       !$omp end parallel do
       call coefficients_of(harmonic, column, n_used, m, self%output, product)

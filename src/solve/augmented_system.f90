@@ -237,6 +237,8 @@ contains
       integer, intent(out) :: n_linear
       logical :: reduced
 
+      ! Derivatives that products are to read nearly are taken as the inner system is linearized.
+      self%inner%nearly = self%nearly
       ! Who solves the inner system by itself finds it as it was.
       reduced = self%inner%reduced
       self%inner%reduced = self%reduced
@@ -258,7 +260,9 @@ contains
       self%adjusted = r(:n)
       self%unit = 0.0_wp
       call self%settle(r(n + 1:), self%unit(:self%n_linear_extra), self%adjusted)
+      self%inner%asked = self%asked
       call self%inner%reduce(self%adjusted, rhs(:k))
+      self%inner%asked = 0.0_wp
       call self%reduce_rows(self%adjusted, r(n + 1:), rhs(k + 1:))
    end subroutine reduce
 

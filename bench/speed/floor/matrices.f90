@@ -10,6 +10,8 @@ module floor_matrices
    use fw_column_panels, only: column_panels => panel_count
    use fw_column_panels, only: multiply_column
    use fw_column_product, only: multiply_columns
+   use fw_condensed_group, only: condensed_group
+   use fw_condensed_group, only: lanes
    use fw_kinds, only: sp
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
@@ -41,6 +43,9 @@ module floor_matrices
       complex(wp), allocatable, private :: stiffness(:, :, :), coupling(:, :), solved(:, :)
       complex(wp), allocatable, private :: input(:, :), output(:, :), inverse(:)
       type(complex_lu_type), private :: internal
+      !> Harmonics side by side, and loads (n_i, lanes), (m, lanes).
+      type(condensed_group), private :: group
+      complex(wp), allocatable, private :: load_i(:, :), load(:, :)
       !> S_n and what it is made of.
       complex(wp), allocatable, private :: pattern_i(:, :), pattern_solved(:, :), dynamic(:, :)
       complex(wp), allocatable, private :: amplitude(:), turned(:)
@@ -95,6 +100,8 @@ contains
          if (self%is_formed) then
             allocate (self%stiffness(m, m, self%n_harmonics), self%coupling(n_i, m), &
                       self%solved(n_i, m), source=cmplx(entry, kind=wp))
+            call self%group%reserve(structure%basis, self%n_harmonics)
+            allocate (self%load_i(n_i, lanes), self%load(m, lanes), source=zero)
             allocate (self%near_stiffness(m, m, self%n_harmonics), self%near_input(m), &
                       self%near_output(m), source=cmplx(entry, kind=sp))
             allocate (self%packed(2*column_height*m*column_panels(m), self%n_harmonics), &
@@ -116,6 +123,10 @@ contains
       type(plain_structure), intent(in) :: structure
       integer :: h
 
+      if (self%is_formed .and. self%by_panels .and. self%group%serves) then
+         call form_groups(self, structure)
+         return
+      end if
       do h = 1, self%n_harmonics
          if (self%is_coupled) call factor_internal(self)
          if (self%is_formed) then
@@ -129,6 +140,24 @@ contains
                  structure%basis%coupling, self%n_i*self%n_blocks, self%multiples, &
                  self%n_i*self%n_blocks, 1.0_wp, self%product, self%m)
    end subroutine condense
+
+   !> Z_r of all harmonics, several side by side.
+   subroutine form_groups(self, structure)
+      type(matrix_kernels), intent(inout) :: self
+      type(plain_structure), intent(in) :: structure
+      real(wp) :: s(self%n_harmonics)
+      integer :: first, h, last, n_failed
+
+      n_failed = 0
+      s = [(entry*h, h=1, self%n_harmonics)]
+      do first = 1, self%n_harmonics, lanes
+         last = min(first + lanes - 1, self%n_harmonics)
+         call self%group%form(structure%basis, s(first:last)**2, s(first:last), &
+                              self%load_i(:, :last - first + 1), &
+                              self%stiffness(:, :, first:last), &
+                              self%load(:, :last - first + 1), n_failed)
+      end do
+   end subroutine form_groups
 
    !> A matrix that elimination leaves as it is takes no less time than any other.
    subroutine factor_internal(self)
