@@ -25,6 +25,8 @@ module fw_python_session
    !> Of the last point, as the bits of reals.
    integer, parameter :: control_omega = 4, control_amplitude = 5, control_cycles = 6, &
                          control_depth = 7
+   !> Python sets how many points are enough (0: all).
+   integer, parameter :: control_wanted = 8
 
    type :: handle_type
       type(session_type) :: session
@@ -139,6 +141,9 @@ contains
       class(python_observer), intent(inout) :: self
 
       self%stop_requested = self%stop_requested .or. self%control(control_stop) /= 0_i8
+      if (self%control(control_wanted) > 0_i8) then
+         self%n_wanted = int(self%control(control_wanted))
+      end if
    end subroutine poll
 
    subroutine on_start(self, case_title, n_points)

@@ -170,10 +170,11 @@ contains
 
    !> Run the case. Another thread may set control(1) to stop the run, and read how many points
    !> are done in control(2), of control(3); of the last one, as the bits of a real, the frequency
-   !> [rad/s] in control(4), the largest amplitude, cycles and depth of wear (-1: not known).
+   !> [rad/s] in control(4), the largest amplitude, cycles and depth of wear (-1: not known). A
+   !> sweep ends after control(8) points, where that is set.
    subroutine run_case(number, control, in_memory, status)
       integer(i8), intent(in) :: number
-      integer(i8), intent(inout) :: control(7)
+      integer(i8), intent(inout) :: control(8)
       integer, intent(in) :: in_memory
       integer, intent(out) :: status
       type(handle_type), pointer :: handle
@@ -200,7 +201,7 @@ contains
    subroutine solve(number, omega, control, status)
       integer(i8), intent(in) :: number
       real(wp), intent(in) :: omega
-      integer(i8), intent(inout) :: control(7)
+      integer(i8), intent(inout) :: control(8)
       integer, intent(out) :: status
       type(handle_type), pointer :: handle
       !f2py threadsafe

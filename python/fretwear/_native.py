@@ -162,9 +162,10 @@ class Session:
 
         Parameters
         ----------
-        control : (7,) int64
-            Set the first to stop; the run counts its points in the second, of those in the third
-            (0: not known); the others are the bits of reals, see `fretwear._progress`.
+        control : (8,) int64
+            Set the first to stop, the last to end a sweep after so many points; the run counts its
+            points in the second, of those in the third (0: not known); the others are the bits of
+            reals, see `fretwear._progress`.
         in_memory : bool
             Write no result file; `image` has its bytes.
 

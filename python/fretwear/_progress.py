@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CONTROL", "Bar", "State", "read_state", "stages"]
+__all__ = ["CONTROL", "WANTED", "Bar", "State", "read_state", "stages"]
 
-#: Numbers that a run and this package share: stop, points done, points to come, and of the last
-#: point omega [rad/s], largest amplitude, cycles and depth of wear.
-CONTROL = 7
+#: Numbers that a run and this package share: stop, points done, points to come, of the last point
+#: omega [rad/s], largest amplitude, cycles and depth of wear, and how many points are enough (0:
+#: all).
+CONTROL, WANTED = 8, 7
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class State:
 
 def read_state(control: NDArray[np.int64]) -> State:
     """The state in the shared numbers."""
-    return State(int(control[1]), int(control[2]), *control[3:CONTROL].view(np.float64).tolist())
+    return State(int(control[1]), int(control[2]), *control[3:WANTED].view(np.float64).tolist())
 
 
 class Bar:

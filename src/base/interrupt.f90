@@ -19,6 +19,8 @@ module fw_interrupt
    type :: interrupt_type
       !> The run is to end, with what is done so far.
       logical :: stop_requested = .false.
+      !> Points that are enough: less than all of them where another run has taken over the rest.
+      integer :: n_wanted = huge(1)
       !> The time of the whole run was over.
       logical :: run_out = .false.
       !> Readings of the clock at which the run and the present point are to end.

@@ -40,6 +40,7 @@ module fw_one_level
       procedure :: describe
       procedure :: remember
       procedure :: recall
+      procedure :: start_anew
       final :: forget
    end type one_level
 
@@ -162,5 +163,13 @@ contains
 
       call self%level%solver%known%begin_with(memory%omega, memory%x)
    end subroutine recall
+
+   !> Neither solutions nor failures are known.
+   subroutine start_anew(self)
+      class(one_level), intent(inout) :: self
+
+      self%level%solver%known%kept = 0
+      self%level%solver%point_failures = 0
+   end subroutine start_anew
 
 end module fw_one_level

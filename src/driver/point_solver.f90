@@ -34,6 +34,7 @@ module fw_point_solver
    use fw_solver_options, only: pseudo_time_options
    use fw_solver_options, only: solver_kinsol
    use fw_solver_options, only: solver_newton
+   use fw_solver_options, only: solver_options
    use fw_solver_options, only: solver_powell
    use fw_solver_options, only: solver_pseudo_time
    use fw_text, only: to_text
@@ -120,7 +121,7 @@ contains
       type(point_type), intent(out) :: point
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      real(wp) :: tolerance
+      type(solver_options) :: kept
       integer(int64) :: clock, clock_end, rate
 
       call system_clock(clock, rate)
@@ -131,11 +132,17 @@ contains
       system%interrupt => request%interrupt
       if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)
       if (allocated(error)) return
-      tolerance = self%method%newton%options%tolerance
+      kept = self%method%newton%options
       if (request%by_newton) self%method%kind = solver_newton
-      self%method%newton%options%tolerance = max(tolerance, request%tolerance)
+      associate (options => self%method%newton%options)
+         options%tolerance = max(options%tolerance, request%tolerance)
+         if (request%most_iterations > 0) then
+            options%max_iterations = min(options%max_iterations, request%most_iterations)
+            options%fallback = .false.
+         end if
+      end associate
       call reach(self, case, system, request, report, point%iterations, error)
-      self%method%newton%options%tolerance = tolerance
+      self%method%newton%options = kept
       self%method%kind = case%solver%kind
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return

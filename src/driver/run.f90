@@ -91,6 +91,7 @@ contains
       if (allocated(error)) return
       ! Observers may be used again.
       observer%stop_requested = .false.
+      observer%n_wanted = huge(1)
       call observer%limit_run(case%max_seconds)
       if (present(image)) then
          call writer%open(case, error, in_memory=.true.)

@@ -70,6 +70,7 @@ contains
 
       call self%observer%poll()
       self%stop_requested = self%stop_requested .or. self%observer%stop_requested
+      self%n_wanted = self%observer%n_wanted
    end subroutine poll
 
    subroutine on_start(self, case_title, n_points)

@@ -40,6 +40,8 @@ module fw_strategy
       logical :: sensitivity = .false.
       !> Relative residual that is enough, where less than the case asks for is wanted.
       real(wp) :: tolerance = 0.0_wp
+      !> From one guess, with no more iterations than these (0: as the case has it).
+      integer :: most_iterations = 0
    contains
       procedure :: place
       procedure :: describe => describe_request
@@ -65,6 +67,7 @@ module fw_strategy
       procedure :: solve_in_time
       procedure :: remember => remember_nothing
       procedure :: recall => recall_nothing
+      procedure :: start_anew => keep_all
    end type point_strategy
 
    abstract interface
@@ -137,6 +140,14 @@ contains
       associate (unused => self, unused_memory => memory)
       end associate
    end subroutine recall_nothing
+
+   !> Start the next point as if it were the first; a strategy may go on from what it knows.
+   subroutine keep_all(self)
+      class(point_strategy), intent(inout) :: self
+
+      associate (unused => self)
+      end associate
+   end subroutine keep_all
 
    !> Solve within the time that the case gives a point. A stop is an error of status_stopped.
    subroutine solve_in_time(self, case, request, point, error)

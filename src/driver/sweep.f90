@@ -60,8 +60,8 @@ module fw_sweep
       real(wp), allocatable :: amplitude(:)
       !> On the way to the first of them, solved and not given (n_lead).
       real(wp), allocatable :: lead(:)
-      !> Points given so far.
-      integer :: n_given = 0
+      !> Points given so far, and those that are enough.
+      integer :: n_given = 0, n_wanted = huge(1)
       !> How each of them is solved.
       class(point_strategy), pointer :: strategy => null()
    contains
@@ -137,7 +137,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(point_request) :: request
 
-      more = self%n_given < size(self%place)
+      self%n_wanted = observer%n_wanted
+      more = .not. self%is_covered()
       if (.not. more) return
       if (self%n_given == 0 .and. allocated(self%lead)) then
          call come_to_first(self, case, observer, error)
@@ -152,8 +153,9 @@ contains
       self%n_given = self%n_given + 1
    end subroutine next_of_list
 
-   !> Solve on the way to the first row; what fails there is of no account, and what is solved only
-   !> tells solutions apart.
+   !> Solve on the way to the first row: what is solved there only tells solutions apart. Where the
+   !> way is too rough for its steps, the first row starts as that of a sweep does: it costs less
+   !> than failures that follow each other, and takes no guess from afar.
    subroutine come_to_first(self, case, observer, error)
       class(list_source), intent(inout) :: self
       type(case_type), intent(in) :: case
@@ -163,6 +165,8 @@ contains
       type(point_type) :: point
       !> Residual that is enough.
       real(wp), parameter :: on_the_way = 1.0e-3_wp
+      !> Iterations of a step that is short enough.
+      integer, parameter :: most_iterations = 8
       integer :: k
 
       do k = 1, size(self%lead)
@@ -174,8 +178,12 @@ contains
          request%histories = .false.
          request%sensitivity = .false.
          request%tolerance = on_the_way
+         request%most_iterations = most_iterations
          call self%strategy%solve_in_time(case, request, point, error)
          if (allocated(error)) return
+         if (point%converged) cycle
+         call self%strategy%start_anew()
+         exit
       end do
       deallocate (self%lead)
    end subroutine come_to_first
@@ -184,7 +192,7 @@ contains
    pure logical function all_given(self)
       class(list_source), intent(in) :: self
 
-      all_given = self%n_given == size(self%place)
+      all_given = self%n_given >= min(size(self%place), self%n_wanted)
    end function all_given
 
    !> The frequencies that a case asks for [rad/s], or the values of its parameter: those of the
@@ -201,15 +209,29 @@ contains
       end associate
    end function sweep_places
 
-   !> Those on the way to a piece, in even steps from the start of the sweep.
+   !> Those on the way to a piece, from the start of the sweep in steps that shorten evenly: the
+   !> rows that follow are close to each other, and extrapolate the last ones.
    pure function lead_places(case) result(places)
       type(case_type), intent(in) :: case
       real(wp), allocatable :: places(:)
-      integer :: k, n
+      integer :: before, k, n
 
-      n = min(case%sweep%lead_points, case%sweep%first_point - 1)
+      before = case%sweep%first_point - 1
+      n = min(case%sweep%lead_points, before)
       places = all_places(case)
-      places = places([(1 + ((k - 1)*(case%sweep%first_point - 1))/n, k=1, n)])
+      places = places([(lead_point(k), k=1, n)])
+
+   contains
+
+      !> Each once, where there are hardly more points than these.
+      pure integer function lead_point(k)
+         integer, intent(in) :: k
+         real(wp) :: left
+
+         left = real(n + 1 - k, wp)/real(n, wp)
+         lead_point = min(1 + int(real(before, wp)*(1.0_wp - left**2)), before - n + k)
+      end function lead_point
+
    end function lead_places
 
    !> Those of the whole sweep.

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["OVERLAP", "Piece", "cut"]
+__all__ = ["OVERLAP", "Piece", "cut", "divided"]
 
 #: Rows that a piece solves beyond its own on either side: there two pieces are compared, and a
 #: maximum at a cut has its neighbours.
-OVERLAP = 4
+OVERLAP = 2
 #: Points over the whole sweep from which those on the way to a piece are taken: from the start of
 #: the sweep to its first row, so that it comes to the same solutions as a sweep would.
 _LEADS = 12
 #: What one of them costs, in rows: its step is longer.
 _COST = 2.0
 #: Rows below which a piece does not pay.
-_LEAST = 4 * OVERLAP
+_LEAST = 16
 
 
 @dataclass(frozen=True)
@@ -61,3 +61,17 @@ def cut(n_points: int, n_pieces: int) -> list[Piece]:
     before = [round(n_points * (1.0 - left**k) / (1.0 - left**n_pieces))
               for k in range(n_pieces + 1)]
     return [Piece(a + 1, b, n_points) for a, b in zip(before, before[1:])]
+
+
+def divided(piece: Piece, row: int) -> tuple[Piece, Piece] | None:
+    """A piece whose worker is at a row, for two workers: what it keeps, and what another takes.
+
+    Both end at once if the rows take the same time: the other one has its lead before it, and
+    solves rows beyond the cut as the first one does. None where too few rows are left.
+    """
+    lead = _COST * Piece(piece.last, piece.last, piece.n_points).lead
+    taken = int(piece.last - row - OVERLAP - lead) // 2
+    if taken < _LEAST:
+        return None
+    cut_at = piece.last - taken
+    return Piece(piece.first, cut_at, piece.n_points), Piece(cut_at + 1, piece.last, piece.n_points)

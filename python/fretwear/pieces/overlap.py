@@ -33,16 +33,19 @@ class Part:
     Attributes
     ----------
     piece : Piece
-        What was asked for.
+        What it is of.
     image : bytes
         What a result file would hold.
     was_stopped : bool
         Whether it has not come to its end.
+    seconds : tuple of float
+        When it was begun and when it ended, by the clock of its worker.
     """
 
     piece: Piece
     image: bytes
     was_stopped: bool
+    seconds: tuple[float, float]
 
     @contextmanager
     def open(self) -> Iterator[h5py.File]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -21,16 +22,19 @@ from ..result import Result
 from .cutting import Piece, cut
 from .joining import join
 from .overlap import Part, agree, tolerance_of
+from .sharing import AtWork, Board
 
 __all__ = ["run_in_pieces"]
 
 
 def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress | None,
-                  is_stopped: Callable[[], object] | None, *,
-                  in_memory: bool) -> tuple[Result, list[str]]:
+                  is_stopped: Callable[[], object] | None, *, in_memory: bool,
+                  see: Callable[[Sequence[Part]], object] | None = None
+                  ) -> tuple[Result, list[str]]:
     """Run a natural sweep in pieces, and join them.
 
-    Where two pieces do not agree in the rows that both have solved, there are several solutions;
+    A worker of this process that is ready takes over half of what another one has before it. Where
+    two pieces do not agree in the rows that both have solved, there are several solutions;
     both are then solved again as one, so that the rows are those of a sweep.
 
     Parameters
@@ -45,6 +49,8 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
         As in `fretwear.run`.
     in_memory : bool
         Write no file.
+    see : callable, optional
+        Given the parts before they are joined.
 
     Returns
     -------
@@ -66,6 +72,8 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
                 parts, remarks = _solve(case, plan, pool, watch)
     if not parts:
         raise RunInterrupted(None)
+    if see is not None:
+        see(parts)
     image = join(parts, plan.places, text, time.monotonic() - started, remarks,
                  was_stopped=watch.ended)
     result = Result.from_bytes(image, case)
@@ -127,12 +135,12 @@ class _Watch:
     control: NDArray[np.int64]
     total: int
     ended: bool = False
-    states: dict[Piece, State] = field(default_factory=dict)
+    board: Board = field(default_factory=Board)
 
     def tick(self) -> bool:
         """Whether to end."""
-        if self.tell is not None and self.states:
-            states = list(self.states.values())
+        states = self.board.states
+        if self.tell is not None and states:
             newest = max(states, key=lambda state: state.done)
             self.tell(State(min(sum(state.done for state in states), self.total), self.total,
                             newest.omega, newest.amplitude, newest.cycles, newest.depth))
@@ -146,15 +154,16 @@ def _solve(case: Case, plan: _Plan, pool: Pool, watch: _Watch) -> tuple[list[Par
     wanted = cut(len(plan.places), pool.workers)
     parts: dict[Piece, Part] = {}
     remarks: list[str] = []
+    work = _Work(case, watch.board if type(pool) is Pool else None)
     while wanted and not watch.ended:
-        local = type(pool) is Pool
-        work = _Work(case, watch.states if local and watch.tell is not None else None)
-        for part in pool.run(work, wanted, tick=watch.tick):
+        for part in chain.from_iterable(pool.run(work, wanted, tick=watch.tick)):
             watch.ended = watch.ended or part.was_stopped
             if part.image:
                 parts[part.piece] = part
         if watch.ended:
             break
+        # What is solved again as one shall not be cut once more.
+        watch.board.is_shared = False
         in_order = sorted(parts.values(), key=lambda part: part.piece.first)
         groups: list[list[Part]] = []
         for part in in_order:
@@ -177,21 +186,33 @@ def _told(plan: _Plan, piece: Piece, difference: float) -> str:
 
 
 class _Work:
-    """Solves one piece; travels to other processes."""
+    """Solves one piece, then what others have left; travels to other processes, without a board."""
 
-    def __init__(self, case: Case, states: dict[Piece, State] | None) -> None:
-        self._case, self._states = case, states
+    def __init__(self, case: Case, board: Board | None) -> None:
+        self._case, self._board = case, board
 
-    def __call__(self, piece: Piece, stop: threading.Event | None = None) -> Part:
-        first, last = piece.solved
-        sweep: Any = {"first_point": first, "last_point": last, "lead_points": piece.lead}
+    def __call__(self, piece: Piece, stop: threading.Event | None = None) -> list[Part]:
+        if self._board is None:
+            return [self._solve(AtWork(piece), stop)]
+        parts: list[Part] = []
+        following: Piece | None = piece
+        while following is not None:
+            with self._board.solving(following) as work:
+                part = self._solve(work, stop)
+            # Others may have taken rows of it meanwhile.
+            parts.append(replace(part, piece=work.piece))
+            following = None if part.was_stopped else self._board.take()
+        return parts
+
+    def _solve(self, work: AtWork, stop: threading.Event | None) -> Part:
+        started = time.monotonic()
+        first, last = work.piece.solved
+        sweep: Any = {"first_point": first, "last_point": last, "lead_points": work.piece.lead}
         case = self._case.replace(sweep=sweep, case={"threads": 1})
-        states = self._states
-        tell = None if states is None else lambda state: states.__setitem__(piece, state)
         with case.open() as session:
-            status, _ = run_watched(session, tell, None if stop is None else stop.is_set,
-                                    in_memory=True)
+            status, _ = run_watched(session, None, None if stop is None else stop.is_set,
+                                    in_memory=True, control=work.control)
             if status not in (NOT_CONVERGED, STOPPED):
                 raise_status(status, session.text("message"))
-            return Part(piece, session.image(), status == STOPPED)
-
+            return Part(work.piece, session.image(), status == STOPPED,
+                        (started, time.monotonic()))
