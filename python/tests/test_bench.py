@@ -284,3 +284,38 @@ def test_kernels_are_compared_by_the_step_where_their_paths_differ() -> None:
     assert row_of("path", [1.5, 1.0], [6, 5]) == ("path", "1.50 (6)", "1.00 (5)", "1e+03",
                                                   "1.25: met")
     assert row_of("slow", [1.5, 1.0], [5, 5])[-1] == "1.50: missed"
+
+
+def worn(scheme: str, error: float, cpu: float) -> Any:
+    from bench.precision.worn import WearPoint
+
+    return WearPoint(scheme, "", 1, 1, error, cpu)
+
+
+def test_times_at_an_error_lie_on_the_frontier_of_a_scheme() -> None:
+    from bench.precision.worn import time_at
+
+    # A power law between points; one that another beats in error and time is left out, and one
+    # without a steady state too.
+    points = [worn("a", 1e-2, 1.0), worn("a", 1e-4, 4.0), worn("a", 5e-3, 3.9),
+              worn("a", math.nan, math.nan), worn("a", 2e-2, 2.0)]
+    steep = math.log(1e-2 / 5e-3) / math.log(1e-2 / 1e-3)
+    assert time_at(5e-3, points) == pytest.approx(3.9)
+    assert time_at(1e-3, points[:2]) == pytest.approx(2.0)
+    assert time_at(5e-3, points[:2]) == pytest.approx(2.0**steep)
+    assert time_at(1e-2, points) == pytest.approx(1.0)
+    # The fastest run may be more accurate than it has to be.
+    assert time_at(1.5e-2, points) == pytest.approx(1.0)
+    assert math.isnan(time_at(1e-5, points)) and math.isnan(time_at(1e-2, []))
+
+
+def test_wear_at_equal_error_is_judged() -> None:
+    from bench.precision.worn import times_at_equal_error
+
+    points = [worn(name, error, cpu * at) for name, cpu in (
+        ("implicit, order 1", 1.0), ("implicit, order 2", 0.5), ("pseudo-time, order 1", 0.28),
+        ("pseudo-time, Rosenbrock", 0.25)) for error, at in ((1e-2, 1.0), (1e-4, 4.0))]
+    text = "\n".join(times_at_equal_error(points))
+    assert text.count("| 0.28: met | 0.56 |") == 3
+    assert text.count("| 0.25: missed | 0.50 |") == 3 and "pseudo-time, Rosenbrock, 0.50" in text
+    assert times_at_equal_error(points[:2])[-1].count(" - |") >= 3
