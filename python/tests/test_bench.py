@@ -319,3 +319,14 @@ def test_wear_at_equal_error_is_judged() -> None:
     assert text.count("| 0.28: met | 0.56 |") == 3
     assert text.count("| 0.25: missed | 0.50 |") == 3 and "pseudo-time, Rosenbrock, 0.50" in text
     assert times_at_equal_error(points[:2])[-1].count(" - |") >= 3
+
+
+def test_two_workers_are_judged_by_medians_and_their_rows() -> None:
+    from bench.speed.workers import Turns, waiting
+
+    turns = Turns("sweep", [2.0, 1.9, 3.0], [1.0, 1.1, 0.9], 2e-6)
+    assert turns.row == ("sweep", "2.00 (1.90)", "1.00 (0.90)", "2.00: met", "2.11", "2e-06")
+    slow = Turns("sweep", [1.7], [1.0], 1e-3)
+    assert slow.row[3] == "1.70: missed" and slow.row[-1] == "1e-03, NOT the same"
+    # The second worker begins one second later, and has nothing to do for half a second.
+    assert waiting([(0.0, 4.0), (1.0, 2.0), (2.5, 4.0)]) == pytest.approx(1.5)
