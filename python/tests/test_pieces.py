@@ -13,7 +13,7 @@ from rubbing import RUBBING
 
 import fretwear as fw
 from fretwear._native import Session, namelist_values
-from fretwear._progress import WANTED
+from fretwear._progress import CONTROL, WANTED
 from fretwear.cli import main
 from fretwear.pieces import cutting, running
 from fretwear.pieces.cutting import OVERLAP, cut
@@ -220,13 +220,25 @@ def test_lists_in_no_order_and_negative_numbers_are_refused() -> None:
 
 def test_a_piece_has_the_rows_of_its_sweep() -> None:
     whole = fw.run(SLIDING)
-    piece = fw.run(SLIDING.replace(sweep={"first_point": 20, "last_point": 30, "lead_points": 4}))
-    assert piece.omega.tobytes() == whole.omega[19:30].tobytes()
-    assert np.allclose(piece.coefficients, whole.coefficients[19:30], rtol=0.0, atol=SAME)
+    for leads in (0, 1, 4, 19, 400):
+        piece = fw.run(SLIDING.replace(sweep={"first_point": 20, "last_point": 30,
+                                              "lead_points": leads}))
+        assert piece.omega.tobytes() == whole.omega[19:30].tobytes()
+        assert np.allclose(piece.coefficients, whole.coefficients[19:30], rtol=0.0, atol=SAME)
     for sweep, told in (({"first_point": 66}, "first_point = 66: must be one of the 65"),
                         ({"first_point": 9, "last_point": 8}, "from first_point = 9 to 65")):
         with pytest.raises(fw.InputError, match=told):
             SLIDING.replace(sweep=sweep).check()  # type: ignore[typeddict-item]
+
+
+def test_a_sweep_ends_after_the_points_that_are_wanted() -> None:
+    control = np.zeros(CONTROL, dtype=np.int64)
+    control[WANTED] = 9
+    with SLIDING.open() as session:
+        assert session.run(control, in_memory=True) == 0
+        part = fw.Result.from_bytes(session.image(), SLIDING)
+    assert part.status == "complete" and control[1] == 9
+    assert part.coefficients.tobytes() == fw.run(SLIDING).coefficients[:9].tobytes()
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -164,7 +164,7 @@ contains
       type(point_request) :: request
       type(point_type) :: point
       !> Residual that is enough.
-      real(wp), parameter :: on_the_way = 1.0e-3_wp
+      real(wp), parameter :: on_the_way = 1.0e-2_wp
       !> Iterations of a step that is short enough.
       integer, parameter :: most_iterations = 8
       integer :: k
