@@ -16,6 +16,8 @@ _LEADS = 12
 _COST = 2.0
 #: Rows below which a piece does not pay.
 _LEAST = 16
+#: The same of rows that another worker takes over: it sets up the case and finds its way anew.
+_LEAST_TAKEN = 32
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def divided(piece: Piece, row: int) -> tuple[Piece, Piece] | None:
     """
     lead = _COST * Piece(piece.last, piece.last, piece.n_points).lead
     taken = int(piece.last - row - OVERLAP - lead) // 2
-    if taken < _LEAST:
+    if taken < _LEAST_TAKEN:
         return None
     cut_at = piece.last - taken
     return Piece(piece.first, cut_at, piece.n_points), Piece(cut_at + 1, piece.last, piece.n_points)
