@@ -51,34 +51,48 @@ contains
       tile(:, 2) = re_im + im_re
    end subroutine multiply_column
 
-   !> Pack rows and columns of a matrix, times a factor.
-   pure subroutine pack_columns(matrix, factor, n_columns, rows, panels)
+   !> Pack rows and columns of a matrix, to the order of one: single precision ends at 1e38.
+   pure subroutine pack_columns(matrix, n_columns, rows, panels, largest)
       complex(wp), intent(in) :: matrix(:, :)
-      !> Brings the entries to the order of one: single precision ends at 1e38.
-      real(wp), intent(in) :: factor
       !> Numbers of the rows; the first n_columns of them are those of the columns.
       integer, intent(in) :: n_columns, rows(:)
       real(sp), intent(inout) :: panels(panel_height, 2, n_columns, *)
+      !> What the panels are to be multiplied by.
+      real(wp), intent(out) :: largest
+      real(wp) :: factor
       integer :: i, j, p
 
+      largest = 0.0_wp
+      do j = 1, n_columns
+         do i = 1, size(rows)
+            associate (entry => matrix(rows(i), rows(j)))
+               largest = max(largest, abs(real(entry, wp)), abs(aimag(entry)))
+            end associate
+         end do
+      end do
+      ! Its reciprocal is to be finite.
+      if (.not. largest > tiny(1.0_wp)) largest = 1.0_wp
+      factor = 1.0_wp/largest
       panels(:, :, :, panel_count(size(rows))) = 0.0_sp
       do j = 1, n_columns
          do p = 1, panel_count(size(rows))
             associate (first => (p - 1)*panel_height)
                do i = 1, min(panel_height, size(rows) - first)
-                  panels(i, 1, j, p) = real(factor*real(matrix(rows(first + i), rows(j)), wp), sp)
-                  panels(i, 2, j, p) = real(factor*aimag(matrix(rows(first + i), rows(j))), sp)
+                  associate (entry => matrix(rows(first + i), rows(j)))
+                     panels(i, 1, j, p) = real(factor*real(entry, wp), sp)
+                     panels(i, 2, j, p) = real(factor*aimag(entry), sp)
+                  end associate
                end do
             end associate
          end do
       end do
    end subroutine pack_columns
 
-   !> product = scale matrix column.
+   !> product = scale panels column.
    pure subroutine multiply_panels(n_rows, n_columns, panels, scale, column, product)
       integer, intent(in) :: n_rows, n_columns
-      real(wp), intent(in) :: scale
       real(sp), intent(in) :: panels(panel_height, 2, n_columns, *)
+      real(wp), intent(in) :: scale
       complex(wp), intent(in) :: column(n_columns)
       complex(wp), intent(inout) :: product(n_rows)
       real(sp) :: usual_room(2, usual)
@@ -94,8 +108,8 @@ contains
 
    pure subroutine multiply_in(n_rows, n_columns, panels, scale, column, right, product)
       integer, intent(in) :: n_rows, n_columns
-      real(wp), intent(in) :: scale
       real(sp), intent(in) :: panels(panel_height, 2, n_columns, *)
+      real(wp), intent(in) :: scale
       complex(wp), intent(in) :: column(n_columns)
       !> Room.
       real(sp), intent(inout) :: right(2, n_columns)
@@ -104,7 +118,7 @@ contains
       real(wp) :: largest
       integer :: first, i, n, p
 
-      ! Single precision ends at 1e38: to the order of one before.
+      ! To the order of one, as the panels are.
       largest = 0.0_wp
       do i = 1, n_columns
          largest = max(largest, abs(real(column(i), wp)), abs(aimag(column(i))))
@@ -118,7 +132,7 @@ contains
          first = (p - 1)*panel_height
          n = min(panel_height, n_rows - first)
          call multiply_column(n_columns, panels(1, 1, 1, p), right, tile)
-         product(first + 1:first + n) = (scale*largest)*cmplx(tile(:n, 1), tile(:n, 2), wp)
+         product(first + 1:first + n) = scale*(largest*cmplx(tile(:n, 1), tile(:n, 2), wp))
       end do
    end subroutine multiply_in
 

@@ -35,7 +35,7 @@ module fw_formed_stiffness
       logical :: is_static = .false.
       real(wp), allocatable, private :: static(:, :), static_active(:)
       !> Rows and columns in use in single precision, for what only has to be near, one harmonic
-      !> behind the other, each over its largest entry (n_retained).
+      !> behind the other, and what each is to be multiplied by (n_retained).
       real(sp), allocatable, private :: near(:)
       real(wp), allocatable, private :: near_scale(:)
       !> Harmonics side by side.
@@ -448,27 +448,11 @@ contains
       !$omp parallel do default(none) private(h) shared(self, n, n_active, n_used, used) &
       !$omp shared(n_harmonics) if(size(self%matrix, 1) >= coordinates_for_threads)
       do h = 1, n_harmonics
-         self%near_scale(h) = largest_part(self%matrix(:, :, h))
-         call pack_columns(self%matrix(:, :, h), 1.0_wp/self%near_scale(h), n_active, &
-                           used(:n_used), self%near((h - 1)*n + 1))
+         call pack_columns(self%matrix(:, :, h), n_active, used(:n_used), &
+                           self%near((h - 1)*n + 1), self%near_scale(h))
       end do
       !$omp end parallel do
    end subroutine pack_near
-
-   !> The largest real or imaginary part, 1 of a matrix that is all but zero.
-   pure real(wp) function largest_part(matrix) result(largest)
-      complex(wp), intent(in) :: matrix(:, :)
-      integer :: i, j
-
-      largest = 0.0_wp
-      do j = 1, size(matrix, 2)
-         do i = 1, size(matrix, 1)
-            largest = max(largest, abs(real(matrix(i, j), wp)), abs(aimag(matrix(i, j))))
-         end do
-      end do
-      ! Its reciprocal is to be finite.
-      if (.not. largest > tiny(1.0_wp)) largest = 1.0_wp
-   end function largest_part
 
    !> Numbers of a harmonic.
    pure integer function near_size(n_active, n_used)

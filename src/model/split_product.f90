@@ -31,8 +31,10 @@ module fw_split_product
       complex(wp), allocatable :: dynamic(:, :, :)
       !> Rows, and columns among them.
       integer, private :: n_used = 0, n_active = 0
-      !> [K V] of the rows in use in panels, V of the columns (n_active, rank).
+      !> [K/scale V/sqrt(scale)] of the rows in use in panels, V of the columns (n_active, rank).
       real(sp), allocatable, private :: rows(:)
+      !> The largest stiffness, because single precision ends at 1e38.
+      real(wp), private :: scale = 1.0_wp
       real(wp), allocatable, private :: v(:, :)
       !> Right-hand sides in groups; patterns (rank, n_coefficients) and their amplitudes.
       real(sp), allocatable, private :: groups(:)
@@ -53,7 +55,7 @@ contains
       integer, intent(in) :: n_coefficients, n_active, n_used
       !> First n_used entries; the first n_active of them are columns.
       integer, intent(in) :: used(:)
-      integer :: n_stored
+      integer :: j, n_stored
 
       self%n_used = n_used
       self%n_active = n_active
@@ -67,21 +69,29 @@ contains
          allocate (self%groups(group_width*(size(part%v, 1) + part%rank)* &
                                group_count(n_coefficients)))
       end if
-      call fill_rows(basis, part, n_active, n_used, used, n_active + part%rank, self%rows)
+      ! Of a static stiffness the largest entry is on the diagonal. Its reciprocal is to be finite.
+      self%scale = maxval([(abs(basis%blocks(used(j), used(j), 1)), j=1, n_active)])
+      if (.not. self%scale > tiny(1.0_wp)) self%scale = 1.0_wp
+      call fill_rows(basis, part, n_active, n_used, used, n_active + part%rank, &
+                     1.0_wp/self%scale, self%rows)
    end subroutine pack_rows
 
    !> A few columns of the matrix at a time, which stay at hand while the panels go through their
    !> rows; threads share them.
-   subroutine fill_rows(basis, part, n_active, n_used, used, n_inner, panels)
+   subroutine fill_rows(basis, part, n_active, n_used, used, n_inner, factor, panels)
       type(reduction_type), intent(in) :: basis
       type(dynamic_part), intent(in) :: part
       integer, intent(in) :: n_active, n_used, n_inner
       integer, intent(in) :: used(:)
+      !> Of K, and of V its root.
+      real(wp), intent(in) :: factor
       real(sp), intent(inout) :: panels(panel_height, n_inner, *)
+      real(wp) :: root
       integer :: first, i, j, k, n, p
 
+      root = sqrt(factor)
       !$omp parallel do default(none) private(first, i, j, k, n, p) &
-      !$omp shared(basis, part, n_active, n_used, n_inner, used, panels) &
+      !$omp shared(basis, part, n_active, n_used, n_inner, used, factor, root, panels) &
       !$omp if(n_used >= coordinates_for_threads)
       do k = 1, n_inner, columns_at_hand
          do p = 1, panel_count(n_used)
@@ -92,11 +102,11 @@ contains
                panels(n + 1:, j, p) = 0.0_sp
                if (j <= n_active) then
                   do i = 1, n
-                     panels(i, j, p) = real(basis%blocks(used(first + i), used(j), 1), sp)
+                     panels(i, j, p) = real(factor*basis%blocks(used(first + i), used(j), 1), sp)
                   end do
                else
                   do i = 1, n
-                     panels(i, j, p) = real(part%v(used(first + i), j - n_active), sp)
+                     panels(i, j, p) = real(root*part%v(used(first + i), j - n_active), sp)
                   end do
                end if
             end do
@@ -134,10 +144,10 @@ contains
       end do
       call coefficients_of(factors%harmonic, factors%column, rank, rank, self%turned, &
                            self%patterns)
-      call fill_groups(self%n_active, rank, n_inner, n_coefficients, largest, v, self%patterns, &
-                       shares_columns, self%groups)
-      call multiply_panels(self%n_used, n_inner, n_coefficients, self%rows, self%groups, largest, &
-                           threaded, n_stored, product)
+      call fill_groups(self%n_active, rank, n_inner, n_coefficients, largest, self%scale, v, &
+                       self%patterns, shares_columns, self%groups)
+      call multiply_panels(self%n_used, n_inner, n_coefficients, self%rows, self%groups, &
+                           self%scale*largest, threaded, n_stored, product)
    end subroutine multiply
 
    !> V^T v, and the largest entry of v. Threads share groups of columns.
@@ -162,19 +172,20 @@ contains
       !$omp end parallel do
    end subroutine find_patterns
 
-   !> [v; S V^T v] over the largest entry, in groups of columns: single precision ends at 1e38.
-   subroutine fill_groups(n_active, rank, n_inner, n_columns, largest, v, patterns, threaded, &
-                          groups)
+   !> [v; S V^T v/sqrt(scale)] over the largest entry of v, in groups of columns.
+   subroutine fill_groups(n_active, rank, n_inner, n_columns, largest, scale, v, patterns, &
+                          threaded, groups)
       integer, intent(in) :: n_active, rank, n_inner, n_columns
-      real(wp), intent(in) :: largest, v(n_active, n_columns), patterns(rank, n_columns)
+      real(wp), intent(in) :: largest, scale, v(n_active, n_columns), patterns(rank, n_columns)
       logical, intent(in) :: threaded
       real(sp), intent(inout) :: groups(group_width, n_inner, *)
-      real(wp) :: factor
+      real(wp) :: factor, of_patterns
       integer :: g, i, k, p
 
       factor = 1.0_wp/largest
+      of_patterns = 1.0_wp/sqrt(scale)
       !$omp parallel do default(none) private(g, i, k, p) if(threaded) &
-      !$omp shared(n_active, rank, n_columns, factor, v, patterns, groups)
+      !$omp shared(n_active, rank, n_columns, factor, of_patterns, v, patterns, groups)
       do g = 1, group_count(n_columns)
          do p = 1, group_width
             k = (g - 1)*group_width + p
@@ -186,7 +197,7 @@ contains
                groups(p, i, g) = real(factor*v(i, k), sp)
             end do
             do i = 1, rank
-               groups(p, n_active + i, g) = real(factor*patterns(i, k), sp)
+               groups(p, n_active + i, g) = real(factor*(of_patterns*patterns(i, k)), sp)
             end do
          end do
       end do
