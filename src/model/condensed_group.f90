@@ -12,7 +12,7 @@
 !> (`is_regular` looks at it): a Schur complement with respect to modes E adds
 !> S_kE (R_EE + i S_EE)^-1 S_El, which is at most sqrt(S_kk S_ll), because
 !> (S_EE^(-1/2) R_EE S_EE^(-1/2) + i)^-1 is at most 1. L may have large entries, but what round-off
-!> follows, |L| |d| |L|^T, is made of differences of such complements and is as small as D. A damping
+!> follows, |L| |d| |L|^T, is made of differences of such complements and is as small as D. Damping
 !> that excites (an imaginary part of theta) leaves S without a sign, and is for a library.
 !> K, M and C are symmetric.
 module fw_condensed_group
