@@ -111,9 +111,8 @@ contains
       options = self
       options%n_harmonics = n_harmonics
       if (options%method == method_hdhb) options%n_time = 0
-      ! Those of `sampling = 'auto'` may come to be located too.
       least = 2*n_harmonics + 1
-      if (options%sampling /= sampling_uniform) least = instants_per_event_wave*n_harmonics
+      if (options%sampling == sampling_events) least = instants_per_event_wave*n_harmonics
       do while (options%n_time > 0 .and. options%n_time < least)
          options%n_time = 2*options%n_time
       end do

@@ -216,6 +216,7 @@ contains
       type(rule_type), intent(in) :: rule
       real(wp), intent(in) :: h, dp(n_points, 2), radius(n_points), slope_0
       type(stages_type), intent(inout) :: stages
+      real(wp), parameter :: smallest = 1.0e-100_wp
       real(wp) :: v(2), w(2), d(2), a(n_points, 2), length, ratio, x
       integer :: i, j
 
@@ -227,8 +228,10 @@ contains
       end if
       ! A mean direction for each gap: stable however stiff, and near enough for Newton's method.
       v = direction_of(0.5_wp*stages%phi(1))
+      ! Finite where R vanishes, and its square too.
+      x = max(smallest*h*maxval(abs(dp)), tiny(1.0_wp))
       do j = 1, 2
-         a(:, j) = (0.25_wp*h)*dp(:, j)/max(radius, tiny(1.0_wp))
+         a(:, j) = (0.25_wp*h)*dp(:, j)/max(radius, x)
       end do
       do j = 2, n_stages + 1
          d = (rule%place(j) - rule%place(j - 1))*(a(j - 1, :) + a(j, :))
