@@ -1,6 +1,6 @@
 """A sweep of 401 points by one worker and by two, written to a page.
 
-    python -m bench.speed.workers [--build build/release] [--cases 1 2 3 4] [--turns 5] [--quick]
+    python -m bench.speed.workers [--build build/release] [--cases 1 2 3 4] [--turns 3] [--quick]
         [--page docs/benchmarks/workers.md]
 
 Wall times of the whole command `fretwear run CASE.nml --workers N`, by turns; a worker has one
@@ -38,8 +38,8 @@ N_POINTS, QUICK_POINTS, WANTED = 401, 41, 1.8
 #: fretwear.pieces.overlap.
 SAME = 1e-5
 #: Pairs, harmonics and range [Hz] with the peak in the middle, of 96 pairs at two thirds.
-SWEEPS = ((16, 3, 1014.7, 1030.7), (48, 7, 1009.8, 1025.8), (96, 7, 1017.7, 1033.7),
-          (192, 7, 1023.0, 1039.0))
+SWEEPS = ((48, 7, 1009.8, 1025.8), (96, 7, 1017.7, 1033.7), (192, 7, 1023.0, 1039.0),
+          (192, 17, 1023.0, 1039.0))
 
 
 @dataclass
@@ -149,7 +149,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--build", type=Path, default=ROOT / "build" / "release")
     parser.add_argument("--page", type=Path, default=PAGE)
-    parser.add_argument("--turns", type=int, default=5)
+    parser.add_argument("--turns", type=int, default=3)
     parser.add_argument("--cases", type=int, nargs="+", default=list(range(1, len(SWEEPS) + 1)),
                         help="numbers of those to measure")
     parser.add_argument("--quick", action="store_true",
