@@ -27,7 +27,7 @@ module fw_linalg
    private
 
    public :: lu_type, complex_lu_type, solve_symmetric_eigen, diagonalize, &
-             solve_symmetric_above, is_positive_definite
+             solve_symmetric_above, is_positive_definite, has_pivots
 
    !> LU factors of a real matrix. The storage only grows, so that refactoring does not allocate.
    type :: lu_type
@@ -318,5 +318,31 @@ contains
       positive = .not. allocated(error)
       if (positive) positive = values(1) > round_off
    end function is_positive_definite
+
+   !> Whether Cholesky's pivots of a symmetric matrix are above round-off: one that is singular may
+   !> pass by the sign of its last pivots. Cheaper than `is_positive_definite`, and content with
+   !> less.
+   logical function has_pivots(a)
+      !> (n, n)
+      real(wp), intent(in) :: a(:, :)
+      !> Of the scaled matrix: some times the round-off of its sums.
+      real(wp), parameter :: round_off = 1.0e-13_wp
+      real(wp), allocatable :: scaled(:, :)
+      integer :: i, info, j, n
+
+      n = size(a, 1)
+      has_pivots = all([(a(i, i) > 0.0_wp, i=1, n)])
+      if (.not. has_pivots .or. n == 0) return
+      allocate (scaled(n, n))
+      do j = 1, n
+         scaled(:, j) = a(:, j)/sqrt(a(j, j))
+      end do
+      do j = 1, n
+         scaled(j, :) = scaled(j, :)/sqrt(a(j, j))
+      end do
+      call dpotrf('U', n, scaled, n, info)
+      has_pivots = info == 0
+      if (has_pivots) has_pivots = all([(scaled(i, i)**2 > round_off, i=1, n)])
+   end function has_pivots
 
 end module fw_linalg

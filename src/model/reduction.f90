@@ -7,6 +7,7 @@ module fw_reduction
    use fw_error, only: fatal_error
    use fw_error, only: status_input
    use fw_lapack, only: dgemm
+   use fw_linalg, only: has_pivots
    use fw_linalg, only: solve_symmetric_eigen
    use fw_model, only: model_type
    use fw_relative, only: relative_type
@@ -184,7 +185,7 @@ contains
 
       k = congruence(t_i, model%stiffness, t_i)
       m = congruence(t_i, model%mass, t_i)
-      do trial = 1, size(shift_trials)
+      do trial = merge(1, 2, has_pivots(k)), size(shift_trials)
          ! In units of the ratio of both matrices; no shift where K alone is positive definite.
          shift = shift_trials(trial)*norm2(k)/max(norm2(m), tiny(1.0_wp))
          call solve_symmetric_eigen(m, k + shift*m, m_i, modes, done)
