@@ -4,6 +4,7 @@ module fw_sector_modes
    use fw_case, only: case_type
    use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type
+   use fw_hermitian, only: is_regular
    use fw_hermitian, only: solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_laws, only: new_law
@@ -57,7 +58,7 @@ contains
          call find_waves(case, nodal, harmonic, range, modes)
          return
       end if
-      do trial = 1, size(shift_trials)
+      do trial = merge(1, 2, is_regular(nodal%stiffness)), size(shift_trials)
          shift = shift_trials(trial)*norm2(abs(nodal%stiffness))/ &
                  max(norm2(abs(nodal%mass)), tiny(1.0_wp))
          call solve_hermitian_eigen(nodal%mass, nodal%stiffness + shift*nodal%mass, theta, shapes, &

@@ -2,6 +2,7 @@
 !> dofs, and a stiffness that holds the structure only in part, are no exceptions.
 module fw_modes
    use fw_kinds, only: wp
+   use fw_linalg, only: has_pivots
    use fw_linalg, only: solve_symmetric_above
    use fw_linalg, only: solve_symmetric_eigen
    implicit none (type, external)
@@ -52,7 +53,7 @@ contains
 
       allocate (modes(0))
       allocate (in_range(0))
-      do trial = 1, size(shift_trials)
+      do trial = merge(1, 2, has_pivots(stiffness)), size(shift_trials)
          shift = shift_trials(trial)*norm2(stiffness)/max(norm2(mass), tiny(1.0_wp))
          done = size(mass, 1) >= above_from .and. range(2) > 0.0_wp
          if (done) call solve_symmetric_above(mass, stiffness + shift*mass, &

@@ -13,6 +13,7 @@ module fw_sector_reduction
    use fw_hermitian, only: cholesky
    use fw_hermitian, only: congruence
    use fw_hermitian, only: product_of
+   use fw_hermitian, only: is_regular
    use fw_hermitian, only: solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_lapack, only: zpotrs
@@ -85,7 +86,7 @@ contains
       call split_basis(relative, size(nodal%mass, 1), self%t_q, self%t_i)
       k = congruence(self%t_i, nodal%stiffness, self%t_i)
       m = congruence(self%t_i, nodal%mass, self%t_i)
-      do trial = 1, size(shift_trials)
+      do trial = merge(1, 2, is_regular(k)), size(shift_trials)
          shift = shift_trials(trial)*norm2(abs(k))/max(norm2(abs(m)), tiny(1.0_wp))
          call solve_hermitian_eigen(m, k + shift*m, self%m_i, modes, done)
          if (done) exit
