@@ -6,7 +6,7 @@ import numpy as np
 
 #: Long enough that no machine finishes it before it is stopped.
 N_POINTS = 1000000
-#: A run has saved something by this point.
+#: Points after which a run is at work.
 SEEN = 300
 #: Runs of different lengths take frequencies that differ by round-off.
 SAME = 1e-11
@@ -66,9 +66,18 @@ class Case:
                 return
         raise AssertionError(f"ended before point {point}: {process.wait()}")
 
+    def wait_for_saved_points(self, process):
+        """Until a flush has saved some: it waits for 20 times what the one before took, which is
+        long on a busy machine."""
+        self.wait_for_points(process)
+        while saved(self.part(), locking=False) == 0:
+            for _ in range(SEEN):
+                process.stderr.readline()
+            assert process.poll() is None
+
     def kill(self, **options):
         process = self.start(**options)
-        self.wait_for_points(process)
+        self.wait_for_saved_points(process)
         process.kill()
         process.communicate()
 
@@ -109,10 +118,11 @@ class Case:
                             for name in reference))
 
 
-def saved(path):
-    """Points of a file that nobody writes; 0 where its run did not come to flush it."""
+def saved(path, locking=None):
+    """Points of a file that nobody writes, or of one at work whose lock is passed over; 0 where
+    its run did not come to flush it."""
     try:
-        with h5py.File(path) as file:
+        with h5py.File(path, locking=locking) as file:
             return len(file["omega"])
     except (OSError, KeyError):
         return 0

@@ -38,8 +38,7 @@ def test_a_signal_ends_a_run_with_the_points_that_are_done(case, number):
 
 def test_a_second_signal_ends_it_at_once_and_keeps_its_points(case):
     process = case.start()
-    # On a slow disk the first flush with points waits for 20 times what the one before took.
-    case.wait_for_points(process, 20 * fault_cases.SEEN)
+    case.wait_for_saved_points(process)
     for _ in range(100):
         if process.poll() is not None:
             break
