@@ -79,19 +79,25 @@ contains
    end function handle_of
 
    !> Run the case; the array `control` is watched and updated meanwhile.
-   subroutine run(self, control, in_memory, status)
+   subroutine run(self, control, in_memory, status, piece)
       class(handle_type), intent(inout) :: self
       integer(i8), intent(inout), target :: control(:)
       !> Keep the bytes of the result file in `image` instead of writing it.
       logical, intent(in) :: in_memory
       integer, intent(out) :: status
+      !> In memory, of a sweep: first and last point, points on the way, and the one solved before
+      !> (0: none).
+      integer, intent(in), optional :: piece(4)
       type(error_type), allocatable :: error
       type(python_observer) :: observer
 
       observer%control => control
       observer%remarks = ''
       if (allocated(self%image)) deallocate (self%image)
-      if (in_memory) then
+      if (present(piece)) then
+         call self%session%run_piece(piece(1), piece(2), piece(3), piece(4), observer, error, &
+                                     self%image)
+      else if (in_memory) then
          call self%session%run(observer, error, image=self%image)
       else
          call self%session%run(observer, error, write_file=.true.)

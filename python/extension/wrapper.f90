@@ -21,7 +21,7 @@ module fw_python
 
    public :: open_session, close_session, library_version
    public :: new_model, put_reals, put_integers, put_texts, observe
-   public :: give_case, prepare, check_case, run_case
+   public :: give_case, prepare, check_case, run_case, run_piece, copy_session
    public :: start, solve, count_frequencies, frequencies
    public :: count_values, get_values, count_bytes, get_bytes, parse_namelist
 
@@ -38,6 +38,18 @@ contains
 
       number = new_handle()
    end subroutine open_session
+
+   !> A session with the case of another one, as it was read.
+   subroutine copy_session(other, number)
+      integer(i8), intent(in) :: other
+      integer(i8), intent(out) :: number
+      type(handle_type), pointer :: handle, source
+
+      number = new_handle()
+      handle => handle_of(number)
+      source => handle_of(other)
+      call handle%session%copy(source%session)
+   end subroutine copy_session
 
    subroutine close_session(number)
       integer(i8), intent(in) :: number
@@ -183,6 +195,20 @@ contains
       handle => handle_of(number)
       call handle%run(control, in_memory /= 0, status)
    end subroutine run_case
+
+   !> Run a piece of a sweep in memory: first and last point, points on the way to it, and the last
+   !> point that this session has solved, which it goes on from (0: none).
+   subroutine run_piece(number, piece, control, status)
+      integer(i8), intent(in) :: number
+      integer, intent(in) :: piece(4)
+      integer(i8), intent(inout) :: control(8)
+      integer, intent(out) :: status
+      type(handle_type), pointer :: handle
+      !f2py threadsafe
+
+      handle => handle_of(number)
+      call handle%run(control, .true., status, piece)
+   end subroutine run_piece
 
    !> Prepare for steps from frequency to frequency.
    subroutine start(number, status)

@@ -98,9 +98,11 @@ def namelist_values(text: str) -> dict[str, list[str]]:
 class Session:
     """One case in the library, from reading to running. To be used in a `with` block."""
 
-    def __init__(self) -> None:
+    def __init__(self, other: Session | None = None) -> None:
+        """Empty, or with the case of another session, which is not read again."""
         self._core = routines()
-        self._handle: int | None = self._core.open_session()
+        self._handle: int | None = (self._core.open_session() if other is None
+                                    else self._core.copy_session(other._handle))
 
     def __enter__(self) -> Session:
         return self
@@ -175,6 +177,29 @@ class Session:
             Status of the library; `text("message")` explains it where the run has failed.
         """
         return int(self._core.run_case(self._handle, control, int(in_memory)))
+
+    def run_piece(self, points: tuple[int, int], lead: int, solved: int,
+                  control: NDArray[np.int64]) -> int:
+        """Run some points of a sweep in memory and in one thread; see `run`.
+
+        Parameters
+        ----------
+        points : (int, int)
+            First and last, counted from 1.
+        lead : int
+            Points on the way to the first one.
+        solved : int
+            The last one that this session has solved, from which it goes on; 0 goes on from the
+            start of the sweep.
+        control : (8,) int64
+            As in `run`.
+
+        Returns
+        -------
+        int
+            Status of the library.
+        """
+        return int(self._core.run_piece(self._handle, [*points, lead, solved], control))
 
     def start(self) -> None:
         """Prepare for steps from frequency to frequency."""

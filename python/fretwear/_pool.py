@@ -14,7 +14,10 @@ from typing import Any, Callable, TypeVar
 from ._watching import StopFlag
 from .errors import InputError
 
-__all__ = ["Pool", "Tick", "core_count", "open_pool"]
+__all__ = ["HERE", "Pool", "Tick", "core_count", "open_pool"]
+
+#: Schedulers that are threads of this process.
+HERE = ("threads", "processes")
 
 _Item = TypeVar("_Item")
 _Answer = TypeVar("_Answer")
@@ -139,7 +142,7 @@ def open_pool(scheduler: str, workers: int, said_by: str = "scheduler") -> Itera
     InputError
         Dask is not installed, or nothing answers, or the package is not there.
     """
-    if scheduler in ("threads", "processes"):
+    if scheduler in HERE:
         yield Pool(workers or core_count())
         return
     distributed = _distributed(said_by)

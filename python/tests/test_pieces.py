@@ -12,7 +12,7 @@ from project import EXAMPLE
 from rubbing import RUBBING
 
 import fretwear as fw
-from fretwear._native import Session, namelist_values
+from fretwear._native import Session
 from fretwear._progress import CONTROL, WANTED
 from fretwear.cli import main
 from fretwear.pieces import cutting, running
@@ -35,8 +35,8 @@ HARDENING = fw.Model([[1.0]], [[0.1]], [[1.0]], cosine=[0.25],
 DUFFING = fw.Case(HARDENING, harmonics={"n_harmonics": 5},
                   sweep={"start": 0.3, "end": 1.8, "n_points": 101})
 PENALTY: Groups = {"contact": {"law": "penalty"}}
-SLIDING = fw.Case(RUBBING, **PENALTY, harmonics={"n_harmonics": 3, "n_time": 64},
-                  sweep={"start": 0.4, "end": 2.0, "n_points": 65})
+SLIDING_SWEEP: Groups = {**PENALTY, "sweep": {"start": 0.4, "end": 2.0, "n_points": 65}}
+SLIDING = fw.Case(RUBBING, **SLIDING_SWEEP, harmonics={"n_harmonics": 3, "n_time": 64})
 
 
 def assert_same_result(one: fw.Result, other: fw.Result) -> None:
@@ -106,11 +106,17 @@ def test_pieces_on_different_branches_are_found_and_solved_as_one(
 
 def test_a_worker_that_is_ready_takes_half_of_what_another_has_left() -> None:
     piece = cutting.Piece(101, 400, 401)
-    kept, taken = cutting.divided(piece, 200) or (piece, piece)
-    assert (kept.first, kept.last + 1, taken.last) == (101, taken.first, 400)
-    # What leads the other one to its rows counts.
-    to_come = kept.last - 200 + OVERLAP
-    assert abs(to_come - (taken.last - kept.last + 2 * OVERLAP + 2 * taken.lead)) <= OVERLAP + 2
+    leads = []
+    for solved in (0, 102, 300):
+        kept, taken = cutting.divided(piece, 200, solved) or (piece, piece)
+        assert (kept.first, kept.last + 1, taken.last) == (101, taken.first, 400)
+        # It goes on from what it has solved before these rows.
+        assert taken.start == (102 if solved == 102 else 0)
+        # What leads the other one to its rows counts.
+        to_come = kept.last - 200 + OVERLAP
+        assert abs(to_come - (taken.last - kept.last + 2 * OVERLAP + 2 * taken.lead)) <= OVERLAP + 4
+        leads.append(taken.lead)
+    assert leads[1] < leads[0] == leads[2]
     assert cutting.divided(piece, 350) is None and cutting.divided(piece, 400) is None
 
     board = Board()
@@ -131,22 +137,22 @@ def test_rows_that_were_taken_over_are_those_of_one_process(
     monkeypatch.setattr(running, "cut", lambda n, _: [cutting.Piece(1, 20, n),
                                                       cutting.Piece(21, n, n)])
     was_asked, both_begun = threading.Event(), threading.Barrier(2)
-    take, watched = Board.take, running.run_watched
+    take, run_piece = Board.take, Session.run_piece
 
-    def asked(board: Board) -> cutting.Piece | None:
-        given = take(board)
+    def asked(board: Board, solved: int) -> cutting.Piece | None:
+        given = take(board, solved)
         was_asked.set()
         return given
 
-    def second_waits(session: Session, *arguments: Any, **options: Any) -> Any:
-        first = int(namelist_values(session.text("namelist"))["sweep%first_point"][0])
+    def second_waits(session: Session, points: tuple[int, int], *arguments: Any) -> int:
+        first = points[0]
         if first <= 21:
             both_begun.wait(60.0)
         assert first != 21 - OVERLAP or was_asked.wait(60.0)
-        return watched(session, *arguments, **options)
+        return run_piece(session, points, *arguments)
 
     monkeypatch.setattr(Board, "take", asked)
-    monkeypatch.setattr(running, "run_watched", second_waits)
+    monkeypatch.setattr(Session, "run_piece", second_waits)
     seen: list[Part] = []
     result, _ = running.run_in_pieces(case, 2, "threads", None, None, in_memory=True,
                                       see=seen.extend)
@@ -229,6 +235,26 @@ def test_a_piece_has_the_rows_of_its_sweep() -> None:
                         ({"first_point": 9, "last_point": 8}, "from first_point = 9 to 65")):
         with pytest.raises(fw.InputError, match=told):
             SLIDING.replace(sweep=sweep).check()  # type: ignore[typeddict-item]
+
+
+@pytest.mark.parametrize("harmonics", [
+    {"n_harmonics": 3}, {"n_harmonics": 9, "adaptive": True}, {"accuracy": 1e-2}],
+    ids=["as given", "adaptive", "to an accuracy"])
+@pytest.mark.parametrize("leads", [0, 1, 5, 400])
+def test_a_piece_goes_on_from_the_one_before(harmonics: Any, leads: int) -> None:
+    case = fw.Case(RUBBING, **SLIDING_SWEEP, harmonics=harmonics)
+    whole = fw.run(case)
+    same = max(SAME, 2.0 * harmonics.get("accuracy", 0.0) * np.abs(whole.coefficients).max())
+    with case.open() as given, Session(given) as session:
+        # From the start, behind the rows before, and from the start again.
+        for first, last, solved in ((1, 12, 0), (13, 20, 12), (45, 50, 20), (5, 9, 0)):
+            control = np.zeros(CONTROL, dtype=np.int64)
+            assert session.run_piece((first, last), leads, solved, control) == 0
+            piece = fw.Result.from_bytes(session.image(), case)
+            assert piece.omega.tobytes() == whole.omega[first - 1:last].tobytes()
+            n = min(piece.coefficients.shape[1], whole.coefficients.shape[1])
+            assert np.allclose(piece.coefficients[:, :n], whole.coefficients[first - 1:last, :n],
+                               rtol=0.0, atol=same)
 
 
 def test_a_sweep_ends_after_the_points_that_are_wanted() -> None:

@@ -33,6 +33,7 @@ module fw_frequency_response
    use fw_sinks, only: writer_sink
    use fw_solver_options, only: continuation_arclength
    use fw_stability_verdict, only: verdict_undecided
+   use fw_strategy, only: kept_strategy
    use fw_strategy, only: point_strategy
    use fw_summary, only: summary_type
    use fw_sweep, only: lead_places
@@ -50,13 +51,15 @@ module fw_frequency_response
 contains
 
    !> Solve every point, in the order given; each is written as soon as it is known.
-   subroutine run_frequency_response(case, observer, writer, summary, state, error)
+   subroutine run_frequency_response(case, observer, writer, summary, state, error, kept)
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(result_writer), intent(inout), target :: writer
       type(summary_type), intent(inout), target :: summary
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
+      !> Go on from what is kept, and keep what this run ends with.
+      type(kept_strategy), intent(inout), optional :: kept
       class(point_strategy), allocatable, target :: strategy
       class(point_source), allocatable, target :: source
       type(writer_sink), target :: to_file
@@ -68,8 +71,7 @@ contains
       type(sink_list) :: sinks
       logical :: in_order
 
-      call new_strategy(case, strategy)
-      call strategy%start(case, error)
+      call begin(case, strategy, error, kept)
       if (allocated(error)) return
       ! The source needs a strategy that is started: a branch shares its system.
       call new_source(case, strategy, source, to_observer%n_points)
@@ -106,6 +108,8 @@ contains
       end select
       ! Points in their order; searches between them come after the last.
       call run_sweep(case, source, sinks, observer, state, error)
+      ! Searches behind the rows leave other solutions.
+      if (present(kept)) call source%remember(kept%memory)
       call observer%on_end()
       select type (source)
       type is (branch_source)
@@ -126,7 +130,27 @@ contains
       if (.not. allocated(error)) call keep_bifurcations(case, source, changes, writer, summary, &
                                                          error)
       call finder%clear()
+      if (.not. present(kept) .or. allocated(error)) return
+      if (allocated(kept%memory%x)) call move_alloc(strategy, kept%strategy)
    end subroutine run_frequency_response
+
+   !> A strategy that is ready for the first point: the one kept, or one that is started.
+   subroutine begin(case, strategy, error, kept)
+      type(case_type), intent(in) :: case
+      class(point_strategy), allocatable, target, intent(out) :: strategy
+      type(error_type), allocatable, intent(out) :: error
+      type(kept_strategy), intent(inout), optional :: kept
+
+      if (present(kept)) then
+         if (allocated(kept%strategy)) then
+            call move_alloc(kept%strategy, strategy)
+            call strategy%recall(kept%memory)
+            return
+         end if
+      end if
+      call new_strategy(case, strategy)
+      call strategy%start(case, error)
+   end subroutine begin
 
    subroutine describe(case, strategy, observer, state, summary, error)
       type(case_type), intent(in) :: case

@@ -26,6 +26,7 @@ module fw_run
    use fw_run_modes, only: run_modes
    use fw_run_resonance, only: run_resonance
    use fw_run_state, only: run_state
+   use fw_strategy, only: kept_strategy
    use fw_summary, only: summary_type
    use fw_summary, only: new_summary
    use fw_text, only: string_type
@@ -64,7 +65,7 @@ contains
    !> Run a case and write its result file. Points that did not converge make the outcome
    !> status_not_converged, an observer that asks for it status_stopped; `error` is for what ends
    !> the run.
-   subroutine run_case(case, observer, outcome, error, write_file, image)
+   subroutine run_case(case, observer, outcome, error, write_file, image, kept)
       type(case_type), intent(in) :: case
       class(observer_type), intent(inout), target :: observer
       type(outcome_type), intent(out) :: outcome
@@ -74,6 +75,8 @@ contains
       !> The bytes of the result file, which is not written then; not allocated where the run has
       !> not come to a point.
       integer(c_int8_t), allocatable, intent(out), optional :: image(:)
+      !> Of a piece of a sweep: what the one before left, and then what this one leaves.
+      type(kept_strategy), intent(inout), optional :: kept
       type(result_writer), target :: writer
       type(summary_type), target :: summary
       type(run_state) :: state
@@ -113,7 +116,7 @@ contains
       else if (case%analysis == analysis_wear) then
          call run_wear(case, restart, observer, writer, summary, state, error)
       else
-         call run_frequency_response(case, observer, writer, summary, state, error)
+         call run_frequency_response(case, observer, writer, summary, state, error, kept)
       end if
       call threads%leave()
       call system_clock(clock_end)

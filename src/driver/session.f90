@@ -30,6 +30,7 @@ module fw_session
    use fw_session_points, only: point_list
    use fw_session_points, only: point_recorder
    use fw_solver_options, only: continuation_natural
+   use fw_strategy, only: kept_strategy
    use fw_strategy, only: new_request
    use fw_sweep, only: sweep_frequency
    use fw_text, only: string_type
@@ -61,6 +62,8 @@ module fw_session
       logical, private :: is_read = .false.
       !> Only between `start` and the next change.
       type(one_level), allocatable, private :: strategy
+      !> Only between pieces of one sweep.
+      type(kept_strategy), private :: kept
    contains
       procedure :: load_file
       procedure :: load_text
@@ -77,6 +80,8 @@ module fw_session
       procedure :: frequency
       procedure :: solve
       procedure :: run
+      procedure :: run_piece
+      procedure :: copy
       procedure :: get
       procedure, private :: put_reals
       procedure, private :: put_integers
@@ -386,6 +391,49 @@ contains
       end if
    end subroutine run
 
+   !> Run points `first` to `last` of a natural sweep, in one thread, and keep the system and the
+   !> last solution for the next piece.
+   subroutine run_piece(self, first, last, lead, solved, observer, error, image)
+      class(session_type), intent(inout), target :: self
+      integer, intent(in) :: first, last
+      !> Points on the way to the first, and where that begins: with the start of the sweep (0), or
+      !> behind this point, the last one of the piece before.
+      integer, intent(in) :: lead, solved
+      class(observer_type), intent(inout), target :: observer
+      !> What ends the run; not converging is an outcome.
+      type(error_type), allocatable, intent(out) :: error
+      !> The bytes that a result file would have.
+      integer(c_int8_t), allocatable, intent(out) :: image(:)
+
+      call self%prepare(error)
+      if (allocated(error)) return
+      if (solved == 0) call forget_system(self)
+      self%case%threads = 1
+      associate (sweep => self%case%sweep)
+         sweep%first_point = first
+         sweep%last_point = last
+         sweep%lead_points = lead
+         sweep%solved_point = merge(solved, 0, allocated(self%kept%strategy))
+      end associate
+      call run_case(self%case, observer, self%outcome, error, image=image, kept=self%kept)
+   end subroutine run_piece
+
+   !> Take the case of another session over, read as it is there.
+   subroutine copy(self, other)
+      class(session_type), intent(inout) :: self
+      class(session_type), intent(in) :: other
+
+      call forget_system(self)
+      call self%points%clear()
+      self%case = other%case
+      if (allocated(other%text)) self%text = other%text
+      if (allocated(other%path)) self%path = other%path
+      if (allocated(other%keys)) self%keys = other%keys
+      if (allocated(other%model)) self%model = other%model
+      self%origin = other%origin
+      self%is_read = other%is_read
+   end subroutine copy
+
    !> Values of a point by the name of their dataset in a result file; see fw_point_quantities.
    subroutine get(self, name, index, values, error)
       class(session_type), intent(in) :: self
@@ -429,6 +477,7 @@ contains
       class(session_type), intent(inout) :: self
 
       if (allocated(self%strategy)) deallocate (self%strategy)
+      if (allocated(self%kept%strategy)) deallocate (self%kept%strategy)
    end subroutine forget_system
 
 end module fw_session

@@ -15,7 +15,7 @@ module fw_strategy
    private
 
    public :: point_strategy, point_request, new_request, note_time_limit, solver_memory
-   public :: keeps_cycles
+   public :: keeps_cycles, kept_strategy
 
    !> What is asked of a point.
    type :: point_request
@@ -69,6 +69,14 @@ module fw_strategy
       procedure :: recall => recall_nothing
       procedure :: start_anew => keep_all
    end type point_strategy
+
+   !> What one run leaves for the next one over the same sweep.
+   type :: kept_strategy
+      !> Started; not allocated where there is nothing to go on from.
+      class(point_strategy), allocatable :: strategy
+      !> The last solution among the rows.
+      type(solver_memory) :: memory
+   end type kept_strategy
 
    abstract interface
       !> Build what every point needs.

@@ -209,15 +209,18 @@ contains
       end associate
    end function sweep_places
 
-   !> Those on the way to a piece, from the start of the sweep in steps that shorten evenly: the
-   !> rows that follow are close to each other, and extrapolate the last ones.
+   !> Those on the way to a piece, from the start of the sweep, or behind the point that is solved,
+   !> in steps that shorten evenly: the rows that follow are close to each other, and extrapolate
+   !> the last ones.
    pure function lead_places(case) result(places)
       type(case_type), intent(in) :: case
       real(wp), allocatable :: places(:)
-      integer :: before, k, n
+      integer :: before, k, n, n_steps
 
-      before = case%sweep%first_point - 1
+      before = case%sweep%first_point - 1 - case%sweep%solved_point
       n = min(case%sweep%lead_points, before)
+      ! The start of the sweep is one of them; a point that is solved is left by a first step.
+      n_steps = merge(n, n + 1, case%sweep%solved_point == 0)
       places = all_places(case)
       places = places([(lead_point(k), k=1, n)])
 
@@ -228,8 +231,9 @@ contains
          integer, intent(in) :: k
          real(wp) :: left
 
-         left = real(n + 1 - k, wp)/real(n, wp)
+         left = real(n + 1 - k, wp)/real(n_steps, wp)
          lead_point = min(1 + int(real(before, wp)*(1.0_wp - left**2)), before - n + k)
+         lead_point = lead_point + case%sweep%solved_point
       end function lead_point
 
    end function lead_places

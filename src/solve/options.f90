@@ -104,6 +104,8 @@ module fw_solver_options
       !> A piece of the sweep: its rows (0: up to the last), and how many points on the way from the
       !> start lead to the first of them.
       integer :: first_point = 1, last_point = 0, lead_points = 0
+      !> The point that the run goes on from, solved by the one before it (0: none; not a key).
+      integer :: solved_point = 0
    contains
       procedure :: bind_keys => bind_sweep_keys
       procedure :: is_piece

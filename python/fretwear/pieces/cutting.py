@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 __all__ = ["OVERLAP", "Piece", "cut", "divided"]
 
@@ -14,10 +14,8 @@ OVERLAP = 2
 _LEADS = 12
 #: What one of them costs, in rows: its step is longer.
 _COST = 2.0
-#: Rows below which a piece does not pay.
+#: Rows below which a piece does not pay, of those that another worker takes over too.
 _LEAST = 16
-#: The same of rows that another worker takes over: it sets up the case and finds its way anew.
-_LEAST_TAKEN = 32
 
 
 @dataclass(frozen=True)
@@ -30,11 +28,14 @@ class Piece:
         Its own rows.
     n_points : int
         Of the whole sweep.
+    start : int
+        The point that its worker has solved and goes on from; 0 is the start of the sweep.
     """
 
     first: int
     last: int
     n_points: int
+    start: int = 0
 
     @property
     def solved(self) -> tuple[int, int]:
@@ -44,7 +45,7 @@ class Piece:
     @property
     def lead(self) -> int:
         """Points on the way to the first of them."""
-        before = self.solved[0] - 1
+        before = self.solved[0] - 1 - self.start
         return min(before, -(-_LEADS * before // self.n_points))
 
     def with_next(self, other: Piece) -> Piece:
@@ -65,15 +66,18 @@ def cut(n_points: int, n_pieces: int) -> list[Piece]:
     return [Piece(a + 1, b, n_points) for a, b in zip(before, before[1:])]
 
 
-def divided(piece: Piece, row: int) -> tuple[Piece, Piece] | None:
+def divided(piece: Piece, row: int, solved: int = 0) -> tuple[Piece, Piece] | None:
     """A piece whose worker is at a row, for two workers: what it keeps, and what another takes.
 
-    Both end at once if the rows take the same time: the other one has its lead before it, and
-    solves rows beyond the cut as the first one does. None where too few rows are left.
+    Both end at once if the rows take the same time: the other one, which has solved up to some
+    point, has its lead before it, and solves rows beyond the cut as the first one does. None where
+    too few rows are left.
     """
-    lead = _COST * Piece(piece.last, piece.last, piece.n_points).lead
+    start = solved if solved < row else 0
+    lead = _COST * Piece(piece.last, piece.last, piece.n_points, start).lead
     taken = int(piece.last - row - OVERLAP - lead) // 2
-    if taken < _LEAST_TAKEN:
+    if taken < _LEAST:
         return None
     cut_at = piece.last - taken
-    return Piece(piece.first, cut_at, piece.n_points), Piece(cut_at + 1, piece.last, piece.n_points)
+    return (replace(piece, last=cut_at),
+            Piece(cut_at + 1, piece.last, piece.n_points, start))

@@ -5,24 +5,24 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._native import NOT_CONVERGED, STOPPED, namelist_values, raise_status
-from .._pool import Pool, open_pool
+from .._native import NOT_CONVERGED, STOPPED, Session, namelist_values, raise_status
+from .._pool import HERE, Pool, open_pool
 from .._progress import CONTROL, State
-from .._watching import Progress, Tell, run_watched, stops_on_interrupt, teller
+from .._watching import Progress, StopFlag, Tell, run_watched, stops_on_interrupt, teller
 from ..case import Case
 from ..errors import InputError, RunInterrupted
 from ..result import Result
 from .cutting import Piece, cut
 from .joining import join
 from .overlap import Part, agree, tolerance_of
-from .sharing import AtWork, Board
+from .sharing import Board
 
 __all__ = ["run_in_pieces"]
 
@@ -61,7 +61,9 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
         raise InputError(f"workers = {workers}: must be at least 0 (0: one for each core)")
     started = time.monotonic()
     with case.open() as session:
-        session.check()
+        if scheduler not in HERE:
+            # Before a cluster is asked; here the first piece is refused for the same.
+            session.check()
         plan = _plan(namelist_values(session.text("namelist")), session.frequencies())
         text, path = session.text("namelist"), session.text("output")
         with teller(progress, session) as tell:
@@ -69,7 +71,9 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
             in_main = threading.current_thread() is threading.main_thread()
             watch = _Watch(tell, is_stopped, control, len(plan.places))
             with stops_on_interrupt(control, in_main), open_pool(scheduler, workers) as pool:
-                parts, remarks = _solve(case, plan, pool, watch)
+                work = _Work(session, watch.board) if scheduler in HERE else (
+                    _WorkElsewhere(case))
+                parts, remarks = _solve(work, plan, pool, watch)
     if not parts:
         raise RunInterrupted(None)
     if see is not None:
@@ -149,12 +153,12 @@ class _Watch:
         return self.ended
 
 
-def _solve(case: Case, plan: _Plan, pool: Pool, watch: _Watch) -> tuple[list[Part], list[str]]:
+def _solve(work: Callable[..., list[Part]], plan: _Plan, pool: Pool, watch: _Watch
+           ) -> tuple[list[Part], list[str]]:
     """Parts in the order of the sweep that agree with each other, and where they did not."""
     wanted = cut(len(plan.places), pool.workers)
     parts: dict[Piece, Part] = {}
     remarks: list[str] = []
-    work = _Work(case, watch.board if type(pool) is Pool else None)
     while wanted and not watch.ended:
         for part in chain.from_iterable(pool.run(work, wanted, tick=watch.tick)):
             watch.ended = watch.ended or part.was_stopped
@@ -186,33 +190,44 @@ def _told(plan: _Plan, piece: Piece, difference: float) -> str:
 
 
 class _Work:
-    """Solves one piece, then what others have left; travels to other processes, without a board."""
+    """Solves a piece in a session of its own, then what others have left with the same set-up."""
 
-    def __init__(self, case: Case, board: Board | None) -> None:
-        self._case, self._board = case, board
+    def __init__(self, session: Session, board: Board) -> None:
+        self._session, self._board = session, board
 
-    def __call__(self, piece: Piece, stop: threading.Event | None = None) -> list[Part]:
-        if self._board is None:
-            return [self._solve(AtWork(piece), stop)]
+    def __call__(self, piece: Piece, stop: StopFlag) -> list[Part]:
         parts: list[Part] = []
         following: Piece | None = piece
-        while following is not None:
-            with self._board.solving(following) as work:
-                part = self._solve(work, stop)
-            # Others may have taken rows of it meanwhile.
-            parts.append(replace(part, piece=work.piece))
-            following = None if part.was_stopped else self._board.take()
+        with Session(self._session) as session:
+            while following is not None:
+                started = time.monotonic()
+                with self._board.solving(following) as work, stop.reaching(work.control):
+                    status = session.run_piece(following.solved, following.lead, following.start,
+                                               work.control)
+                # Others may have taken rows of it meanwhile.
+                parts.append(_part(session, work.piece, status, started))
+                following = None if status == STOPPED else (
+                    self._board.take(work.piece.solved[1]))
         return parts
 
-    def _solve(self, work: AtWork, stop: threading.Event | None) -> Part:
+
+class _WorkElsewhere:
+    """Solves one piece; travels to other processes."""
+
+    def __init__(self, case: Case) -> None:
+        self._case = case
+
+    def __call__(self, piece: Piece) -> list[Part]:
         started = time.monotonic()
-        first, last = work.piece.solved
-        sweep: Any = {"first_point": first, "last_point": last, "lead_points": work.piece.lead}
-        case = self._case.replace(sweep=sweep, case={"threads": 1})
-        with case.open() as session:
-            status, _ = run_watched(session, None, None if stop is None else stop.is_set,
-                                    in_memory=True, control=work.control)
-            if status not in (NOT_CONVERGED, STOPPED):
-                raise_status(status, session.text("message"))
-            return Part(work.piece, session.image(), status == STOPPED,
-                        (started, time.monotonic()))
+        first, last = piece.solved
+        sweep: Any = {"first_point": first, "last_point": last, "lead_points": piece.lead}
+        with self._case.replace(sweep=sweep, case={"threads": 1}).open() as session:
+            status, _ = run_watched(session, None, None, in_memory=True)
+            return [_part(session, piece, status, started)]
+
+
+def _part(session: Session, piece: Piece, status: int, started: float) -> Part:
+    """What a run has given; raises what has ended it."""
+    if status not in (NOT_CONVERGED, STOPPED):
+        raise_status(status, session.text("message"))
+    return Part(piece, session.image(), status == STOPPED, (started, time.monotonic()))

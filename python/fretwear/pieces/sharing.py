@@ -50,9 +50,10 @@ class AtWork:
         done = max(int(self.control[1]), 1)
         return (time.monotonic() - self._started) * (self.piece.last - self.row) / done
 
-    def give(self) -> Piece | None:
-        """Rows for another worker; None where sharing does not pay."""
-        parts = divided(self.piece, self.row)
+    def give(self, solved: int) -> Piece | None:
+        """Rows for a worker that has solved up to some point (0: none); None where sharing does not
+        pay."""
+        parts = divided(self.piece, self.row, solved)
         if parts is None:
             return None
         self.piece, given = parts
@@ -82,12 +83,13 @@ class Board:
                 self._at_work.remove(work)
                 self._ended.append(read_state(work.control))
 
-    def take(self) -> Piece | None:
-        """Rows of the piece that has the longest way to go; None where nothing is left to share."""
+    def take(self, solved: int = 0) -> Piece | None:
+        """Rows of the piece that has the longest way to go, for a worker that has solved up to some
+        point (0: none); None where nothing is left to share."""
         with self._lock:
             if not self.is_shared or not self._at_work:
                 return None
-            return max(self._at_work, key=lambda work: work.time_left).give()
+            return max(self._at_work, key=lambda work: work.time_left).give(solved)
 
     @property
     def states(self) -> list[State]:
