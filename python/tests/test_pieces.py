@@ -89,6 +89,36 @@ def test_the_result_is_that_of_one_process(case: fw.Case, workers: int) -> None:
     assert_same_result(one, pieces)
 
 
+def random_chain(rng: np.random.Generator) -> fw.Case:
+    """Two to four masses of which some rub, on the ground or on each other, swept up or down."""
+    n = int(rng.integers(2, 5))
+    springs = rng.uniform(0.3, 2.0, n + 1)
+    stiffness = (np.diag(springs[:-1] + springs[1:]) - np.diag(springs[1:-1], 1)
+                 - np.diag(springs[1:-1], -1))
+    rubbing = rng.permutation(n)[:int(rng.integers(1, n + 1))]
+    joint = fw.ContactPairs([[dof + 1, 0, 0] for dof in rubbing], mu=1.0,
+                            normal_load=rng.uniform(0.1, 1.0, len(rubbing)),
+                            tangential_stiffness=float(rng.uniform(0.5, 3.0)))
+    model = fw.Model(np.eye(n), stiffness * float(rng.uniform(0.005, 0.03)), stiffness,
+                     contact=joint, cosine=rng.uniform(-1.0, 1.0, n))
+    ends = np.sort(rng.uniform(0.3, 2.4, 2)) if rng.random() < 0.7 else rng.uniform(0.3, 2.4, 2)
+    return fw.Case(model, **PENALTY, harmonics={"n_harmonics": int(rng.choice([1, 3, 5])),
+                                                "n_time": 64},
+                   sweep={"start": ends[0], "end": ends[1], "n_points": int(rng.integers(40, 200))})
+
+
+def test_random_sweeps_in_pieces_are_those_of_one_process() -> None:
+    rng = np.random.default_rng(20)
+    for _ in range(30):
+        case, workers = random_chain(rng), int(rng.integers(2, 5))
+        one = fw.run(case, in_memory=True, check=False)
+        pieces = fw.run(case, workers=workers, in_memory=True, check=False)
+        assert (one.converged == pieces.converged).all()
+        solved = one.converged.astype(bool)
+        assert np.allclose(one.coefficients[solved], pieces.coefficients[solved], rtol=0.0,
+                           atol=1e-5 * np.abs(one.coefficients).max())
+
+
 def test_pieces_on_different_branches_are_found_and_solved_as_one(
         monkeypatch: pytest.MonkeyPatch) -> None:
     """Without points that lead to it, the second piece begins on the lower branch."""
