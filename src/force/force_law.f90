@@ -131,6 +131,8 @@ module fw_force_law
       !> input (coefficient, component; element): only where asked for.
       logical :: measures_slip = .false.
       real(wp), allocatable :: slip(:), slip_derivative(:, :)
+      !> Whether anybody wants that derivative: at held depths only the sliding itself.
+      logical :: differentiates_slip = .false.
       !> Angular frequency of the period: makes a derivative by tau one by t.
       real(wp) :: rate = 1.0_wp
       class(law_room), allocatable :: room
@@ -223,6 +225,7 @@ contains
       class(force_workspace), intent(inout) :: self
 
       self%measures_slip = .true.
+      self%differentiates_slip = .true.
       allocate (self%slip(size(self%input, 2)), source=0.0_wp)
       allocate (self%slip_derivative, source=self%input)
    end subroutine measure_slip

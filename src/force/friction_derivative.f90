@@ -3,6 +3,7 @@
 submodule(fw_friction) fw_friction_derivative
    use fw_instant_sum, only: instant_sum
    use fw_lapack, only: dgemm
+   use fw_lapack, only: dgemv
    use fw_march_derivative, only: march_derivative
    use fw_march_derivative, only: numbers_of_instant
    use fw_memory, only: allocate_zeros
@@ -12,7 +13,7 @@ submodule(fw_friction) fw_friction_derivative
    use fw_one_direction, only: project_runs
    use fw_one_direction, only: run_room
    use fw_sampled_turn, only: limit_is_unique
-   use fw_slip, only: slip_gradient
+   use fw_slip, only: slip_weights
    use fw_two_directions, only: add_start
    use fw_two_directions, only: turn_derivative
    implicit none (type, external)
@@ -29,8 +30,9 @@ submodule(fw_friction) fw_friction_derivative
       real(wp) :: inverse(2, 2) = 0.0_wp
       type(turn_derivative) :: turn
       type(instant_sum) :: sums
-      !> d lambda_t by inputs, for each tangential component and instant: of paths of slip alone.
-      real(wp), allocatable :: rows(:, :, :)
+      !> Derivatives of the path of slip by positions (2, n_time) and pressures (n_time) at the
+      !> instants.
+      real(wp), allocatable :: by_x(:, :), by_p(:)
       real(wp), allocatable :: weight(:, :, :)
       !> Predicted forces (3, n_time).
       real(wp), allocatable :: y(:, :)
@@ -56,10 +58,10 @@ contains
       work%waits = .false.
       if (allocated(work%march)) then
          ! Only those who read it are worth a march; wear reads blocks.
-         marched = work%may_wait .and. .not. work%measures_slip .and. &
+         marched = work%may_wait .and. .not. work%differentiates_slip .and. &
                    work%state == pair_mixed .and. all(self%present(1:2, :), dim=1)
          call work%march%choose(marched)
-         work%waits = work%may_wait .and. .not. work%measures_slip .and. &
+         work%waits = work%may_wait .and. .not. work%differentiates_slip .and. &
                       all(marched .or. work%state /= pair_mixed)
       end if
       if (.not. any(work%state == pair_mixed)) work%waits = .false.
@@ -205,7 +207,7 @@ contains
       type(derivative_room), intent(inout) :: of_pair
 
       call of_pair%sums%reserve(fourier)
-      if (.not. work%measures_slip .and. count(self%present(1:2, i)) == 1) then
+      if (.not. work%differentiates_slip .and. count(self%present(1:2, i)) == 1) then
          call differentiate_one_direction(self, fourier, room, i, work, of_pair)
       else
          call differentiate_rows(self, fourier, room, i, work, of_pair)
@@ -319,20 +321,39 @@ contains
       call project_pair(self, fourier, room, i, of_pair, work)
       if (unique) call project_start(work%jacobian(:, :, i), fourier, of_pair%turn%dx, &
                                      of_pair%by_start, of_pair%weight)
-      if (.not. work%measures_slip) return
+      if (.not. work%differentiates_slip) return
       if (work%rests(i)) then
          work%slip_derivative(:, i) = 0.0_wp
-         return
+      else
+         call differentiate_path(self, fourier, i, x, unique, of_pair, work%slip_derivative(:, i))
       end if
-      ! The path of slip needs the rows themselves, not only their projections.
-      if (.not. allocated(of_pair%rows)) allocate (of_pair%rows(3*nc, 2, fourier%n_time))
-      call of_pair%turn%rows_at_instants(nc, fourier%synthesis, self%present(:, i), of_pair%rows)
-      if (unique) call add_start(3*nc, fourier%n_time, of_pair%by_start, of_pair%turn%dx, &
-                                 of_pair%rows)
-      call slip_gradient(fourier%n_time, nc, fourier%synthesis, of_pair%y, self%mu(i), &
-                         self%present(:, i), self%facts%remembers, x, of_pair%rows, &
-                         work%slip_derivative(:, i))
    end subroutine differentiate_rows
+
+   !> dS of a pair by the Fourier coefficients of its predicted forces.
+   subroutine differentiate_path(self, fourier, i, x, unique, of_pair, gradient)
+      class(friction_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      integer, intent(in) :: i
+      !> At the end of the period, and whether the derivative is that of the limit alone.
+      real(wp), intent(in) :: x(2)
+      logical, intent(in) :: unique
+      !> Its turn, by_start and y are set.
+      type(derivative_room), intent(inout) :: of_pair
+      real(wp), intent(out) :: gradient(3*fourier%n_coefficients)
+
+      if (.not. allocated(of_pair%by_x)) allocate (of_pair%by_x(2, fourier%n_time), &
+                                                   of_pair%by_p(fourier%n_time))
+      associate (nc => fourier%n_coefficients, n_time => fourier%n_time)
+         call slip_weights(n_time, of_pair%y, self%mu(i), self%facts%remembers, x, of_pair%by_x, &
+                           of_pair%by_p)
+         call of_pair%turn%sum_positions(nc, fourier%synthesis, self%present(:, i), of_pair%by_x, &
+                                         gradient)
+         if (unique) call add_start(3*nc, n_time, of_pair%by_start, of_pair%turn%dx, of_pair%by_x, &
+                                    gradient)
+         if (self%present(3, i)) call dgemv('N', nc, n_time, -1.0_wp, fourier%synthesis, nc, &
+                                            of_pair%by_p, 1, 1.0_wp, gradient(2*nc + 1), 1)
+      end associate
+   end subroutine differentiate_path
 
    !> The last turn, for products that only have to be near.
    subroutine keep_march(work, pair, of_pair)

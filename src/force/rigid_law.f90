@@ -281,7 +281,7 @@ contains
          call linearize_pair(fourier, nc, (room%direction(j) - 1)*nc, &
                              self%present(3, room%pair(j)), room%massive(j), &
                              work%jacobian(:, :, room%pair(j)))
-         if (.not. work%measures_slip) cycle
+         if (.not. work%differentiates_slip) cycle
          call differentiate_path(fourier, nc, (room%direction(j) - 1)*nc, &
                                  self%present(3, room%pair(j)), room%massive(j), &
                                  work%slip_derivative(:, room%pair(j)))

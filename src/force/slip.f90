@@ -8,11 +8,10 @@
 module fw_slip
    use fw_kinds, only: wp
    use fw_kinds, only: pi
-   use fw_lapack, only: dgemv
    implicit none (type, external)
    private
 
-   public :: slip_work, slip_gradient
+   public :: slip_work, slip_weights
 
 contains
 
@@ -75,39 +74,22 @@ contains
       x = x + move
    end subroutine advance
 
-   !> dS of one pair by the Fourier coefficients of its predicted forces, ordered as the rows.
-   subroutine slip_gradient(n_time, n_coef, base, y, mu, present, remembers, x_end, rows, gradient)
-      integer, intent(in) :: n_time, n_coef
-      !> Base functions (n_coef, n_time), predicted forces (3, n_time).
-      real(wp), intent(in) :: base(n_coef, n_time), y(3, n_time)
-      real(wp), intent(in) :: mu
-      !> Which of t1, t2, n exist.
-      logical, intent(in) :: present(3)
+   !> dS of one pair by its corrected positions and pressures at the instants.
+   pure subroutine slip_weights(n_time, y, mu, remembers, x_end, by_x, by_p)
+      integer, intent(in) :: n_time
+      !> Predicted forces.
+      real(wp), intent(in) :: y(3, n_time), mu
       logical, intent(in) :: remembers
       real(wp), intent(in) :: x_end(2)
-      !> d lambda_t / d inputs of the last turn (n_coef, 3, tangential component, instant).
-      real(wp), intent(in) :: rows(n_coef, 3, 2, n_time)
-      !> dS by the coefficients of (t1, t2, n).
-      real(wp), intent(out) :: gradient(n_coef, 3)
-      !> dS/dx and dS/dp at the instants.
-      real(wp) :: by_x(2, n_time), by_p(n_time)
-      integer :: c
+      !> By p = max(-y_n, 0): zero where the pair is open.
+      real(wp), intent(out) :: by_x(2, n_time), by_p(n_time)
 
       if (remembers) then
          call weights_of_path(n_time, y, mu, x_end, by_x, by_p)
       else
          call weights_of_rate(n_time, y, mu, by_x, by_p)
       end if
-      ! dx = dy - d lambda at every instant, whatever the state.
-      call dgemv('N', 3*n_coef, 2*n_time, -1.0_wp, rows, 3*n_coef, by_x, 1, 0.0_wp, gradient, 1)
-      do c = 1, 2
-         if (.not. present(c)) cycle
-         call dgemv('N', n_coef, n_time, 1.0_wp, base, n_coef, by_x(c, 1), 2, 1.0_wp, &
-                    gradient(:, c), 1)
-      end do
-      if (.not. present(3)) return
-      call dgemv('N', n_coef, n_time, -1.0_wp, base, n_coef, by_p, 1, 1.0_wp, gradient(:, 3), 1)
-   end subroutine slip_gradient
+   end subroutine slip_weights
 
    !> S is a function of the positions and pressures at the instants: its derivatives by both,
    !> summed by the two intervals that meet in an instant.

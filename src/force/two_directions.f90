@@ -15,8 +15,8 @@
 !> from dx = 0; no second one is needed.
 !>
 !> All that an instant of slip needs beside the base functions is w, and all that a run of stick
-!> needs is the dx on which it stands: few vectors, which one product takes to the harmonics. Rows
-!> at all instants are formed only for those who want them (`rows_at_instants`).
+!> needs is the dx on which it stands: few vectors, which one product takes to the harmonics. What
+!> depends on the positions at the instants is summed from the same vectors (`sum_positions`).
 module fw_two_directions
    use fw_fourier, only: fourier_type
    use fw_instant_sum, only: instant_sum
@@ -58,7 +58,7 @@ module fw_two_directions
       procedure :: march
       procedure :: to_limit
       procedure :: project
-      procedure :: rows_at_instants
+      procedure :: sum_positions
       procedure :: numbers_at
       procedure :: replay
    end type turn_derivative
@@ -298,32 +298,40 @@ contains
                  jacobian(2*nc + 1, 1), 3*nc)
    end subroutine project_pull
 
-   !> d lambda_t / d inputs at the instants (inputs, tangential component, instant).
-   pure subroutine rows_at_instants(self, n_coef, base, present, rows)
+   !> total = the sum of weight(c, k) times the derivative of x_c at instant k, by the inputs, from
+   !> dx = 0 at the start of the turn.
+   pure subroutine sum_positions(self, n_coef, base, present, weight, total)
       class(turn_derivative), intent(in) :: self
       integer, intent(in) :: n_coef
       real(wp), intent(in) :: base(:, :)
       logical, intent(in) :: present(3)
-      real(wp), intent(inout) :: rows(:, :, :)
+      !> (2, n_time)
+      real(wp), intent(in) :: weight(:, :)
+      real(wp), intent(out) :: total(:)
       integer :: c, k, v
 
-      do k = 1, size(rows, 3)
+      total = 0.0_wp
+      do k = 1, size(weight, 2)
+         ! Most instants stick or are open from one to the next: S does not know their positions.
+         if (all(abs(weight(:, k)) <= 0.0_wp)) cycle
          v = self%vector(k)
+         if (self%state(k) == sticks) then
+            if (v > 0) total = total + weight(1, k)*self%vectors(:, v) &
+                               + weight(2, k)*self%vectors(:, v + 1)
+            cycle
+         end if
+         ! dx = dy - d lambda.
          do c = 1, 2
-            associate (row => rows(:, c, k), first => (c - 1)*n_coef + 1, last => c*n_coef)
-               row = 0.0_wp
-               if (self%state(k) == slips) then
-                  row = self%turning(c, k)*self%vectors(:, v)
-                  if (present(3)) row(2*n_coef + 1:) = row(2*n_coef + 1:) + &
-                                                       self%pull(c, k)*base(:, k)
-               else if (self%state(k) == sticks) then
-                  if (v > 0) row = -self%vectors(:, v + c - 1)
-                  if (present(c)) row(first:last) = row(first:last) + base(:, k)
-               end if
-            end associate
+            if (present(c)) total((c - 1)*n_coef + 1:c*n_coef) = &
+               total((c - 1)*n_coef + 1:c*n_coef) + weight(c, k)*base(:, k)
          end do
+         if (self%state(k) /= slips) cycle
+         total = total - dot_product(weight(:, k), self%turning(:, k))*self%vectors(:, v)
+         if (.not. present(3)) cycle
+         total(2*n_coef + 1:) = total(2*n_coef + 1:) - &
+                                dot_product(weight(:, k), self%pull(:, k))*base(:, k)
       end do
-   end subroutine rows_at_instants
+   end subroutine sum_positions
 
    !> The last turn by few numbers for each instant, see fw_march_derivative, but for whether the
    !> pair bears.
@@ -371,19 +379,21 @@ contains
       end do
    end subroutine replay
 
-   !> Add to rows at a limit what the start of the turn adds.
-   pure subroutine add_start(n_inputs, n_time, by_start, dx, rows)
+   !> What the start of a turn adds to such a sum, where it moves too.
+   pure subroutine add_start(n_inputs, n_time, by_start, dx, weight, total)
       integer, intent(in) :: n_inputs, n_time
       !> Derivative of the position at the instants by the one at the start, and of that.
       real(wp), intent(in) :: by_start(2, 2, n_time), dx(n_inputs, 2)
-      real(wp), intent(inout) :: rows(n_inputs, 2, n_time)
-      integer :: c, k
+      real(wp), intent(in) :: weight(2, n_time)
+      real(wp), intent(inout) :: total(n_inputs)
+      real(wp) :: share(2)
+      integer :: k
 
+      share = 0.0_wp
       do k = 1, n_time
-         do c = 1, 2
-            rows(:, c, k) = rows(:, c, k) - by_start(c, 1, k)*dx(:, 1) - by_start(c, 2, k)*dx(:, 2)
-         end do
+         share = share + weight(1, k)*by_start(1, :, k) + weight(2, k)*by_start(2, :, k)
       end do
+      total = total + share(1)*dx(:, 1) + share(2)*dx(:, 2)
    end subroutine add_start
 
 end module fw_two_directions
