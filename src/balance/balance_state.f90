@@ -9,6 +9,7 @@
 !>
 !> Unknowns are (coordinate, coefficient), coordinates innermost.
 module fw_balance_state
+   use fw_kinds, only: i8
    use fw_kinds, only: wp
    use fw_error, only: error_type
    use fw_active_set, only: active_set
@@ -93,6 +94,9 @@ module fw_balance_state
       !> Derivatives of the laws for products that only have to be near (n_laws).
       type(near_derivative), allocatable, private :: near(:)
       type(balance_scratch) :: scratch
+      !> Goes up with every residual and frequency: who kept a residual knows by it whether the
+      !> state still stands there.
+      integer(i8), private :: n_moves = 0_i8
    contains
       procedure :: set_parameter
       procedure :: set_place
@@ -115,6 +119,7 @@ module fw_balance_state
       procedure :: pair_states
       procedure :: pair_shares
       procedure :: n_turns
+      procedure :: moves
       procedure :: residual
       procedure :: linearize
       procedure :: form_jacobians
@@ -577,6 +582,7 @@ contains
       real(wp), intent(in) :: omega, self_excitation
       type(error_type), allocatable, intent(out) :: error
 
+      self%n_moves = self%n_moves + 1_i8
       call self%problem%structure%at(self%structure_state, omega, self_excitation, error)
       if (allocated(error)) return
       call to_real(self%problem%fourier, self%problem%structure%n_coordinates, &
@@ -615,6 +621,13 @@ contains
          call self%problem%forces%entry(pairs)%law%fractions(self%work(pairs), share)
       end associate
    end subroutine pair_shares
+
+   !> Residuals and frequencies so far.
+   pure integer(i8) function moves(self)
+      class(balance_state), intent(in) :: self
+
+      moves = self%n_moves
+   end function moves
 
    !> Turns of the march that all pairs took together at the last point.
    pure integer function n_turns(self)
@@ -673,6 +686,7 @@ contains
 
       m = self%problem%structure%n_coordinates
       nc = self%problem%fourier%n_coefficients
+      self%n_moves = self%n_moves + 1_i8
       if (m == 0) return
       call multiply_stiffness(self, m, nc, x)
       do k = 1, self%problem%forces%n_laws

@@ -71,6 +71,8 @@ module fw_wear_step
    real(wp), parameter :: stage_tolerance = 1.0e-3_wp, farthest_lag = 0.3_wp
    !> What linear solutions may leave, as a part of the error that a step may have.
    real(wp), parameter :: noise = 0.3_wp
+   !> Residual at which a step that lags too far has caught up: well within what others may lag.
+   real(wp), parameter :: settled = 1.0e-1_wp*largest_lag
    integer, parameter :: max_corrections = 5
    !> A pseudo-time step may exceed the growth of the depth that was aimed at by this factor.
    real(wp), parameter :: depth_allowance = 1.5_wp
@@ -162,16 +164,26 @@ contains
    end subroutine try_implicitly
 
    !> The vibration at given depths, from the guess in state%x; its rates.
-   subroutine settle(self, system, state, report)
+   subroutine settle(self, system, state, report, tolerance)
       class(wear_stepper), intent(inout) :: self
       type(wear_system), intent(inout) :: system
       type(wear_state), intent(inout) :: state
       type(solver_report), intent(out) :: report
+      !> Relative residual that is enough (default: that of the solver).
+      real(wp), intent(in), optional :: tolerance
+      real(wp) :: strict
       integer :: n
 
       n = system%n_vibration()
       system%vibration%depth = state%x(n + 1:)
+      strict = self%newton%options%tolerance
+      if (present(tolerance)) self%newton%options%tolerance = max(strict, tolerance)
+      call system%hold_depths(.true.)
       call self%newton%solve(system%vibration, state%x(:n), report)
+      call system%hold_depths(.false.)
+      self%newton%options%tolerance = strict
+      ! The last point of Newton's method is the last one that it evaluated.
+      if (report%converged) call system%remember(state%x, self%newton%r)
       call system%update_rate()
       state%rate = system%rate
       state%residual = report%residual
@@ -331,7 +343,7 @@ contains
       if (report%converged .or. .not. after%residual <= farthest_lag) return
       ! Its depths are as good as its estimate says: back to the equilibrium at these, which keeps
       ! the order and is far cheaper than the stages of an implicit step.
-      call self%settle(system, after, solution)
+      call self%settle(system, after, solution, tolerance=settled)
       report%iterations = report%iterations + solution%iterations
       report%converged = solution%converged
    end subroutine high_order_step

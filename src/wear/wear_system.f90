@@ -29,6 +29,7 @@ module fw_wear_system
    use fw_error, only: error_type
    use fw_force_law, only: pair_mixed
    use fw_force_law, only: pair_stuck
+   use fw_kinds, only: i8
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    use fw_tall_product, only: multiply_transposed
@@ -68,10 +69,17 @@ module fw_wear_system
       integer, allocatable, private :: built_for(:)
       !> Of a vector what they make of it (n_pairs).
       real(wp), allocatable, private :: turned(:)
+      !> Where the vibration was evaluated last, depths included, its residual there, and its count
+      !> of moves then.
+      real(wp), allocatable, private :: last_x(:), last_r(:)
+      integer(i8), private :: last_move = -1_i8
    contains
+      procedure :: residual
+      procedure :: remember
       procedure :: begin_step
       procedure :: n_vibration
       procedure :: update_rate
+      procedure :: hold_depths
       procedure :: force_of_depth
       procedure :: mean_pressure
       procedure :: openings
@@ -152,6 +160,16 @@ contains
       self%rate = self%factor*self%vibration%work(self%vibration%problem%forces%pairs)%slip
    end subroutine update_rate
 
+   !> Whether the vibration is solved by itself from now on: nobody wants derivatives of the rates
+   !> then.
+   subroutine hold_depths(self, are_held)
+      class(wear_system), intent(inout) :: self
+      logical, intent(in) :: are_held
+
+      self%vibration%work(self%vibration%problem%forces%pairs)%differentiates_slip = &
+         .not. are_held
+   end subroutine hold_depths
+
    !> Whether a pair slides under pressure at the last point.
    pure logical function slides(self)
       class(wear_system), intent(in) :: self
@@ -224,6 +242,49 @@ contains
       depth_scale = self%compression()
       if (depth_scale <= 0.0_wp) depth_scale = maxval(self%mean_pressure()/self%weight)
    end function depth_scale
+
+   !> R and g at (q, w). A step begins where the one before was judged, and R does not know the
+   !> cycles: there it is known.
+   subroutine residual(self, x, r)
+      class(wear_system), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:)
+      real(wp), intent(out), contiguous :: r(:)
+      integer :: n
+
+      n = self%n_vibration()
+      if (stands_at(self, x)) then
+         r(:n) = self%last_r
+      else
+         self%vibration%depth = x(n + 1:)
+         call self%vibration%residual(x(:n), r(:n))
+         call self%remember(x, r(:n))
+      end if
+      call self%conditions(x(:n), x(n + 1:), r(n + 1:))
+      if (.not. self%holds_reference) self%reference = self%vibration%reference
+   end subroutine residual
+
+   !> The vibration was evaluated last at x, and has this residual.
+   subroutine remember(self, x, r)
+      class(wear_system), intent(inout) :: self
+      !> (n), (n_vibration)
+      real(wp), intent(in) :: x(:), r(:)
+
+      self%last_x = x
+      self%last_r = r
+      self%last_move = self%vibration%moves()
+   end subroutine remember
+
+   !> Whether the vibration has not been evaluated elsewhere since it was at x.
+   pure logical function stands_at(self, x)
+      type(wear_system), intent(in) :: self
+      real(wp), intent(in) :: x(:)
+
+      stands_at = self%last_move == self%vibration%moves()
+      ! Depths may have been moved without an evaluation.
+      if (stands_at) stands_at = all(abs(x - self%last_x) <= 0.0_wp)
+      if (stands_at) stands_at = all(abs(self%vibration%depth - x(self%n_vibration() + 1:)) <= &
+                                     0.0_wp)
+   end function stands_at
 
    !> Hold the vibration at depths; any will do.
    subroutine take(self, z, error)
