@@ -7,6 +7,7 @@ module fw_finer_wear
    use fw_level, only: level_type
    use fw_newton, only: solver_report
    use fw_recovery, only: carry_solution
+   use fw_reduction, only: held_basis
    use fw_restart_rows, only: n_notes
    use fw_summary, only: summary_type
    use fw_text, only: to_text
@@ -30,6 +31,8 @@ module fw_finer_wear
    real(wp), parameter :: hardly = 0.5_wp
    !> Relative residual of linear solutions from the solution with fewer harmonics.
    real(wp), parameter :: guess_forcing = 1.0e-2_wp
+   !> Residual of the finer solutions, of which rates are asked to a factor of two.
+   real(wp), parameter :: finer_tolerance = 1.0e-5_wp
    !> States that are looked at: each costs a solution with twice the harmonics.
    integer, parameter :: most_states = 24
 
@@ -38,6 +41,8 @@ module fw_finer_wear
       type(level_type), pointer, private :: level => null()
       type(wear_system), private :: system
       type(wear_stepper), private :: stepper
+      !> Modes of the structure that the case itself found.
+      type(held_basis) :: held
       integer, private :: n_states = 0
       !> What was found: the first pair that slips only with H harmonics, the cycle, whether there
       !> is such a state (1); of a steady state, whether a pair still wears.
@@ -121,7 +126,7 @@ contains
       call carry_solution(system%vibration, state%x(:system%n_vibration()), &
                           self%level%system, finer%x(:n))
       finer%x(n + 1:) = state%x(system%n_vibration() + 1:)
-      call self%stepper%settle(self%system, finer, report)
+      call self%stepper%settle(self%system, finer, report, tolerance=finer_tolerance)
       known = report%converged
       if (known) rate = finer%rate
    end subroutine solve
@@ -134,7 +139,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       allocate (self%level)
-      call self%level%build(case, 2*case%harmonics%n_harmonics + 1, error)
+      call self%level%build(case, 2*case%harmonics%n_harmonics + 1, error, held=self%held)
       if (allocated(error)) then
          ! Not looked for, then: no state is known.
          self%n_states = most_states

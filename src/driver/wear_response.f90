@@ -89,7 +89,7 @@ contains
       type(wear_run), target :: run
       type(point_type) :: point
 
-      call build_system(case, run%problem, run%balance, error)
+      call build_system(case, run%problem, run%balance, error, held=run%recorder%finer%held)
       if (.not. allocated(error)) then
          call start_recorder(run%recorder, case, observer, writer, summary, state, error)
       end if
