@@ -65,7 +65,9 @@ module fw_wear_step
 
    !> Relative residual of the linear solution of a pseudo-time step, and the growth of the
    !> residual of the vibration above which such a step is corrected.
-   real(wp), parameter :: linear_tolerance = 1.0e-4_wp, largest_lag = 1.0e-2_wp
+   ! The next step starts from what a solution leaves: with a tenth of this, profiles of 5 to 320
+   ! steps are the same.
+   real(wp), parameter :: linear_tolerance = 1.0e-3_wp, largest_lag = 1.0e-2_wp
    !> The same of a step of high order, whose stages mend what the solutions before them left; above
    !> the lag its depths are not to be trusted.
    real(wp), parameter :: stage_tolerance = 1.0e-3_wp, farthest_lag = 0.3_wp
