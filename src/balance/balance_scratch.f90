@@ -16,6 +16,9 @@ module fw_balance_scratch
       !> Operators of all harmonics of a result at the instants of the balance, whatever harmonics
       !> that retains: made at the first point that wants them.
       type(fourier_type) :: all_harmonics
+      !> First waves on the grid where peaks of the response are looked for, made at the first point
+      !> (see fw_recovery).
+      real(wp), allocatable :: grid_waves(:, :)
    contains
       procedure :: reserve
       procedure :: make_all_harmonics

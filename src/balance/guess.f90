@@ -47,7 +47,7 @@ contains
       integer :: round
 
       closed = .true.
-      do round = 1, max_rounds
+      do round = 1, merge(max_rounds, 0, size(closed) > 0)
          call linear_solution(system, closed, .true., x, tension)
          bears = .not. tension > 0.0_wp
          ! Of late only opened: rounds that close pairs again could go on for ever.
@@ -195,10 +195,17 @@ contains
       tension = 0.0_wp
       last = system%problem%fourier%n_retained
       if (at_rest) last = count(system%problem%fourier%harmonic == 0)
+      if (m < coordinates_for_threads) then
+         do h = 1, last
+            if (.not. system%is_interrupted()) call solve_harmonic(system, closed, h, q(:, h), &
+                                                                   tension)
+         end do
+         call to_real_vector(system, q, x)
+         return
+      end if
       ended = .false.
       !$omp parallel do default(none) private(h, skipped) schedule(dynamic) &
-      !$omp shared(system, closed, q, tension, m, last, ended) &
-      !$omp if(m >= coordinates_for_threads .and. last > 1)
+      !$omp shared(system, closed, q, tension, last, ended) if(last > 1)
       do h = 1, last
          ! A harmonic of many pairs takes tenths of a second; nobody looks at the rest then. Only
          ! one thread asks: others may not call what listens for the end.
@@ -237,7 +244,7 @@ contains
       ! may press at rest.
       if (any(abs(q) > 0.0_wp)) then
          is_idle = .false.
-      else if (system%problem%fourier%harmonic(h) > 0) then
+      else if (system%problem%fourier%harmonic(h) > 0 .or. system%problem%n_pairs == 0) then
          is_idle = all(held) .or. .not. any(abs(force) > 0.0_wp)
       else
          is_idle = all(held)

@@ -28,12 +28,19 @@ contains
       integer, intent(in) :: n_harmonics
       logical, intent(in) :: with_contact
       type(point_type), intent(inout) :: point
-      real(wp), allocatable :: waves(:, :)
       integer :: i
 
       call observed_coefficients(system, x, n_harmonics, point%coefficients)
-      waves = grid_waves(n_harmonics)
-      point%amplitude = [(largest_on(point%coefficients(:, i), waves), &
+      if (allocated(system%scratch%grid_waves)) then
+         ! Another number of harmonics.
+         if (size(system%scratch%grid_waves, 1) /= grid_size(n_harmonics)/4 + 1) then
+            deallocate (system%scratch%grid_waves)
+         end if
+      end if
+      if (.not. allocated(system%scratch%grid_waves)) then
+         system%scratch%grid_waves = grid_waves(n_harmonics)
+      end if
+      point%amplitude = [(largest_on(point%coefficients(:, i), system%scratch%grid_waves), &
                           i=1, system%problem%structure%n_observed)]
       associate (pairs => system%problem%forces%pairs)
          i = system%problem%forces%entry(pairs)%law%instants_wanted(system%work(pairs))
@@ -237,7 +244,7 @@ contains
       real(wp), allocatable :: grid(:)
 
       n_harmonics = (size(coefficients) - 1)/2
-      n_grid = points_per_wave*max(1, n_harmonics)
+      n_grid = grid_size(n_harmonics)
       spacing = 2.0_wp*pi/real(n_grid, wp)
       allocate (grid(0:n_grid + 1))
       call evaluate_grid(coefficients, n_grid, waves, grid)
@@ -276,7 +283,7 @@ contains
       real(wp), allocatable :: grid(:)
       integer :: k, i, n_grid
 
-      n_grid = points_per_wave*max(1, (size(coefficients) - 1)/2)
+      n_grid = grid_size((size(coefficients) - 1)/2)
       spacing = 2.0_wp*pi/real(n_grid, wp)
       largest = largest_magnitude(coefficients)
       allocate (grid(0:n_grid + 1))
@@ -304,6 +311,13 @@ contains
       end do
    end subroutine peak_angles
 
+   !> Angles of the grid on a period, a multiple of 8.
+   pure integer function grid_size(n_harmonics)
+      integer, intent(in) :: n_harmonics
+
+      grid_size = points_per_wave*max(1, n_harmonics)
+   end function grid_size
+
    !> Cosine and sine of the angles of a quarter of the grid (0:n_grid/4, 2).
    pure function grid_waves(n_harmonics) result(waves)
       integer, intent(in) :: n_harmonics
@@ -311,7 +325,7 @@ contains
       real(wp) :: angle
       integer :: k, quarter
 
-      quarter = points_per_wave*max(1, n_harmonics)/4
+      quarter = grid_size(n_harmonics)/4
       allocate (waves(0:quarter, 2))
       do k = 0, quarter/2
          angle = 0.5_wp*pi*real(k, wp)/real(quarter, wp)

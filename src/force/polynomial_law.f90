@@ -82,6 +82,9 @@ contains
 
       call work%reserve(self%n_elements, self%n_components, fourier)
       allocate (room)
+      associate (nc => fourier%n_coefficients)
+         allocate (work%jacobian(nc, nc, self%n_elements), source=0.0_wp)
+      end associate
       if (self%n_elements > 0) then
          allocate (room%slope(fourier%n_time))
          if (fourier%projects) then
@@ -154,7 +157,6 @@ contains
 
       nc = fourier%n_coefficients
       work%linear_state = work%state
-      if (.not. allocated(work%jacobian)) allocate (work%jacobian(nc, nc, self%n_elements))
       select type (room => work%room)
       type is (polynomial_room)
          do i = 1, self%n_elements

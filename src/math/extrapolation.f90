@@ -1,6 +1,7 @@
 !> Polynomials through points that are known, to guess the next one.
 module fw_extrapolation
    use fw_kinds, only: wp
+   use fw_norm, only: norm_of
    implicit none (type, external)
    private
 
@@ -40,7 +41,8 @@ contains
       least = huge(1.0_wp)
       do k = 1, size(x)
          call extrapolate(x(:k), y, at, guess)
-         off = norm2(guess - value)
+         guess = guess - value
+         off = norm_of(guess)
          if (off >= share*least) cycle
          order = k - 1
          least = off

@@ -101,6 +101,8 @@ contains
       real(wp), intent(in) :: factor, wave(n)
       real(wp), intent(inout) :: sums(n)
 
+      ! Motions that repeat with the other sign after half a period have no even waves.
+      if (abs(factor) <= 0.0_wp) return
       sums = sums + factor*wave
    end subroutine add_wave
 
@@ -140,6 +142,7 @@ contains
       real(wp), intent(in) :: values(stride, *), factor, of_constant
       real(wp), intent(inout) :: coefficients(stride_out, *)
       real(wp) :: folded(block, n_kinds)
+      logical :: acts(n_kinds)
       integer :: first, i, j, n
 
       do j = 1, size(self%number)
@@ -149,6 +152,11 @@ contains
       do first = 0, self%last, block
          n = min(block, self%last - first + 1)
          call fold(self%n_time, first, n, stride, values, folded)
+         ! Of a function with a symmetry half of them or more are zero, to the last bit.
+         do i = 1, n_kinds
+            ! A sum, and this way round: what is not a number acts.
+            acts(i) = .not. sum_of_sizes(n, folded(1, i)) <= 0.0_wp
+         end do
          do j = 1, size(self%number)
             i = kind_of(self, j)
             associate (column => self%column(j))
@@ -157,10 +165,10 @@ contains
                                             sum_with(n, self%cosine(first, j), folded(1, i))
                   cycle
                end if
-               coefficients(1, column) = coefficients(1, column) + factor* &
-                                         sum_with(n, self%cosine(first, j), folded(1, i))
-               coefficients(1, column + 1) = coefficients(1, column + 1) + factor* &
-                                             sum_with(n, self%sine(first, j), folded(1, i + 2))
+               if (acts(i)) coefficients(1, column) = coefficients(1, column) + factor* &
+                  sum_with(n, self%cosine(first, j), folded(1, i))
+               if (acts(i + 2)) coefficients(1, column + 1) = coefficients(1, column + 1) + &
+                  factor*sum_with(n, self%sine(first, j), folded(1, i + 2))
             end associate
          end do
       end do
@@ -177,6 +185,18 @@ contains
          total = total + wave(k)*values(k)
       end do
    end function sum_with
+
+   pure real(wp) function sum_of_sizes(n, values) result(total)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: values(n)
+      integer :: k
+
+      total = 0.0_wp
+      !$omp simd reduction(+:total)
+      do k = 1, n
+         total = total + abs(values(k))
+      end do
+   end function sum_of_sizes
 
    !> What the waves of each kind meet at n instants from `first` on, which represent their images.
    pure subroutine fold(n_time, first, n, stride, values, folded)

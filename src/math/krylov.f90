@@ -5,11 +5,11 @@
 !> cycle instead of a guess. Both vectors and their products may hold physical units; the only norm
 !> taken is the Euclidean one of the right-hand side's space, so the caller scales where it matters.
 module fw_krylov
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_interrupt, only: interrupt_type
    use fw_interrupt, only: must_end
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
+   use fw_norm, only: is_finite
    use fw_norm, only: norm_of
    use fw_tall_product, only: multiply_transposed
    use fw_tall_product, only: subtract_product
@@ -151,7 +151,7 @@ contains
          if (norm < before) cycle
          ! Infinite corrections come of a singular small matrix; with them the earlier cycles are
          ! lost, because infinity cannot be subtracted again.
-         where (ieee_is_finite(self%direction))
+         where (is_finite(self%direction))
             x = x - self%direction
          else where
             x = 0.0_wp

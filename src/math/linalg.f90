@@ -153,6 +153,12 @@ contains
       logical, intent(out) :: singular
       integer :: info
 
+      if (self%n == 1) then
+         ! The guess of one dof: the way into a library takes longer than its harmonics.
+         self%pivot(1) = 1
+         singular = abs(self%matrix(1, 1)) <= 0.0_wp
+         return
+      end if
       call zgetrf(self%n, self%n, self%matrix, size(self%matrix, 1), self%pivot, info)
       singular = info /= 0
    end subroutine factor_complex
@@ -180,6 +186,10 @@ contains
       complex(wp) :: entry
       integer :: i
 
+      if (self%n == 1) then
+         b(1) = b(1)/self%matrix(1, 1)
+         return
+      end if
       do i = 1, self%n
          ! The swaps of the elimination in their order, then L with its unit diagonal, then U.
          entry = b(i)

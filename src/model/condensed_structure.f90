@@ -55,8 +55,15 @@ contains
       complex(wp), intent(in), contiguous :: q(:, :)
       complex(wp), intent(out), contiguous :: observed(:, :)
       type(real_products) :: work
-      integer :: n_failed
+      integer :: h, n_failed
 
+      if (self%basis%n_internal == 0) then
+         ! Nothing but the coordinates moves.
+         do h = 1, size(self%harmonic)
+            observed(:, h) = matmul(self%basis%observe_q, q(:, h))
+         end do
+         return
+      end if
       call work%reserve(self%basis, size(self%harmonic), self%n_coefficients)
       select type (state)
       class is (condensed_state)

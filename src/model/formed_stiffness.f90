@@ -84,7 +84,9 @@ contains
 
       n_failed = 0
       ! An imaginary part is a damping that excites.
-      if (self%group%serves .and. all(abs(aimag(theta)) <= 0.0_wp)) then
+      if (basis%n_internal == 0) then
+         call form_uncondensed(self, basis, harmonic, theta, s, load)
+      else if (self%group%serves .and. all(abs(aimag(theta)) <= 0.0_wp)) then
          call form_groups(self, basis, harmonic, real(theta, wp), s, load, n_failed)
       else if (basis%n_coordinates < coordinates_for_threads) then
          do h = 1, size(harmonic)
@@ -102,6 +104,48 @@ contains
       end if
       call find_static(self)
    end subroutine form
+
+   !> Where there are no internal modes: a sum of matrices.
+   subroutine form_uncondensed(self, basis, harmonic, theta, s, load)
+      class(formed_stiffness), intent(inout) :: self
+      type(reduction_type), intent(in) :: basis
+      integer, intent(in) :: harmonic(:)
+      complex(wp), intent(in) :: theta(:)
+      real(wp), intent(in) :: s(:)
+      complex(wp), intent(inout) :: load(:, :)
+      integer :: h
+
+      ! A region of one thread takes as long as a few harmonics of a small structure.
+      if (basis%n_coordinates < coordinates_for_threads) then
+         do h = 1, size(harmonic)
+            call add_matrices(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), load(:, h))
+         end do
+         return
+      end if
+      !$omp parallel do default(none) private(h) &
+      !$omp shared(self, basis, harmonic, theta, s, load)
+      do h = 1, size(harmonic)
+         call add_matrices(basis, harmonic(h), theta(h), s(h), self%matrix(:, :, h), load(:, h))
+      end do
+      !$omp end parallel do
+   end subroutine form_uncondensed
+
+   !> Of one harmonic, and its load.
+   subroutine add_matrices(basis, n, theta, s, matrix, load)
+      type(reduction_type), intent(in) :: basis
+      integer, intent(in) :: n
+      complex(wp), intent(in) :: theta
+      real(wp), intent(in) :: s
+      complex(wp), intent(inout), contiguous :: matrix(:, :)
+      complex(wp), intent(inout) :: load(:)
+      integer :: j
+
+      do j = 1, basis%n_coordinates
+         call combine(basis%n_coordinates, basis%n_blocks, theta, s, basis%blocks(:, j, :), &
+                      matrix(:, j))
+      end do
+      call find_load(basis%load_q, basis%waves, n, s, load)
+   end subroutine add_matrices
 
    !> One group of harmonics after the other.
    subroutine form_groups(self, basis, harmonic, theta, s, load, n_failed)
@@ -274,6 +318,17 @@ contains
       !> n omega.
       real(wp), intent(in) :: s
       complex(wp) :: load(size(parts, 1))
+
+      call find_load(parts, waves, n, s, load)
+   end function harmonic_load
+
+   !> The same without a copy.
+   pure subroutine find_load(parts, waves, n, s, load)
+      real(wp), intent(in) :: parts(:, :)
+      type(load_waves), intent(in) :: waves
+      integer, intent(in) :: n
+      real(wp), intent(in) :: s
+      complex(wp), intent(inout) :: load(:)
       integer :: w
 
       ! An amplitude is U = uc - i us.
@@ -289,7 +344,7 @@ contains
          if (waves%harmonic(w) /= n) cycle
          load = load + waves%factor(w, n, s)*cmplx(parts(:, 2*w + 2), -parts(:, 2*w + 3), wp)
       end do
-   end function harmonic_load
+   end subroutine find_load
 
    !> d F_n/dp of loads that grow with their frequency, at a rate ds/dp.
    pure function load_slope(parts, waves, n, s, rate) result(slope)

@@ -122,6 +122,7 @@ contains
       self%kept = self%basis%kept
       self%n_observed = size(self%basis%observe_q, 1)
       call lay_out_coefficients(self, harmonic)
+      call find_norms(self)
       self%forms_blocks = real(self%n_coordinates, wp)**2*size(harmonic) < most_entries .or. &
                           self%basis%n_internal > most_internal*self%n_coordinates
       if (present(forms_blocks)) self%forms_blocks = forms_blocks
@@ -130,6 +131,17 @@ contains
       if (size(self%kept) == 0) call find_dynamic_part(self%basis, &
                                      maxval(harmonic)*omega_range(2), self%dynamic)
    end subroutine new_plain_structure
+
+   !> Of K and M, which are the same in all harmonics.
+   pure subroutine find_norms(self)
+      type(plain_structure), intent(inout) :: self
+
+      allocate (self%norms(2, size(self%harmonic)))
+      associate (m => self%n_coordinates, b => self%basis)
+         self%norms(1, :) = norm2(b%blocks(:m, :, 1))
+         self%norms(2, :) = norm2(b%blocks(:m, :, 2))
+      end associate
+   end subroutine find_norms
 
    !> Room for one thread: formed matrices, or what real products need.
    subroutine new_state(self, state)

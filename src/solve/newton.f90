@@ -1,7 +1,7 @@
 !> Newton's method with a backtracking line search, for systems that are only piecewise smooth.
 module fw_newton
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
+   use fw_norm, only: is_finite
    use fw_norm, only: norm_of
    use fw_linear_step, only: linear_step_type
    use fw_solver_options, only: solver_options
@@ -72,7 +72,7 @@ contains
          report%residual = norm
          report%converged = norm <= self%options%tolerance
          if (report%converged .or. report%iterations >= self%options%max_iterations) exit
-         if (.not. ieee_is_finite(norm) .or. stalled > patience) exit
+         if (.not. is_finite(norm) .or. stalled > patience) exit
          report%interrupted = system%is_interrupted()
          if (report%interrupted) exit
          call self%linear%solve(system, self%r, forcing, self%step, done)
@@ -119,7 +119,7 @@ contains
          self%trial = x + fraction*self%step
          call system%residual(self%trial, self%r)
          trial_norm = norm_of(self%r)/system%reference
-         if (ieee_is_finite(trial_norm) .and. trial_norm < best_norm) then
+         if (is_finite(trial_norm) .and. trial_norm < best_norm) then
             best_norm = trial_norm
             best_fraction = fraction
          end if
