@@ -15,6 +15,7 @@ module fw_level
    use fw_problem, only: build_system
    use fw_recovery, only: carry_solution
    use fw_reduction, only: held_basis
+   use fw_remarks, only: remark_undetermined
    use fw_strategy, only: point_request
    use fw_summary, only: summary_type
    implicit none (type, external)
@@ -88,6 +89,12 @@ contains
          if (levels(k)%system%n > levels(largest)%system%n) largest = k
       end do
       call summary%describe_work(levels(largest)%system, work, kind, all_converged)
+      do k = 1, n
+         if (.not. levels(k)%solver%method%undetermined_at > 0.0_wp) cycle
+         call remark_undetermined(levels(k)%solver%method%undetermined_at, &
+                                  levels(k)%solver%method%undetermined_again, summary%remarks)
+         exit
+      end do
    end subroutine describe_levels
 
    !> Build the system, unless it is there.

@@ -11,6 +11,7 @@ module fw_one_level
    use fw_point, only: point_type
    use fw_point_solver, only: looks_again
    use fw_remarks, only: is_undamped
+   use fw_remarks, only: remark_undetermined
    use fw_run_state, only: run_state
    use fw_strategy, only: point_request
    use fw_strategy, only: point_strategy
@@ -114,6 +115,8 @@ contains
          call solver%sensitivity%describe(derivatives)
          call summary%describe_sensitivity(derivatives)
          call solver%sensitivity%remark(case, system, summary%remarks)
+         call remark_undetermined(solver%method%undetermined_at, &
+                                  solver%method%undetermined_again, summary%remarks)
          if (solver%n_by_flow > 0) call summary%note_fallback(solver%n_by_flow)
          if (self%n_elsewhere > 0) call summary%note_elsewhere(self%n_elsewhere, self%way)
          if (state%was_stopped .or. state%all_converged()) return

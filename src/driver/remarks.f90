@@ -30,7 +30,7 @@ module fw_remarks
    private
 
    public :: remark_list, remark_input, remark_range, remark_peaks, remark_stability
-   public :: remark_condensed, is_shaken, is_undamped
+   public :: remark_condensed, remark_undetermined, is_shaken, is_undamped
 
    !> Friction coefficients above it are no dry friction of metals.
    real(wp), parameter :: highest_friction = 2.0_wp
@@ -285,6 +285,24 @@ contains
          'and a resonance that these do not show may be stepped over; loosen '// &
          'solver%tolerance, or compare with a natural sweep')
    end subroutine remark_condensed
+
+   !> Of modes that are met, not damped, and neither coupled nor loaded.
+   subroutine remark_undetermined(omega, again, remarks)
+      !> Where that was first [rad/s]; below 0: nowhere.
+      real(wp), intent(in) :: omega
+      !> Whether it was so elsewhere too.
+      logical, intent(in) :: again
+      type(remark_list), intent(inout) :: remarks
+      character(:), allocatable :: where_else
+
+      if (omega < 0.0_wp) return
+      where_else = ''
+      if (again) where_else = ', and at further frequencies,'
+      call remarks%add('undetermined mode', 'at '//to_text(rounded(omega))//' rad/s'//where_else// &
+         ' a harmonic meets a mode without damping that neither contact nor load reaches: its '// &
+         'motion follows from nothing and is taken for none; set model%damping or '// &
+         'model%modal_damping, or move the frequency')
+   end subroutine remark_undetermined
 
    !> Of verdicts on stability that nothing stands behind.
    subroutine remark_stability(n_undecided, n_points, remarks)

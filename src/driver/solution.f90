@@ -45,6 +45,10 @@ module fw_solution
       type(balance_state), allocatable :: whole
       !> A solution was refused because it grows without bound.
       logical :: unbounded = .false.
+      !> Where a motion was first taken for none because nothing determines it [rad/s], and whether
+      !> that was so at other frequencies too; below 0: nowhere.
+      real(wp) :: undetermined_at = -1.0_wp
+      logical :: undetermined_again = .false.
       !> A solution was refused because its friction is ripple.
       logical :: rippled = .false.
       !> The system was evaluated last at the very solution that converged.
@@ -207,14 +211,21 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       type(solver_report), intent(inout) :: report
       logical :: lost, rippled
+      integer :: n_driven, n_idle
 
-      lost = is_lost_in_round_off(system, x)
+      call system%problem%structure%undetermined(system%structure_state, n_idle, n_driven)
+      lost = n_driven > 0 .or. is_lost_in_round_off(system, x)
       self%unbounded = self%unbounded .or. lost
       report%converged = is_lasting(system) .and. .not. lost
       if (.not. report%converged) return
       rippled = lacks_friction(system, x)
       self%rippled = self%rippled .or. rippled
       report%converged = .not. rippled
+      if (n_idle > 0 .and. report%converged) then
+         if (self%undetermined_at < 0.0_wp) self%undetermined_at = system%frequency()
+         self%undetermined_again = self%undetermined_again .or. &
+                                   abs(self%undetermined_at - system%frequency()) > 0.0_wp
+      end if
    end subroutine refuse_unreal
 
 end module fw_solution

@@ -64,6 +64,7 @@ module fw_plain_structure
       procedure :: diagonal
       procedure :: derivative
       procedure :: recover => recover_observed
+      procedure :: undetermined
       procedure :: split_rank
       procedure :: multiply_nearly
       procedure :: has_near_product
@@ -112,6 +113,7 @@ contains
       type(held_basis), intent(inout), optional :: held
       !> Condense every internal mode, whatever a harmonic may hit.
       logical, intent(in), optional :: keep_none
+      logical :: is_whole
 
       call new_reduction(model, relative, harmonic, omega_range, self%basis, error, keep_all, &
                          held, keep_none)
@@ -125,6 +127,10 @@ contains
       call find_norms(self)
       self%forms_blocks = real(self%n_coordinates, wp)**2*size(harmonic) < most_entries .or. &
                           self%basis%n_internal > most_internal*self%n_coordinates
+      is_whole = .false.
+      if (present(keep_all)) is_whole = keep_all
+      ! Products of K and M cannot lift a pivot.
+      if (.not. is_whole) self%forms_blocks = self%forms_blocks .or. any(self%basis%alone)
       if (present(forms_blocks)) self%forms_blocks = forms_blocks
       if (self%forms_blocks) return
       ! Kept modes have no stiffness of their own to trust.
@@ -218,8 +224,62 @@ contains
             if (self%dynamic%rank > 0) call find_dynamic(self, f, state)
          end if
          call state%scale_loads()
+         if (self%forms_blocks .and. any(self%basis%alone)) call lift_pivots(self, state)
       end associate
    end subroutine go_to
+
+   !> Any pivot will do where a harmonic meets a mode that is alone: without a load it stays at
+   !> rest, and with one nobody takes the motion for a solution (see `undetermined`). Where nothing
+   !> is loaded the mode itself is looked for.
+   subroutine lift_pivots(self, state)
+      type(plain_structure), intent(in) :: self
+      type(plain_state), intent(inout) :: state
+      integer :: h, j
+
+      if (.not. any(abs(state%load(:, pack([(h, h=1, size(self%harmonic))], &
+                                           self%harmonic > 0))) > 0.0_wp)) return
+      do h = 1, size(self%harmonic)
+         if (self%harmonic(h) == 0) cycle
+         do j = 1, self%n_coordinates
+            if (.not. self%basis%alone(j)) cycle
+            if (abs(state%formed%matrix(j, j, h)) > 0.0_wp) cycle
+            state%formed%matrix(j, j, h) = cmplx(self%basis%blocks(j, j, 1), kind=wp)
+         end do
+      end do
+   end subroutine lift_pivots
+
+   !> Modes that are alone and meet a harmonic, to round-off, without and with a load there.
+   subroutine undetermined(self, state, n_idle, n_driven)
+      class(plain_structure), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(out) :: n_idle, n_driven
+      !> Of the sizes of K and theta M: eigenvalues are good to some thousand times epsilon.
+      real(wp), parameter :: round_off = 1.0e-12_wp
+      real(wp) :: stiffness, inertia, damping
+      integer :: h, j
+
+      n_idle = 0
+      n_driven = 0
+      if (.not. any(self%basis%alone)) return
+      do j = 1, self%n_coordinates
+         if (.not. self%basis%alone(j)) cycle
+         do h = 1, size(self%harmonic)
+            if (self%harmonic(h) == 0) cycle
+            associate (s => self%harmonic(h)*state%omega, b => self%basis)
+               stiffness = b%blocks(j, j, 1)
+               inertia = s**2*b%blocks(j, j, 2)
+               damping = 0.0_wp
+               if (b%n_blocks == 3) damping = s*abs(b%blocks(j, j, 3))
+            end associate
+            if (abs(stiffness - inertia) + damping > round_off*(stiffness + inertia)) cycle
+            if (abs(state%load(j, h)) > 0.0_wp) then
+               n_driven = n_driven + 1
+            else
+               n_idle = n_idle + 1
+            end if
+         end do
+      end do
+   end subroutine undetermined
 
    !> S_n of all harmonics.
    subroutine find_dynamic(self, factors, state)

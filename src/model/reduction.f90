@@ -7,6 +7,7 @@ module fw_reduction
    use fw_error, only: fatal_error
    use fw_error, only: status_input
    use fw_lapack, only: dgemm
+   use fw_linalg, only: diagonalize
    use fw_linalg, only: has_pivots
    use fw_linalg, only: solve_symmetric_eigen
    use fw_model, only: model_type
@@ -23,6 +24,9 @@ module fw_reduction
       integer :: n_internal = 0
       !> Internal modes kept as coordinates, behind the relative ones: their numbers.
       integer, allocatable :: kept(:)
+      !> Those of the coordinates that are kept modes without a coupling to anything else
+      !> (n_coordinates).
+      logical, allocatable :: alone(:)
       !> K, M and C, the last only where there is damping: rows of the coordinates, then of the
       !> internal modes (n_coordinates + n_internal, n_coordinates, n_blocks). One array, so that
       !> products with all of them are one product.
@@ -62,6 +66,9 @@ module fw_reduction
    !> A mode with a smaller damping ratio counts as undamped: near its resonance the condensed
    !> stiffness would lose more than half of the digits.
    real(wp), parameter :: undamped_ratio = 1.0e-7_wp
+   !> Round-off of sums with a kept mode, whose largest displacement is 1, over the sizes of what it
+   !> is multiplied by: each of its displacements is good to some hundred times epsilon.
+   real(wp), parameter :: mode_round_off = 1.0e-13_wp
    !> Relative stiffness below which an internal mode is free.
    real(wp), parameter :: free_stiffness = 1.0e-11_wp
 
@@ -105,12 +112,65 @@ contains
       if (present(keep_none)) keep = keep .and. .not. keep_none
       if (present(keep_all)) keep = keep .or. keep_all
       if (any(keep)) then
+         call separate_equals(keep, t_i, self, error)
+         if (allocated(error)) return
          call move_to_coordinates(keep, t_q, t_i, self)
          call transform(model, t_q, t_i, self)
       end if
       self%kept = pack([(j, j=1, size(keep))], keep)
+      call clear_round_off(model, t_q, t_i, self)
       if (allocated(model%changes)) call transform_changes(model, t_q, t_i, self)
    end subroutine new_reduction
+
+   !> Zero the couplings and loads of kept modes that are the round-off of their sums: where a
+   !> harmonic meets the mode nothing else stands in its row, and their quotient would be a motion.
+   subroutine clear_round_off(model, t_q, t_i, self)
+      type(model_type), intent(in) :: model
+      real(wp), intent(in) :: t_q(:, :), t_i(:, :)
+      type(reduction_type), intent(inout) :: self
+      real(wp), allocatable :: loads(:, :)
+      integer :: c, first
+
+      allocate (self%alone(self%n_coordinates), source=.false.)
+      if (size(self%kept) == 0) return
+      first = self%n_coordinates - size(self%kept) + 1
+      self%alone(first:) = .true.
+      call clear_couplings(model%stiffness, t_q, t_i, first, 1, self)
+      call clear_couplings(model%mass, t_q, t_i, first, 2, self)
+      if (self%n_blocks == 3) call clear_couplings(model%damping, t_q, t_i, first, 3, self)
+      loads = model%load_columns()
+      do c = 1, size(loads, 2)
+         where (abs(self%load_q(first:, c)) <= mode_round_off*sum(abs(loads(:, c)))) &
+            self%load_q(first:, c) = 0.0_wp
+      end do
+   end subroutine clear_round_off
+
+   !> Of one matrix: what is left says which modes are not alone.
+   subroutine clear_couplings(matrix, t_q, t_i, first, block, self)
+      real(wp), intent(in) :: matrix(:, :), t_q(:, :), t_i(:, :)
+      !> The first kept mode.
+      integer, intent(in) :: first, block
+      type(reduction_type), intent(inout) :: self
+      real(wp) :: sums(size(matrix, 2)), sizes(size(self%blocks, 1))
+      integer :: i, j, m
+
+      m = self%n_coordinates
+      sums = sum(abs(matrix), dim=1)
+      sizes(:m) = matmul(sums, abs(t_q))
+      sizes(m + 1:) = matmul(sums, abs(t_i))
+      do j = first, m
+         do i = 1, size(sizes)
+            ! Its own stiffness and mass are what a mode is.
+            if (i == j .and. block < 3) cycle
+            associate (entry => self%blocks(i, j, block))
+               if (abs(entry) <= mode_round_off*sizes(i)) entry = 0.0_wp
+               if (i /= j .and. abs(entry) > 0.0_wp) self%alone(j) = .false.
+            end associate
+         end do
+         self%blocks(j, :, block) = self%blocks(:m, j, block)
+         self%coupling(:, block, j) = self%blocks(m + 1:, j, block)
+      end do
+   end subroutine clear_couplings
 
    !> What parameters change, in the basis. It spans all motions, so that its own dependence on the
    !> parameters changes no solution.
@@ -334,6 +394,43 @@ contains
       is_hit = any(highest >= (1.0_wp - margin)*harmonic*omega_range(1) .and. &
                    lowest <= (1.0_wp + margin)*harmonic*omega_range(2))
    end function is_hit
+
+   !> Of undamped modes of one frequency any mixture is one: take those of which as many as possible
+   !> move nothing else, as equal parts of a structure that move against each other.
+   subroutine separate_equals(keep, t_i, self, error)
+      logical, intent(in) :: keep(:)
+      real(wp), intent(inout) :: t_i(:, :)
+      type(reduction_type), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      !> Of frequencies that are the same.
+      real(wp), parameter :: alike = 1.0e-12_wp
+      real(wp), allocatable :: coupling(:, :), mixture(:, :), values(:)
+      logical :: waits(size(keep))
+      integer, allocatable :: equals(:)
+      real(wp) :: weight
+      integer :: b, j
+
+      waits = [(keep(j) .and. is_undamped(self, j), j=1, size(keep))]
+      do j = 1, size(keep)
+         if (.not. waits(j)) cycle
+         equals = pack([(b, b=1, size(keep))], waits .and. &
+                       abs(self%k_i*self%m_i(j) - self%m_i*self%k_i(j)) <= &
+                       alike*self%k_i*self%m_i(j))
+         waits(equals) = .false.
+         if (size(equals) == 1 .or. self%n_coordinates == 0) cycle
+         allocate (mixture(size(equals), size(equals)), source=0.0_wp)
+         do b = 1, self%n_blocks
+            ! As they add up where a harmonic meets the modes: K - omega**2 M + i omega C.
+            weight = merge(1.0_wp, frequency(self, j)**merge(2, 1, b == 2), b == 1)
+            coupling = weight*self%coupling(equals, b, :)
+            mixture = mixture + matmul(coupling, transpose(coupling))
+         end do
+         call diagonalize(mixture, values, 'modes of one frequency', error)
+         if (allocated(error)) return
+         t_i(:, equals) = matmul(t_i(:, equals), mixture)
+         deallocate (mixture)
+      end do
+   end subroutine separate_equals
 
    !> Kept modes are scaled to a largest displacement of 1: their equations are forces then, as
    !> those of the relative coordinates are, and the norm of a residual means the same in all units.

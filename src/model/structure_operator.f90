@@ -78,6 +78,7 @@ module fw_structure_operator
       procedure(sum_magnitudes), deferred :: magnitudes
       procedure(derive_observed), deferred :: observed_slope
       procedure(find_load_work), deferred :: load_work
+      procedure :: undetermined => none_undetermined
       procedure :: whole_size
       procedure :: condense_field
       procedure :: complete_field
@@ -293,6 +294,20 @@ contains
          self%load(:, h) = self%load_factor(h)*self%unit_load(:, h)
       end do
    end subroutine scale_loads
+
+   !> Where the state stands, motions that no equation determines and that no load drives, and those
+   !> that a load drives: harmonics that meet modes without damping and without a coupling to what
+   !> is solved for.
+   subroutine none_undetermined(self, state, n_idle, n_driven)
+      class(structure_operator), intent(in) :: self
+      class(structure_state), intent(in) :: state
+      integer, intent(out) :: n_idle, n_driven
+
+      n_idle = 0
+      n_driven = 0
+      associate (unused => self, unused_state => state)
+      end associate
+   end subroutine none_undetermined
 
    ! The whole field: the coordinates and what is condensed behind them, complex amplitudes
    ! (whole_size, n_retained). Structures without it leave these as they are.

@@ -1,0 +1,122 @@
+"""Modes without damping that a harmonic meets, beside a part with a joint: dense solutions."""
+import subprocess
+
+import numpy as np
+import pytest
+from cases import read, run
+from project import PROGRAM
+
+#: Motions are of the order of one: far above round-off, far below a motion that it would make.
+CLOSE = 1e-7
+#: What stands on the first dof, which belongs to the part that is not met.
+JOINTS = {
+    "nothing": {},
+    "spring": {"spring": {"n_springs": 1, "side_1": 1, "coefficient": 1.0, "power": 3}},
+    "pair": {"contact": {"n_pairs": 1, "law": "penalty", "tangential_stiffness": 1.0,
+                         "side_1": [1, 0, 0], "mu": 1.0, "normal_load": 0.5}}}
+SEEDS = range(8)
+
+
+def add_chain(stiffness, dofs, random):
+    """Springs from the ground to the first dof and from each to the next."""
+    for before, dof in zip([None, *dofs], dofs):
+        value = random.uniform(0.5, 2.0)
+        stiffness[dof, dof] += value
+        if before is not None:
+            stiffness[before, before] += value
+            stiffness[dof, before] = stiffness[before, dof] = -value
+
+
+def structure(seed):
+    """Two chains that nothing joins: matrices, dofs of the second, a mode of it and the rest."""
+    random = np.random.default_rng(seed)
+    sizes = random.integers(1, 4), random.integers(2, 5)
+    n = sum(sizes)
+    others = 1 + random.permutation(n - 1)
+    first, second = [0, *others[:sizes[0] - 1]], others[sizes[0] - 1:]
+    stiffness, mass = np.zeros((n, n)), random.uniform(0.5, 2.0, n)
+    add_chain(stiffness, first, random)
+    add_chain(stiffness, second, random)
+    root = np.sqrt(mass[second])
+    squares, shapes = np.linalg.eigh(stiffness[np.ix_(second, second)] / np.outer(root, root))
+    met = random.integers(len(second))
+    shapes /= root[:, None]
+    load = np.zeros(n)
+    load[0] = 0.5
+    return stiffness, mass, second, squares, shapes, met, load
+
+
+def solve(folder, stiffness, mass, load, omega, joint, status=0):
+    """Coefficients of the response, and names of remarks."""
+    n = len(mass)
+    run(folder, {
+        "case": {"analysis": "point"},
+        "model": {"n_dof": n, "mass": np.diag(mass).ravel().tolist(),
+                  "stiffness": stiffness.ravel().tolist()},
+        "load": {"cosine": load.tolist()}, "sweep": {"start": float(omega)},
+        "harmonics": {"n_harmonics": 3, "parity": "all"}, **joint}, status=status)
+    found = read(folder / "case.h5")
+    names = [name.decode() for name in found.get("remarks/name", [])]
+    return found["coefficients"][0], names
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.parametrize("harmonic", [1, 2, 3])
+def test_a_mode_that_nothing_drives_is_at_rest(tmp_path, joint, harmonic):
+    """Also one that the load does not reach for it is orthogonal: the others answer alone."""
+    for seed in SEEDS:
+        stiffness, mass, second, squares, shapes, met, load = structure(seed)
+        kept = np.arange(len(second)) != met
+        push = np.random.default_rng(seed + 100).normal(size=len(second)) * (seed % 2)
+        # What is left of a load moves no longer the mode that is met.
+        push -= mass[second] * shapes[:, met] * (shapes[:, met] @ push)
+        load[second] = push
+        omega = np.sqrt(squares[met]) / harmonic
+        weights = (shapes.T @ push)[kept] / (squares[kept] - omega**2)
+        found, names = solve(tmp_path, stiffness, mass, load, omega, JOINTS[joint])
+        expected = np.zeros((7, len(second)))
+        expected[1] = shapes[:, kept] @ weights
+        assert found[:, second] == pytest.approx(expected, abs=CLOSE), seed
+        assert "undetermined mode" in names, seed
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_mode_that_a_load_drives_is_no_solution(tmp_path, joint):
+    """However small the load is."""
+    for seed in SEEDS:
+        stiffness, mass, second, squares, _, met, load = structure(seed)
+        load[second] = np.random.default_rng(seed).normal(size=len(second)) * 10.0**(-seed)
+        _, names = solve(tmp_path, stiffness, mass, load, np.sqrt(squares[met]), JOINTS[joint],
+                         status=4)
+        assert "undetermined mode" not in names, seed
+    done = subprocess.run([PROGRAM, "case.nml"], cwd=tmp_path, text=True, capture_output=True,
+                          check=False)
+    assert "grows without bound" in done.stderr + done.stdout
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_equal_parts_that_move_against_each_other(tmp_path, joint):
+    """The frequency of each blade alone: their common motion moves the hub, the others do not."""
+    for n_blades in (2, 3, 5):
+        random = np.random.default_rng(n_blades)
+        k, m = random.uniform(0.5, 2.0, 2)
+        n = n_blades + 1
+        stiffness = np.diag([1.0 + n_blades * k] + n_blades * [k])
+        stiffness[0, 1:] = stiffness[1:, 0] = -k
+        mass = np.array([1.0] + n_blades * [m])
+        load = np.zeros(n)
+        load[0] = 0.5
+        found, names = solve(tmp_path, stiffness, mass, load, np.sqrt(k / m), JOINTS[joint])
+        # The hub stands still, and the blades carry its load.
+        assert found[1, 0] == pytest.approx(0.0, abs=CLOSE)
+        assert found[1, 1:] == pytest.approx(np.full(n_blades, -0.5 / (n_blades * k)), abs=CLOSE)
+        assert "undetermined mode" in names
+
+
+def test_damping_determines_the_mode(tmp_path):
+    """The remedy of the remark."""
+    stiffness, mass, _, squares, _, met, load = structure(3)
+    damped = {"model": {"n_dof": len(mass), "mass": np.diag(mass).ravel().tolist(),
+                        "stiffness": stiffness.ravel().tolist(), "modal_damping": 1e-3}}
+    _, names = solve(tmp_path, stiffness, mass, load, np.sqrt(squares[met]), damped)
+    assert "undetermined mode" not in names
