@@ -26,6 +26,7 @@ module fw_controlled_response
    use fw_point, only: served_by_smaller_steps
    use fw_problem, only: build_system
    use fw_remarks, only: remark_list
+   use fw_remarks, only: remark_undetermined
    use fw_recovery, only: recover_histories
    use fw_recovery, only: recover_point
    use fw_run_state, only: run_state
@@ -544,6 +545,8 @@ contains
       call summary%describe_sensitivity(derivatives)
       call self%sensitivity%remark(case, self%system, summary%remarks)
       call self%remark(state%n_points, summary%remarks)
+      call remark_undetermined(self%method%undetermined_at, self%method%undetermined_again, &
+                               summary%remarks)
       if (state%was_stopped .or. state%all_converged()) return
       message = 'not converged: try smaller steps of frequency or amplitude, or more '// &
                 'harmonics%n_harmonics, for the points above'
