@@ -7,6 +7,5 @@ import pytest
 
 @pytest.mark.parametrize(("make", "n_points"), [(long_runs.sweep, 8000), (long_runs.wear, 4000)])
 def test_memory_is_flat(make, n_points):
-    # From half way on: HDF5 has what it keeps of a file by then.
     memory, _, _ = long_runs.measure(make(n_points), n_points)
     assert memory[-1] - memory[len(memory) // 2] < long_runs.MEMORY_GROWTH
