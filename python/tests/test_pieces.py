@@ -287,6 +287,15 @@ def test_a_piece_goes_on_from_the_one_before(harmonics: Any, leads: int) -> None
                                rtol=0.0, atol=same)
 
 
+def test_a_session_is_of_the_whole_sweep_behind_a_piece() -> None:
+    with SLIDING.open() as given, Session(given) as session:
+        control = np.zeros(CONTROL, dtype=np.int64)
+        assert session.run_piece((13, 20), 3, 0, control) == 0
+        assert session.run(control, in_memory=True) == 0
+        whole = fw.Result.from_bytes(session.image(), SLIDING)
+    assert whole.omega.tobytes() == fw.run(SLIDING).omega.tobytes()
+
+
 def test_a_sweep_ends_after_the_points_that_are_wanted() -> None:
     control = np.zeros(CONTROL, dtype=np.int64)
     control[WANTED] = 9

@@ -30,6 +30,7 @@ module fw_session
    use fw_session_points, only: point_list
    use fw_session_points, only: point_recorder
    use fw_solver_options, only: continuation_natural
+   use fw_solver_options, only: sweep_options
    use fw_strategy, only: kept_strategy
    use fw_strategy, only: new_request
    use fw_sweep, only: sweep_frequency
@@ -404,10 +405,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> The bytes that a result file would have.
       integer(c_int8_t), allocatable, intent(out) :: image(:)
+      type(sweep_options) :: whole
+      integer :: n_threads
 
       call self%prepare(error)
       if (allocated(error)) return
       if (solved == 0) call forget_system(self)
+      ! The case stays that of the whole sweep.
+      whole = self%case%sweep
+      n_threads = self%case%threads
       self%case%threads = 1
       associate (sweep => self%case%sweep)
          sweep%first_point = first
@@ -416,6 +422,8 @@ contains
          sweep%solved_point = merge(solved, 0, allocated(self%kept%strategy))
       end associate
       call run_case(self%case, observer, self%outcome, error, image=image, kept=self%kept)
+      self%case%sweep = whole
+      self%case%threads = n_threads
    end subroutine run_piece
 
    !> Take the case of another session over, read as it is there.
