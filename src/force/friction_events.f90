@@ -137,9 +137,13 @@ contains
       if (.not. allocated(work%jacobian)) allocate (work%jacobian(3*nc, 3*nc, self%n_elements))
       select type (room => work%room)
       class is (event_room)
-         ! Where slip is not measured, the derivative of it is not allocated: not present.
-         call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, &
-                                   work%jacobian, work%slip_derivative)
+         if (work%differentiates_slip) then
+            call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, &
+                                      work%jacobian, work%slip_derivative)
+         else
+            call room%paths%linearize(fourier, work%state == pair_mixed, work%x_start, &
+                                      work%jacobian)
+         end if
       end select
    end subroutine linearize
 
