@@ -95,7 +95,8 @@ module fw_balance_state
       type(near_derivative), allocatable, private :: near(:)
       type(balance_scratch) :: scratch
       !> Goes up with every residual and frequency: who kept a residual knows by it whether the
-      !> state still stands there.
+      !> state still stands there. Depths, factors of the loads, and where marches start may be set
+      !> without it.
       integer(i8), private :: n_moves = 0_i8
    contains
       procedure :: set_parameter

@@ -196,6 +196,7 @@ contains
       last = system%problem%fourier%n_retained
       if (at_rest) last = count(system%problem%fourier%harmonic == 0)
       if (m < coordinates_for_threads) then
+         ! A region of one thread takes as long as a few harmonics of a small structure.
          do h = 1, last
             if (.not. system%is_interrupted()) call solve_harmonic(system, closed, h, q(:, h), &
                                                                    tension)

@@ -420,7 +420,8 @@ contains
          if (size(equals) == 1 .or. self%n_coordinates == 0) cycle
          allocate (mixture(size(equals), size(equals)), source=0.0_wp)
          do b = 1, self%n_blocks
-            ! As they add up where a harmonic meets the modes: K - omega**2 M + i omega C.
+            ! Each matrix by itself, with the factor that it has where a harmonic meets the modes: 1
+            ! of K, omega**2 of M, omega of C.
             weight = merge(1.0_wp, frequency(self, j)**merge(2, 1, b == 2), b == 1)
             coupling = weight*self%coupling(equals, b, :)
             mixture = mixture + matmul(coupling, transpose(coupling))
