@@ -90,14 +90,13 @@ def teller(progress: Progress | None, session: Session) -> Iterator[Tell | None]
 
 
 def run_watched(session: Session, progress: Tell | None, stop: Callable[[], object] | None, *,
-                in_memory: bool, control: NDArray[np.int64] | None = None) -> tuple[int, bool]:
+                in_memory: bool) -> tuple[int, bool]:
     """Run a session so that it can be interrupted; its status, and whether it was.
 
     The main thread alone gets signals, and only while it runs Python: the library works in another
     thread, while this one waits.
     """
-    if control is None:
-        control = np.zeros(CONTROL, dtype=np.int64)
+    control = np.zeros(CONTROL, dtype=np.int64)
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main and progress is None and stop is None:
         return session.run(control, in_memory=in_memory), False
