@@ -296,6 +296,21 @@ def test_a_session_is_of_the_whole_sweep_behind_a_piece() -> None:
     assert whole.omega.tobytes() == fw.run(SLIDING).omega.tobytes()
 
 
+def test_what_a_piece_remarks_is_not_said_of_the_next() -> None:
+    # A mode without damping that nothing reaches, at the second row.
+    model = fw.Model(np.eye(2), np.diag([0.1, 0.0]), np.diag([1.3, 1.0]), cosine=[1.0, 0.0])
+    case = fw.Case(model, harmonics={"n_harmonics": 1},
+                   sweep={"start": 0.5, "end": 4.5, "n_points": 9})
+    told = []
+    with case.open() as given, Session(given) as session:
+        for first, last, solved in ((1, 3, 0), (4, 9, 3)):
+            assert session.run_piece((first, last), 1, solved,
+                                     np.zeros(CONTROL, dtype=np.int64)) == 0
+            piece = fw.Result.from_bytes(session.image(), case)
+            told.append("undetermined mode" in list(piece["remarks/name"]))
+    assert told == [True, False]
+
+
 def test_a_sweep_ends_after_the_points_that_are_wanted() -> None:
     control = np.zeros(CONTROL, dtype=np.int64)
     control[WANTED] = 9

@@ -59,7 +59,7 @@ contains
       type(run_state), intent(inout) :: state
       type(error_type), allocatable, intent(out) :: error
       !> Go on from what is kept, and keep what this run ends with.
-      type(kept_strategy), intent(inout), optional :: kept
+      type(kept_strategy), intent(inout), target, optional :: kept
       class(point_strategy), allocatable, target :: strategy
       class(point_source), allocatable, target :: source
       type(writer_sink), target :: to_file
@@ -69,7 +69,7 @@ contains
       type(sweep_bifurcations), target :: changes
       type(cycle_keeper), target :: keeper
       type(sink_list) :: sinks
-      logical :: in_order
+      logical :: in_order, is_kept
 
       call begin(case, strategy, error, kept)
       if (allocated(error)) return
@@ -131,7 +131,13 @@ contains
                                                          error)
       call finder%clear()
       if (.not. present(kept) .or. allocated(error)) return
-      if (allocated(kept%memory%x)) call move_alloc(strategy, kept%strategy)
+      ! Of other strategies what a point needs depends on those before it.
+      is_kept = .false.
+      select type (strategy)
+      type is (one_level)
+         is_kept = allocated(kept%memory%x)
+      end select
+      if (is_kept) call move_alloc(strategy, kept%strategy)
    end subroutine run_frequency_response
 
    !> A strategy that is ready for the first point: the one kept, or one that is started.
@@ -139,12 +145,16 @@ contains
       type(case_type), intent(in) :: case
       class(point_strategy), allocatable, target, intent(out) :: strategy
       type(error_type), allocatable, intent(out) :: error
-      type(kept_strategy), intent(inout), optional :: kept
+      type(kept_strategy), intent(inout), target, optional :: kept
 
       if (present(kept)) then
          if (allocated(kept%strategy)) then
             call move_alloc(kept%strategy, strategy)
-            call strategy%recall(kept%memory)
+            select type (strategy)
+            type is (one_level)
+               call strategy%begin_run(case)
+               call strategy%recall(kept%memory)
+            end select
             return
          end if
       end if

@@ -39,6 +39,7 @@ module fw_level
       logical, private :: is_built = .false.
    contains
       procedure :: build
+      procedure :: renew
       procedure :: solve
       procedure :: take_over
    end type level_type
@@ -116,6 +117,16 @@ contains
       call self%solver%start(case, self%harmonics, self%system%n)
       self%is_built = .true.
    end subroutine build
+
+   !> Forget solutions and work: the system alone stays.
+   subroutine renew(self, case)
+      class(level_type), intent(inout) :: self
+      type(case_type), intent(in) :: case
+
+      self%solver = point_solver()
+      call self%solver%start(case, self%harmonics, self%system%n)
+      self%is_solved = .false.
+   end subroutine renew
 
    !> Solve at a frequency.
    subroutine solve(self, case, request, point, error)

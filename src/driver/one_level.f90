@@ -42,6 +42,7 @@ module fw_one_level
       procedure :: remember
       procedure :: recall
       procedure :: start_anew
+      procedure :: begin_run
       final :: forget
    end type one_level
 
@@ -143,10 +144,23 @@ contains
       end associate
    end subroutine describe
 
+   !> Another run with the same system: what it tells of its work is not that of the one before.
+   subroutine begin_run(self, case)
+      class(one_level), intent(inout) :: self
+      type(case_type), intent(in) :: case
+
+      call self%level%renew(case)
+      call forget(self)
+      self%n_elsewhere = 0
+      if (allocated(self%way)) deallocate (self%way)
+      if (allocated(self%note)) deallocate (self%note)
+   end subroutine begin_run
+
    impure elemental subroutine forget(self)
       type(one_level), intent(inout) :: self
 
       if (associated(self%below)) deallocate (self%below)
+      nullify (self%below)
    end subroutine forget
 
    !> The last converged solution, so that points of a search start from it.

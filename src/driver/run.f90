@@ -76,7 +76,7 @@ contains
       !> not come to a point.
       integer(c_int8_t), allocatable, intent(out), optional :: image(:)
       !> Of a piece of a sweep: what the one before left, and then what this one leaves.
-      type(kept_strategy), intent(inout), optional :: kept
+      type(kept_strategy), intent(inout), target, optional :: kept
       type(result_writer), target :: writer
       type(summary_type), target :: summary
       type(run_state) :: state

@@ -419,7 +419,13 @@ contains
          sweep%first_point = first
          sweep%last_point = last
          sweep%lead_points = lead
-         sweep%solved_point = merge(solved, 0, allocated(self%kept%strategy))
+         sweep%solved_point = solved
+         if (.not. allocated(self%kept%strategy) .and. solved > 0) then
+            ! From the start of the sweep then, by steps as long.
+            sweep%solved_point = 0
+            sweep%lead_points = ceiling(real(max(lead, 1), wp)*real(first - 1, wp) &
+                                        /real(max(first - 1 - solved, 1), wp))
+         end if
       end associate
       call run_case(self%case, observer, self%outcome, error, image=image, kept=self%kept)
       self%case%sweep = whole
