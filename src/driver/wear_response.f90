@@ -13,6 +13,7 @@ module fw_wear_response
    use fw_point_solver, only: point_solver
    use fw_problem, only: build_system
    use fw_hdf5, only: hdf5_file
+   use fw_remarks, only: remark_undetermined
    use fw_resonance, only: resonance_type
    use fw_restart_file, only: restart_type
    use fw_restart_rows, only: c_noted
@@ -107,6 +108,8 @@ contains
       if (.not. point%converged) call note_time_limit(observer, case%solver%max_seconds, point)
       call observer%limit_point(0.0_wp)
       if (allocated(point%note)) call observer%on_message(point%note)
+      call remark_undetermined(run%solver%method%undetermined_at, &
+                               run%solver%method%undetermined_again, summary%remarks)
       if (point%converged) then
          call start_march(run, case, point, error)
          if (.not. allocated(error)) call march_on(run, restart, error)

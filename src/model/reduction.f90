@@ -151,7 +151,7 @@ contains
       !> The first kept mode.
       integer, intent(in) :: first, block
       type(reduction_type), intent(inout) :: self
-      real(wp) :: sums(size(matrix, 2)), sizes(size(self%blocks, 1))
+      real(wp) :: sums(size(matrix, 2)), sizes(size(self%blocks, 1)), largest
       integer :: i, j, m
 
       m = self%n_coordinates
@@ -163,7 +163,10 @@ contains
             ! Its own stiffness and mass are what a mode is.
             if (i == j .and. block < 3) cycle
             associate (entry => self%blocks(i, j, block))
-               if (abs(entry) <= mode_round_off*sizes(i)) entry = 0.0_wp
+               ! Of two kept modes, the same for both of their entries.
+               largest = sizes(i)
+               if (i >= first .and. i <= m) largest = max(largest, sizes(j))
+               if (abs(entry) <= mode_round_off*largest) entry = 0.0_wp
                if (i /= j .and. abs(entry) > 0.0_wp) self%alone(j) = .false.
             end associate
          end do

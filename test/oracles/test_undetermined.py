@@ -120,3 +120,18 @@ def test_damping_determines_the_mode(tmp_path):
                         "stiffness": stiffness.ravel().tolist(), "modal_damping": 1e-3}}
     _, names = solve(tmp_path, stiffness, mass, load, np.sqrt(squares[met]), damped)
     assert "undetermined mode" not in names
+
+
+def test_wear_says_so_too(tmp_path):
+    """A pair that wears on one dof, and an oscillator beside it."""
+    run(tmp_path, {
+        "case": {"analysis": "wear"},
+        "model": {"n_dof": 2, "mass": [1.0, 0.0, 0.0, 1.0], "stiffness": [2.0, 0.0, 0.0, 1.0],
+                  "damping": [0.05, 0.0, 0.0, 0.0]},
+        "contact": {"n_pairs": 1, "law": "penalty", "side_1": [1, 0, 0], "mu": 0.3,
+                    "tangential_stiffness": 1.0, "normal_load": 0.5, "area": 1.0},
+        "load": {"cosine": [1.0, 0.0]}, "harmonics": {"n_harmonics": 3, "n_time": 64},
+        "sweep": {"start": 1.0},
+        "wear": {"coefficient": 1e-6, "max_depth_step": 1e-6, "max_steps": 2}}, status=(0, 4))
+    assert "undetermined mode" in [name.decode() for name in
+                                   read(tmp_path / "case.h5")["remarks/name"]]
