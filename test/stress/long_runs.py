@@ -34,6 +34,8 @@ MEMORY_GROWTH, TIME_GROWTH = 1.0, 1.5
 # Memory is read at these shares of a run's points, of which the last leaves room for those that
 # the program reports before they are read.
 SHARES = np.arange(0.05, 0.96, 0.05)
+# F_SETPIPE_SZ of Linux, which Python has from 3.10 on.
+SET_PIPE_SIZE = 1031
 
 
 def sweep(n_points):
@@ -67,7 +69,7 @@ def measure(case, n_points):
                               env=runs.ENVIRONMENT, stdout=subprocess.DEVNULL,
                               stderr=subprocess.PIPE) as process:
             # A pipe of one page: the program is at most some fifty points ahead of what is read.
-            fcntl.fcntl(process.stderr, fcntl.F_SETPIPE_SZ, 4096)
+            fcntl.fcntl(process.stderr, SET_PIPE_SIZE, 4096)
             memory = [resident(process.pid) for line in process.stderr
                       if re.split(" of |:", line, maxsplit=1)[0] in marks]
         if process.returncode not in (0, 4):
