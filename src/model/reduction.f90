@@ -69,6 +69,8 @@ module fw_reduction
    !> Round-off of sums with a kept mode, whose largest displacement is 1, over the sizes of what it
    !> is multiplied by: each of its displacements is good to some hundred times epsilon.
    real(wp), parameter :: mode_round_off = 1.0e-13_wp
+   !> Couplings of a mode are none beside its own stiffness, mass or critical damping.
+   real(wp), parameter :: own_round_off = 1.0e-12_wp
    !> Relative stiffness below which an internal mode is free.
    real(wp), parameter :: free_stiffness = 1.0e-11_wp
 
@@ -122,36 +124,51 @@ contains
       if (allocated(model%changes)) call transform_changes(model, t_q, t_i, self)
    end subroutine new_reduction
 
-   !> Zero the couplings and loads of kept modes that are the round-off of their sums: where a
-   !> harmonic meets the mode nothing else stands in its row, and their quotient would be a motion.
+   !> Find the kept modes that nothing couples to, and zero what round-off has left of their
+   !> couplings and loads: where a harmonic meets the mode nothing else stands in its row, and their
+   !> quotient would be a motion. A mode with a single coupling that is more keeps all of them, as
+   !> together they may be far less than each.
    subroutine clear_round_off(model, t_q, t_i, self)
       type(model_type), intent(in) :: model
       real(wp), intent(in) :: t_q(:, :), t_i(:, :)
       type(reduction_type), intent(inout) :: self
       real(wp), allocatable :: loads(:, :)
-      integer :: c, first
+      integer :: block, c, first, j
 
       allocate (self%alone(self%n_coordinates), source=.false.)
       if (size(self%kept) == 0) return
       first = self%n_coordinates - size(self%kept) + 1
       self%alone(first:) = .true.
-      call clear_couplings(model%stiffness, t_q, t_i, first, 1, self)
-      call clear_couplings(model%mass, t_q, t_i, first, 2, self)
-      if (self%n_blocks == 3) call clear_couplings(model%damping, t_q, t_i, first, 3, self)
+      call find_couplings(model%stiffness, t_q, t_i, first, 1, self)
+      call find_couplings(model%mass, t_q, t_i, first, 2, self)
+      if (self%n_blocks == 3) call find_couplings(model%damping, t_q, t_i, first, 3, self)
       loads = model%load_columns()
-      do c = 1, size(loads, 2)
-         where (abs(self%load_q(first:, c)) <= mode_round_off*sum(abs(loads(:, c)))) &
-            self%load_q(first:, c) = 0.0_wp
+      do j = first, self%n_coordinates
+         if (.not. self%alone(j)) cycle
+         do block = 1, self%n_blocks
+            associate (own => self%blocks(j, j, block))
+               self%blocks(:j - 1, j, block) = 0.0_wp
+               self%blocks(j + 1:, j, block) = 0.0_wp
+               if (block == 3 .and. own <= own_round_off*critical(self, j)) own = 0.0_wp
+            end associate
+            self%blocks(j, :, block) = self%blocks(:self%n_coordinates, j, block)
+            self%coupling(:, block, j) = 0.0_wp
+         end do
+         do c = 1, size(loads, 2)
+            if (abs(self%load_q(j, c)) > mode_round_off*sum(abs(loads(:, c)))) cycle
+            self%load_q(j, c) = 0.0_wp
+         end do
       end do
    end subroutine clear_round_off
 
-   !> Of one matrix: what is left says which modes are not alone.
-   subroutine clear_couplings(matrix, t_q, t_i, first, block, self)
+   !> Modes that one matrix couples to anything by more than round-off, of its sums and beside what
+   !> the mode has itself, are not alone.
+   subroutine find_couplings(matrix, t_q, t_i, first, block, self)
       real(wp), intent(in) :: matrix(:, :), t_q(:, :), t_i(:, :)
       !> The first kept mode.
       integer, intent(in) :: first, block
       type(reduction_type), intent(inout) :: self
-      real(wp) :: sums(size(matrix, 2)), sizes(size(self%blocks, 1)), largest
+      real(wp) :: sums(size(matrix, 2)), sizes(size(self%blocks, 1)), own, limit
       integer :: i, j, m
 
       m = self%n_coordinates
@@ -159,21 +176,23 @@ contains
       sizes(:m) = matmul(sums, abs(t_q))
       sizes(m + 1:) = matmul(sums, abs(t_i))
       do j = first, m
+         own = critical(self, j)
+         if (block < 3) own = self%blocks(j, j, block)
          do i = 1, size(sizes)
-            ! Its own stiffness and mass are what a mode is.
-            if (i == j .and. block < 3) cycle
-            associate (entry => self%blocks(i, j, block))
-               ! Of two kept modes, the same for both of their entries.
-               largest = sizes(i)
-               if (i >= first .and. i <= m) largest = max(largest, sizes(j))
-               if (abs(entry) <= mode_round_off*largest) entry = 0.0_wp
-               if (i /= j .and. abs(entry) > 0.0_wp) self%alone(j) = .false.
-            end associate
+            if (i == j) cycle
+            limit = min(mode_round_off*sizes(i), own_round_off*own)
+            if (abs(self%blocks(i, j, block)) > limit) self%alone(j) = .false.
          end do
-         self%blocks(j, :, block) = self%blocks(:m, j, block)
-         self%coupling(:, block, j) = self%blocks(m + 1:, j, block)
       end do
-   end subroutine clear_couplings
+   end subroutine find_couplings
+
+   !> sqrt(k m) of a coordinate: half its critical damping.
+   pure real(wp) function critical(self, j)
+      type(reduction_type), intent(in) :: self
+      integer, intent(in) :: j
+
+      critical = sqrt(max(self%blocks(j, j, 1), 0.0_wp)*self%blocks(j, j, 2))
+   end function critical
 
    !> What parameters change, in the basis. It spans all motions, so that its own dependence on the
    !> parameters changes no solution.

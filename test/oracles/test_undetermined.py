@@ -1,5 +1,6 @@
 """Modes without damping that a harmonic meets, beside a part with a joint: dense solutions."""
 import subprocess
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -120,6 +121,41 @@ def test_damping_determines_the_mode(tmp_path):
                         "stiffness": stiffness.ravel().tolist(), "modal_damping": 1e-3}}
     _, names = solve(tmp_path, stiffness, mass, load, np.sqrt(squares[met]), damped)
     assert "undetermined mode" not in names
+
+
+def exact(matrix, load):
+    """Solution in rational numbers, of which those given are exact ones."""
+    n = len(load)
+    rows = [[Fraction(value) for value in [*row, f]] for row, f in zip(matrix, load, strict=True)]
+    for k in range(n):
+        pivot = next(i for i in range(k, n) if rows[i][k])
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [value / rows[k][k] for value in rows[k]]
+        for i in range(n):
+            if i != k:
+                rows[i] = [a - rows[i][k] * b for a, b in zip(rows[i], rows[k], strict=True)]
+    return np.array([float(row[-1]) for row in rows])
+
+
+@pytest.mark.parametrize("joining", [1e-9, 1e-10])
+def test_equal_parts_that_a_weak_spring_joins_are_coupled(tmp_path, joining):
+    """At a mode of both their coupling is all that counts, however little it is beside K and M."""
+    springs = [0.02447313091633785, 0.004846333174229288, 19.656211347790872, 0.07290039396017745]
+    mass = [0.53843651611629, 0.7495319524489236, 1.871346884381871, 1.7560745361382053]
+    part = np.diag(np.add(springs, [*springs[1:], 0.0]))
+    part -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
+    stiffness, masses = np.kron(np.eye(2), part), np.tile(mass, 2)
+    stiffness[[3, 4, 3, 4], [3, 4, 4, 3]] += np.array([1.0, 1.0, -1.0, -1.0]) * joining
+    load, omega = np.array([0.01, *np.zeros(7)]), 6.061699624303173
+    found, names = solve(tmp_path, stiffness, masses, load, omega, JOINTS["pair"])
+    assert "undetermined mode" not in names
+    # The pair sticks: a spring.
+    stiffness[0, 0] += JOINTS["pair"]["contact"]["tangential_stiffness"]
+    square = Fraction(omega)**2
+    expected = exact([[Fraction(k) - (i == j) * square * Fraction(masses[i])
+                       for j, k in enumerate(row)] for i, row in enumerate(stiffness)], load)
+    # A part of 1e-14 of the frequency makes 1.5e-4 of it, and what was lost of the coupling 0.5.
+    assert found[1] == pytest.approx(expected, abs=1e-2 * np.abs(expected).max())
 
 
 def test_wear_says_so_too(tmp_path):
