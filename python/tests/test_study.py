@@ -317,7 +317,8 @@ def test_a_scheduler_without_the_package_is_one_message(
     with subprocess.Popen([sys.executable, "-c", BARE_SCHEDULER, told],
                           stderr=subprocess.DEVNULL) as process:
         try:
-            while not told.exists():
+            # It is written bit by bit.
+            while not (told.exists() and told.read_text().rstrip().endswith("}")):
                 assert process.poll() is None
                 time.sleep(0.1)
             address = json.loads(told.read_text())["address"]

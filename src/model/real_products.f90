@@ -260,6 +260,8 @@ contains
       real(wp) :: re, im
       integer :: h, k
 
+      ! Without rows no column has a first entry.
+      if (n == 0) return
       !$omp parallel do default(none) private(h, k, re, im) &
       !$omp if(n*size(factors%harmonic) >= entries_for_threads) &
       !$omp shared(factors, n, n_blocks, sign, v, first, n_inner, multiples) schedule(static, 1)
