@@ -215,6 +215,10 @@ contains
       real(wp), intent(in) :: multiples(n_active + basis%n_internal, self%n_acting, *)
       integer :: b, k, n, n_inner
 
+      if (n_active == 0) then
+         self%modes(:, :self%n_coefficients) = 0.0_wp
+         return
+      end if
       n_inner = n_active + basis%n_internal
       !$omp parallel do default(none) private(b, k, n) if(n_used >= coordinates_for_threads) &
       !$omp shared(self, basis, n_active, n_inner, columns, multiples)
