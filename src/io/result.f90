@@ -33,6 +33,7 @@ module fw_result
    use fw_resonance_group, only: write_resonance
    use fw_resonance_options, only: resonance_options
    use fw_result_labels, only: label_dataset
+   use fw_result_part, only: at_work
    use fw_result_part, only: create_part
    use fw_result_part, only: delete_part
    use fw_result_part, only: publish_part
@@ -393,7 +394,7 @@ contains
       call write_attribute(file, '/', 'fretwear_version', version, error)
       if (allocated(error)) return
       ! Until the run is over; a file that is cut short keeps it.
-      call write_attribute(file, '/', 'status', 'incomplete', error)
+      call write_attribute(file, '/', 'status', at_work, error)
       if (allocated(error)) return
       call write_attribute(file, '/', 'elapsed', 0.0_wp, error)
       if (allocated(error)) return

@@ -5,7 +5,7 @@
 !> Remains are kept until a later run has published its result under the same name, because they
 !> hold points that nothing else has; then they go. A run at work is told from a killed one by the
 !> lock that HDF5 holds on an open file, so a part says on which machine its lock works: nothing
-!> else is removed.
+!> else is removed, nor a part that is whole.
 module fw_result_part
    use, intrinsic :: iso_c_binding, only: c_char
    use, intrinsic :: iso_c_binding, only: c_int
@@ -27,13 +27,15 @@ module fw_result_part
    implicit none (type, external)
    private
 
-   public :: create_part, publish_part, delete_part
+   public :: create_part, publish_part, delete_part, at_work
 
    !> As many parts of one result are told apart.
    integer, parameter :: most_parts = 100
 
    !> Attribute of a part: the machine on which its lock can be seen.
    character(*), parameter :: lock_attribute = 'locked_on'
+   !> Status of a part until its run has written everything.
+   character(*), parameter :: at_work = 'incomplete'
 
    interface
       function c_rename(old, new) bind(c, name='rename') result(status)
@@ -116,26 +118,32 @@ contains
          part = part_name(path, i)
          if (.not. is_there(part)) cycle
          if (is_locked(part)) cycle
-         if (was_locked_here(part)) call delete_part(part)
+         if (was_killed_here(part)) call delete_part(part)
       end do
    end subroutine delete_remains
 
-   !> Whether a file without a lock is the part of a run that had one on this machine.
-   logical function was_locked_here(part)
+   !> Whether a file without a lock is the part of a run that had one on this machine, and was
+   !> killed at work: one that is whole is about to get its name, or could not get it.
+   logical function was_killed_here(part)
       character(*), intent(in) :: part
       type(error_type), allocatable :: error
       type(hdf5_file) :: file
-      character(:), allocatable :: machine
+      character(:), allocatable :: machine, status
 
-      was_locked_here = .false.
+      was_killed_here = .false.
       call file%open_read(part, error)
       if (allocated(error)) return
       if (has_attribute(file, '/', lock_attribute)) then
          call read_attribute(file, '/', lock_attribute, machine, error)
-         if (.not. allocated(error)) was_locked_here = machine == machine_name()
+         if (.not. allocated(error)) was_killed_here = machine == machine_name()
+      end if
+      if (was_killed_here .and. has_attribute(file, '/', 'status')) then
+         call read_attribute(file, '/', 'status', status, error)
+         was_killed_here = .not. allocated(error)
+         if (was_killed_here) was_killed_here = status == at_work
       end if
       call file%close(error)
-   end function was_locked_here
+   end function was_killed_here
 
    !> `<target>.part`, then `<target>.part.2` and so on.
    pure function part_name(target, i) result(part)

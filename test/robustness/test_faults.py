@@ -90,6 +90,15 @@ def test_a_part_whose_lock_proves_nothing_is_left_alone(case):
     assert case.files() == ["case.nml", "x.h5", "x.h5.part"]
 
 
+def test_a_part_that_is_whole_is_left_alone(case):
+    """Its run has closed it and is about to give it its name."""
+    case.kill()
+    with h5py.File(case.part(), "a") as file:
+        file.attrs["status"] = b"complete"
+    case.complete()
+    assert case.files() == ["case.nml", "x.h5", "x.h5.part"]
+
+
 @pytest.mark.parametrize("name", faults.SCENARIOS)
 def test_at_random_moments(tmp_path, name):
     """A few tries of each fault; `make faults` takes more."""
