@@ -8,7 +8,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help deps build configured program debug run test lint keys docs clean
 .PHONY: fuzz notebooks wheel ways sensitivities resonances modes calibration stops controls
-.PHONY: parameters
+.PHONY: parameters family
 .PHONY: bench bench-precision bench-solvers bench-paper bench-time bench-scaling bench-limit
 .PHONY: bench-peers bench-full compare disk paper
 .PHONY: stress long faults sectors peaks bifurcations rest scars slow verify
@@ -91,7 +91,7 @@ lint: build/deps.stamp ## linters of the Fortran and the Python code, type check
 	@$(PYTHON) tools/comment_share.py
 	@$(PYTHON) -m mypy
 	@$(PYTHON) -m ruff check python conftest.py bench tools docs \
-	   test/builds test/cyclic test/design test/fretting test/legacy test/modes test/rest test/rigid \
+	   test/builds test/cyclic test/design test/families test/fretting test/legacy test/modes test/rest test/rigid \
 	   test/robustness test/stress test/verify
 
 keys: build ## tables of keys in the user guide, settings of the Python package
@@ -189,6 +189,10 @@ resonances: build ## 200 random resonances over a parameter against sweeps, in d
 
 controls: build ## 200 random responses of given amplitude against equations of another code
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/control_family.py -o docs/robustness.md
+
+family: build ## a random family of test/families at full size: NAME=, BEFORE=fw_run
+	PYTHONPATH=python:$(BUILD)/python FW_RUN=$(BUILD)/fw_run $(PYTHON) test/families/runner.py \
+	   $(NAME) --page $(if $(BEFORE),--before $(BEFORE))
 
 parameters: build ## 112 random sweeps over matrices against equations of another code, and runs
 	FW_RUN=$(BUILD)/fw_run $(PYTHON) test/oracles/parameter_family.py -o docs/robustness.md
