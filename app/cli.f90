@@ -20,6 +20,8 @@ module fw_cli
       logical :: check = .false.
       !> Show the keys of the namelist, all or those of the group `input`, for a program or not.
       logical :: keys = .false., keys_as_json = .false.
+      !> Show which keys do not go together.
+      logical :: rules = .false.
       logical :: quiet = .false.
       logical :: verbose = .false.
       logical :: help = .false.
@@ -69,7 +71,8 @@ contains
          if (allocated(error)) return
          i = i + 1
       end do
-      if (options%help .or. options%version .or. options%keys) return
+      if (options%help .or. options%version .or. options%keys .or. &
+          options%rules) return
       if (options%quiet .and. options%verbose) then
          call fatal_error(error, '-q and -v exclude each other'//hint, status_usage)
       else if (.not. allocated(options%input)) then
@@ -197,6 +200,8 @@ contains
       select case (name)
       case ('--check')
          options%check = .true.
+      case ('--rules')
+         options%rules = .true.
       case ('-q', '--quiet')
          options%quiet = .true.
       case ('-v', '--verbose')
@@ -213,15 +218,15 @@ contains
    pure logical function is_flag(name)
       character(*), intent(in) :: name
 
-      is_flag = any(name == [character(9) :: '--check', '--quiet', '--verbose', '--help', &
-                             '--version'])
+      is_flag = any(name == [character(9) :: '--check', '--rules', '--quiet', '--verbose', &
+                             '--help', '--version'])
    end function is_flag
 
    function near(name) result(text)
       character(*), intent(in) :: name
       character(:), allocatable :: text
       character(*), parameter :: names(*) = [character(9) :: '--set', '--output', '--restart', &
-         '--keys', '--check', '--quiet', '--verbose', '--help', '--version']
+         '--keys', '--rules', '--check', '--quiet', '--verbose', '--help', '--version']
       type(string_type) :: options(size(names))
       integer :: i
 

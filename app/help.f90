@@ -25,6 +25,7 @@ contains
          '                         was killed (FILE.part)', &
          '  --keys [GROUP]         what every key accepts and means, its unit and its default;', &
          '                         --keys=json for programs', &
+         '  --rules                which keys do not go together, and what to use instead', &
          '  --check                validate, print the effective input and the natural', &
          '                         frequencies within the sweep, run nothing', &
          '  -q                     errors only', &

@@ -4,7 +4,8 @@
     write_keys.py [--check] [PROGRAM]
 
 Writes the tables of docs/user-guide.md, between their marks, and python/fretwear/settings.py from
-`fw_run --keys=json`. With --check nothing is written; the status is 1 where a file differs.
+`fw_run --keys=json`, and the table of keys that do not go together from `fw_run --rules`. With
+--check nothing is written; the status is 1 where a file differs.
 """
 
 from __future__ import annotations
@@ -49,6 +50,26 @@ def declared(program: str) -> Keys:
     """Every group with its purpose and its keys."""
     shown = subprocess.run([program, "--keys=json"], check=True, capture_output=True, text=True)
     return json.loads(shown.stdout)
+
+
+def rules(program: str) -> str:
+    """What does not go together as Markdown; one row for each asker and remedy."""
+    shown = subprocess.run([program, "--rules"], check=True, capture_output=True, text=True)
+    rows: dict[str, dict[str, list[str]]] = {}
+    for line in shown.stdout.splitlines():
+        asks, rest = line.split(" does not go with ", 1)
+        forbids, remedy = rest.split(": ", 1)
+        rows.setdefault(asks, {}).setdefault(remedy, []).append(forbids)
+    lines = ["| what | does not go with | instead |", "|---|---|---|"]
+    for asks, remedies in rows.items():
+        lines += [f"| {quoted(asks)} | {'; '.join(map(quoted, forbids))} | {coded(remedy)} |"
+                  for remedy, forbids in remedies.items()]
+    return "\n".join(lines)
+
+
+def quoted(feature: str) -> str:
+    """A feature with its key as code, and what it says of it as text."""
+    return re.sub(r"\b\w+%\w+(?: = (?:'[^']*'|\.true\.|\d+))?|&\w+|'[^']+'", r"`\g<0>`", feature)
 
 
 def number(value: float) -> str:
@@ -119,16 +140,20 @@ def coded_unit(key: dict[str, Any]) -> str:
     return "`unit`" if "unit" in key else ""
 
 
-def guide(groups: Keys, text: str) -> str:
+def guide(groups: Keys, together: str, text: str) -> str:
     """The guide with its tables renewed."""
     for group, content in groups.items():
-        begin, end = f"<!-- keys of {group} -->\n", "<!-- end of keys -->"
-        pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
-        if not pattern.search(text):
-            sys.exit(f"{GUIDE}: has no table of &{group}: put {begin.strip()} and {end} there")
-        new = begin + table(content["keys"]) + "\n" + end
-        text = pattern.sub(lambda _, new=new: new, text)
-    return text
+        text = put(text, f"keys of {group}", "end of keys", table(content["keys"]))
+    return put(text, "rules", "end of rules", together)
+
+
+def put(text: str, name: str, last: str, lines: str) -> str:
+    """A table between its two marks."""
+    begin, end = f"<!-- {name} -->\n", f"<!-- {last} -->"
+    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+    if not pattern.search(text):
+        sys.exit(f"{GUIDE}: has no table of {name}: put {begin.strip()} and {end} there")
+    return pattern.sub(lambda _: begin + lines + "\n" + end, text)
 
 
 def annotation(name: str, key: dict[str, Any]) -> str:
@@ -223,7 +248,9 @@ def main() -> int:
     arguments = parser.parse_args()
     groups = declared(arguments.program)
     stale = 0
-    for path, text in ((GUIDE, guide(groups, GUIDE.read_text())), (SETTINGS, settings(groups))):
+    written = ((GUIDE, guide(groups, rules(arguments.program), GUIDE.read_text())),
+               (SETTINGS, settings(groups)))
+    for path, text in written:
         if path.read_text() == text:
             continue
         if arguments.check:

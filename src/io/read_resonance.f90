@@ -1,9 +1,7 @@
 !> Group &resonance: which parameter a resonance is followed over, and whether the case has it.
 module fw_read_resonance
    use fw_case, only: analysis_resonance, case_type
-   use fw_contact_data, only: memory_carried
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_harmonics_options, only: method_hbm
    use fw_kinds, only: wp
    use fw_parameter_checks, only: check_parameter
    use fw_parameter_values, only: get_parameter
@@ -13,7 +11,7 @@ module fw_read_resonance
    use fw_reader, only: reader_type
    use fw_resonance_options, only: as_factor, condition_phase, resonance_options, &
                                    spacing_log
-   use fw_solver_options, only: continuation_arclength, jacobian_analytic, solver_newton
+   use fw_solver_options, only: continuation_arclength
    use fw_values, only: number_text
    implicit none (type, external)
    private
@@ -97,10 +95,7 @@ contains
       character(len(parameter_words)) :: name
 
       if (case%analysis /= analysis_resonance) return
-      call check_combination(case, error)
-      if (.not. allocated(error)) call check_parameter(case, case%resonance%parameter, &
-                                                       'resonance%parameter', error)
-      if (.not. allocated(error)) call check_load(case, error)
+      call check_parameter(case, case%resonance%parameter, 'resonance%parameter', error)
       if (allocated(error)) return
       call get_parameter(case, case%resonance%parameter, values)
       name = parameter_words(case%resonance%parameter)
@@ -114,64 +109,5 @@ contains
                           'all of them together', status_input)
       end if
    end subroutine check_resonance
-
-   !> Solvers and harmonics that a resonance does not go with.
-   subroutine check_combination(case, error)
-      type(case_type), intent(in) :: case
-      type(error_type), allocatable, intent(out) :: error
-      character(*), parameter :: with = " does not go with case%analysis = 'resonance': "
-      character(:), allocatable :: text
-
-      if (case%harmonics%method /= method_hbm) then
-         text = 'harmonics%method'//with//"use 'hbm'"
-      else if (case%harmonics%adaptive) then
-         text = 'harmonics%adaptive = .true.'//with//'give n_harmonics'
-      else if (case%harmonics%accuracy > 0.0_wp) then
-         text = 'harmonics%accuracy'//with//'give n_harmonics'
-      else if (case%solver%kind /= solver_newton) then
-         text = 'solver%kind'//with//"use 'newton'"
-      else if (case%solver%jacobian /= jacobian_analytic) then
-         text = "solver%jacobian = 'difference'"//with//"use 'analytic'"
-      else if (case%contact%memory == memory_carried .and. case%contact%n_pairs > 0) then
-         text = "contact%memory = 'carried'"//with//"use 'assembly'"
-      else if (case%output%histories) then
-         text = 'output%histories'//with//'leave it out'
-      else if (case%output%tail > 0) then
-         text = 'output%tail'//with//'take more n_harmonics'
-      else if (case%sweep%continuation == continuation_arclength) then
-         text = "sweep%continuation = 'arclength'"//with//"&sweep is where the first resonance "// &
-                "is looked for: use 'natural' (resonance%continuation follows folds)"
-      else if (case%sweep%stability) then
-         text = 'sweep%stability = .true.'//with//'leave it out'
-      else if (.not. abs(case%sweep%end - case%sweep%start) > 0.0_wp .or. &
-               case%sweep%n_points < 3) then
-         text = 'sweep%start, end and n_points must be a range of three points at least: a '// &
-                'resonance is looked for in it'
-      end if
-      if (allocated(text)) call fatal_error(error, text, status_input)
-   end subroutine check_combination
-
-   !> Without vibration there is no resonance; nor does a load of other harmonics do work in the
-   !> first.
-   subroutine check_load(case, error)
-      type(case_type), intent(in) :: case
-      type(error_type), allocatable, intent(out) :: error
-      logical :: acts, in_first
-
-      if (case%model%cyclic%is_cyclic) return
-      acts = any(abs(case%model%load_cosine) > 0.0_wp) .or. any(abs(case%model%load_sine) > 0.0_wp)
-      in_first = acts
-      if (allocated(case%model%load_wave)) then
-         acts = acts .or. any(abs(case%model%load_wave) > 0.0_wp)
-         in_first = in_first .or. any(case%model%waves%harmonic == 1)
-      end if
-      if (.not. acts) then
-         call fatal_error(error, "case%analysis = 'resonance' needs a vibratory load: set "// &
-                          'load%cosine or load%sine', status_input)
-      else if (.not. in_first .and. case%resonance%condition == condition_phase) then
-         call fatal_error(error, "resonance%condition = 'phase': no load acts in harmonic 1; "// &
-                          "use 'amplitude'", status_input)
-      end if
-   end subroutine check_load
 
 end module fw_read_resonance

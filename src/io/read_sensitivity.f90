@@ -1,9 +1,7 @@
 !> Group &sensitivity: which derivatives are wanted, and whether the case has them.
 module fw_read_sensitivity
-   use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_point, analysis_resonance
-   use fw_contact_data, only: memory_carried
+   use fw_case, only: analysis_mode, analysis_resonance, case_type
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_harmonics_options, only: method_hbm
    use fw_key, only: key
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
@@ -15,7 +13,6 @@ module fw_read_sensitivity
                                load_scale, mode_damping_ratio, mode_omega, quantity_words, &
                                resonance_omega, wear_volume
    use fw_sensitivity_options, only: sensitivity_options
-   use fw_solver_options, only: solver_newton
    use fw_text, only: lower_case, string_type
    use fw_values, only: quoted_text
    implicit none (type, external)
@@ -133,31 +130,9 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
       character(*), parameter :: asks = 'sensitivity%parameters'
-      !> What derivatives go with instead of what was found.
-      character(:), allocatable :: with
       integer :: k
 
       if (.not. case%sensitivity%is_wanted()) return
-      ! Carried positions depend on all points before.
-      if (all(case%analysis /= [analysis_frf, analysis_point, analysis_resonance, &
-                                analysis_mode])) then
-         with = "analysis = 'frf', 'point', 'resonance' or 'mode'"
-      else if (case%harmonics%method /= method_hbm) then
-         with = "harmonics%method = 'hbm'"
-      else if (case%contact%memory == memory_carried) then
-         with = "contact%memory = 'assembly'"
-      else if (case%solver%kind /= solver_newton) then
-         with = "solver%kind = 'newton'"
-      else if (case%harmonics%adaptive) then
-         with = 'harmonics%adaptive = .false.'
-      else if (case%harmonics%accuracy > 0.0_wp) then
-         with = 'a given n_harmonics, not with harmonics%accuracy'
-      end if
-      if (allocated(with)) then
-         call fatal_error(error, asks//' goes with '//with//': leave one of the two out', &
-                          status_input)
-         return
-      end if
       do k = 1, size(case%sensitivity%parameters)
          call check_parameter(case, case%sensitivity%parameters(k), asks, error)
          if (case%analysis == analysis_mode .and. .not. allocated(error) .and. &

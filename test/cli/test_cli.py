@@ -50,7 +50,7 @@ def test_the_blas_is_named(fw_run, monkeypatch):
 def test_help_names_every_option_and_group(fw_run, option):
     done = fw_run(option)
     assert done.returncode == 0 and done.stderr == ""
-    for word in ["--set", "-o", "--restart", "--keys", "--check", "-q", "-v", "--version", "&contact",
+    for word in ["--set", "-o", "--restart", "--keys", "--rules", "--check", "-q", "-v", "--version", "&contact",
                  "Exit status"]:
         assert word in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 88
@@ -66,6 +66,15 @@ def test_keys_of_all_groups_or_of_one(fw_run):
         everything.stdout
     assert "did you mean solver?" in fw_run.refused("--keys", "solvr", status=2)
     assert "json" in fw_run.refused("--keys=xml", status=2)
+
+
+def test_rules_name_two_features_and_a_remedy(fw_run):
+    lines = fw_run("--rules").stdout.splitlines()
+    assert len(lines) == len(set(lines)) > 50
+    for line in lines:
+        asks, rest = line.split(" does not go with ")
+        forbids, remedy = rest.split(": ", 1)
+        assert asks and forbids and remedy and asks != forbids
 
 
 def test_keys_for_programs_are_those_that_a_case_has(fw_run):

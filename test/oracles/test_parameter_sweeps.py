@@ -299,7 +299,7 @@ def test_a_branch_that_is_cut_says_so(tmp_path):
     ({"sweep": {"values": [0.1, 0.2]}}, "keep one of the two"),
     ({"case": {"analysis": "point"}}, "goes with analysis = 'frf'"),
     ({"load": {"harmonic_scale": 0.0}}, "load%harmonic_scale is 0"),
-    ({"sensitivity": {"parameters": ["load%harmonic_scale"]}}, "does not go with sensitivity"),
+    ({"sensitivity": {"parameters": ["load%harmonic_scale"]}}, "does not go with group &sensitivity"),
     ({"sweep": {"parameter": None}}, "goes with a parameter other than the frequency"),
 ])
 def test_what_is_refused(tmp_path, changes, words):

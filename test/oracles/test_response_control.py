@@ -255,8 +255,8 @@ def test_half_the_load_and_its_sign(tmp_path):
 
 
 @pytest.mark.parametrize(("changes", "words"), [
-    ({"load": {"cosine": [0.0]}}, "there is none"),
-    ({"load": {"harmonic_scale": 0.0}}, "load%harmonic_scale is 0"),
+    ({"load": {"cosine": [0.0]}}, "without a vibratory load"),
+    ({"load": {"harmonic_scale": 0.0}}, "load%harmonic_scale = 0"),
     ({"load": {"cosine": [0.0], "n_terms": 1, "term_dof": [1], "term_harmonic": [2],
                "term_amplitude": [0.4]}}, "use 'largest'"),
     ({"sweep": {"parameter": "load%harmonic_scale", "frequency": 1.0}}, "sweep frequencies"),

@@ -100,8 +100,8 @@ def test_random_structures(tmp_path):
 
 
 @pytest.mark.parametrize(("changes", "words"), [
-    ({"harmonics": {"method": "tcm"}}, "method = 'hbm'"),
-    ({"harmonics": {"sampling": "uniform"}}, "follows events"),
+    ({"harmonics": {"method": "tcm"}}, "use 'hbm'"),
+    ({"harmonics": {"sampling": "uniform"}}, "takes integrals between its events"),
     ({"output": {"tail": 20}, "contact": {"law": "dlft"}}, "output%tail"),
     ({"output": {"tail": 20}, "harmonics": {"adaptive": True}}, "output%tail"),
 ])

@@ -1,0 +1,225 @@
+!> Keys that are sound one by one and cannot be run together: a row each, with what to do instead.
+!>
+!> A row names two features of a case in the words of fw_features; the first row whose features are
+!> both asked for is told, as `asks does not go with forbids: remedy`. `fw_run --rules` lists them.
+!> What needs numbers of the case (sizes, ranges between keys) is in fw_combinations.
+module fw_rules
+   use fw_case, only: case_type
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_features, only: asks_for, feature_length, feature_text
+   implicit none (type, external)
+   private
+
+   public :: apply_rules, rule_type, rules, write_rules
+
+   type :: rule_type
+      character(feature_length) :: asks, forbids
+      character(128) :: remedy
+   end type rule_type
+
+   character(*), parameter :: between = ' does not go with '
+
+   !> Nonlinear modes and resonances are balances of given harmonics with borders of their own,
+   !> followed by Newton's method.
+   type(rule_type), parameter :: of_modes(*) = [ &
+      rule_type("case%analysis = 'mode'", "harmonics%method other than 'hbm'", "use 'hbm'"), &
+      rule_type("case%analysis = 'mode'", 'harmonics%adaptive = .true.', 'give n_harmonics'), &
+      rule_type("case%analysis = 'mode'", 'harmonics%accuracy', 'give n_harmonics'), &
+      rule_type("case%analysis = 'mode'", "solver%kind other than 'newton'", "use 'newton'"), &
+      rule_type("case%analysis = 'mode'", "solver%jacobian = 'difference'", "use 'analytic'"), &
+      rule_type("case%analysis = 'mode'", "contact%memory = 'carried'", "use 'assembly'"), &
+      rule_type("case%analysis = 'mode'", 'output%histories', 'leave it out'), &
+      rule_type("case%analysis = 'mode'", 'output%tail', 'take more n_harmonics'), &
+      rule_type("case%analysis = 'mode'", 'a law of velocities, whose pairs do not stick', &
+                "no mode starts from stuck pairs; use 'penalty' or 'dlft'"), &
+      rule_type('mode%synthesis', 'a case without a load in harmonic 1 for the mode', &
+                'set load%cosine or load%sine'), &
+      rule_type("case%analysis = 'resonance'", "harmonics%method other than 'hbm'", "use 'hbm'"), &
+      rule_type("case%analysis = 'resonance'", 'harmonics%adaptive = .true.', 'give n_harmonics'), &
+      rule_type("case%analysis = 'resonance'", 'harmonics%accuracy', 'give n_harmonics'), &
+      rule_type("case%analysis = 'resonance'", "solver%kind other than 'newton'", "use 'newton'"), &
+      rule_type("case%analysis = 'resonance'", "solver%jacobian = 'difference'", &
+                "use 'analytic'"), &
+      rule_type("case%analysis = 'resonance'", "contact%memory = 'carried'", "use 'assembly'"), &
+      rule_type("case%analysis = 'resonance'", 'output%histories', 'leave it out'), &
+      rule_type("case%analysis = 'resonance'", 'output%tail', 'take more n_harmonics'), &
+      rule_type("case%analysis = 'resonance'", "sweep%continuation = 'arclength'", &
+                "&sweep is where the first resonance is looked for: use 'natural' "// &
+                '(resonance%continuation follows folds)'), &
+      rule_type("case%analysis = 'resonance'", 'sweep%stability = .true.', 'leave it out'), &
+      rule_type("case%analysis = 'resonance'", 'a sweep of fewer than three points', &
+                'a resonance is looked for between sweep%start and end: give three n_points '// &
+                'at least'), &
+      rule_type("case%analysis = 'resonance'", 'a case without a vibratory load', &
+                'set load%cosine or load%sine'), &
+      rule_type("resonance%condition = 'phase'", 'a case without a load in harmonic 1', &
+                "use 'amplitude'")]
+
+   !> Points of a sweep stand by themselves, have one length, or are compared with each other.
+   type(rule_type), parameter :: of_sweeps(*) = [ &
+      rule_type("solver%jacobian = 'difference'", "solver%kind = 'pseudo_time'", &
+                "use 'analytic'"), &
+      rule_type("solver%jacobian = 'difference'", "case%analysis = 'wear'", "use 'analytic'"), &
+      rule_type("solver%jacobian = 'difference'", "sweep%continuation = 'arclength'", &
+                "use 'analytic'"), &
+      rule_type("contact%memory = 'carried'", "sweep%continuation = 'arclength'", &
+                "a branch turns back on itself; use 'assembly'"), &
+      rule_type('sweep%refine = .true.', "case%analysis other than 'frf'", 'leave it out'), &
+      rule_type('sweep%refine = .true.', 'sweep%n_points = 1', 'leave it out'), &
+      rule_type('sweep%refine = .true.', "sweep%continuation = 'arclength'", 'leave it out'), &
+      rule_type('sweep%refine = .true.', "contact%memory = 'carried'", &
+                'a point depends on those before; leave it out'), &
+      rule_type('sweep%first_point, last_point or lead_points', &
+                "case%analysis other than 'frf'", 'leave them out'), &
+      rule_type('sweep%first_point, last_point or lead_points', &
+                "sweep%continuation = 'arclength'", 'leave them out'), &
+      rule_type('sweep%first_point, last_point or lead_points', 'group &control', &
+                'leave them out'), &
+      rule_type('sweep%first_point, last_point or lead_points', "contact%memory = 'carried'", &
+                'a point depends on all those before; leave them out'), &
+      rule_type('sweep%parameter', 'group &sensitivity', &
+                'derivatives are those at the values of the case; leave one of the two out'), &
+      rule_type('sweep%parameter', 'output%tail', 'take more n_harmonics'), &
+      rule_type('sweep%parameter', 'sweep%refine = .true.', &
+                'no maxima are looked for; leave it out'), &
+      rule_type('harmonics%adaptive = .true.', "case%analysis other than 'frf' or 'point'", &
+                'use .false.'), &
+      rule_type('harmonics%adaptive = .true.', "sweep%continuation = 'arclength'", &
+                'use .false.'), &
+      rule_type('harmonics%adaptive = .true.', 'output%histories without harmonics%n_time', &
+                'give harmonics%n_time'), &
+      rule_type('harmonics%accuracy', "case%analysis other than 'frf' or 'point'", &
+                'leave it out, and give n_harmonics'), &
+      rule_type('harmonics%accuracy', "sweep%continuation = 'arclength'", &
+                'leave it out, and give n_harmonics'), &
+      rule_type('harmonics%accuracy', 'output%histories', &
+                'they have one length: leave it out, and give n_harmonics and n_time as large '// &
+                'as a run with accuracy reports'), &
+      rule_type('harmonics%accuracy', "contact%memory = 'carried'", "use 'assembly'")]
+
+   !> The factor of the load is an unknown of its own: what follows solves without such a border,
+   !> or for a load that the case gives.
+   type(rule_type), parameter :: of_control(*) = [ &
+      rule_type('group &control', "case%analysis other than 'frf' or 'point'", &
+                "use 'frf' or 'point'"), &
+      rule_type('group &control', "sweep%parameter = 'load%harmonic_scale'", &
+                'the load is found for each amplitude; sweep frequencies, or another parameter'), &
+      rule_type('group &control', "sweep%parameter = 'load%static_scale' through 0", &
+                'sweep on one side of it'), &
+      rule_type('group &control', "solver%kind other than 'newton'", "use 'newton'"), &
+      rule_type('group &control', "solver%jacobian = 'difference'", "use 'analytic'"), &
+      rule_type('group &control', "harmonics%method = 'hdhb'", "use 'hbm'"), &
+      rule_type('group &control', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
+      rule_type('group &control', 'harmonics%accuracy', 'give n_harmonics'), &
+      rule_type('group &control', "contact%memory = 'carried'", "use 'assembly'"), &
+      rule_type('group &control', 'sweep%refine = .true.', &
+                'no maxima are looked for; leave it out'), &
+      rule_type('group &control', 'output%tail', 'take more n_harmonics'), &
+      rule_type('group &control', 'load%harmonic_scale = 0', &
+                'a vibratory load is scaled: give another scale'), &
+      rule_type('group &control', 'a case without a vibratory load', &
+                'set load%cosine or load%sine'), &
+      rule_type("control%of = 'first_harmonic'", 'a case without a load in harmonic 1', &
+                "use 'largest'")]
+
+   !> Derivatives are those of a balance of given harmonics; carried positions depend on all points
+   !> before.
+   type(rule_type), parameter :: of_derivatives(*) = [ &
+      rule_type('group &sensitivity', &
+                "case%analysis other than 'frf', 'point', 'resonance' or 'mode'", &
+                'leave one of the two out'), &
+      rule_type('group &sensitivity', "harmonics%method other than 'hbm'", "use 'hbm'"), &
+      rule_type('group &sensitivity', "contact%memory = 'carried'", "use 'assembly'"), &
+      rule_type('group &sensitivity', "solver%kind other than 'newton'", "use 'newton'"), &
+      rule_type('group &sensitivity', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
+      rule_type('group &sensitivity', 'harmonics%accuracy', 'give n_harmonics')]
+
+   !> What waves around a cyclic structure, and the motion of all its sectors, are not solved with.
+   type(rule_type), parameter :: of_sectors(*) = [ &
+      rule_type('cyclic%mistuned = .true.', &
+                "case%analysis other than 'frf', 'point' or 'wear'", &
+                'use one of them, or leave mistuned out'), &
+      rule_type('cyclic%mistuned = .true.', "harmonics%method other than 'hbm'", "use 'hbm'"), &
+      rule_type('cyclic%mistuned = .true.', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
+      rule_type('cyclic%mistuned = .true.', 'harmonics%accuracy', &
+                'give n_harmonics (left out, an accuracy chooses them), as many as a run of '// &
+                'the tuned wave reports'), &
+      rule_type('cyclic%mistuned = .true.', 'group &sensitivity', 'leave it out'), &
+      rule_type('cyclic%mistuned = .true.', 'sweep%parameter', 'sweep over the frequency'), &
+      rule_type('cyclic%mistuned = .true.', 'group &control', 'give the load'), &
+      rule_type('group &cyclic', "case%analysis = 'time'", &
+                "use 'frf' or 'point', or model all sectors"), &
+      rule_type('group &cyclic', 'sweep%stability = .true.', &
+                'a wave may become unstable to motions of other nodal diameters; leave it out'), &
+      rule_type('group &cyclic', "solver%kind = 'pseudo_time'", "use 'newton'"), &
+      rule_type('group &cyclic', 'output%tail', 'take more n_harmonics')]
+
+   !> By what the law of the pairs can do, not by its name: a new law needs no new row.
+   type(rule_type), parameter :: of_laws(*) = [ &
+      rule_type('a law that takes integrals between its events', &
+                "harmonics%method other than 'hbm'", "use 'hbm'"), &
+      rule_type('a law that takes integrals between its events', &
+                "harmonics%sampling = 'uniform'", "leave it out, or take 'events'"), &
+      rule_type('output%tail', 'a law without forces above the harmonics of the balance', &
+                "use contact%law = 'rigid'"), &
+      rule_type('output%tail', 'pairs with two tangential directions', 'leave it out'), &
+      rule_type('output%tail', 'harmonics%adaptive = .true.', 'give n_harmonics'), &
+      rule_type('output%tail', 'harmonics%accuracy', 'give n_harmonics'), &
+      rule_type('output%tail', "sweep%continuation = 'arclength'", 'leave it out'), &
+      rule_type('output%tail', "case%analysis other than 'frf' or 'point'", 'leave it out'), &
+      rule_type('a law without events, whose force is smooth', "harmonics%sampling = 'events'", &
+                "leave it to 'auto'"), &
+      rule_type('a law that is not integrated in time', "case%analysis = 'time'", &
+                "use 'penalty' or 'dlft', or 'frf' and 'point'"), &
+      rule_type('a law that does not measure slip', "case%analysis = 'wear'", &
+                "use 'dlft' (nodes without mass), 'dlft_velocity' or 'penalty'"), &
+      rule_type('sweep%stability = .true.', 'a law without Floquet multipliers', &
+                "use contact%law = 'penalty'")]
+
+   type(rule_type), parameter :: of_wear(*) = [ &
+      rule_type("case%analysis = 'wear'", 'a case without contact pairs', &
+                'give group &contact, or take a model file with contact'), &
+      rule_type('wear%follow_resonance = .true.', &
+                "wear by pseudo_time%scheme = 'bdf', which builds on earlier steps", &
+                "use 'rosenbrock', or wear%scheme = 'implicit'"), &
+      rule_type("case%analysis = 'wear'", "wear by pseudo_time%scheme = 'runge_kutta'", &
+                "wear is stiff: use 'implicit_euler', 'rosenbrock' or 'bdf'"), &
+      rule_type('wear%error_tolerance', "wear by pseudo_time%scheme = 'implicit_euler'", &
+                'it estimates no error: give wear%max_depth_step, or use '// &
+                "'rosenbrock' or 'bdf'")]
+
+   type(rule_type), parameter :: rules(*) = [of_modes, of_sweeps, of_control, of_sectors, of_laws, &
+                                             of_wear, of_derivatives]
+
+contains
+
+   !> Refuse the first pair of features that do not go together.
+   subroutine apply_rules(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(rule_type) :: rule
+      integer :: i
+
+      do i = 1, size(rules)
+         rule = rules(i)
+         if (.not. asks_for(case, rule%asks)) cycle
+         if (.not. asks_for(case, rule%forbids)) cycle
+         call fatal_error(error, feature_text(case, rule%asks)//between// &
+                          feature_text(case, rule%forbids)//': '//trim(rule%remedy), status_input)
+         return
+      end do
+   end subroutine apply_rules
+
+   !> A line for each rule.
+   subroutine write_rules(unit)
+      !> Of a file, or of the standard output.
+      integer, intent(in) :: unit
+      integer :: i
+
+      do i = 1, size(rules)
+         write (unit, '(5a)') trim(rules(i)%asks), between, trim(rules(i)%forbids), ': ', &
+            trim(rules(i)%remedy)
+      end do
+   end subroutine write_rules
+
+end module fw_rules
