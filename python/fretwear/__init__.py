@@ -53,6 +53,7 @@ from .errors import (
     InputError,
     OutputError,
     RunInterrupted,
+    RunStopped,
 )
 from .model import ContactPairs, Model, Spring
 from .result import Result
@@ -61,8 +62,8 @@ from .steps import Point, Steps
 
 __all__ = ["AbsentError", "Air", "Bifurcation", "Case", "ContactPairs", "ConvergenceError",
            "FretwearError", "InputError", "Model", "NodalDiameter", "OutputError", "Point",
-           "Result", "RunInterrupted", "Sectors", "Spring", "Steps", "__version__", "calibrate",
-           "frf", "mode", "optimise", "resonance", "run", "wear"]
+           "Result", "RunInterrupted", "RunStopped", "Sectors", "Spring", "Steps", "__version__",
+           "calibrate", "frf", "mode", "optimise", "resonance", "run", "wear"]
 
 
 def __getattr__(name: str) -> object:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Callable, Union
 
@@ -16,7 +16,7 @@ from ._progress import CONTROL, Bar, State, read_state
 from .errors import InputError
 
 __all__ = ["Progress", "Stop", "StopFlag", "Tell", "run_watched", "stop_function",
-           "stops_on_interrupt", "teller"]
+           "stop_reason", "stops_on_interrupt", "teller"]
 
 #: Called with the number of points done and of points to come (0: not known); True for a bar on
 #: the standard error, or in a notebook.
@@ -28,6 +28,8 @@ Stop = Union[threading.Event, Callable[[], object]]
 #: What is told how far the run is.
 Tell = Callable[[State], object]
 
+#: How a run remarks that its time is over.
+_TIME_OVER = "time limit:"
 #: Time between two calls of a progress function [s].
 _BETWEEN_CALLS = 0.1
 
@@ -70,6 +72,14 @@ def stop_function(stop: object) -> Callable[[], object] | None:
         raise InputError(f"stop: is a {type(stop).__name__}, must be a threading.Event or a "
                          "function without arguments")
     return asked
+
+
+def stop_reason(remarks: Iterable[str]) -> str:
+    """What has ended a run that no signal has: its time, of which it remarks, or `stop`."""
+    for line in remarks:
+        if line.startswith(_TIME_OVER):
+            return line
+    return "the run was ended by `stop`"
 
 
 @contextmanager

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, cast
 from numpy.typing import ArrayLike
 
 from ._native import NOT_CONVERGED, STOPPED, raise_status
-from ._watching import Progress, Stop, run_watched, stop_function, teller
+from ._watching import Progress, Stop, run_watched, stop_function, stop_reason, teller
 from .case import Case, ModelLike
-from .errors import ConvergenceError, InputError, RunInterrupted
+from .errors import ConvergenceError, InputError, RunInterrupted, RunStopped
 from .result import Result
 
 if TYPE_CHECKING:
@@ -80,7 +80,9 @@ def run(case: Case | str | Path, file: str | Path | None = None, *, check: bool 
         Points have not converged; its `result` holds all that was computed, its `report` the
         summary of the run.
     RunInterrupted
-        The run was stopped (a KeyboardInterrupt); its `result` holds the points up to there.
+        Ctrl-C has stopped the run (a KeyboardInterrupt); its `result` holds the points up to there.
+    RunStopped
+        `max_seconds` or `stop` has; its `reason` says which, its `result` holds the points.
     """
     is_stopped = stop_function(stop)
     if progress is not None and not isinstance(progress, bool) and not callable(progress):
@@ -117,8 +119,10 @@ def _run(case: Case, progress: Progress | None, is_stopped: Callable[[], object]
     if status not in (NOT_CONVERGED, STOPPED):
         raise_status(status, message)
     result = Result.of_run(case, path, image)
-    if status == STOPPED or interrupted:
+    if interrupted:
         raise RunInterrupted(result)
+    if status == STOPPED:
+        raise RunStopped(stop_reason(report), result)
     if status == NOT_CONVERGED and check:
         raise ConvergenceError(_failure(result, report), result, report)
     return result

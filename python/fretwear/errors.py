@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 __all__ = ["AbsentError", "ConvergenceError", "FretwearError", "InputError", "OutputError",
-           "RunInterrupted"]
+           "RunInterrupted", "RunStopped"]
 
 
 class FretwearError(Exception):
@@ -68,8 +68,27 @@ class OutputError(FretwearError, OSError):
     exit_status = 5
 
 
+class RunStopped(FretwearError):
+    """A run was ended by `max_seconds` or by `stop`; the points up to there are saved.
+
+    Parameters
+    ----------
+    reason : str
+        What ended it.
+    result : Result, optional
+        The points up to there; None where there is not even one.
+    """
+
+    exit_status = 6
+
+    def __init__(self, reason: str, result: Result | None = None) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.result = result
+
+
 class RunInterrupted(KeyboardInterrupt):
-    """A run was stopped (Ctrl-C, `stop`, `max_seconds`); the points up to there are saved.
+    """A run was stopped by Ctrl-C; the points up to there are saved.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .analyses import run
 from .case import Case
-from .errors import AbsentError, RunInterrupted
+from .errors import AbsentError, RunInterrupted, RunStopped
 from .result import Result
 
 __all__ = ["add_arguments", "main"]
@@ -38,9 +38,9 @@ def main(options: argparse.Namespace) -> int:
     try:
         result = run(case, options.output, check=False, progress=not options.quiet,
                      workers=options.workers, scheduler=options.scheduler)
-    except RunInterrupted as interrupted:
-        if interrupted.result is not None and not options.quiet:
-            _print_summary(interrupted.result)
+    except (RunInterrupted, RunStopped) as ended:
+        if ended.result is not None and not options.quiet:
+            _print_summary(ended.result)
         raise
     if not options.quiet:
         _print_summary(result)

@@ -215,7 +215,7 @@ def test_rows_before_a_stop_are_kept() -> None:
         return len(asked) > 2
 
     case = SLIDING.replace(sweep={"n_points": 200000})
-    with pytest.raises(fw.RunInterrupted) as interrupted:
+    with pytest.raises(fw.RunStopped) as interrupted:
         fw.run(case, workers=2, stop=stop)
     result = interrupted.value.result
     assert result is not None and result.status == "stopped"

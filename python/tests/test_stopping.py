@@ -25,13 +25,13 @@ STOPPED_WITHIN = 5.0
 
 def test_a_stop_from_another_thread_ends_the_run() -> None:
     stop = threading.Event()
-    ended: list[fw.Result | None] = []
+    ended: list[fw.RunStopped] = []
 
     def run_until_stopped() -> None:
         try:
             fw.run(long_run(), stop=stop)
-        except fw.RunInterrupted as interrupted:
-            ended.append(interrupted.result)
+        except fw.RunStopped as stopped:
+            ended.append(stopped)
 
     worker = threading.Thread(target=run_until_stopped)
     worker.start()
@@ -40,7 +40,8 @@ def test_a_stop_from_another_thread_ends_the_run() -> None:
     stop.set()
     worker.join(30.0)
     assert not worker.is_alive()
-    assert ended and ended[0] is not None and ended[0].status == "stopped"
+    assert ended and ended[0].result is not None and ended[0].result.status == "stopped"
+    assert ended[0].reason == "the run was ended by `stop`"
 
 
 def endless_point() -> fw.Case:
@@ -58,8 +59,8 @@ def test_a_stop_acts_within_a_point(by_function: bool) -> None:
     def run_until_stopped() -> None:
         try:
             fw.run(endless_point(), stop=stop.is_set if by_function else stop)
-        except fw.RunInterrupted as interrupted:
-            results.append(interrupted.result)
+        except fw.RunStopped as stopped:
+            results.append(stopped.result)
 
     worker = threading.Thread(target=run_until_stopped)
     worker.start()
@@ -73,8 +74,10 @@ def test_a_stop_acts_within_a_point(by_function: bool) -> None:
 
 def test_a_run_ends_after_its_seconds() -> None:
     begun = time.monotonic()
-    with pytest.raises(fw.RunInterrupted) as stopped:
-        fw.run(endless_point(), max_seconds=0.5)
+    with pytest.raises(fw.RunStopped, match=r"case%max_seconds = 0\.5") as stopped:
+        fw.run(endless_point(), max_seconds=0.5, check=False)
+    # What `except Exception` takes, and what a command ends with.
+    assert isinstance(stopped.value, fw.FretwearError) and stopped.value.exit_status == 6
     assert time.monotonic() - begun < 0.5 + STOPPED_WITHIN
     assert stopped.value.result is not None and stopped.value.result.status == "stopped"
 

@@ -34,7 +34,7 @@ threading.Thread(target=lambda: (sys.stdin.readline(), stop.set()), daemon=True)
 try:
     fw.run(sys.argv[1], stop=stop, check=False)
     sys.exit(1)
-except fw.RunInterrupted:
+except fw.RunStopped:
     pass
 """
 

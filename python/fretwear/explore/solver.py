@@ -12,7 +12,7 @@ import numpy as np
 
 from ..analyses import run
 from ..case import Case
-from ..errors import FretwearError, RunInterrupted
+from ..errors import FretwearError, RunStopped
 from ..result import Result
 
 __all__ = ["Answer", "Solver"]
@@ -116,10 +116,10 @@ class Solver:
         try:
             result = run(case, check=False, in_memory=True, stop=self._is_stale,
                          max_seconds=self._max_seconds)
-        except RunInterrupted as interrupted:
+        except RunStopped as stopped:
             if self._is_stale():
                 return False
-            self._tell(Answer(interrupted.result, f"stopped after {self._max_seconds:g} s: "
+            self._tell(Answer(stopped.result, f"stopped after {self._max_seconds:g} s: "
                               "what was computed until then is shown", is_final,
                               time.monotonic() - wish.since))
             return False

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,17 @@ from numpy.typing import NDArray
 from .._native import NOT_CONVERGED, STOPPED, Session, namelist_values, raise_status
 from .._pool import HERE, Pool, open_pool
 from .._progress import CONTROL, State
-from .._watching import Progress, StopFlag, Tell, run_watched, stops_on_interrupt, teller
+from .._watching import (
+    Progress,
+    StopFlag,
+    Tell,
+    run_watched,
+    stop_reason,
+    stops_on_interrupt,
+    teller,
+)
 from ..case import Case
-from ..errors import InputError, RunInterrupted
+from ..errors import InputError, RunInterrupted, RunStopped
 from ..result import Result
 from .cutting import Piece, cut
 from .joining import join
@@ -70,12 +78,13 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
             control = np.zeros(CONTROL, dtype=np.int64)
             in_main = threading.current_thread() is threading.main_thread()
             watch = _Watch(tell, is_stopped, control, len(plan.places))
-            with stops_on_interrupt(control, in_main), open_pool(scheduler, workers) as pool:
+            with stops_on_interrupt(control, in_main) as received, \
+                    open_pool(scheduler, workers) as pool:
                 work = _Work(session, watch.board) if scheduler in HERE else (
                     _WorkElsewhere(case))
                 parts, remarks = _solve(work, plan, pool, watch)
     if not parts:
-        raise RunInterrupted(None)
+        _raise_ended(None, received, remarks)
     if see is not None:
         see(parts)
     image = join(parts, plan.places, text, time.monotonic() - started, remarks,
@@ -84,8 +93,16 @@ def run_in_pieces(case: Case, workers: int, scheduler: str, progress: Progress |
     if not in_memory:
         result = result.save(path)
     if watch.ended:
-        raise RunInterrupted(result)
+        _raise_ended(result, received, remarks)
     return result, list(result.remarks)
+
+
+def _raise_ended(result: Result | None, received: Sequence[int], remarks: Iterable[str]
+                 ) -> NoReturn:
+    """Of Ctrl-C, of `stop`, or of the time that was given."""
+    if received:
+        raise RunInterrupted(result)
+    raise RunStopped(stop_reason(remarks), result)
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from pathlib import Path
 from .._native import library_version
 from ..analyses import run
 from ..case import Case
-from ..errors import ConvergenceError, FretwearError, InputError, RunInterrupted
+from ..errors import ConvergenceError, FretwearError, InputError, RunInterrupted, RunStopped
 from .plan import override
-from .run import STATUS, Job, Record, RunStopped, keep, remove_partial
+from .run import STATUS, Job, JobStopped, Record, keep, remove_partial
 
 __all__ = ["check_program", "find_program", "run_job"]
 
@@ -61,7 +61,7 @@ def run_job(job: Job, stop: threading.Event | None = None) -> Record:
 
     Raises
     ------
-    RunStopped
+    JobStopped
         `stop` was set; the run was ended and left nothing.
     """
     Path(job.folder).mkdir(parents=True, exist_ok=True)
@@ -78,17 +78,24 @@ def _run_here(job: Job, stop: threading.Event | None) -> Record:
             [*(override(key, value) for key, value in job.settings.items()), "case%threads=1"])
         run(case, job.result, stop=stop, max_seconds=job.timeout or None)
     except RunInterrupted:
-        with contextlib.suppress(OSError):
-            job.result.unlink()
-        remove_partial(job.result)
+        _remove_result(job)
+        raise
+    except RunStopped:
+        _remove_result(job)
         if stop is not None and stop.is_set():
-            raise RunStopped(job.name) from None
+            raise JobStopped(job.name) from None
         status, message = _TIMEOUT_STATUS, f"stopped after {job.timeout:g} s"
     except ConvergenceError as failure:
         status, message = failure.exit_status, _summary("\n".join(failure.report))
     except FretwearError as error:
         status, message = error.exit_status, str(error)
     return keep(job, status, _kind(status), message, time.perf_counter() - started)
+
+
+def _remove_result(job: Job) -> None:
+    with contextlib.suppress(OSError):
+        job.result.unlink()
+    remove_partial(job.result)
 
 
 def _kind(status: int) -> str:
@@ -106,7 +113,7 @@ def _run_program(job: Job, stop: threading.Event | None) -> Record:
     out, err, status = _wait(process, stop, job.timeout)
     if stop is not None and stop.is_set() and process.returncode < 0:
         remove_partial(job.result)
-        raise RunStopped(job.name)
+        raise JobStopped(job.name)
     if status < 0 or status == _TIMEOUT_STATUS:
         remove_partial(job.result)
     message = "" if status == 0 else _message(err)

@@ -21,7 +21,7 @@ from ..case import Case
 from ..errors import FretwearError
 from .plan import Setting, override
 
-__all__ = ["STATUS", "Job", "Record", "RunStopped", "identify", "keep", "recorded",
+__all__ = ["STATUS", "Job", "JobStopped", "Record", "identify", "keep", "recorded",
            "remove_partial"]
 
 STATUS = {0: "ok", 3: "bad input", 4: "not converged"}
@@ -33,7 +33,7 @@ _BEGINNING = re.compile(r"   (\w+) = ")
 _INDIFFERENT = ("case%threads", "case%title", "output%file", "model%file", "contact%worn")
 
 
-class RunStopped(Exception):
+class JobStopped(Exception):
     """A run was stopped from outside; nothing is recorded of it."""
 
 
