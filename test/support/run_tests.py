@@ -95,7 +95,8 @@ def pytest_stage(python, build, tests):
                            str(ROOT / "python"), os.environ.get("PYTHONPATH", "")])))
     status = subprocess.run(
         [python, "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider", f"-n{PROCESSES}",
-         "--dist=loadfile", "--no-loadscope-reorder", f"--junitxml={report}", *map(str, directories)],
+         "--dist=loadfile", "--no-loadscope-reorder", f"--junitxml={report}",
+         *map(str, directories)],
         cwd=ROOT, env=environment, check=False).returncode
     counts = Counter()
     if report.exists():
