@@ -18,6 +18,7 @@ submodule(fw_balance_state) fw_balance_linear
    use fw_lapack, only: zgemv
    use fw_march_derivative, only: elements_of_group
    use fw_threads, only: pairs_for_threads
+   use fw_threads, only: watch_team
    implicit none (type, external)
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)
@@ -313,6 +314,7 @@ contains
 
       na = self%active%n_active
       roughly = self%nearly .and. self%asked >= near_enough
+      call watch_team()
       if (roughly .and. (self%splits() .or. self%problem%structure%has_near_product())) then
          call self%problem%structure%multiply_nearly(self%structure_state, vector, &
                                                      self%scratch%active_out)

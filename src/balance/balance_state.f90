@@ -29,6 +29,7 @@ module fw_balance_state
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_structure_operator, only: structure_state
    use fw_threads, only: coordinates_for_threads
+   use fw_threads, only: watch_team
    implicit none (type, external)
    private
 
@@ -689,6 +690,7 @@ contains
       nc = self%problem%fourier%n_coefficients
       self%n_moves = self%n_moves + 1_i8
       if (m == 0) return
+      call watch_team()
       call multiply_stiffness(self, m, nc, x)
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))

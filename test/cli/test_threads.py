@@ -1,10 +1,19 @@
-"""Joints that are large enough for threads: the same bits with 1, 2 and 4 of them."""
+"""Joints that are large enough for threads: the same bits with 1, 2 and 4 of them, and no more
+waits than they are worth."""
+import os
+import subprocess
+
 import h5py
 import numpy as np
 import pytest
+from cases import read, write_namelist
+from project import PROGRAM
 from wear_cases import result
 
+resource = pytest.importorskip("resource")
+
 N_PAIRS = 72
+MOST_WAITS = 600
 
 
 @pytest.fixture
@@ -46,3 +55,26 @@ def test_same_bits(chain, harmonics):
         found = run(chain, threads, harmonics)
         for name in ("coefficients", "contact/force", "iterations", "residual"):
             assert found[name].tobytes() == one[name].tobytes(), (threads, name)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="needs Linux")
+def test_threads_without_processors_do_not_wait_for_each_other(chain):
+    """Two threads that have one processor: one of them does the work soon. Each region that both
+    share ends in a wait, which the system counts."""
+    chosen = min(os.sched_getaffinity(0))
+    waits, shared = [], []
+    for threads in (1, 2):
+        groups = {"case": {"analysis": "frf", "threads": threads},
+                  "model": {"source": "hdf5", "file": "chain.h5"},
+                  "contact": {"mu": 0.4, "gap": 0.0, "area": 1.0},
+                  "harmonics": {"n_harmonics": 5, "n_time": 64},
+                  "sweep": {"start": 1.2, "end": 1.8, "n_points": 12}}
+        write_namelist(chain / "busy.nml", groups)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_nvcsw
+        subprocess.run(["taskset", "-c", str(chosen), PROGRAM, "-q", "busy.nml"], cwd=chain,
+                       check=True)
+        waits.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_nvcsw - before)
+        shared.append(read(chain / "busy.h5")["coefficients"].tobytes())
+    assert shared[0] == shared[1]
+    # Some 6,000 where all regions are shared; some tens in the looks at whether that would help.
+    assert waits[1] < waits[0] + MOST_WAITS, waits
