@@ -19,7 +19,7 @@ from .steps import Point, Steps
 if TYPE_CHECKING:
     from .result import Result
 
-__all__ = ["Cycle", "read_cycle", "read_peak_cycle"]
+__all__ = ["Cycle", "read_cycle", "read_peak_cycle", "run_again"]
 
 Floats = NDArray[np.float64]
 
@@ -34,8 +34,10 @@ _SAME, _SAME_OF_SOLVER = 1e-6, 1e3
 #: Instants of a period where the law may be asked at any.
 _INSTANTS = 256
 #: Points before the one in question from which its solution is followed, where it does not come
-#: out by itself.
+#: out by itself; after that, all.
 _BEFORE = 10
+#: Values of histories that a run may hold to show a point.
+_MOST = 50_000_000
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,10 @@ def _again(result: Result, point: int) -> Point:
     by_events = result.attributes.get("sampling") == "events"
     tried = [(finer, point)] if by_events else []
     tried += [(settings, point), (settings, max(0, point - _BEFORE))]
+    is_sweep = values.get("sweep%continuation", ["natural"]) == ["natural"]
+    if is_sweep and point > _BEFORE:
+        # Of several solutions the way from the first row leads to that of the row.
+        tried.append((settings, 0))
     if "error_estimate" in result and values.get("contact%law", ["dlft"])[0] in _RIGID_WORDS:
         # Under an accuracy, friction in one direction is solved as by the law of high order.
         rigid = {**finer, "contact": {**settings.get("contact", {}), "law": "rigid"}}
@@ -137,7 +143,44 @@ def _again(result: Result, point: int) -> Point:
             solved = steps.solve(result.omega[point])
         if _is_same(result, point, solved, tolerance, "error_estimate" in result):
             return solved
+    if not is_sweep and "wear/depth" not in result:
+        return _of_run(run_again(result), point)
     raise AbsentError(_excuse(result, point, "solving it again leads to another solution"))
+
+
+def _of_run(known: Result, point: int) -> Point:
+    names = ("history/relative_displacement", "history/force")
+    return Point({name: known[name][point] for name in names})
+
+
+def run_again(result: Result) -> Result:
+    """The run once more, with histories; it has to come out as it stands in the result.
+
+    Raises
+    ------
+    FretwearError
+        It is another solution, or its histories are too many.
+    """
+    from .analyses import run  # takes results, and these their periods
+
+    size = result.n_points * max(result.n_pairs, 1) * int(result.attributes.get("n_time", 1024))
+    if size > _MOST:
+        raise FretwearError(f"{size} values of histories are too many; run with output%histories "
+                            "= .true., or fewer points")
+    groups: Any = {"output": {"histories": True}}
+    values = namelist_values(result.namelist)
+    # Left to the program, histories would ask for another law, and for instants.
+    if "contact%law" in values:
+        groups["contact"] = {"law": values["contact%law"][0]}
+    if "sampling" in result.attributes:
+        groups["harmonics"] = {"sampling": result.attributes["sampling"]}
+    known = run(result.case.replace(**groups), check=False, in_memory=True)
+    tolerance = float(values.get("solver%tolerance", ["1e-8"])[0])
+    limit = max(_SAME, _SAME_OF_SOLVER * tolerance) * np.abs(result.amplitude).max()
+    if known.amplitude.shape != result.amplitude.shape or (
+            np.abs(known.amplitude - result.amplitude)[result.converged].max(initial=0.0) > limit):
+        raise FretwearError("the case, run once more, does not give what the result holds")
+    return known
 
 
 def _settings(result: Result, point: int) -> dict[str, Any]:

@@ -77,6 +77,26 @@ def test_a_branch_and_a_file_have_their_law_too(examples: Path, tmp_path: Path) 
     assert normal.max() == 0.0 and normal.min() < 0.0
 
 
+def test_of_several_solutions_that_of_the_result_is_shown(examples: Path, tmp_path: Path) -> None:
+    """On the way down another one than from a start near it; behind a fold of a branch."""
+    wave = run(examples.parent / "shrouded_disk" / "wave.nml", tmp_path / "wave.h5")
+    stop = fw.ContactPairs([[0, 0, 1]], mu=0.0, gap=0.5, tangential_stiffness=1.0,
+                           normal_stiffness=2.0)
+    model = fw.Model([[1.0]], [[0.05]], [[1.0]], contact=stop, cosine=[0.1])
+    branch = fw.run(fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 7},
+                            sweep={"start": 0.7, "end": 1.6, "n_points": 61,
+                                   "continuation": "arclength"}))
+    behind = int(np.flatnonzero(np.diff(branch.omega) < 0.0)[0]) + 2
+    for result, point in ((wave, 30), (branch, behind)):
+        cycle = result.cycle(point)
+        tau = np.radians(cycle.degrees[:-1])
+        first = 2.0 * np.einsum("tij,t->ij", cycle.force[:-1],
+                                np.cos(tau)) / len(tau)
+        stored = result.force[point][1]
+        # A sum over instants of a force with kinks; another solution is off by 0.4.
+        assert first == pytest.approx(stored, abs=0.03 * np.abs(stored).max())
+
+
 def test_wear_shows_the_law_of_the_worn_joint(tmp_path: Path) -> None:
     """Each step has its own gap."""
     model = fw.Model.from_hdf5(Path(__file__).resolve().parents[2] / "example" / "blade_sector"

@@ -180,6 +180,27 @@ return [all.find(m => m.type == "Slider").value, Array.from(data(loop).y),
         all.filter(m => m.type == "Div").map(m => m.text).join(" ")]"""
 
 
+@pytest.mark.parametrize("groups", [
+    {}, {"harmonics": {"sampling": "uniform", "n_time": 128}}, {"harmonics": {"accuracy": 1e-2}},
+    {"sweep": {"continuation": "arclength"}}], ids=str)
+def test_an_interactive_page_has_loops(groups: Any) -> None:
+    """Of every converged point, where events are located as where contact is sampled."""
+    pytest.importorskip("bokeh")
+    from fretwear.explore.standing import _numbers
+
+    case = fw.Case(RUBBING, contact={"law": "penalty"}, harmonics={"n_harmonics": 7},
+                   sweep={"start": 0.6, "end": 1.6, "n_points": 9})
+    result = fw.run(case.replace(**groups), in_memory=True)
+    found, words = _numbers(result)
+    assert not words and found["force"] is not None
+    force = found["force"].reshape(result.n_points, -1, found["instants"])
+    assert np.isfinite(force[result.converged]).all()
+    cycle = result.cycle(result.peak())
+    ratio = np.ptp(force[result.peak(), 0]) / np.ptp(cycle.force[:, 0, 0])
+    assert ratio == pytest.approx(10.0 ** round(np.log10(ratio)), rel=1e-3)
+    assert "No loops" not in render_report(result, Choices(), interactive=True)
+
+
 def test_an_interactive_page_answers_without_a_server(tmp_path: Path, browser: Any) -> None:
     """A click shows the loops and the shares of that point; keys move it; nothing is asked for."""
     from selenium.webdriver.common.action_chains import ActionChains

@@ -16,9 +16,8 @@ from bokeh.models.widgets import Div, Select, Slider
 from bokeh.resources import Resources
 from numpy.typing import NDArray
 
-from .._native import namelist_values
-from ..analyses import run
-from ..errors import FretwearError
+from ..cycle import run_again
+from ..errors import AbsentError, FretwearError
 from ..plot.style import label, scale, units_of
 from ..result import STATES, Result
 from .figures import (
@@ -33,10 +32,8 @@ from .figures import (
 
 __all__ = ["standing_page"]
 
-#: Instants of a loop; pairs, points and instants of a case beyond which no loops are made.
-_INSTANTS, _MOST = 128, 50_000_000
-#: Two runs of one case agree to this share of the largest amplitude.
-_SAME = 1e-6
+#: Instants of a loop.
+_INSTANTS = 128
 
 _SHOW = """
 const n = at.x.length
@@ -213,7 +210,7 @@ def _numbers(result: Result) -> tuple[dict[str, Any], str]:
 def _loops(result: Result) -> dict[str, Any]:
     """Loops of the pairs that dissipate most at each point, by a run that keeps histories."""
     n_loops = min(LOOPS, result.n_pairs)
-    known = result if "history/force" in result else _again(result)
+    known = _with_periods(result)
     pairs = np.argsort(-result.dissipation, axis=1, kind="stable")[:, :n_loops]
     moved = np.zeros((result.n_points, n_loops, _INSTANTS + 1))
     force = np.zeros_like(moved)
@@ -221,7 +218,11 @@ def _loops(result: Result) -> dict[str, Any]:
         if not result.converged[point]:
             moved[point] = force[point] = np.nan
             continue
-        cycle = known.cycle(point)
+        try:
+            cycle = known.cycle(point)
+        except AbsentError:  # a loop that cannot be had leaves its place empty
+            moved[point] = force[point] = np.nan
+            continue
         instants = np.linspace(0.0, len(cycle.displacement) - 1, _INSTANTS + 1).round().astype(int)
         for j, pair in enumerate(pairs[point]):
             c = int(np.argmax(np.ptp(cycle.displacement[:, pair], axis=0)))
@@ -235,24 +236,17 @@ def _loops(result: Result) -> dict[str, Any]:
             "axes": (label("relative displacement", length), label("contact force", newton))}
 
 
-def _again(result: Result) -> Result:
-    """The run once more, with histories; it has to come out as it stands in the result."""
-    size = result.n_points * max(result.n_pairs, 1) * int(result.attributes.get("n_time", 1024))
-    if size > _MOST:
-        raise FretwearError(f"{size} values of histories are too many; run with output%histories "
-                            "= .true., or fewer points")
-    groups: Any = {"output": {"histories": True}}
-    values = namelist_values(result.namelist)
-    if "contact%law" in values:
-        # Left to the program, histories would ask for another one.
-        groups["contact"] = {"law": values["contact%law"][0]}
-    known = run(result.case.replace(**groups), check=False, in_memory=True)
-    largest = np.abs(result.amplitude).max()
-    if known.amplitude.shape != result.amplitude.shape or (
-            np.abs(known.amplitude - result.amplitude)[result.converged].max(initial=0.0)
-            > _SAME * largest):
-        raise FretwearError("the case, run once more, does not give what the result holds")
-    return known
+def _with_periods(result: Result) -> Result:
+    """The result, or its run with histories; the result where that comes out otherwise, of which
+    each point is then solved again by itself.
+    """
+    if "history/force" in result:
+        return result
+    try:
+        return run_again(result)
+    except FretwearError:
+        result.cycle(_highest(result))  # or why there is none
+        return result
 
 
 def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:
