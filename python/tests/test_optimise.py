@@ -45,15 +45,94 @@ def rubbing(**groups: Any) -> fw.Case:
 def test_best_load_of_a_damper(start: float) -> None:
     told: list[Evaluation] = []
     found = fw.optimise(jenkins(), minimise="max_amplitude", over="contact%normal_load",
-                        bounds=(0.05, 5.0), start=start, progress=told.append)
+                        bounds=(0.05, 5.0), start=start, scan=False, progress=told.append)
     assert found.converged and found.word == "optimum"
+    assert found.doubt.startswith("another optimum may exist between")
     assert found.n_evaluations <= 9 and len(told) == len(found.history) == found.n_evaluations
     assert found.values[0] == pytest.approx(BEST_LOAD, rel=1e-6)
     assert found.value == pytest.approx(BEST_AMPLITUDE, rel=1e-10)
-    assert abs(found.gradient[0]) < 1e-6 and not found.failures
+    assert abs(found.gradient[0]) <= found.gradient_size[0] < 1e-6 and not found.failures
     assert "contact%normal_load" in str(found)
     # The case at the optimum is a case like any other.
     assert fw.run(found.case).maximum()[1] == pytest.approx(BEST_AMPLITUDE, rel=1e-3)
+
+
+@pytest.mark.parametrize("start", [0.06, 0.5, 2.0])
+def test_the_range_is_scanned(start: float) -> None:
+    """Until nothing lower is to be expected anywhere between the bounds."""
+    found = fw.optimise(jenkins(), minimise="max_amplitude", over="contact%normal_load",
+                        bounds=(0.05, 5.0), start=start)
+    assert found.word == "optimum" and not found.doubt and found.n_evaluations <= 20
+    assert found.values[0] == pytest.approx(BEST_LOAD, rel=1e-6)
+
+
+def chain(mass: list[float], springs: list[float], rubs: list[int], stiffness: float,
+          sweep: tuple[float, float], observe: int, damping: float, n: int = 121) -> fw.Case:
+    """Masses on springs one after the other, forced at the first; pairs that rub at some."""
+    matrix = np.diag(np.array([*springs]) + np.array([*springs[1:], 0.0]))
+    for k, spring in enumerate(springs[1:]):
+        matrix[k, k + 1] = matrix[k + 1, k] = -spring
+    contact = fw.ContactPairs([[dof, 0, 0] for dof in rubs], mu=0.5, normal_load=1.0,
+                              tangential_stiffness=stiffness)
+    model = fw.Model(np.diag(mass), None, matrix, contact=contact,
+                     cosine=[1.0] + [0.0] * (len(mass) - 1))
+    return fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 5},
+                   structure={"modal_damping": damping}, output={"observe": [observe]},
+                   sweep={"start": sweep[0], "end": sweep[1], "n_points": n})
+
+
+#: Case, start, load of the optimum, amplitude there (of sweeps in steps of 2 % of the load).
+STEPPED_OVER = [
+    # A far point on the plateau of sticking ended the search.
+    (([0.75566, 1.98903], [0.56272, 0.75101], [2], 0.66722, (0.18872, 3.5121), 1, 0.026574),
+     0.18828, 2.063, 9.1832),
+    (([0.98412, 0.70842, 1.13726], [0.59563, 1.45607, 0.93946], [3], 1.21079, (0.23945, 2.8436),
+      2, 0.008139), 1.0, 1.916, 5.1166),
+    # A start on that plateau, and a corner below it.
+    (([1.97151, 0.68216, 0.75393], [1.77248, 1.73173, 1.35934], [2], 1.70054, (0.37365, 3.16747),
+      3, 0.0055729), 1.0, 0.7153, 20.0564),
+    # Minima within one doubling.
+    (([0.98113, 0.52275], [0.55748, 1.99706], [2], 0.96822, (0.35892, 0.83748), 1, 0.0064979),
+     1.0, 3.453, 2.7877),
+    (([1.47685, 0.95508, 0.62187, 0.99993], [0.8556, 1.46517, 0.8099, 0.70433], [2, 3], 0.88924,
+      (0.21506, 0.50181), 1, 0.019511), 1.0, 0.669, 0.9357),
+]
+
+
+@pytest.mark.parametrize(("parts", "start", "best", "height"), STEPPED_OVER)
+def test_no_minimum_is_stepped_over(parts: Any, start: float, best: float, height: float) -> None:
+    found = fw.optimise(chain(*parts), minimise="max_amplitude", over="contact%normal_load",
+                        bounds=(0.02, 20.0), start=start)
+    assert found.word.startswith("optimum") and not found.doubt
+    assert found.values[0] == pytest.approx(best, rel=2e-3)
+    assert found.value == pytest.approx(height, rel=2e-4)
+    if "corner" in found.word:
+        assert found.sides[0].gradient[0] < 0.0 < found.sides[1].gradient[0]
+    else:
+        assert abs(found.gradient[0]) <= found.gradient_size[0] < 1e-4
+
+
+def test_a_plateau_is_named() -> None:
+    """The largest peak over the load is that of the pair that sticks, from some load on."""
+    found = fw.optimise(jenkins(), maximise="omega_at_peak", over="contact%normal_load",
+                        bounds=(0.05, 5.0), start=4.0)
+    assert found.converged and found.word.startswith("optimum on a plateau: from ")
+
+
+def test_a_gap_between_bounds_of_any_unit() -> None:
+    """A parameter that may be zero is scaled by its bounds."""
+    found = []
+    for unit in (1.0, 1e-6):
+        contact = fw.ContactPairs([[0, 0, 1]], mu=0.0, gap=0.3 * unit, tangential_stiffness=1.0,
+                                  normal_stiffness=0.3)
+        model = fw.Model([[1.0]], [[0.1]], [[1.0]], contact=contact, cosine=[0.3 * unit])
+        case = fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 7},
+                       sweep={"start": 0.7, "end": 1.6, "n_points": 41})
+        best = fw.optimise(case, minimise="max_amplitude", over="contact%gap",
+                           bounds=(0.0, 6.0 * unit))
+        found.append((best.values[0] / unit, best.value / unit, best.word))
+    assert found[0][:2] == pytest.approx(found[1][:2], rel=1e-5)
+    assert found[0][2] == found[1][2] and found[0][2].startswith("optimum")
 
 
 def test_where_all_sticks_the_load_changes_nothing() -> None:
@@ -99,7 +178,10 @@ def test_two_peaks_of_one_height() -> None:
     found = fw.optimise(case, minimise="max_amplitude[u1]", over="contact%tangential_stiffness",
                         bounds=(0.02, 0.5))
     assert found.converged and found.word.startswith("optimum at a corner")
-    assert found.n_evaluations <= 20
+    assert found.n_evaluations <= 32 and not found.doubt
+    low, high = found.sides
+    assert low.gradient[0] < 0.0 < high.gradient[0]
+    assert high.parameters[0] - low.parameters[0] < 1.1e-6 * found.values[0]
     first, second = sorted((peak for peak in fw.run(found.case).peaks if peak.observed == "u1"),
                            key=lambda peak: peak.omega)
     assert first.amplitude == pytest.approx(second.amplitude, rel=1e-3)

@@ -31,6 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="default: 100")
     parser.add_argument("--tolerance", type=float, default=1e-6, metavar="T",
                         help="relative, on the parameters (default: 1e-6)")
+    parser.add_argument("--no-scan", dest="scan", action="store_false",
+                        help="end at the first optimum, without a look for others between the "
+                             "bounds")
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
@@ -99,7 +102,8 @@ def main(options: argparse.Namespace) -> int:
     found = optimise(read_case(options), minimise=options.minimise, maximise=options.maximise,
                      over=options.over, bounds=options.bounds, start=options.start,
                      factors=options.kind == "factor", tolerance=options.tolerance,
-                     max_evaluations=options.max_evaluations, progress=not options.quiet)
+                     max_evaluations=options.max_evaluations, scan=options.scan,
+                     progress=not options.quiet)
     print(found)
     write_case(found.case, options.output)
     write_picture(lambda: plot_optimum(found), options.picture)

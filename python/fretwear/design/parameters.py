@@ -147,18 +147,21 @@ class Unknowns:
         return np.stack(columns, axis=-1)
 
     def to_scaled(self, values: Floats) -> Floats:
-        """From values to what a method works with: logarithms of the positive ones."""
-        return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
+        """From values to what a method works with: logarithms of the positive ones, and the others
+        over their ranges.
+        """
+        return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)),
+                        values / (self.high - self.low))
 
     def to_values(self, scaled: Floats) -> Floats:
         """Back again; never outside of the bounds by round-off."""
         values = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, scaled, 0.0)),
-                          scaled)
+                          scaled * (self.high - self.low))
         return np.clip(values, self.low, self.high)
 
     def slope(self, values: Floats) -> Floats:
         """d(value)/d(scaled) of each."""
-        return np.where(self.logarithmic, values, 1.0)
+        return np.where(self.logarithmic, values, self.high - self.low)
 
     def at_bound(self, values: Floats) -> NDArray[np.int_]:
         """-1 at the lower bound, 1 at the upper, 0 between."""

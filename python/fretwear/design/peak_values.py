@@ -35,8 +35,11 @@ _NODES = -np.cos(np.pi * np.arange(7) / 6.0)
 _FIRST_WIDTH, _LAST_WIDTH = 0.05, 0.02
 #: Peaks within this of the highest one are all located: a sweep knows heights to some 1e-4.
 _TIED = 1e-3
+#: Last coefficients of a window over the largest one, above which contact switches in it: a smaller
+#: one is taken, down to this part of the frequency.
+_TAIL, _LEAST_WIDTH = 1e-8, 1e-6
 #: Windows until a peak counts as not located.
-_MOST_WINDOWS = 12
+_MOST_WINDOWS = 20
 #: Rows from which the peak is come back to, and how near they have to be to the sweep's own.
 _APPROACH, _SAME = 4, 1e-5
 #: How the remark begins that slopes are those of contact at instants.
@@ -234,6 +237,11 @@ class _Window:
         places = np.concatenate((inside, [-1.0, 1.0]))
         return float(places[np.argmax(chebyshev.chebval(places, series))])
 
+    def is_smooth(self, quantity: str) -> bool:
+        """Whether the polynomial tells the quantity: no switch of contact bends it."""
+        series = np.abs(self.polynomial(quantity)[:, 0])
+        return bool(series[-2:].max() <= _TAIL * series.max())
+
     def height(self, quantity: str) -> float:
         """The largest value of the quantity."""
         x = self.top(quantity) if self.half > 0.0 else 0.0
@@ -278,7 +286,9 @@ def _located(solver: _Solver, start: float, width: float, ends: tuple[float, flo
         window = _Window(centre, half, rows)
         x = window.top(quantity)
         if abs(x) < 0.7 and half <= last:
-            return window
+            last = 0.3 * half
+            if window.is_smooth(quantity) or last < _LEAST_WIDTH * centre:
+                return window
         centre += half * x
         # At an end of the window the peak is outside.
         half = 2.0 * half if abs(x) == 1.0 else max(last, 0.3 * half)
