@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import FretwearError, InputError, OutputError
+from .errors import FretwearError, InputError, NotBuiltError, OutputError
 
 __all__ = ["NOT_CONVERGED", "STOPPED", "Session", "functions", "join_texts", "library_version",
            "namelist_values", "raise_status", "routines"]
@@ -22,15 +22,15 @@ def routines() -> Any:
 
     Raises
     ------
-    ImportError
+    NotBuiltError
         The package stands in a source tree whose extension has not been built.
     """
     try:
         from ._core import fw_python
     except ImportError as error:
-        raise ImportError("the compiled part of fretwear cannot be loaded: install the package "
-                          "with `pip install .`, or build it and put <build>/python on "
-                          f"PYTHONPATH ({error})") from error
+        raise NotBuiltError("the compiled part of fretwear cannot be loaded: install the package "
+                            "with `pip install .`, or build it and put <build>/python on "
+                            f"PYTHONPATH ({error})") from error
     return fw_python
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._native import namelist_values
+from ._progress import CONTROL
 from .errors import AbsentError, FretwearError
 from .steps import Point, Steps
 
@@ -161,8 +162,6 @@ def run_again(result: Result) -> Result:
     FretwearError
         It is another solution, or its histories are too many.
     """
-    from .analyses import run  # takes results, and these their periods
-
     size = result.n_points * max(result.n_pairs, 1) * int(result.attributes.get("n_time", 1024))
     if size > _MOST:
         raise FretwearError(f"{size} values of histories are too many; run with output%histories "
@@ -174,7 +173,10 @@ def run_again(result: Result) -> Result:
         groups["contact"] = {"law": values["contact%law"][0]}
     if "sampling" in result.attributes:
         groups["harmonics"] = {"sampling": result.attributes["sampling"]}
-    known = run(result.case.replace(**groups), check=False, in_memory=True)
+    case = result.case.replace(**groups)
+    with case.open() as session:
+        session.run(np.zeros(CONTROL, dtype=np.int64), in_memory=True)
+        known = type(result).of_run(case, session.text("output"), session.image())
     tolerance = float(values.get("solver%tolerance", ["1e-8"])[0])
     limit = max(_SAME, _SAME_OF_SOLVER * tolerance) * np.abs(result.amplitude).max()
     if known.amplitude.shape != result.amplitude.shape or (

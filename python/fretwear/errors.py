@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .result import Result
 
-__all__ = ["AbsentError", "ConvergenceError", "FretwearError", "InputError", "OutputError",
-           "RunInterrupted", "RunStopped"]
+__all__ = ["AbsentError", "ConvergenceError", "FretwearError", "InputError", "NotBuiltError",
+           "OutputError", "RunInterrupted", "RunStopped"]
 
 
 class FretwearError(Exception):
@@ -37,6 +37,16 @@ class AbsentError(InputError):
     ----------
     message : str
         What is absent, and what would make it present.
+    """
+
+
+class NotBuiltError(AbsentError, ImportError):
+    """The compiled part of the package is not there: what needs it cannot be had.
+
+    Parameters
+    ----------
+    message : str
+        How to get it.
     """
 
 

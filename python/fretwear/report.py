@@ -139,6 +139,9 @@ def render_report(result: Result, choices: Choices, *, interactive: bool = False
         except AbsentError as error:
             content = f'<p class="warning">{escape(str(error))}</p>'
         sections.append((name, KINDS[name].title, content))
+    if "modes/open" in result:
+        frequencies, *rows = result.modes.table()
+        sections.append(("modes", "Natural frequencies", _table(frequencies, rows)))
     if result.n_points:
         sections.append(("points", "Points", _points(result)))
     if "wear/depth" in result:
@@ -217,15 +220,18 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]],
 
 def _numbers(result: Result) -> str:
     """What is asked first: how the run went, peaks, contact and wear."""
-    values = namelist_values(result.namelist)
-    rows: list[tuple[str, object, str]] = [
-        ("analysis", str(values.get("case%analysis", ["?"])[0]), "")]
+    analysis = _or_not_known(
+        lambda: str(namelist_values(result.namelist).get("case%analysis", ["?"])[0]))
+    rows: list[tuple[str, object, str]] = [("analysis", analysis, "")]
     if result.n_points:
         rows += [("converged points", f"{result.converged.sum()} of {result.n_points}", ""),
                  ("iterations", int(result.iterations.sum()), ""),
                  ("harmonics", result.n_harmonics, "")]
-    if result.n_pairs:
-        rows.append(("contact pairs", result.n_pairs, ""))
+    if "modes/open" in result:
+        rows.append(("natural frequencies", int(np.isfinite(result.modes.free).sum()), ""))
+    pairs = _or_not_known(lambda: str(result.n_pairs))
+    if pairs != "0":
+        rows.append(("contact pairs", int(pairs) if pairs.isdigit() else pairs, ""))
     if "wear/depth" in result:
         rows += _wear_numbers(result)
     else:

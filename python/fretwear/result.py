@@ -212,8 +212,8 @@ class Result(ResultFile):
 
     @property
     def n_points(self) -> int:
-        """Solution points in the file."""
-        return len(self.omega)
+        """Solution points in the file; natural frequencies have none."""
+        return 0 if "omega" not in self and "modes/open" in self else len(self.omega)
 
     @property
     def n_harmonics(self) -> int:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from .._native import namelist_values
-from ..errors import InputError
+from ..errors import InputError, NotBuiltError
 from .style import CURVE, FAILED, Source, as_result, label, new_figure, tidy
 
 __all__ = ["plot_convergence"]
@@ -44,7 +46,9 @@ def plot_convergence(source: Source) -> Figure:
         panels[1].set_yscale("log")
         # A residual below round-off is zero by chance; its decades would squeeze the others.
         panels[1].set_ylim(bottom=max(1e-18, 0.3 * np.nanmin(residual)))
-    tolerance = namelist_values(result.namelist).get("solver%tolerance")
+    tolerance = None
+    with contextlib.suppress(NotBuiltError):  # a line of the picture
+        tolerance = namelist_values(result.namelist).get("solver%tolerance")
     if tolerance:
         panels[1].axhline(float(tolerance[0]), linestyle="--", color="0.4", linewidth=1.0,
                           label="tolerance")

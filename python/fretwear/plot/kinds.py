@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
+from ..errors import NotBuiltError
 from ..result import Result
 from .backbone import plot_backbone
 from .convergence import plot_convergence
@@ -132,4 +133,11 @@ KINDS: dict[str, Kind] = {
 
 def fitting(result: Result) -> list[str]:
     """Kinds of pictures for which a result has the data."""
-    return [name for name, kind in KINDS.items() if kind.fits(result)]
+    return [name for name, kind in KINDS.items() if _fits(kind, result)]
+
+
+def _fits(kind: Kind, result: Result) -> bool:
+    try:
+        return kind.fits(result)
+    except NotBuiltError:  # the input of the run is asked for, and nothing can read it
+        return False
