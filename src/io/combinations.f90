@@ -9,13 +9,13 @@ module fw_combinations
    use fw_memory, only: require_memory
    use fw_path_checks, only: check_parameter_sweep
    use fw_rules, only: apply_rules
-   use fw_solver_options, only: scheme_bdf, scheme_implicit_euler
+   use fw_solver_options, only: scheme_implicit_euler
    use fw_text, only: to_text
    use fw_wear_options, only: wear_explicit, wear_pseudo_time
    implicit none (type, external)
    private
 
-   public :: check_combinations, has_history, is_linear_euler
+   public :: check_combinations, is_linear_euler
 
    !> Accuracy that may be asked for, as a multiple of the tolerance of the iterations.
    real(wp), parameter :: least_to_tolerance = 100.0_wp
@@ -125,13 +125,5 @@ contains
       is_linear_euler = case%wear%scheme == wear_pseudo_time .and. &
                         case%pseudo_time%scheme == scheme_implicit_euler
    end function is_linear_euler
-
-   !> Whether the steps of a wear run build on earlier ones.
-   pure logical function has_history(case)
-      type(case_type), intent(in) :: case
-
-      has_history = case%wear%scheme == wear_pseudo_time .and. &
-                    case%pseudo_time%scheme == scheme_bdf
-   end function has_history
 
 end module fw_combinations

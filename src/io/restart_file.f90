@@ -5,7 +5,6 @@
 !> structure, whose matrices the file does not hold.
 module fw_restart_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use fw_combinations, only: has_history
    use fw_case, only: analysis_wear
    use fw_case, only: analysis_words
    use fw_case, only: case_type
@@ -24,6 +23,7 @@ module fw_restart_file
    use fw_restart_rows, only: c_converged
    use fw_restart_rows, only: c_largest_rate
    use fw_restart_rows, only: c_next_cycles
+   use fw_restart_rows, only: c_provisional
    use fw_restart_rows, only: c_rejected
    use fw_restart_rows, only: c_spacing
    use fw_restart_rows, only: c_steps
@@ -63,7 +63,7 @@ module fw_restart_file
 
    type :: restart_type
       character(:), allocatable :: path
-      !> Steps that the file holds.
+      !> Steps that the file holds, up to the one from which the run goes on.
       integer :: n_rows = 0
       !> What is known of these steps without the contact.
       type(point_type), allocatable :: points(:)
@@ -97,12 +97,6 @@ contains
          call fatal_error(error, "--restart continues a run of analysis = 'wear', but this "// &
                           "case has analysis = '"//trim(analysis_words(case%analysis))//"'", &
                           status_usage)
-         return
-      end if
-      if (has_history(case)) then
-         call fatal_error(error, "--restart does not go with pseudo_time%scheme = 'bdf', whose "// &
-                          'steps build on earlier ones: &contact worn starts anew from the '// &
-                          'depths', status_usage)
          return
       end if
       self%path = path
@@ -224,7 +218,10 @@ contains
                           'of another version?)', status_input)
          return
       end if
-      n = self%n_rows
+      ! What another march would have left otherwise is taken once more. The first state is no step.
+      n = min(self%n_rows, size(control, 2))
+      n = max(1, findloc(control(c_provisional, :n) <= 0.0_wp, .true., 1, back=.true.))
+      self%n_rows = n
       if (file%exists('/wear/energy')) then
          call read_dataset(file, '/wear/energy', energy, error)
          if (allocated(error)) return

@@ -93,6 +93,9 @@ module fw_wear_march
       !> steps in which what they wear depends on the step, however short.
       logical, allocatable :: begins(:)
       integer :: n_unsettled = 0
+      !> The last step is not the one of a longer march, or what it leaves is not all that the next
+      !> one needs: who goes on takes it once more.
+      logical :: is_provisional = .false.
       type(bdf_integrator), private :: bdf
    contains
       procedure :: run
@@ -161,6 +164,7 @@ contains
          ! A run that is continued from here has no preconditioners from before either.
          self%stepper%newton%linear%worth_keeping = .false.
          self%begins = spread(.false., 1, size(state%rate))
+         self%is_provisional = .false.
          if (self%options%scheme == wear_pseudo_time .and. &
              self%stepper%pseudo_scheme == scheme_bdf) then
             call one_bdf_step(self, system, state, after, iterations)
@@ -466,6 +470,8 @@ contains
             call self%stepper%evaluate(system, after)
          end if
          if (report%converged) call confirm(self, system, after, report, iterations)
+         ! What the integrator knows of earlier steps is nowhere else.
+         if (self%bdf%is_started()) self%is_provisional = .true.
       end if
       self%gave_up = .not. report%converged
       if (self%gave_up) self%ending = 'no step from cycle '//to_text(state%cycles)// &
@@ -485,8 +491,11 @@ contains
 
       if (self%options%scheme /= wear_pseudo_time) return
       if (maxval(after%rate) > self%options%steady_tolerance*self%largest_rate .and. &
-          after%cycles < self%options%n_cycles .and. &
-          self%n_steps + 1 < self%options%max_steps) return
+          after%cycles < self%options%n_cycles) then
+         if (self%n_steps + 1 < self%options%max_steps) return
+         ! With more steps it would have been left as it was.
+         self%is_provisional = .true.
+      end if
       call self%stepper%settle(system, after, solution)
       call self%bdf%forget_derivative()
       iterations = iterations + solution%iterations
