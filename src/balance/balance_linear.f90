@@ -314,7 +314,7 @@ contains
 
       na = self%active%n_active
       roughly = self%nearly .and. self%asked >= near_enough
-      call watch_team()
+      call watch_team(self%problem%structure%n_coordinates)
       if (roughly .and. (self%splits() .or. self%problem%structure%has_near_product())) then
          call self%problem%structure%multiply_nearly(self%structure_state, vector, &
                                                      self%scratch%active_out)

@@ -690,7 +690,7 @@ contains
       nc = self%problem%fourier%n_coefficients
       self%n_moves = self%n_moves + 1_i8
       if (m == 0) return
-      call watch_team()
+      call watch_team(m)
       call multiply_stiffness(self, m, nc, x)
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))

@@ -121,11 +121,13 @@ contains
 
    !> To be called between regions, as often as one likes: take one thread for all while others
    !> have the processors, and all again later.
-   subroutine watch_team()
+   subroutine watch_team(n_coordinates)
+      !> Of the joint: one that is too small for threads has no team to look at.
+      integer, intent(in) :: n_coordinates
       real(wp) :: passed, queued
       integer(int64) :: clock, rate
 
-      if (team%n_threads == 1) return
+      if (team%n_threads == 1 .or. n_coordinates < coordinates_for_threads) return
       call system_clock(clock, rate)
       passed = real(clock - team%clock, wp)/real(rate, wp)
       if (passed < span .and. team%is_open) return

@@ -184,7 +184,7 @@ def test_options_that_a_scheme_has_not(tmp_path, changes, words):
 def test_nothing_to_wear(tmp_path, spring):
     groups = {name: keys for name, keys in prescribed_slip().items() if name != "contact"}
     message = run(tmp_path, {**groups, **spring}, status=3).stderr
-    assert "needs contact pairs" in message
+    assert "without contact pairs" in message
 
 
 @pytest.mark.parametrize("scheme, control", [

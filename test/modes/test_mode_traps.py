@@ -223,7 +223,7 @@ REFUSALS = [
      "regularised"),
     ({"output": {"histories": True}}, "histories"),
     ({"mode": {"synthesis": [1.0] * 101}}, "at most 100"),
-    ({"mode": {"synthesis": [1.0]}}, "needs a vibratory load"),
+    ({"mode": {"synthesis": [1.0]}}, "without a load in harmonic 1"),
 ]
 
 

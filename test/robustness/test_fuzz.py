@@ -79,7 +79,7 @@ def test_wear_without_pairs(tmp_path):
     (tmp_path / "case.nml").write_text(text[:text.index("&contact")] + text[text.index("&load"):])
     done = check(tmp_path)
     assert done.returncode == 3
-    assert "needs contact pairs" in done.stderr
+    assert "without contact pairs" in done.stderr
 
 
 @pytest.mark.parametrize("number", [289, 170])
