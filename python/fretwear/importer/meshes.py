@@ -50,6 +50,8 @@ class ImportedMesh:
         Connected part that the cell belongs to.
     notes : list of str
         What was left out.
+    all_points, all_nodes : (n_all, 3), (n_all,) int
+        Positions and numbers of all nodes of the file, those in the middle of edges too.
     """
 
     path: Path
@@ -59,6 +61,8 @@ class ImportedMesh:
     kind: Ints
     body: Ints
     notes: list[str]
+    all_points: Floats
+    all_nodes: Ints
 
 
 def read_mesh_file(path: str | Path) -> ImportedMesh:
@@ -186,7 +190,7 @@ def _linear(path: Path, points: Floats, nodes: Ints,
         raise InputError(f"{path}: names a node twice")
     renumbered = place[every]
     return ImportedMesh(path, points[used], nodes[used], renumbered, kind,
-                        _bodies(renumbered, len(used)), notes)
+                        _bodies(renumbered, len(used)), notes, points, nodes)
 
 
 def _bodies(cells: Ints, n_points: int) -> Ints:
