@@ -2,9 +2,7 @@
 module fw_progress
    use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit
-   use fw_kinds, only: i8
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: i8, pi, wp
    use fw_observer, only: observer_type
    use fw_parameters, only: parameter_words
    use fw_point, only: point_type

@@ -1,15 +1,8 @@
 !> SIGINT and SIGTERM ask a run to end, so that its result file is complete as far as it goes; a
 !> second one ends the program at once.
 module fw_signals
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_char
-   use, intrinsic :: iso_c_binding, only: c_funloc
-   use, intrinsic :: iso_c_binding, only: c_funptr
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_intptr_t
-   use, intrinsic :: iso_c_binding, only: c_long
-   use, intrinsic :: iso_c_binding, only: c_null_funptr
-   use, intrinsic :: iso_c_binding, only: c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_funloc, c_funptr, c_int, &
+      c_intptr_t, c_long, c_null_funptr, c_size_t
    implicit none (type, external)
    private
 

@@ -1,7 +1,6 @@
 ! Says whether the BLAS that this is linked with runs a kernel below what the processor can do.
 program blas_probe
-   use fw_blas, only: slow_kernel
-   use fw_blas, only: text_length
+   use fw_blas, only: slow_kernel, text_length
    implicit none (type, external)
    interface
       subroutine dscal(n, a, x, incx)

@@ -17,24 +17,15 @@ module fretwear
    ! A case as data, from a namelist, and run with a result file.
    use fw_case, only: case_type
    use fw_outcome, only: outcome_type
-   use fw_read_case, only: read_case
-   use fw_read_case, only: read_case_text
-   use fw_run, only: check_case
-   use fw_run, only: run_case
+   use fw_read_case, only: read_case, read_case_text
+   use fw_run, only: check_case, run_case
    ! Progress, messages and stops: extend the abstract type, or take the silent one.
-   use fw_observer, only: observer_type
-   use fw_observer, only: silent_observer
+   use fw_observer, only: observer_type, silent_observer
    ! What is known of a solution point.
    use fw_point, only: point_type
    ! Errors and statuses.
-   use fw_error, only: error_type
-   use fw_error, only: status_failure
-   use fw_error, only: status_input
-   use fw_error, only: status_io
-   use fw_error, only: status_not_converged
-   use fw_error, only: status_ok
-   use fw_error, only: status_stopped
-   use fw_error, only: status_usage
+   use fw_error, only: error_type, status_failure, status_input, status_io, status_not_converged, &
+      status_ok, status_stopped, status_usage
    ! The kind of every real, a text of its own length, and the version of the library.
    use fw_kinds, only: wp
    use fw_text, only: string_type

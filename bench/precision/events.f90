@@ -7,10 +7,8 @@
 program events
    use, intrinsic :: iso_fortran_env, only: output_unit
    use fw_force_law, only: force_workspace
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
-   use fw_friction, only: friction_law
-   use fw_friction, only: rigid_friction
+   use fw_fourier, only: fourier_type, new_fourier
+   use fw_friction, only: friction_law, rigid_friction
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
    implicit none (type, external)

@@ -12,9 +12,7 @@
 !> converged, iterations, median time [s], relative residual, why it failed, and the coefficients of
 !> the first observed quantity in the order (0, c1, s1, ..).
 program starts
-   use, intrinsic :: iso_fortran_env, only: error_unit
-   use, intrinsic :: iso_fortran_env, only: int64
-   use, intrinsic :: iso_fortran_env, only: output_unit
+   use, intrinsic :: iso_fortran_env, only: error_unit, int64, output_unit
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_guess, only: stuck_guess

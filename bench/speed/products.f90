@@ -6,10 +6,8 @@ program products
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: model_type
-   use fw_plain_structure, only: new_plain_structure
-   use fw_plain_structure, only: plain_structure
-   use fw_relative, only: new_relative
-   use fw_relative, only: relative_type
+   use fw_plain_structure, only: new_plain_structure, plain_structure
+   use fw_relative, only: new_relative, relative_type
    use fw_structure_operator, only: structure_state
    use fw_threads, only: thread_scope
    implicit none (type, external)

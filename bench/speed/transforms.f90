@@ -3,10 +3,8 @@
 !> rests on it.
 program transforms
    use, intrinsic :: iso_fortran_env, only: int64, output_unit
-   use fw_fourier, only: fft_pays
+   use fw_fourier, only: fft_pays, fourier_type, new_fourier
    use fw_fft, only: fft_type
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
    use fw_kinds, only: wp
    implicit none (type, external)
 

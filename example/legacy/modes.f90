@@ -4,10 +4,7 @@
 !>
 !> The lines written are those of modes.c.
 program modes
-   use fretwear, only: error_type
-   use fretwear, only: session_type
-   use fretwear, only: silent_observer
-   use fretwear, only: wp
+   use fretwear, only: error_type, session_type, silent_observer, wp
    implicit none (type, external)
    character(200) :: path(3)
    integer :: k, unit

@@ -1,19 +1,14 @@
 !> Functions of arrays for the Python module fretwear._core, beside the sessions of wrapper.f90 and
 !> in their style: transforms, condensation, contact forces.
 module fw_python_functions
-   use fw_error, only: error_type
-   use fw_error, only: status_ok
+   use fw_error, only: error_type, status_ok
    use fw_force_law, only: force_workspace
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
-   use fw_friction, only: friction_law
-   use fw_friction, only: rigid_friction
-   use fw_friction, only: rigid_friction_of_rates
+   use fw_fourier, only: fourier_type, new_fourier
+   use fw_friction, only: friction_law, rigid_friction, rigid_friction_of_rates
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_plain_structure, only: plain_structure
-   use fw_python_operators, only: build_condensation
-   use fw_python_operators, only: unpack_jacobian
+   use fw_python_operators, only: build_condensation, unpack_jacobian
    use fw_recovery, only: largest_magnitude
    use fw_structure_operator, only: structure_state
    implicit none (type, external)

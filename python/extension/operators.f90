@@ -1,17 +1,11 @@
 !> Core operators for post-processing, with plain arrays: what the wrapper for Python calls.
 module fw_python_operators
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_stuck
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_force_law, only: force_workspace, pair_mixed, pair_stuck
    use fw_kinds, only: wp
    use fw_model, only: model_type
-   use fw_plain_structure, only: new_plain_structure
-   use fw_plain_structure, only: plain_structure
-   use fw_relative, only: relative_type
-   use fw_relative, only: new_relative
+   use fw_plain_structure, only: new_plain_structure, plain_structure
+   use fw_relative, only: relative_type, new_relative
    use fw_structure_operator, only: structure_state
    use fw_text, only: to_text
    implicit none (type, external)

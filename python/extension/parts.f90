@@ -1,19 +1,14 @@
 !> What Python asks of input: the structure of a case as it is computed, with what the namelist
 !> adds, scales and overrides, and the keys of a namelist that need not be a valid case any more.
 module fw_python_parts
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_case, only: case_type
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_usage
+   use fw_error, only: error_type, fatal_error, status_usage
    use fw_kinds, only: wp
    use fw_namelist, only: parse_namelist
    use fw_namelist_data, only: namelist_type
-   use fw_point_quantities, only: point_quantities
-   use fw_point_quantities, only: quantity_type
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_point_quantities, only: point_quantities, quantity_type
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private

@@ -2,14 +2,9 @@
 !> opaque handle: f2py passes no derived types. A handle belongs to one thread at a time; separate
 !> ones may run side by side.
 module fw_python_session
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_int8_t
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use fw_error, only: error_type
-   use fw_error, only: status_ok
-   use fw_kinds, only: i8
-   use fw_kinds, only: wp
+   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int8_t, c_loc, c_ptr
+   use fw_error, only: error_type, status_ok
+   use fw_kinds, only: i8, wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_session, only: session_type

@@ -3,18 +3,11 @@
 !> python/fretwear/ checks arguments; texts are arrays of bytes, lists of texts have null bytes
 !> between them.
 module fw_python
-   use fw_error, only: error_type
-   use fw_error, only: status_ok
-   use fw_kinds, only: i8
-   use fw_kinds, only: wp
-   use fw_python_parts, only: case_part
-   use fw_python_parts, only: namelist_words
-   use fw_python_parts, only: quantity_lines
-   use fw_python_session, only: handle_of
-   use fw_python_session, only: handle_type
-   use fw_python_session, only: new_handle
-   use fw_text, only: join
-   use fw_text, only: string_type
+   use fw_error, only: error_type, status_ok
+   use fw_kinds, only: i8, wp
+   use fw_python_parts, only: case_part, namelist_words, quantity_lines
+   use fw_python_session, only: handle_of, handle_type, new_handle
+   use fw_text, only: join, string_type
    use fw_version, only: version
    implicit none (type, external)
    private

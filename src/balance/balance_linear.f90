@@ -9,16 +9,11 @@
 !> coordinates whose rows of A the active pairs need still (normal forces of slipping pairs).
 submodule(fw_balance_state) fw_balance_linear
    use fw_complex_form, only: amplitudes_of
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
-   use fw_force_law, only: pair_stuck
-   use fw_input_rates, only: take_rate
-   use fw_input_rates, only: turn_row
-   use fw_lapack, only: dgemv
-   use fw_lapack, only: zgemv
+   use fw_force_law, only: pair_mixed, pair_open, pair_stuck
+   use fw_input_rates, only: take_rate, turn_row
+   use fw_lapack, only: dgemv, zgemv
    use fw_march_derivative, only: elements_of_group
-   use fw_threads, only: pairs_for_threads
-   use fw_threads, only: watch_team
+   use fw_threads, only: pairs_for_threads, watch_team
    implicit none (type, external)
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)

@@ -1,8 +1,7 @@
 !> The preconditioner of the linear problem of a Newton step: per harmonic, in single precision, for
 !> the coordinates that were active when it was built.
 submodule(fw_balance_state) fw_balance_preconditioner
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
+   use fw_force_law, only: pair_mixed, pair_open
    use fw_kinds, only: sp
    implicit none (type, external)
 

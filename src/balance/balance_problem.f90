@@ -7,13 +7,11 @@ module fw_balance_problem
    use fw_force_law, only: prediction_type
    use fw_force_list, only: force_list
    use fw_fourier, only: fourier_type
-   use fw_incidence, only: incidence_type
-   use fw_incidence, only: new_incidence
+   use fw_incidence, only: incidence_type, new_incidence
    use fw_joint, only: joint_type
    use fw_kinds, only: wp
    use fw_reduction, only: held_basis
-   use fw_structure_operator, only: structure_operator
-   use fw_structure_operator, only: structure_state
+   use fw_structure_operator, only: structure_operator, structure_state
    implicit none (type, external)
    private
 

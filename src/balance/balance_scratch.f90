@@ -1,7 +1,6 @@
 !> Room for products of the balance, so that none of them allocates.
 module fw_balance_scratch
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
+   use fw_fourier, only: fourier_type, new_fourier
    use fw_kinds, only: wp
    implicit none (type, external)
    private

@@ -9,27 +9,21 @@
 !>
 !> Unknowns are (coordinate, coefficient), coordinates innermost.
 module fw_balance_state
-   use fw_kinds, only: i8
-   use fw_kinds, only: wp
+   use fw_kinds, only: i8, wp
    use fw_error, only: error_type
-   use fw_active_set, only: active_set
-   use fw_active_set, only: element_list
+   use fw_active_set, only: active_set, element_list
    use fw_balance_problem, only: balance_problem
    use fw_balance_scratch, only: balance_scratch
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: prediction_type
+   use fw_force_law, only: force_workspace, prediction_type
    use fw_force_list, only: force_entry
    use fw_fourier, only: to_real
-   use fw_input_rates, only: take_inertias
-   use fw_input_rates, only: take_means
-   use fw_input_rates, only: take_rates
+   use fw_input_rates, only: take_inertias, take_means, take_rates
    use fw_kept_factors, only: kept_factors
    use fw_near_derivative, only: near_derivative
    use fw_parameter_system, only: parameter_system
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use fw_structure_operator, only: structure_state
-   use fw_threads, only: coordinates_for_threads
-   use fw_threads, only: watch_team
+   use fw_threads, only: coordinates_for_threads, watch_team
    implicit none (type, external)
    private
 

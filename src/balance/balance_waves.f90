@@ -7,8 +7,7 @@
 !> sectors where a coordinate is active. Where others are solved at once they act as zeros in the
 !> right-hand side, and their part of the solution is dropped.
 submodule(fw_balance_state) fw_balance_waves
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
+   use fw_force_law, only: pair_mixed, pair_open
    implicit none (type, external)
 
    complex(wp), parameter :: one = (1.0_wp, 0.0_wp), zero = (0.0_wp, 0.0_wp)

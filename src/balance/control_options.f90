@@ -1,8 +1,7 @@
 !> Response control (group &control): amplitudes that the response is to have, for which the
 !> vibratory load is found.
 module fw_control_options
-   use fw_key, only: key
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_visitor
    use fw_key_range, only: above
    use fw_kinds, only: wp
    implicit none (type, external)

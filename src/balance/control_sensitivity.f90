@@ -10,20 +10,12 @@
 module fw_control_sensitivity
    use fw_control_system, only: control_system
    use fw_kinds, only: wp
-   use fw_parameter_slopes, only: parameter_entry
-   use fw_parameter_slopes, only: parameter_slope
-   use fw_parameter_slopes, only: slope_finder
+   use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
    use fw_parameters, only: harmonic_scale
    use fw_response_rows, only: new_rows
-   use fw_sensitivity, only: by_adjoint
-   use fw_sensitivity, only: by_counts
-   use fw_sensitivity, only: change_of
-   use fw_sensitivity, only: follow
-   use fw_sensitivity, only: held_change
-   use fw_sensitivity, only: pull_row
-   use fw_sensitivity, only: sensitivity_finder
-   use fw_solver_options, only: linear_krylov
-   use fw_solver_options, only: linear_lu
+   use fw_sensitivity, only: by_adjoint, by_counts, change_of, follow, held_change, pull_row, &
+      sensitivity_finder
+   use fw_solver_options, only: linear_krylov, linear_lu
    use fw_transposed_balance, only: transposed_balance
    implicit none (type, external)
    private

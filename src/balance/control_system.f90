@@ -12,15 +12,12 @@
 !> state, the frequency or the parameter that it goes along.
 module fw_control_system
    use fw_balance_state, only: balance_state
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
+   use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_control_options, only: of_first_harmonic
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_plane_system, only: plane_system
-   use fw_recovery, only: largest_magnitude
-   use fw_recovery, only: observe
-   use fw_recovery, only: peak_angles
+   use fw_recovery, only: largest_magnitude, observe, peak_angles
    use fw_structure_operator, only: by_frequency
    implicit none (type, external)
    private

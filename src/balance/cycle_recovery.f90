@@ -1,12 +1,9 @@
 !> One period of the pairs that dissipate most, from a solution of the balance or from histories.
 module fw_cycle_recovery
    use fw_balance_state, only: balance_state
-   use fw_fourier, only: coefficient_count
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
+   use fw_fourier, only: coefficient_count, fourier_type, new_fourier
    use fw_kinds, only: wp
-   use fw_pair_cycle, only: busiest_pairs
-   use fw_pair_cycle, only: thinned
+   use fw_pair_cycle, only: busiest_pairs, thinned
    use fw_point, only: point_type
    implicit none (type, external)
    private

@@ -14,13 +14,11 @@
 module fw_flow
    use fw_kinds, only: wp
    use fw_balance_state, only: balance_state
-   use fw_fourier, only: to_complex
-   use fw_fourier, only: to_real
+   use fw_fourier, only: to_complex, to_real
    use fw_lapack, only: zgemm
    use fw_linalg, only: complex_lu_type
    use fw_pseudo_system, only: pseudo_system
-   use fw_solver_options, only: flow_identity
-   use fw_solver_options, only: flow_preconditioned
+   use fw_solver_options, only: flow_identity, flow_preconditioned
    implicit none (type, external)
    private
 

@@ -2,8 +2,7 @@
 !> (hdhb). The builder of a problem says which; who solves sees a system and two conversions.
 module fw_formulation
    use fw_balance_state, only: balance_state
-   use fw_hdhb, only: hdhb_system
-   use fw_hdhb, only: new_hdhb
+   use fw_hdhb, only: hdhb_system, new_hdhb
    use fw_kinds, only: wp
    use fw_parameter_system, only: parameter_system
    implicit none (type, external)

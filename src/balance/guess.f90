@@ -5,8 +5,7 @@ module fw_guess
    use fw_kinds, only: wp
    use fw_balance_state, only: balance_state
    use fw_fourier, only: to_real
-   use fw_linalg, only: complex_lu_type
-   use fw_linalg, only: is_positive_definite
+   use fw_linalg, only: complex_lu_type, is_positive_definite
    use fw_threads, only: coordinates_for_threads
    use omp_lib, only: omp_get_thread_num
    implicit none (type, external)

@@ -11,8 +11,7 @@
 !> Vectors of some of the coordinates come with a map (n_coordinates): the place of each coordinate
 !> in the vector. Places 0 and those beyond the vector do not count. `identity` is the map of all.
 module fw_incidence
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
+   use fw_kinds, only: sp, wp
    use fw_relative, only: relative_type
    implicit none (type, external)
    private

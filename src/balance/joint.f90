@@ -2,19 +2,13 @@
 !> at all, and the relative coordinates that carry them.
 module fw_joint
    use fw_kinds, only: wp
-   use fw_contact_data, only: contact_type
-   use fw_contact_data, only: spring_type
-   use fw_contact_data, only: memory_carried
-   use fw_cyclic_relative, only: cyclic_relative
-   use fw_cyclic_relative, only: new_cyclic_relative
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_contact_data, only: contact_type, spring_type, memory_carried
+   use fw_cyclic_relative, only: cyclic_relative, new_cyclic_relative
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_force_law, only: law_facts
    use fw_laws, only: facts_of
    use fw_model, only: model_type
-   use fw_relative, only: relative_type
-   use fw_relative, only: new_relative
+   use fw_relative, only: relative_type, new_relative
    use fw_text, only: to_text
    implicit none (type, external)
    private

@@ -2,8 +2,7 @@
 !> so that they follow from these in every harmonic.
 module fw_kept_modes
    use fw_balance_state, only: balance_state
-   use fw_fourier, only: to_complex
-   use fw_fourier, only: to_real
+   use fw_fourier, only: to_complex, to_real
    use fw_kinds, only: wp
    use fw_linalg, only: complex_lu_type
    implicit none (type, external)

@@ -1,7 +1,6 @@
 !> What a balance leaves out: the part of the nonlinear forces in harmonics above its own.
 module fw_left_out
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
+   use fw_fourier, only: fourier_type, new_fourier
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    implicit none (type, external)

@@ -12,8 +12,7 @@
 !> those of a response. P_1 alone is as good as singular: the motion may be shifted in time.
 submodule(fw_mode_system) fw_mode_linear
    use fw_kinds, only: sp
-   use fw_structure_operator, only: by_frequency
-   use fw_structure_operator, only: by_self_excitation
+   use fw_structure_operator, only: by_frequency, by_self_excitation
    implicit none (type, external)
 
    complex(wp), parameter :: i = (0.0_wp, 1.0_wp)

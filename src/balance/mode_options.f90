@@ -1,14 +1,10 @@
 !> Options of a nonlinear mode (group &mode). Defaults live here and nowhere else.
 module fw_mode_options
-   use fw_key, only: key
-   use fw_key, only: key_visitor
-   use fw_key_range, only: above
-   use fw_key_range, only: at_least
+   use fw_key, only: key, key_visitor
+   use fw_key_range, only: above, at_least
    use fw_kinds, only: wp
-   use fw_solver_options, only: continuation_arclength
-   use fw_solver_options, only: continuation_words
-   use fw_solver_options, only: unit_rad_per_second
-   use fw_solver_options, only: unit_words
+   use fw_solver_options, only: continuation_arclength, continuation_words, unit_rad_per_second, &
+      unit_words
    implicit none (type, external)
    private
 

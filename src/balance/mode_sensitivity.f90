@@ -11,15 +11,12 @@ module fw_mode_sensitivity
    use fw_force_law, only: pair_open
    use fw_kinds, only: wp
    use fw_mode_system, only: mode_system
-   use fw_parameter_slopes, only: parameter_slope
-   use fw_parameter_slopes, only: slope_finder
+   use fw_parameter_slopes, only: parameter_slope, slope_finder
    use fw_recovery, only: observe
    use fw_response_rows, only: new_rows
-   use fw_sensitivity, only: change_of
-   use fw_sensitivity, only: sensitivity_finder
+   use fw_sensitivity, only: change_of, sensitivity_finder
    use fw_solver_options, only: linear_auto
-   use fw_structure_operator, only: by_frequency
-   use fw_structure_operator, only: by_self_excitation
+   use fw_structure_operator, only: by_frequency, by_self_excitation
    implicit none (type, external)
    private
 

@@ -1,12 +1,7 @@
 !> Options of the balance formulations (group &harmonics). Defaults live here and nowhere else.
 module fw_harmonics_options
-   use fw_key, only: key
-   use fw_key, only: key_visitor
-   use fw_key_range, only: above
-   use fw_key_range, only: at_least
-   use fw_key_range, only: below
-   use fw_key_range, only: from_to
-   use fw_key_range, only: operator(.and.)
+   use fw_key, only: key, key_visitor
+   use fw_key_range, only: above, at_least, below, from_to, operator(.and.)
    use fw_kinds, only: wp
    implicit none (type, external)
    private

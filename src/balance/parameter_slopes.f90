@@ -12,27 +12,14 @@
 !> input of every pair, is differentiated in the same motion.
 module fw_parameter_slopes
    use fw_balance_state, only: balance_state
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
-   use fw_force_law, only: force_law
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
-   use fw_force_law, only: pair_stuck
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
+   use fw_complex_form, only: amplitudes_of, coefficients_of
+   use fw_force_law, only: force_law, force_workspace, pair_mixed, pair_open, pair_stuck
+   use fw_fourier, only: fourier_type, new_fourier
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
-   use fw_parameters, only: friction_coefficient
-   use fw_parameters, only: gap
-   use fw_parameters, only: harmonic_scale
-   use fw_parameters, only: is_of_matrices
-   use fw_parameters, only: is_per_pair
-   use fw_parameters, only: normal_load
-   use fw_parameters, only: normal_stiffness
-   use fw_parameters, only: spring_coefficient
-   use fw_parameters, only: static_scale
-   use fw_parameters, only: tangential_stiffness
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
+      is_per_pair, normal_load, normal_stiffness, spring_coefficient, static_scale, &
+      tangential_stiffness
    use fw_recovery, only: observe
    implicit none (type, external)
    private

@@ -1,11 +1,9 @@
 !> From a solution of the balance to what is reported of it: observed quantities, amplitudes,
 !> contact forces, states and friction energy.
 module fw_recovery
-   use fw_kinds, only: wp
-   use fw_kinds, only: pi
-   use fw_fourier, only: coefficient_count
+   use fw_kinds, only: wp, pi
+   use fw_fourier, only: coefficient_count, to_complex
    use fw_balance_state, only: balance_state
-   use fw_fourier, only: to_complex
    use fw_point, only: point_type
    implicit none (type, external)
    private

@@ -1,14 +1,11 @@
 !> Options of a resonance that is followed over a parameter (group &resonance). Defaults live here
 !> and nowhere else.
 module fw_resonance_options
-   use fw_key, only: key
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_visitor
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
-   use fw_parameters, only: parameter_words
-   use fw_parameters, only: rotation_speed
-   use fw_solver_options, only: continuation_natural
-   use fw_solver_options, only: continuation_words
+   use fw_parameters, only: parameter_words, rotation_speed
+   use fw_solver_options, only: continuation_natural, continuation_words
    implicit none (type, external)
    private
 

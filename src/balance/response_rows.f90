@@ -7,11 +7,8 @@
 !>   wear volume      k_w sum over pairs of D/mu: friction works mu p a length
 module fw_response_rows
    use fw_balance_state, only: balance_state
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
-   use fw_recovery, only: observe
-   use fw_recovery, only: observed_coefficients
-   use fw_recovery, only: peak_angles
+   use fw_kinds, only: pi, wp
+   use fw_recovery, only: observe, observed_coefficients, peak_angles
    implicit none (type, external)
    private
 

@@ -7,24 +7,18 @@
 !> One factorization, or one preconditioner, serves all solutions.
 module fw_sensitivity
    use fw_balance_problem, only: balance_problem
-   use fw_balance_state, only: balance_state
-   use fw_balance_state, only: new_balance_state
+   use fw_balance_state, only: balance_state, new_balance_state
    use fw_complex_form, only: coefficients_of
    use fw_error, only: error_type
    use fw_force_law, only: pair_open
    use fw_kinds, only: wp
    use fw_linear_step, only: linear_step_type
-   use fw_parameter_slopes, only: parameter_entry
-   use fw_parameter_slopes, only: parameter_slope
-   use fw_parameter_slopes, only: slope_finder
+   use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
    use fw_parameters, only: friction_coefficient
    use fw_recovery, only: observe
-   use fw_response_rows, only: new_rows
-   use fw_response_rows, only: response_row
-   use fw_solver_options, only: linear_krylov
-   use fw_solver_options, only: linear_lu
-   use fw_transposed_balance, only: pull_forces
-   use fw_transposed_balance, only: transposed_balance
+   use fw_response_rows, only: new_rows, response_row
+   use fw_solver_options, only: linear_krylov, linear_lu
+   use fw_transposed_balance, only: pull_forces, transposed_balance
    implicit none (type, external)
    private
 

@@ -15,8 +15,7 @@
 module fw_slip_gap
    use fw_balance_state, only: balance_state
    use fw_force_law, only: prediction_type
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_pair_law, only: pair_law
    implicit none (type, external)
    private

@@ -17,22 +17,16 @@
 !>   that is left out.
 !> * Rigid contact (dlft, dlft_velocity) has no derivative in time: refused.
 module fw_stability
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_fourier, only: coefficient_count
    use fw_balance_state, only: balance_state
    use fw_hill, only: hill_exponents
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_model, only: model_type
-   use fw_stability_basis, only: new_perturbation_basis
-   use fw_stability_basis, only: perturbation_basis
-   use fw_stability_history, only: history_type
-   use fw_stability_history, only: new_history
+   use fw_stability_basis, only: new_perturbation_basis, perturbation_basis
+   use fw_stability_history, only: history_type, new_history
    use fw_stability_march, only: marched_multipliers
-   use fw_stability_tangent, only: new_tangent
-   use fw_stability_tangent, only: tangent_type
+   use fw_stability_tangent, only: new_tangent, tangent_type
    use fw_text, only: to_text
    implicit none (type, external)
    private

@@ -9,11 +9,9 @@
 !> mixed units do not decide what counts as massless.
 module fw_stability_basis
    use fw_error, only: error_type
-   use fw_incidence, only: incidence_type
-   use fw_incidence, only: new_incidence
+   use fw_incidence, only: incidence_type, new_incidence
    use fw_kinds, only: wp
-   use fw_linalg, only: diagonalize
-   use fw_linalg, only: lu_type
+   use fw_linalg, only: diagonalize, lu_type
    use fw_model, only: model_type
    use fw_relative, only: relative_type
    implicit none (type, external)

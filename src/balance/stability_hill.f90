@@ -9,13 +9,9 @@
 !> from the centre: of each family the one is taken whose p has its mean harmonic next to zero
 !> (in the spirit of Guillot et al. 2020, J. Comput. Phys. 416, who take the most symmetric p).
 module fw_hill
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_failure
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_failure, status_input
    use fw_kinds, only: wp
-   use fw_lapack, only: dgeev
-   use fw_lapack, only: dgetrs
+   use fw_lapack, only: dgeev, dgetrs
    use fw_linalg, only: lu_type
    use fw_stability_basis, only: perturbation_basis
    use fw_stability_tangent, only: tangent_type

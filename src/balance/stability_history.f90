@@ -1,14 +1,9 @@
 !> The nonlinear forces along one period of a solution, and their derivatives at each instant: what
 !> the march of a perturbation needs. Rows are those of the joint.
 module fw_stability_history
-   use fw_force_law, only: force_law
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_stuck
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
-   use fw_friction, only: elastic_friction
-   use fw_friction, only: friction_law
+   use fw_force_law, only: force_law, force_workspace, pair_mixed, pair_stuck
+   use fw_fourier, only: fourier_type, new_fourier
+   use fw_friction, only: elastic_friction, friction_law
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law

@@ -11,15 +11,10 @@
 !> Time steps follow Newmark's rule of constant mean acceleration (error h**2, no numerical
 !> damping), with backward Euler for massless damped directions: there the mean rule would ring.
 module fw_stability_march
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_failure
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_failure, status_input
    use fw_balance_state, only: balance_state
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
-   use fw_lapack, only: dgeev
-   use fw_lapack, only: dgetrs
+   use fw_kinds, only: pi, wp
+   use fw_lapack, only: dgeev, dgetrs
    use fw_linalg, only: lu_type
    use fw_stability_basis, only: perturbation_basis
    use fw_stability_history, only: history_type

@@ -9,12 +9,9 @@
 !> Friction that slips depends on the past and has no place here: see fw_stability_march.
 module fw_stability_tangent
    use fw_force_law, only: pair_stuck
-   use fw_fourier, only: coefficient_count
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
+   use fw_fourier, only: coefficient_count, fourier_type, new_fourier
    use fw_balance_state, only: balance_state
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

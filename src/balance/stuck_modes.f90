@@ -12,11 +12,9 @@
 module fw_stuck_modes
    use fw_balance_state, only: balance_state
    use fw_force_law, only: pair_open
-   use fw_hermitian, only: real_form
-   use fw_hermitian, only: solve_hermitian_eigen
+   use fw_hermitian, only: real_form, solve_hermitian_eigen
    use fw_kinds, only: wp
-   use fw_linalg, only: lu_type
-   use fw_linalg, only: solve_symmetric_eigen
+   use fw_linalg, only: lu_type, solve_symmetric_eigen
    implicit none (type, external)
    private
 

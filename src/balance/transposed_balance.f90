@@ -8,12 +8,8 @@
 !> transposes. The state has to be linearized with all of its coordinates active (`reduced` false).
 module fw_transposed_balance
    use fw_balance_state, only: balance_state
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
-   use fw_force_law, only: prediction_type
+   use fw_complex_form, only: amplitudes_of, coefficients_of
+   use fw_force_law, only: force_workspace, pair_mixed, pair_open, prediction_type
    use fw_force_list, only: force_entry
    use fw_kinds, only: wp
    use fw_krylov, only: linear_operator

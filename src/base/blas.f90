@@ -2,12 +2,7 @@
 !> OpenBLAS that does not know a processor takes a kernel that suits all, three times slower than
 !> the one that fits (48 pairs, H = 17: 52 ms a point against 17).
 module fw_blas
-   use, intrinsic :: iso_c_binding, only: c_char
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_null_char
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use, intrinsic :: iso_c_binding, only: c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_null_char, c_ptr, c_size_t
    implicit none (type, external)
    private
 

@@ -5,8 +5,7 @@
 !> This is C's fenv.h: gfortran restores the environment at the end of every procedure that uses
 !> the intrinsic module, so that the pair below could not be written with it.
 module fw_floating_point
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_int64_t
+   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t
    implicit none (type, external)
    private
 

@@ -5,9 +5,7 @@
 !> verdict on the point.
 module fw_interrupt
    use, intrinsic :: iso_fortran_env, only: int64
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_stopped
+   use fw_error, only: error_type, fatal_error, status_stopped
    use fw_kinds, only: wp
    implicit none (type, external)
    private

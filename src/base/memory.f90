@@ -3,9 +3,7 @@
 module fw_memory
    use, intrinsic :: iso_c_binding, only: c_loc, c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int64
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    implicit none (type, external)
    private

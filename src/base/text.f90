@@ -5,8 +5,7 @@
 !> texts in every layer.
 module fw_text
    use fw_kinds, only: wp
-   use fw_number_field, only: integer_field
-   use fw_number_field, only: real_field
+   use fw_number_field, only: integer_field, real_field
    implicit none (type, external)
    private
 

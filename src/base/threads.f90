@@ -2,15 +2,11 @@
 !> that the two do not oversubscribe the machine. What was set before is restored. While other
 !> programs have the processors, one thread does the work of all (fw_team_rule).
 module fw_threads
-   use, intrinsic :: iso_c_binding, only: c_double
-   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_c_binding, only: c_double, c_int
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
-   use fw_team_rule, only: span
-   use fw_team_rule, only: team_rule
-   use omp_lib, only: omp_get_max_threads
-   use omp_lib, only: omp_get_thread_num
-   use omp_lib, only: omp_set_num_threads
+   use fw_team_rule, only: span, team_rule
+   use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_set_num_threads
    implicit none (type, external)
    private
 

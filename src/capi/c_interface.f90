@@ -6,47 +6,15 @@
 !> anything is touched; texts end in a null and are copied at once; arrays are read in place for the
 !> time of the call. No function returns through an exception or ends the program.
 module fw_c_interface
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_char
-   use, intrinsic :: iso_c_binding, only: c_double
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_funptr
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_intptr_t
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_null_char
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use, intrinsic :: iso_c_binding, only: c_size_t
-   use fw_c_text, only: give_text
-   use fw_c_text, only: take_text
-   use fw_calls, only: call_check
-   use fw_calls, only: call_count
-   use fw_calls, only: call_frequency
-   use fw_calls, only: call_get
-   use fw_calls, only: call_get_text
-   use fw_calls, only: call_load_file
-   use fw_calls, only: call_load_text
-   use fw_calls, only: call_message
-   use fw_calls, only: call_new_model
-   use fw_calls, only: call_observe
-   use fw_calls, only: call_put_integers
-   use fw_calls, only: call_put_reals
-   use fw_calls, only: call_refuse
-   use fw_calls, only: call_run
-   use fw_calls, only: call_set
-   use fw_calls, only: call_size
-   use fw_calls, only: call_solve
-   use fw_calls, only: call_start
-   use fw_error, only: error_type
-   use fw_error, only: status_ok
-   use fw_error, only: status_usage
-   use fw_handles, only: ask_to_stop
-   use fw_handles, only: delete_handle
-   use fw_handles, only: enter
-   use fw_handles, only: handle_type
-   use fw_handles, only: leave
-   use fw_handles, only: new_handle
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_funptr, &
+      c_int, c_intptr_t, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use fw_c_text, only: give_text, take_text
+   use fw_calls, only: call_check, call_count, call_frequency, call_get, call_get_text, &
+      call_load_file, call_load_text, call_message, call_new_model, call_observe, &
+      call_put_integers, call_put_reals, call_refuse, call_run, call_set, call_size, call_solve, &
+      call_start
+   use fw_error, only: error_type, status_ok, status_usage
+   use fw_handles, only: ask_to_stop, delete_handle, enter, handle_type, leave, new_handle
    use fw_kinds, only: i8
    use fw_text, only: to_text
    use fw_version, only: version

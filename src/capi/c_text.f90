@@ -2,12 +2,8 @@
 !>
 !> Letters are copied one by one: a Fortran text has no null at its end and a length of its own.
 module fw_c_text
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_char
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_null_char
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use, intrinsic :: iso_c_binding, only: c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_null_char, c_ptr, &
+      c_size_t
    implicit none (type, external)
    private
 

@@ -3,16 +3,8 @@
 !> Callbacks run on the thread that runs the case, between two points: they may read the points that
 !> there are, and ask for the end by their return value; a function that is not set is passed over.
 module fw_callbacks
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_char
-   use, intrinsic :: iso_c_binding, only: c_double
-   use, intrinsic :: iso_c_binding, only: c_f_procpointer
-   use, intrinsic :: iso_c_binding, only: c_funptr
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_null_char
-   use, intrinsic :: iso_c_binding, only: c_null_funptr
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_procpointer, &
+      c_funptr, c_int, c_null_char, c_null_funptr, c_null_ptr, c_ptr
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type

@@ -8,18 +8,10 @@
 !> on it (another thread, or a callback of the run itself), and gives it back with `leave`. Calls
 !> that only read use `find_handle`, so that a callback may ask for the points there are so far.
 module fw_calls
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_not_converged
-   use fw_error, only: status_ok
-   use fw_error, only: status_stopped
-   use fw_error, only: status_usage
-   use fw_handles, only: enter
-   use fw_handles, only: find_handle
-   use fw_handles, only: handle_type
-   use fw_handles, only: leave
-   use fw_kinds, only: i8
-   use fw_kinds, only: wp
+   use fw_error, only: error_type, fatal_error, status_not_converged, status_ok, status_stopped, &
+      status_usage
+   use fw_handles, only: enter, find_handle, handle_type, leave
+   use fw_kinds, only: i8, wp
    use fw_text, only: to_text
    implicit none (type, external)
    private

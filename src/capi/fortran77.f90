@@ -152,11 +152,8 @@ end subroutine fwobs
 !> ISTOP /= 0 on return ends the run; PROGRESS may read points but change nothing.
 subroutine fwprog(handle, progress, istat)
    use fw_callbacks, only: fortran77_progress
-   use fw_error, only: error_type
-   use fw_error, only: status_usage
-   use fw_handles, only: enter
-   use fw_handles, only: handle_type
-   use fw_handles, only: leave
+   use fw_error, only: error_type, status_usage
+   use fw_handles, only: enter, handle_type, leave
    implicit none (type, external)
    integer, intent(in) :: handle
    procedure(fortran77_progress) :: progress

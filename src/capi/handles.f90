@@ -4,10 +4,7 @@
 !> The list is the one piece of state that sessions share; it is touched under a lock only.
 module fw_handles
    use fw_callbacks, only: callback_observer
-   use fw_error, only: error_type
-   use fw_error, only: status_failure
-   use fw_error, only: status_ok
-   use fw_error, only: status_usage
+   use fw_error, only: error_type, status_failure, status_ok, status_usage
    use fw_floating_point, only: floating_point_scope
    use fw_session, only: session_type
    implicit none (type, external)

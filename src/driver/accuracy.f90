@@ -24,23 +24,15 @@ module fw_accuracy
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_harmonics_options, only: sampling_uniform
-   use fw_known_tail, only: all_know_tails
-   use fw_known_tail, only: is_like_structure
-   use fw_known_tail, only: known_tail
-   use fw_known_tail, only: relative_distance
-   use fw_known_tail, only: unknown
-   use fw_laws, only: is_rigid
-   use fw_laws, only: law_under_accuracy
-   use fw_level, only: describe_levels
-   use fw_level, only: harmonic_levels
-   use fw_level, only: level_type
+   use fw_known_tail, only: all_know_tails, is_like_structure, known_tail, relative_distance, &
+      unknown
+   use fw_laws, only: is_rigid, law_under_accuracy
+   use fw_level, only: describe_levels, harmonic_levels, level_type
    use fw_linear_step, only: linear_step_type
    use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_reduction, only: held_basis
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
-   use fw_strategy, only: solver_memory
+   use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)

@@ -6,15 +6,11 @@ module fw_adaptive
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_left_out, only: force_left_out
-   use fw_level, only: describe_levels
-   use fw_level, only: harmonic_levels
-   use fw_level, only: level_type
+   use fw_level, only: describe_levels, harmonic_levels, level_type
    use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_reduction, only: held_basis
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
-   use fw_strategy, only: solver_memory
+   use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
    implicit none (type, external)
    private

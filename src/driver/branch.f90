@@ -5,46 +5,33 @@ module fw_branch
    use fw_kinds, only: wp
    use fw_bifurcation, only: bifurcation_list
    use fw_branch_fold, only: described_fold
-   use fw_branch_peaks, only: branch_peaks
-   use fw_branch_peaks, only: branch_segment
+   use fw_branch_peaks, only: branch_peaks, branch_segment
    use fw_branch_step, only: interpolate
    use fw_case, only: case_type
-   use fw_continuation, only: arclength_type
-   use fw_continuation, only: branch_point
-   use fw_crossing_search, only: probe_type
-   use fw_crossing_search, only: search_crossings
+   use fw_continuation, only: arclength_type, branch_point
+   use fw_crossing_search, only: probe_type, search_crossings
    use fw_cycle_recovery, only: recover_cycle
    use fw_error, only: error_type
    use fw_formulation, only: formulation_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
-   use fw_newton, only: tight_forcing
+   use fw_newton, only: newton_solver, solver_report, tight_forcing
    use fw_observer, only: observer_type
    use fw_parameter_system, only: parameter_system
-   use fw_point, only: point_type
-   use fw_point, only: served_by_arclength
+   use fw_point, only: point_type, served_by_arclength
    use fw_level, only: level_type
    use fw_problem, only: build_system
-   use fw_recovery, only: carry_solution
-   use fw_recovery, only: observed_coefficients
-   use fw_recovery, only: recover_histories
-   use fw_recovery, only: recover_point
+   use fw_recovery, only: carry_solution, observed_coefficients, recover_histories, recover_point
    use fw_slip_gap, only: lacks_friction
    use fw_solution, only: is_lasting
-   use fw_stability_crossing, only: movement_between
-   use fw_stability_crossing, only: multiplier_track
-   use fw_stability_crossing, only: signature_of
+   use fw_stability_crossing, only: movement_between, multiplier_track, signature_of
    use fw_sensitivity_solver, only: sensitivity_solver
    use fw_stability_solver, only: stability_solver
    use fw_stability_verdict, only: verdict_undecided
-   use fw_strategy, only: new_request
-   use fw_strategy, only: note_time_limit
+   use fw_strategy, only: new_request, note_time_limit
    use fw_remarks, only: is_undamped
    use fw_response_view, only: response_view
-   use fw_sweep, only: path_ends
-   use fw_sweep, only: point_source
+   use fw_sweep, only: path_ends, point_source
    implicit none (type, external)
    private
 

@@ -1,15 +1,10 @@
 !> A fold of a branch as a bifurcation of the result.
 module fw_branch_fold
-   use fw_bifurcation, only: bifurcation_type
-   use fw_bifurcation, only: kind_fold
-   use fw_bifurcation, only: kind_undecided
-   use fw_bifurcation, only: way_bracket
-   use fw_bifurcation, only: way_turn
+   use fw_bifurcation, only: bifurcation_type, kind_fold, kind_undecided, way_bracket, way_turn
    use fw_branch_point, only: branch_point
    use fw_kinds, only: wp
    use fw_point, only: point_type
-   use fw_stability_crossing, only: critical_multiplier
-   use fw_stability_crossing, only: crossing_plus
+   use fw_stability_crossing, only: critical_multiplier, crossing_plus
    implicit none (type, external)
    private
 

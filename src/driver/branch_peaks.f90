@@ -4,11 +4,7 @@
 module fw_branch_peaks
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_peak, only: found_bound
-   use fw_peak, only: found_row
-   use fw_peak, only: found_search
-   use fw_peak, only: found_unresolved
-   use fw_peak, only: peak_type
+   use fw_peak, only: found_bound, found_row, found_search, found_unresolved, peak_type
    use fw_point, only: point_type
    use fw_recovery, only: largest_magnitude
    implicit none (type, external)

@@ -9,20 +9,16 @@ module fw_control_branch
    use fw_bifurcation, only: bifurcation_list
    use fw_branch_fold, only: described_fold
    use fw_case, only: case_type
-   use fw_continuation, only: arclength_type
-   use fw_continuation, only: branch_point
+   use fw_continuation, only: arclength_type, branch_point
    use fw_controlled_response, only: controlled_response
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_newton, only: tight_forcing
    use fw_observer, only: observer_type
-   use fw_point, only: point_type
-   use fw_point, only: served_by_arclength
+   use fw_point, only: point_type, served_by_arclength
    use fw_recovery, only: observed_coefficients
-   use fw_strategy, only: new_request
-   use fw_strategy, only: point_request
-   use fw_sweep, only: path_ends
-   use fw_sweep, only: point_source
+   use fw_strategy, only: new_request, point_request
+   use fw_sweep, only: path_ends, point_source
    use fw_text, only: to_text
    implicit none (type, external)
    private

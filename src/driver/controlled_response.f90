@@ -8,33 +8,23 @@ module fw_controlled_response
    use fw_balance_state, only: balance_state
    use fw_case, only: case_type
    use fw_control_options, only: of_first_harmonic
-   use fw_control_system, only: control_system
-   use fw_control_system, only: new_control_system
+   use fw_control_system, only: control_system, new_control_system
    use fw_error, only: error_type
-   use fw_guess, only: free_guess
-   use fw_guess, only: stuck_guess
+   use fw_guess, only: free_guess, stuck_guess
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_newton, only: solver_report
-   use fw_point, only: point_type
-   use fw_point, only: served_by_free_guess
-   use fw_point, only: served_by_newton
-   use fw_point, only: served_by_none
-   use fw_point, only: served_by_other_guess
-   use fw_point, only: served_by_raised_load
-   use fw_point, only: served_by_smaller_steps
+   use fw_point, only: point_type, served_by_free_guess, served_by_newton, served_by_none, &
+      served_by_other_guess, served_by_raised_load, served_by_smaller_steps
    use fw_problem, only: build_system
-   use fw_remarks, only: remark_list
-   use fw_remarks, only: remark_undetermined
-   use fw_recovery, only: recover_histories
-   use fw_recovery, only: recover_point
+   use fw_remarks, only: remark_list, remark_undetermined
+   use fw_recovery, only: recover_histories, recover_point
    use fw_run_state, only: run_state
    use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution, only: solution_method
    use fw_stability_solver, only: stability_solver
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
+   use fw_strategy, only: point_request, point_strategy
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)

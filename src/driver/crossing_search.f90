@@ -4,31 +4,15 @@
 !> falsi (Illinois) on the distance of the one that passes, with bisections in between. Where the
 !> bracket shrinks to nothing and the distance does not, the multiplier has jumped.
 module fw_crossing_search
-   use fw_bifurcation, only: bifurcation_list
-   use fw_bifurcation, only: bifurcation_type
-   use fw_bifurcation, only: kind_branch
-   use fw_bifurcation, only: kind_doubling
-   use fw_bifurcation, only: kind_fold
-   use fw_bifurcation, only: kind_nonsmooth
-   use fw_bifurcation, only: kind_symmetry
-   use fw_bifurcation, only: kind_torus
-   use fw_bifurcation, only: kind_undecided
-   use fw_bifurcation, only: way_bracket
-   use fw_bifurcation, only: way_multiplier
+   use fw_bifurcation, only: bifurcation_list, bifurcation_type, kind_branch, kind_doubling, &
+      kind_fold, kind_nonsmooth, kind_symmetry, kind_torus, kind_undecided, way_bracket, &
+      way_multiplier
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_point, only: point_type
-   use fw_stability_crossing, only: critical_multiplier
-   use fw_stability_crossing, only: crossing_between
-   use fw_stability_crossing, only: crossing_minus
-   use fw_stability_crossing, only: crossing_none
-   use fw_stability_crossing, only: crossing_pair
-   use fw_stability_crossing, only: crossing_plus
-   use fw_stability_crossing, only: crossing_several
-   use fw_stability_crossing, only: may_hide
-   use fw_stability_crossing, only: movement_between
-   use fw_stability_crossing, only: signature_of
-   use fw_stability_crossing, only: test_value
+   use fw_stability_crossing, only: critical_multiplier, crossing_between, crossing_minus, &
+      crossing_none, crossing_pair, crossing_plus, crossing_several, may_hide, movement_between, &
+      signature_of, test_value
    implicit none (type, external)
    private
 

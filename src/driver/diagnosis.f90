@@ -1,8 +1,7 @@
 !> Why a joint has no periodic vibration, where none was found: in words that say what to change.
 module fw_diagnosis
    use fw_error, only: error_type
-   use fw_guess, only: held_without_friction
-   use fw_guess, only: stuck_guess
+   use fw_guess, only: held_without_friction, stuck_guess
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
    use fw_newton, only: solver_report

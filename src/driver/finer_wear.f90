@@ -11,14 +11,10 @@ module fw_finer_wear
    use fw_restart_rows, only: n_notes
    use fw_summary, only: summary_type
    use fw_text, only: to_text
-   use fw_wear_march, only: steady_reached
-   use fw_wear_march, only: wear_march
+   use fw_wear_march, only: steady_reached, wear_march
    use fw_wear_options, only: wear_energy
-   use fw_wear_step, only: new_wear_stepper
-   use fw_wear_step, only: wear_state
-   use fw_wear_step, only: wear_stepper
-   use fw_wear_system, only: new_wear_system
-   use fw_wear_system, only: wear_system
+   use fw_wear_step, only: new_wear_stepper, wear_state, wear_stepper
+   use fw_wear_system, only: new_wear_system, wear_system
    implicit none (type, external)
    private
 

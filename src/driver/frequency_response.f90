@@ -5,43 +5,28 @@ module fw_frequency_response
    use fw_adaptive, only: adaptive_solver
    use fw_branch, only: branch_source
    use fw_bifurcation, only: bifurcation_list
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_time
-   use fw_case, only: case_type
+   use fw_case, only: analysis_frf, analysis_time, case_type
    use fw_control_branch, only: control_branch
    use fw_controlled_response, only: controlled_response
-   use fw_error, only: error_type
-   use fw_error, only: status_stopped
+   use fw_error, only: error_type, status_stopped
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
    use fw_peak, only: peak_type
    use fw_peak_cycle, only: cycle_keeper
    use fw_peak_finder, only: peak_finder
-   use fw_remarks, only: is_shaken
-   use fw_remarks, only: is_undamped
-   use fw_remarks, only: remark_condensed
-   use fw_remarks, only: remark_peaks
-   use fw_remarks, only: remark_range
-   use fw_remarks, only: remark_stability
+   use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_peaks, remark_range, &
+      remark_stability
    use fw_result, only: result_writer
    use fw_point, only: point_type
    use fw_run_state, only: run_state
-   use fw_sinks, only: observer_sink
-   use fw_sinks, only: sink_list
-   use fw_sinks, only: summary_sink
-   use fw_sinks, only: writer_sink
+   use fw_sinks, only: observer_sink, sink_list, summary_sink, writer_sink
    use fw_solver_options, only: continuation_arclength
    use fw_stability_verdict, only: verdict_undecided
-   use fw_strategy, only: kept_strategy
-   use fw_strategy, only: point_strategy
+   use fw_strategy, only: kept_strategy, point_strategy
    use fw_summary, only: summary_type
-   use fw_sweep, only: lead_places
-   use fw_sweep, only: list_source
-   use fw_sweep, only: point_source
-   use fw_sweep, only: run_sweep
+   use fw_sweep, only: lead_places, list_source, point_source, run_sweep, sweep_places
    use fw_sweep_bifurcations, only: sweep_bifurcations
-   use fw_sweep, only: sweep_places
    use fw_time_response, only: time_strategy
    implicit none (type, external)
    private

@@ -1,15 +1,10 @@
 !> Resonances that two neighbouring rows of a sweep pass by: a phase that turns back between them,
 !> or a mode of the joint there that is narrow beside their distance.
 module fw_hidden_resonance
-   use fw_joint_modes, only: joint_mode_type
-   use fw_joint_modes, only: state_free
-   use fw_joint_modes, only: state_sliding
-   use fw_joint_modes, only: state_stuck
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_joint_modes, only: joint_mode_type, state_free, state_sliding, state_stuck
+   use fw_kinds, only: pi, wp
    use fw_peak_rules, only: negligible
-   use fw_samples, only: phase_step
-   use fw_samples, only: sample_type
+   use fw_samples, only: phase_step, sample_type
    implicit none (type, external)
    private
 

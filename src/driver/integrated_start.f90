@@ -2,11 +2,8 @@
 !> is left of the way is a Newton iteration. Slow stick-slip, whose square waves no balance of few
 !> harmonics resembles, dies out to its periodic motion within some periods.
 module fw_integrated_start
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_point
-   use fw_case, only: case_type
-   use fw_error, only: error_type
-   use fw_error, only: status_stopped
+   use fw_case, only: analysis_frf, analysis_point, case_type
+   use fw_error, only: error_type, status_stopped
    use fw_kept_modes, only: complete_modes
    use fw_kinds, only: wp
    use fw_level, only: level_type

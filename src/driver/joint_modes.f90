@@ -4,9 +4,8 @@ module fw_joint_modes
    use fw_case, only: case_type
    use fw_formed_stiffness, only: harmonic_load
    use fw_kinds, only: wp
-   use fw_modes, only: find_modes
+   use fw_modes, only: find_modes, mode_type
    use fw_laws, only: new_law
-   use fw_modes, only: mode_type
    use fw_pair_law, only: pair_law
    use fw_sector_modes, only: find_sector_modes
    implicit none (type, external)

@@ -16,8 +16,7 @@ module fw_known_tail
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_fourier, only: to_complex
-   use fw_fourier, only: to_real
+   use fw_fourier, only: to_complex, to_real
    use fw_kept_modes, only: complete_modes
    use fw_kinds, only: wp
    use fw_linalg, only: complex_lu_type
@@ -25,9 +24,7 @@ module fw_known_tail
    use fw_point, only: point_type
    use fw_problem, only: build_system
    use fw_reduction, only: held_basis
-   use fw_recovery, only: carry_solution
-   use fw_recovery, only: largest_magnitude
-   use fw_recovery, only: recover_point
+   use fw_recovery, only: carry_solution, largest_magnitude, recover_point
    implicit none (type, external)
    private
 

@@ -3,8 +3,7 @@
 module fw_mode_cycles
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_mode_group, only: mode_row
-   use fw_mode_group, only: mode_table
+   use fw_mode_group, only: mode_row, mode_table
    use fw_mode_path, only: mode_path
    use fw_newton, only: solver_report
    implicit none (type, external)

@@ -6,8 +6,7 @@
 !> onset is looked for between two rows of the curve, of which one is stuck and the next is not,
 !> about positions in a straight line, and confirmed by a solution just below.
 module fw_mode_onset
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_mode_path, only: mode_path

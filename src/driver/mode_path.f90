@@ -2,13 +2,11 @@
 !> fail, from the points before.
 module fw_mode_path
    use fw_error, only: error_type
-   use fw_extrapolation, only: best_order
-   use fw_extrapolation, only: extrapolate
+   use fw_extrapolation, only: best_order, extrapolate
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_mode_system, only: mode_system
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_solver_options, only: solver_options
    implicit none (type, external)
    private

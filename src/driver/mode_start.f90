@@ -2,27 +2,21 @@
 !> closed pairs stuck.
 module fw_mode_start
    use fw_balance_problem, only: balance_problem
-   use fw_balance_state, only: balance_state
-   use fw_balance_state, only: new_balance_state
+   use fw_balance_state, only: balance_state, new_balance_state
    use fw_case, only: case_type
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_force_law, only: pair_open
    use fw_fourier, only: to_real
    use fw_guess, only: stuck_guess
    use fw_kinds, only: wp
    use fw_memory, only: require_memory
    use fw_mode_options, only: control_observed
-   use fw_mode_system, only: mode_system
-   use fw_mode_system, only: new_mode_system
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_mode_system, only: mode_system, new_mode_system
+   use fw_newton, only: newton_solver, solver_report
    use fw_problem, only: build_system
    use fw_solver_options, only: linear_lu
    use fw_structure_operator, only: structure_state
-   use fw_stuck_modes, only: find_stuck_modes
-   use fw_stuck_modes, only: stuck_modes
+   use fw_stuck_modes, only: find_stuck_modes, stuck_modes
    use fw_text, only: to_text
    implicit none (type, external)
    private

@@ -1,7 +1,6 @@
 !> Responses near the resonance of a nonlinear mode, put together from its curve.
 module fw_mode_synthesis
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_kinds, only: wp
    use fw_mode_group, only: mode_table
    implicit none (type, external)

@@ -6,26 +6,18 @@
 !> its solutions do not depend. What changes matrices condenses the structure again.
 module fw_moved_parameter
    use fw_balance_problem, only: balance_problem
-   use fw_balance_state, only: balance_state
-   use fw_balance_state, only: parameter_mover
+   use fw_balance_state, only: balance_state, parameter_mover
    use fw_case, only: case_type
    use fw_case_forces, only: new_forces
-   use fw_contact_data, only: contact_type
-   use fw_contact_data, only: spring_type
+   use fw_contact_data, only: contact_type, spring_type
    use fw_error, only: error_type
    use fw_force_list, only: force_list
    use fw_kinds, only: wp
    use fw_moved_structure, only: move_structure
-   use fw_parameter_slopes, only: parameter_entry
-   use fw_parameter_slopes, only: parameter_slope
-   use fw_parameter_slopes, only: slope_finder
-   use fw_parameter_values, only: get_parameter
-   use fw_parameter_values, only: put_parameter
-   use fw_parameters, only: harmonic_scale
-   use fw_parameters, only: is_of_matrices
-   use fw_parameters, only: is_per_pair
-   use fw_parameters, only: is_per_spring
-   use fw_parameters, only: static_scale
+   use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
+   use fw_parameter_values, only: get_parameter, put_parameter
+   use fw_parameters, only: harmonic_scale, is_of_matrices, is_per_pair, is_per_spring, &
+      static_scale
    implicit none (type, external)
    private
 

@@ -11,11 +11,8 @@ module fw_moved_structure
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_parameter_values, only: put_parameter
-   use fw_plain_structure, only: new_plain_structure
-   use fw_plain_structure, only: plain_structure
-   use fw_reduction, only: may_resonate_between
-   use fw_reduction, only: new_reduction
-   use fw_reduction, only: reduction_type
+   use fw_plain_structure, only: new_plain_structure, plain_structure
+   use fw_reduction, only: may_resonate_between, new_reduction, reduction_type
    use fw_relative, only: relative_type
    use fw_structure_operator, only: structure_state
    implicit none (type, external)

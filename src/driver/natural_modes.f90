@@ -2,28 +2,18 @@
 !> pair as its springs (laws that are elastic at rest) or held (all others). Of a cyclic structure
 !> in each nodal diameter, of any other in nodal diameter 0 alone.
 module fw_natural_modes
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_case, only: case_type
    use fw_cyclic_data, only: nodal_matrices
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_hermitian, only: congruence
-   use fw_hermitian, only: is_regular
-   use fw_hermitian, only: solve_hermitian_eigen
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_hermitian, only: congruence, is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_laws, only: new_law
    use fw_pair_law, only: pair_law
-   use fw_sector, only: add_sector_spring
-   use fw_sector, only: sector_at
-   use fw_sector, only: sector_rows
-   use fw_sector_relative, only: new_sector_relative
-   use fw_sector_relative, only: sector_relative
+   use fw_sector, only: add_sector_spring, sector_at, sector_rows
+   use fw_sector_relative, only: new_sector_relative, sector_relative
    use fw_text, only: to_text
-   use fw_whirl_modes, only: find_whirl
-   use fw_whirl_modes, only: wave_matrices
-   use fw_whirl_modes, only: wave_of
+   use fw_whirl_modes, only: find_whirl, wave_matrices, wave_of
    implicit none (type, external)
    private
 

@@ -2,20 +2,15 @@
 module fw_one_level
    use fw_case, only: case_type
    use fw_contact_data, only: memory_carried
-   use fw_diagnosis, only: explain_failure
-   use fw_diagnosis, only: finer
-   use fw_diagnosis, only: takes_scale
+   use fw_diagnosis, only: explain_failure, finer, takes_scale
    use fw_error, only: error_type
    use fw_level, only: level_type
    use fw_other_starts, only: start_elsewhere
    use fw_point, only: point_type
    use fw_point_solver, only: looks_again
-   use fw_remarks, only: is_undamped
-   use fw_remarks, only: remark_undetermined
+   use fw_remarks, only: is_undamped, remark_undetermined
    use fw_run_state, only: run_state
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
-   use fw_strategy, only: solver_memory
+   use fw_strategy, only: point_request, point_strategy, solver_memory
    use fw_summary, only: summary_type
    implicit none (type, external)
    private

@@ -9,14 +9,10 @@
 module fw_other_starts
    use fw_case, only: case_type
    use fw_error, only: error_type
-   use fw_integrated_start, only: can_integrate
-   use fw_integrated_start, only: integrate_a_few
+   use fw_integrated_start, only: can_integrate, integrate_a_few
    use fw_kinds, only: wp
-   use fw_level, only: harmonic_levels
-   use fw_level, only: level_type
-   use fw_point, only: point_type
-   use fw_point, only: served_by_integration
-   use fw_point, only: served_by_other_balance
+   use fw_level, only: harmonic_levels, level_type
+   use fw_point, only: point_type, served_by_integration, served_by_other_balance
    use fw_point_solver, only: point_solver
    use fw_solution_history, only: solution_history
    use fw_strategy, only: point_request

@@ -2,14 +2,12 @@
 !> resonance is tracked in.
 module fw_parameter_problem
    use fw_balance_problem, only: balance_problem
-   use fw_balance_state, only: balance_state
-   use fw_balance_state, only: new_balance_state
+   use fw_balance_state, only: balance_state, new_balance_state
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_moved_parameter, only: moved_parameter
-   use fw_parameter_values, only: get_parameter
-   use fw_parameter_values, only: put_parameter
+   use fw_parameter_values, only: get_parameter, put_parameter
    implicit none (type, external)
    private
 

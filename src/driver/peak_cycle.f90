@@ -10,9 +10,7 @@ module fw_peak_cycle
    use fw_peak_finder, only: peak_finder
    use fw_point, only: point_type
    use fw_sinks, only: point_sink
-   use fw_strategy, only: keeps_cycles
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
+   use fw_strategy, only: keeps_cycles, point_request, point_strategy
    implicit none (type, external)
    private
 

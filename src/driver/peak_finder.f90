@@ -6,37 +6,21 @@
 !> lies there and is narrow for the interval. After the sweep a few more solutions find the maxima;
 !> rows do not change by it.
 module fw_peak_finder
-   use fw_case, only: analysis_time
-   use fw_case, only: case_type
+   use fw_case, only: analysis_time, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
-   use fw_hidden_resonance, only: hides_mode
-   use fw_hidden_resonance, only: hides_resonance
-   use fw_hidden_resonance, only: turns_back
-   use fw_joint_modes, only: find_joint_modes
-   use fw_joint_modes, only: joint_mode_type
+   use fw_hidden_resonance, only: hides_mode, hides_resonance, turns_back
+   use fw_joint_modes, only: find_joint_modes, joint_mode_type
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_peak, only: peak_type
-   use fw_peak_rules, only: find_edge
-   use fw_peak_rules, only: find_gap
-   use fw_peak_rules, only: find_next
-   use fw_peak_rules, only: find_way_past
-   use fw_peak_rules, only: highest_of
-   use fw_peak_rules, only: is_bound
-   use fw_peak_rules, only: is_maximum
-   use fw_peak_rules, only: list_peaks
-   use fw_peak_rules, only: place_of_highest
+   use fw_peak_rules, only: find_edge, find_gap, find_next, find_way_past, highest_of, is_bound, &
+      is_maximum, list_peaks, place_of_highest
    use fw_point, only: point_type
-   use fw_samples, only: balance_point
-   use fw_samples, only: new_sample
-   use fw_samples, only: sample_list
-   use fw_samples, only: sample_type
+   use fw_samples, only: balance_point, new_sample, sample_list, sample_type
    use fw_session_points, only: point_list
    use fw_sinks, only: point_sink
-   use fw_strategy, only: new_request
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
+   use fw_strategy, only: new_request, point_request, point_strategy
    use fw_sweep, only: point_source
    implicit none (type, external)
    private

@@ -2,17 +2,8 @@
 !> well enough, where to look next, and how wide it is.
 module fw_peak_rules
    use fw_kinds, only: wp
-   use fw_peak, only: found_bound
-   use fw_peak, only: found_jump
-   use fw_peak, only: found_row
-   use fw_peak, only: found_search
-   use fw_peak, only: found_unresolved
-   use fw_peak, only: peak_type
-   use fw_samples, only: position_of
-   use fw_samples, only: sample_list
-   use fw_samples, only: sample_type
-   use fw_samples, only: swing_of
-   use fw_samples, only: vertex_of
+   use fw_peak, only: found_bound, found_jump, found_row, found_search, found_unresolved, peak_type
+   use fw_samples, only: position_of, sample_list, sample_type, swing_of, vertex_of
    implicit none (type, external)
    private
 

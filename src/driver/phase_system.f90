@@ -9,16 +9,12 @@
 module fw_phase_system
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_fourier, only: to_complex
    use fw_kinds, only: wp
    use fw_linear_step, only: linear_step_type
    use fw_parameter_problem, only: parameter_problem
-   use fw_parameter_slopes, only: parameter_entry
-   use fw_parameter_slopes, only: parameter_slope
-   use fw_parameter_slopes, only: slope_finder
+   use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
    use fw_parameters, only: harmonic_scale
    use fw_plane_system, only: plane_system
    use fw_resonance_options, only: resonance_options

@@ -8,35 +8,22 @@ module fw_point_solver
    use fw_contact_data, only: memory_carried
    use fw_cycle_recovery, only: recover_cycle
    use fw_error, only: error_type
-   use fw_guess, only: free_guess
-   use fw_guess, only: stuck_guess
+   use fw_guess, only: free_guess, stuck_guess
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_state, only: balance_state
    use fw_newton, only: solver_report
-   use fw_point, only: point_type
-   use fw_point, only: served_by_free_guess
-   use fw_point, only: served_by_kinsol
-   use fw_point, only: served_by_newton
-   use fw_point, only: served_by_none
-   use fw_point, only: served_by_other_guess
-   use fw_point, only: served_by_powell
-   use fw_point, only: served_by_pseudo_time
-   use fw_point, only: served_by_raised_load
-   use fw_point, only: served_by_smaller_steps
-   use fw_recovery, only: recover_histories
-   use fw_recovery, only: recover_point
+   use fw_point, only: point_type, served_by_free_guess, served_by_kinsol, served_by_newton, &
+      served_by_none, served_by_other_guess, served_by_powell, served_by_pseudo_time, &
+      served_by_raised_load, served_by_smaller_steps
+   use fw_recovery, only: recover_histories, recover_point
    use fw_tail, only: recover_tail
    use fw_sensitivity_solver, only: sensitivity_solver
    use fw_solution, only: solution_method
    use fw_solution_history, only: solution_history
    use fw_stability_solver, only: stability_solver
    use fw_strategy, only: point_request
-   use fw_solver_options, only: pseudo_time_options
-   use fw_solver_options, only: solver_kinsol
-   use fw_solver_options, only: solver_newton
-   use fw_solver_options, only: solver_options
-   use fw_solver_options, only: solver_powell
-   use fw_solver_options, only: solver_pseudo_time
+   use fw_solver_options, only: pseudo_time_options, solver_kinsol, solver_newton, solver_options, &
+      solver_powell, solver_pseudo_time
    use fw_text, only: to_text
    implicit none (type, external)
    private

@@ -2,13 +2,10 @@
 !> of the dataset: the last index of the documented shape runs fastest.
 module fw_point_values
    use fw_case, only: case_type
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_usage
+   use fw_error, only: error_type, fatal_error, status_usage
    use fw_kinds, only: wp
    use fw_point, only: point_type
-   use fw_point_quantities, only: point_quantities
-   use fw_point_quantities, only: quantity_type
+   use fw_point_quantities, only: point_quantities, quantity_type
    implicit none (type, external)
    private
 

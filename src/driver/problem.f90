@@ -1,61 +1,29 @@
 !> From a case to the system that is solved: joint, harmonics, instants, condensation.
 module fw_problem
    use fw_kinds, only: wp
-   use fw_balance_problem, only: balance_problem
-   use fw_balance_problem, only: new_balance_problem
-   use fw_balance_problem, only: problem_origin
-   use fw_balance_state, only: balance_state
-   use fw_balance_state, only: new_balance_state
-   use fw_case, only: case_type
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_mode
-   use fw_case, only: analysis_point
-   use fw_case, only: analysis_resonance
-   use fw_case, only: analysis_wear
-   use fw_all_sectors, only: all_sectors
-   use fw_all_sectors, only: new_all_sectors
-   use fw_cyclic_structure, only: cyclic_structure
-   use fw_cyclic_structure, only: new_cyclic_structure
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_balance_problem, only: balance_problem, new_balance_problem, problem_origin
+   use fw_balance_state, only: balance_state, new_balance_state
+   use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_point, analysis_resonance, &
+      analysis_wear
+   use fw_all_sectors, only: all_sectors, new_all_sectors
+   use fw_cyclic_structure, only: cyclic_structure, new_cyclic_structure
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_case_forces, only: new_forces
    use fw_force_list, only: force_list
-   use fw_fourier, only: fourier_type
-   use fw_fourier, only: new_fourier
-   use fw_fourier, only: fft_pays
-   use fw_harmonics_options, only: harmonics_options
-   use fw_harmonics_options, only: method_hbm
-   use fw_harmonics_options, only: method_hdhb
-   use fw_harmonics_options, only: method_tcm
-   use fw_harmonics_options, only: method_tcm_least_squares
-   use fw_harmonics_options, only: parity_all
-   use fw_harmonics_options, only: parity_odd
-   use fw_harmonics_options, only: sampling_auto
-   use fw_harmonics_options, only: sampling_events
-   use fw_joint, only: joint_type
-   use fw_joint, only: new_joint
-   use fw_joint, only: turn_joint
+   use fw_fourier, only: fourier_type, new_fourier, fft_pays
+   use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, method_tcm, &
+      method_tcm_least_squares, parity_all, parity_odd, sampling_auto, sampling_events
+   use fw_joint, only: joint_type, new_joint, turn_joint
    use fw_memory, only: require_memory
-   use fw_moved_parameter, only: moved_parameter
-   use fw_moved_parameter, only: new_moved_parameter
-   use fw_moved_structure, only: fullest_case
-   use fw_moved_structure, only: meets_modes
-   use fw_moved_structure, only: move_structure
+   use fw_moved_parameter, only: moved_parameter, new_moved_parameter
+   use fw_moved_structure, only: fullest_case, meets_modes, move_structure
    use fw_parameter_sweep, only: as_factor
-   use fw_parameters, only: gap
-   use fw_parameters, only: harmonic_scale
-   use fw_parameters, only: is_of_matrices
-   use fw_plain_structure, only: new_plain_structure
-   use fw_plain_structure, only: plain_structure
+   use fw_parameters, only: gap, harmonic_scale, is_of_matrices
+   use fw_plain_structure, only: new_plain_structure, plain_structure
    use fw_reduction, only: held_basis
-   use fw_sector_means, only: means_none
-   use fw_sector_means, only: means_split
-   use fw_solver_options, only: continuation_arclength
-   use fw_solver_options, only: linear_lu
-   use fw_solver_options, only: solver_powell
-   use fw_structure_operator, only: structure_operator
-   use fw_structure_operator, only: structure_state
+   use fw_sector_means, only: means_none, means_split
+   use fw_solver_options, only: continuation_arclength, linear_lu, solver_powell
+   use fw_structure_operator, only: structure_operator, structure_state
    use fw_text, only: to_text
    use fw_threads, only: coordinates_for_threads
    use fw_wear_options, only: follow_range

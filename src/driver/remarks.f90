@@ -1,30 +1,16 @@
 !> What is allowed and seldom meant: it is said, in the summary and in the result, and never ends a
 !> run.
 module fw_remarks
-   use fw_case, only: analysis_mode
-   use fw_case, only: case_type
+   use fw_case, only: analysis_mode, case_type
    use fw_force_law, only: law_facts
-   use fw_joint_modes, only: held_stiffness
-   use fw_joint_modes, only: joint_mode_type
-   use fw_joint_modes, only: most_dofs
-   use fw_joint_modes, only: state_sliding
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_joint_modes, only: held_stiffness, joint_mode_type, most_dofs, state_sliding
+   use fw_kinds, only: pi, wp
    use fw_lapack, only: dpotrf
-   use fw_harmonics_options, only: method_hbm
-   use fw_harmonics_options, only: sampling_uniform
-   use fw_laws, only: facts_of
-   use fw_laws, only: law_under_accuracy
-   use fw_laws, only: law_words
-   use fw_laws, only: is_of_high_order
-   use fw_parameters, only: modal_damping
-   use fw_parameters, only: rayleigh_mass
-   use fw_parameters, only: rayleigh_stiffness
-   use fw_peak, only: found_bound
-   use fw_peak, only: found_unresolved
-   use fw_peak, only: peak_type
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_harmonics_options, only: method_hbm, sampling_uniform
+   use fw_laws, only: facts_of, law_under_accuracy, law_words, is_of_high_order
+   use fw_parameters, only: modal_damping, rayleigh_mass, rayleigh_stiffness
+   use fw_peak, only: found_bound, found_unresolved, peak_type
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private

@@ -6,26 +6,18 @@ module fw_resonance_track
    use fw_extrapolation, only: extrapolate
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
-   use fw_parameter_problem, only: parameter_problem
-   use fw_parameter_problem, only: renew_state
+   use fw_parameter_problem, only: parameter_problem, renew_state
    use fw_phase_system, only: phase_system
    use fw_point, only: point_type
-   use fw_resonance_options, only: as_factor
-   use fw_resonance_options, only: condition_phase
-   use fw_resonance_search, only: find_maximum
-   use fw_resonance_search, only: outcome_bound
-   use fw_resonance_search, only: outcome_found
-   use fw_resonance_search, only: outcome_unsolved
-   use fw_resonance_search, only: search_outcome
+   use fw_resonance_options, only: as_factor, condition_phase
+   use fw_resonance_search, only: find_maximum, outcome_bound, outcome_found, outcome_unsolved, &
+      search_outcome
    use fw_response_curve, only: response_curve
    use fw_response_quantity, only: of_first_harmonic
-   use fw_strategy, only: new_request
-   use fw_strategy, only: point_request
-   use fw_strategy, only: solver_memory
+   use fw_strategy, only: new_request, point_request, solver_memory
    use fw_sweep, only: sweep_frequency
    implicit none (type, external)
    private

@@ -12,27 +12,19 @@
 !>   dQ/dp = Q_p,   domega/dp = x_pw - t_w Q_sp/Q_ss     along it as p changes.
 module fw_response_curve
    use fw_balance_problem, only: balance_problem
-   use fw_balance_state, only: balance_state
-   use fw_balance_state, only: new_balance_state
+   use fw_balance_state, only: balance_state, new_balance_state
    use fw_error, only: error_type
    use fw_fourier, only: to_complex
    use fw_kinds, only: wp
    use fw_linear_step, only: linear_step_type
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
-   use fw_parameter_slopes, only: parameter_entry
-   use fw_parameter_slopes, only: parameter_slope
-   use fw_parameter_slopes, only: slope_finder
+   use fw_newton, only: newton_solver, solver_report
+   use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
    use fw_plane_system, only: plane_system
    use fw_recovery, only: observe
-   use fw_response_quantity, only: of_first_harmonic
-   use fw_response_quantity, only: response_quantity
-   use fw_response_rows, only: new_rows
-   use fw_response_rows, only: response_row
+   use fw_response_quantity, only: of_first_harmonic, response_quantity
+   use fw_response_rows, only: new_rows, response_row
    use fw_sensitivity, only: sensitivity_finder
-   use fw_solver_options, only: linear_krylov
-   use fw_solver_options, only: linear_lu
-   use fw_solver_options, only: solver_options
+   use fw_solver_options, only: linear_krylov, linear_lu, solver_options
    use fw_structure_operator, only: by_frequency
    implicit none (type, external)
    private

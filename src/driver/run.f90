@@ -4,33 +4,24 @@ module fw_run
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_combinations, only: check_combinations
-   use fw_case, only: analysis_mode
-   use fw_case, only: analysis_modes
-   use fw_case, only: analysis_resonance
-   use fw_case, only: analysis_wear
-   use fw_case, only: case_type
+   use fw_case, only: analysis_mode, analysis_modes, analysis_resonance, analysis_wear, case_type
    use fw_error, only: error_type
    use fw_frequency_response, only: run_frequency_response
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
-   use fw_problem, only: build_system
-   use fw_problem, only: threads_for
+   use fw_problem, only: build_system, threads_for
    use fw_remarks, only: remark_input
-   use fw_restart_file, only: read_restart
-   use fw_restart_file, only: restart_type
+   use fw_restart_file, only: read_restart, restart_type
    use fw_result, only: result_writer
-   use fw_run_mode, only: check_mode_case
-   use fw_run_mode, only: run_mode
+   use fw_run_mode, only: check_mode_case, run_mode
    use fw_run_modes, only: run_modes
    use fw_run_resonance, only: run_resonance
    use fw_run_state, only: run_state
    use fw_strategy, only: kept_strategy
-   use fw_summary, only: summary_type
-   use fw_summary, only: new_summary
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_summary, only: summary_type, new_summary
+   use fw_text, only: string_type, to_text
    use fw_threads, only: thread_scope
    use fw_wear_response, only: run_wear
    implicit none (type, external)

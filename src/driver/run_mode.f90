@@ -1,44 +1,32 @@
 !> Analysis 'mode': a nonlinear mode over its amplitude, its limit cycles, and responses near its
 !> resonance that are put together from it.
 module fw_run_mode
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
-   use fw_continuation, only: arclength_type
-   use fw_continuation, only: branch_point
-   use fw_error, only: error_type
-   use fw_error, only: status_stopped
+   use fw_complex_form, only: amplitudes_of, coefficients_of
+   use fw_continuation, only: arclength_type, branch_point
+   use fw_error, only: error_type, status_stopped
    use fw_kinds, only: wp
    use fw_mode_apart, only: begin_apart
    use fw_mode_branching, only: branch_watch
    use fw_mode_cycles, only: cycle_finder
-   use fw_mode_group, only: mode_row
-   use fw_mode_group, only: mode_table
+   use fw_mode_group, only: mode_row, mode_table
    use fw_mode_options, only: control_observed
    use fw_mode_onset, only: onset_finder
    use fw_mode_path, only: mode_path
-   use fw_mode_remarks, only: remark_internal
-   use fw_mode_remarks, only: remark_jump
+   use fw_mode_remarks, only: remark_internal, remark_jump
    use fw_mode_start, only: mode_start
    use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
-   use fw_point, only: point_type
-   use fw_point, only: served_by_arclength
-   use fw_point, only: served_by_newton
+   use fw_point, only: point_type, served_by_arclength, served_by_newton
    use fw_recovery, only: recover_point
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
    use fw_sensitivity_solver, only: sensitivity_solver
-   use fw_sinks, only: observer_sink
-   use fw_sinks, only: sink_list
-   use fw_sinks, only: summary_sink
-   use fw_sinks, only: writer_sink
-   use fw_solver_options, only: continuation_arclength
-   use fw_solver_options, only: continuation_natural
+   use fw_sinks, only: observer_sink, sink_list, summary_sink, writer_sink
+   use fw_solver_options, only: continuation_arclength, continuation_natural
    use fw_summary, only: summary_type
    use fw_text, only: to_text
    implicit none (type, external)

@@ -1,19 +1,13 @@
 !> Runs analysis 'modes', and lists the natural frequencies that a sweep covers.
 module fw_run_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-   use fw_case, only: analysis_mode
-   use fw_case, only: analysis_modes
-   use fw_case, only: case_type
+   use fw_case, only: analysis_mode, analysis_modes, case_type
    use fw_error, only: error_type
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
-   use fw_natural_modes, only: find_natural_modes
-   use fw_natural_modes, only: natural_modes
+   use fw_kinds, only: pi, wp
+   use fw_natural_modes, only: find_natural_modes, natural_modes
    use fw_result, only: result_writer
-   use fw_solver_options, only: unit_hertz
-   use fw_solver_options, only: unit_words
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_solver_options, only: unit_hertz, unit_words
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private

@@ -1,35 +1,24 @@
 !> Analysis 'resonance': a resonance as a function of a parameter.
 module fw_run_resonance
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
-   use fw_continuation, only: arclength_type
-   use fw_continuation, only: branch_point
-   use fw_error, only: error_type
-   use fw_error, only: status_stopped
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_continuation, only: arclength_type, branch_point
+   use fw_error, only: error_type, status_stopped
+   use fw_kinds, only: pi, wp
    use fw_model, only: model_type
    use fw_observer, only: observer_type
    use fw_parameters, only: parameter_words
-   use fw_point, only: point_type
-   use fw_point, only: served_by_arclength
-   use fw_point, only: served_by_newton
+   use fw_point, only: point_type, served_by_arclength, served_by_newton
    use fw_recovery, only: recover_point
-   use fw_resonance_group, only: resonance_row
-   use fw_resonance_group, only: resonance_table
+   use fw_resonance_group, only: resonance_row, resonance_table
    use fw_resonance_options, only: condition_phase
    use fw_resonance_remarks, only: remark_resonance
-   use fw_resonance_search, only: outcome_found
-   use fw_resonance_search, only: outcome_words
+   use fw_resonance_search, only: outcome_found, outcome_words
    use fw_resonance_track, only: resonance_track
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
-   use fw_sinks, only: observer_sink
-   use fw_sinks, only: sink_list
-   use fw_sinks, only: summary_sink
-   use fw_sinks, only: writer_sink
+   use fw_sinks, only: observer_sink, sink_list, summary_sink, writer_sink
    use fw_solver_options, only: continuation_arclength
    use fw_summary, only: summary_type
    use fw_text, only: to_text

@@ -1,8 +1,6 @@
 !> How far a run has come, and with which status it ends.
 module fw_run_state
-   use fw_error, only: status_not_converged
-   use fw_error, only: status_ok
-   use fw_error, only: status_stopped
+   use fw_error, only: status_not_converged, status_ok, status_stopped
    use fw_point, only: point_type
    implicit none (type, external)
    private

@@ -3,8 +3,7 @@
 !> Near a resonance that one mode dominates, 1/A**2 is a parabola in omega**2, far beyond the width
 !> of the peak: peaks are looked for, and widths are read, in these variables.
 module fw_samples
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_point, only: point_type
    use fw_strategy, only: solver_memory
    implicit none (type, external)

@@ -4,19 +4,13 @@ module fw_sector_modes
    use fw_case, only: case_type
    use fw_cyclic_data, only: nodal_matrices
    use fw_error, only: error_type
-   use fw_hermitian, only: is_regular
-   use fw_hermitian, only: solve_hermitian_eigen
+   use fw_hermitian, only: is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_laws, only: new_law
    use fw_modes, only: mode_type
    use fw_pair_law, only: pair_law
-   use fw_sector, only: add_sector_spring
-   use fw_sector, only: sector_at
-   use fw_sector, only: sector_rows
-   use fw_whirl_modes, only: find_whirl
-   use fw_whirl_modes, only: most_whirling
-   use fw_whirl_modes, only: wave_matrices
-   use fw_whirl_modes, only: wave_of
+   use fw_sector, only: add_sector_spring, sector_at, sector_rows
+   use fw_whirl_modes, only: find_whirl, most_whirling, wave_matrices, wave_of
    implicit none (type, external)
    private
 

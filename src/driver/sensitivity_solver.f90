@@ -1,36 +1,22 @@
 !> Derivatives of a point by the parameters of its case, laid out for the result; what there is to
 !> say of them over a run.
 module fw_sensitivity_solver
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_balance_state, only: balance_state
    use fw_case, only: case_type
    use fw_control_sensitivity, only: find_control_slopes
    use fw_control_system, only: control_system
    use fw_error, only: error_type
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_stuck
+   use fw_force_law, only: pair_mixed, pair_stuck
    use fw_kinds, only: wp
    use fw_mode_sensitivity, only: find_mode_slopes
    use fw_mode_system, only: mode_system
    use fw_parameter_slopes, only: parameter_entry
-   use fw_parameters, only: friction_coefficient
-   use fw_parameters, only: gap
-   use fw_parameters, only: harmonic_scale
-   use fw_parameters, only: is_of_matrices
-   use fw_parameters, only: is_per_pair
-   use fw_parameters, only: is_per_spring
-   use fw_parameters, only: normal_load
-   use fw_parameters, only: normal_stiffness
-   use fw_parameters, only: static_scale
-   use fw_parameters, only: tangential_stiffness
-   use fw_point, only: point_sensitivity
-   use fw_point, only: point_type
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
+      is_per_pair, is_per_spring, normal_load, normal_stiffness, static_scale, tangential_stiffness
+   use fw_point, only: point_sensitivity, point_type
    use fw_remarks, only: remark_list
-   use fw_response_rows, only: load_scale
-   use fw_response_rows, only: mode_damping_ratio
-   use fw_response_rows, only: mode_omega
-   use fw_response_rows, only: resonance_omega
+   use fw_response_rows, only: load_scale, mode_damping_ratio, mode_omega, resonance_omega
    use fw_sensitivity, only: sensitivity_finder
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: to_text

@@ -5,12 +5,8 @@
 !> a time.
 module fw_session
    use, intrinsic :: iso_c_binding, only: c_int8_t
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_point
-   use fw_case, only: case_type
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_usage
+   use fw_case, only: analysis_frf, analysis_point, case_type
+   use fw_error, only: error_type, fatal_error, status_usage
    use fw_harmonics_options, only: harmonics_options
    use fw_kinds, only: wp
    use fw_memory_model, only: memory_model_type
@@ -22,20 +18,14 @@ module fw_session
    use fw_point, only: point_type
    use fw_point_values, only: get_point_values
    use fw_one_level, only: one_level
-   use fw_read_case, only: case_input
-   use fw_read_case, only: read_input
+   use fw_read_case, only: case_input, read_input
    use fw_problem, only: threads_for
-   use fw_run, only: check_case
-   use fw_run, only: run_case
-   use fw_session_points, only: point_list
-   use fw_session_points, only: point_recorder
-   use fw_solver_options, only: continuation_natural
-   use fw_solver_options, only: sweep_options
-   use fw_strategy, only: kept_strategy
-   use fw_strategy, only: new_request
+   use fw_run, only: check_case, run_case
+   use fw_session_points, only: point_list, point_recorder
+   use fw_solver_options, only: continuation_natural, sweep_options
+   use fw_strategy, only: kept_strategy, new_request
    use fw_sweep, only: sweep_frequency
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_threads, only: thread_scope
    implicit none (type, external)

@@ -2,31 +2,25 @@
 module fw_solution
    use fw_kinds, only: wp
    use fw_case, only: case_type
-   use fw_difference_system, only: difference_system
-   use fw_difference_system, only: new_difference_system
+   use fw_difference_system, only: difference_system, new_difference_system
    use fw_error, only: error_type
-   use fw_flow, only: flow_system
-   use fw_flow, only: new_flow
+   use fw_flow, only: flow_system, new_flow
    use fw_formulation, only: formulation_type
    use fw_guess, only: held_without_contact
    use fw_harmonics_options, only: harmonics_options
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_kinsol, only: kinsol_solver
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_parameter_system, only: parameter_system
    use fw_powell, only: powell_solver
    use fw_problem, only: build_system
-   use fw_pseudo_time, only: pseudo_report
-   use fw_pseudo_time, only: pseudo_time_solver
+   use fw_pseudo_time, only: pseudo_report, pseudo_time_solver
    use fw_recovery, only: carry_solution
    use fw_unbounded, only: is_lost_in_round_off
    use fw_slip_gap, only: lacks_friction
-   use fw_solver_options, only: pseudo_time_options
-   use fw_solver_options, only: jacobian_difference
-   use fw_solver_options, only: solver_kinsol
-   use fw_solver_options, only: solver_powell
+   use fw_solver_options, only: pseudo_time_options, jacobian_difference, solver_kinsol, &
+      solver_powell
    implicit none (type, external)
    private
 

@@ -1,7 +1,6 @@
 !> The last solutions of a sweep, from which the next one is guessed.
 module fw_solution_history
-   use fw_extrapolation, only: best_order
-   use fw_extrapolation, only: extrapolate
+   use fw_extrapolation, only: best_order, extrapolate
    use fw_kinds, only: wp
    implicit none (type, external)
    private

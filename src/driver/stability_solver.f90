@@ -15,23 +15,18 @@ module fw_stability_solver
    use fw_balance_state, only: balance_state
    use fw_case, only: case_type
    use fw_error, only: error_type
-   use fw_harmonics_options, only: harmonics_options
-   use fw_harmonics_options, only: method_hbm
-   use fw_harmonics_options, only: parity_all
-   use fw_harmonics_options, only: parity_auto
+   use fw_harmonics_options, only: harmonics_options, method_hbm, parity_all, parity_auto
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_moved_parameter, only: moved_parameter
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_parameters, only: is_of_matrices
    use fw_point, only: point_type
    use fw_problem, only: build_system
    use fw_recovery, only: carry_solution
    use fw_stability, only: floquet_multipliers
-   use fw_stability_verdict, only: multiplier_errors
-   use fw_stability_verdict, only: verdict_of
+   use fw_stability_verdict, only: multiplier_errors, verdict_of
    implicit none (type, external)
    private
 

@@ -1,8 +1,7 @@
 !> How the point at a frequency is solved: with the harmonics of the case, with as many as it needs,
 !> to a given accuracy, or by integration in time.
 module fw_strategy
-   use fw_case, only: analysis_time
-   use fw_case, only: case_type
+   use fw_case, only: analysis_time, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_interrupt, only: interrupt_type

@@ -1,32 +1,22 @@
 !> The short table that a run ends with: how many points, the peak, the work done and what was
 !> skipped.
 module fw_summary
-   use fw_kinds, only: wp
-   use fw_kinds, only: pi
-   use fw_bifurcation, only: bifurcation_list
-   use fw_bifurcation, only: kind_words
+   use fw_kinds, only: wp, pi
+   use fw_bifurcation, only: bifurcation_list, kind_words
    use fw_case, only: case_type
-   use fw_harmonics_options, only: sampling_events
-   use fw_harmonics_options, only: sampling_uniform
+   use fw_harmonics_options, only: sampling_events, sampling_uniform
    use fw_balance_state, only: balance_state
    use fw_linear_step, only: linear_step_type
    use fw_mode_group, only: mode_table
-   use fw_parameters, only: parameter_words
-   use fw_peak, only: found_bound
-   use fw_peak, only: found_jump
-   use fw_peak, only: found_unresolved
-   use fw_peak, only: peak_type
-   use fw_parameters, only: parameter_key
+   use fw_parameters, only: parameter_words, parameter_key
+   use fw_peak, only: found_bound, found_jump, found_unresolved, peak_type
    use fw_point, only: point_type
    use fw_remarks, only: remark_list
    use fw_resonance_group, only: resonance_table
    use fw_run_state, only: run_state
    use fw_solver_options, only: solver_newton
-   use fw_stability_verdict, only: verdict_stable
-   use fw_stability_verdict, only: verdict_undecided
-   use fw_stability_verdict, only: verdict_unstable
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_stability_verdict, only: verdict_stable, verdict_undecided, verdict_unstable
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private

@@ -1,20 +1,14 @@
 !> The one loop over the points of a run: a source gives them one after the other, sinks take them.
 module fw_sweep
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_time
-   use fw_case, only: case_type
-   use fw_error, only: error_type
-   use fw_error, only: status_stopped
+   use fw_case, only: analysis_frf, analysis_time, case_type
+   use fw_error, only: error_type, status_stopped
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_point, only: point_type
    use fw_run_state, only: run_state
    use fw_sinks, only: sink_list
    use fw_solver_options, only: sweep_options
-   use fw_strategy, only: new_request
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
-   use fw_strategy, only: solver_memory
+   use fw_strategy, only: new_request, point_request, point_strategy, solver_memory
    implicit none (type, external)
    private
 

@@ -4,24 +4,16 @@ module fw_sweep_bifurcations
    use fw_bifurcation, only: bifurcation_list
    use fw_case, only: case_type
    use fw_contact_data, only: memory_carried
-   use fw_crossing_search, only: probe_type
-   use fw_crossing_search, only: search_crossings
+   use fw_crossing_search, only: probe_type, search_crossings
    use fw_error, only: error_type
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
    use fw_point, only: point_type
    use fw_sinks, only: point_sink
-   use fw_stability_crossing, only: crossing_between
-   use fw_stability_crossing, only: crossing_none
-   use fw_stability_crossing, only: may_hide
-   use fw_stability_crossing, only: movement_between
-   use fw_stability_crossing, only: multiplier_track
-   use fw_stability_crossing, only: signature_of
+   use fw_stability_crossing, only: crossing_between, crossing_none, may_hide, movement_between, &
+      multiplier_track, signature_of
    use fw_stability_verdict, only: verdict_undecided
-   use fw_strategy, only: new_request
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
-   use fw_strategy, only: solver_memory
+   use fw_strategy, only: new_request, point_request, point_strategy, solver_memory
    use fw_sweep, only: point_source
    implicit none (type, external)
    private

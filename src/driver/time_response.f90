@@ -7,12 +7,9 @@
 module fw_time_response
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
-   use fw_case, only: analysis_frf
-   use fw_case, only: case_type
+   use fw_case, only: analysis_frf, case_type
    use fw_cycle_recovery, only: cycle_of_histories
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_guess, only: stuck_guess
    use fw_harmonics_options, only: method_hbm
    use fw_balance_problem, only: balance_problem
@@ -22,15 +19,11 @@ module fw_time_response
    use fw_problem, only: build_system
    use fw_recovery, only: recover_point
    use fw_run_state, only: run_state
-   use fw_strategy, only: new_request
-   use fw_strategy, only: point_request
-   use fw_strategy, only: point_strategy
+   use fw_strategy, only: new_request, point_request, point_strategy
    use fw_summary, only: summary_type
    use fw_text, only: to_text
-   use fw_time_solution, only: integrate_in_time
-   use fw_time_solution, only: time_state
-   use fw_time_structure, only: new_time_structure
-   use fw_time_structure, only: time_structure
+   use fw_time_solution, only: integrate_in_time, time_state
+   use fw_time_structure, only: new_time_structure, time_structure
    implicit none (type, external)
    private
 

@@ -10,19 +10,15 @@ module fw_wear_recorder
    use fw_observer, only: observer_type
    use fw_patches, only: patch_volumes
    use fw_point, only: point_type
-   use fw_recovery, only: recover_histories
-   use fw_recovery, only: recover_point
+   use fw_recovery, only: recover_histories, recover_point
    use fw_restart_rows, only: restart_row_set
    use fw_result, only: result_writer
    use fw_solution, only: is_lasting
    use fw_run_state, only: run_state
    use fw_summary, only: summary_type
-   use fw_wear_march, only: wear_march
-   use fw_wear_march, only: wear_observer
-   use fw_wear_options, only: wear_energy
-   use fw_wear_options, only: wear_pseudo_time
-   use fw_wear_step, only: largest_lag
-   use fw_wear_step, only: wear_state
+   use fw_wear_march, only: wear_march, wear_observer
+   use fw_wear_options, only: wear_energy, wear_pseudo_time
+   use fw_wear_step, only: largest_lag, wear_state
    use fw_wear_system, only: wear_system
    implicit none (type, external)
    private

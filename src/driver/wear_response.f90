@@ -3,8 +3,7 @@ module fw_wear_response
    use fw_combinations, only: is_linear_euler
    use fw_case, only: case_type
    use fw_diagnosis, only: explain_failure
-   use fw_error, only: error_type
-   use fw_error, only: status_stopped
+   use fw_error, only: error_type, status_stopped
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_kinds, only: wp
@@ -19,27 +18,16 @@ module fw_wear_response
    use fw_restart_rows, only: c_noted
    use fw_result, only: result_writer
    use fw_run_state, only: run_state
-   use fw_strategy, only: new_request
-   use fw_strategy, only: note_time_limit
+   use fw_strategy, only: new_request, note_time_limit
    use fw_summary, only: summary_type
    use fw_text, only: to_text
-   use fw_wear_march, only: steady_not_reached
-   use fw_wear_march, only: steady_reached
-   use fw_wear_march, only: steady_words
-   use fw_wear_march, only: wear_march
-   use fw_wear_march, only: wear_observer
-   use fw_wear_options, only: wear_energy
-   use fw_wear_options, only: wear_explicit
-   use fw_wear_options, only: wear_pseudo_time
-   use fw_wear_recorder, only: friction_energy
-   use fw_wear_recorder, only: wear_recorder
-   use fw_wear_rows, only: start_wear
-   use fw_wear_rows, only: state_halved
-   use fw_wear_rows, only: state_outcome
-   use fw_wear_step, only: new_wear_stepper
-   use fw_wear_step, only: wear_state
-   use fw_wear_system, only: new_wear_system
-   use fw_wear_system, only: wear_system
+   use fw_wear_march, only: steady_not_reached, steady_reached, steady_words, wear_march, &
+      wear_observer
+   use fw_wear_options, only: wear_energy, wear_explicit, wear_pseudo_time
+   use fw_wear_recorder, only: friction_energy, wear_recorder
+   use fw_wear_rows, only: start_wear, state_halved, state_outcome
+   use fw_wear_step, only: new_wear_stepper, wear_state
+   use fw_wear_system, only: new_wear_system, wear_system
    implicit none (type, external)
    private
 

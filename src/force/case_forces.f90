@@ -1,7 +1,6 @@
 !> From the pairs and springs of a case to the laws of their forces.
 module fw_case_forces
-   use fw_contact_data, only: contact_type
-   use fw_contact_data, only: spring_type
+   use fw_contact_data, only: contact_type, spring_type
    use fw_force_list, only: force_list
    use fw_laws, only: new_law
    use fw_pair_law, only: pair_law

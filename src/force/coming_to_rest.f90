@@ -13,8 +13,7 @@
 module fw_coming_to_rest
    use fw_kinds, only: wp
    use fw_sampled_turn, only: settle_samples
-   use fw_settling, only: periodic_tolerance
-   use fw_settling, only: shakedown_turns
+   use fw_settling, only: periodic_tolerance, shakedown_turns
    implicit none (type, external)
    private
 

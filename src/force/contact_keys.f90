@@ -6,16 +6,10 @@
 !> namelist has none.
 module fw_contact_keys
    use fw_contact_data, only: contact_type, spring_type, memory_words
-   use fw_key, only: key
-   use fw_key, only: key_visitor
-   use fw_key_range, only: above
-   use fw_key_range, only: at_least
-   use fw_key_range, only: dof_numbers
-   use fw_key_range, only: from_to
+   use fw_key, only: key, key_visitor
+   use fw_key_range, only: above, at_least, dof_numbers, from_to
    use fw_kinds, only: wp
-   use fw_laws, only: law_help
-   use fw_laws, only: law_words
-   use fw_laws, only: new_law
+   use fw_laws, only: law_help, law_words, new_law
    use fw_pair_law, only: pair_law
    implicit none (type, external)
    private

@@ -5,8 +5,7 @@
 !> The list is written once; each law leaves what it evaluates in a workspace of its own, at the
 !> same place in an array of workspaces.
 module fw_force_list
-   use fw_force_law, only: force_law
-   use fw_force_law, only: force_workspace
+   use fw_force_law, only: force_law, force_workspace
    use fw_fourier, only: fourier_type
    implicit none (type, external)
    private

@@ -4,30 +4,19 @@
 !> One correction serves three laws, which differ in their prediction alone: 'dlft' and
 !> 'dlft_velocity' predict from the balance, and are rigid; 'penalty' predicts from stiffnesses.
 module fw_friction
-   use fw_coming_to_rest, only: come_to_rest
-   use fw_coming_to_rest, only: rest_type
-   use fw_correction, only: march_turn_1d
-   use fw_correction, only: march_turn_2d
-   use fw_correction, only: project_turn
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: law_facts
-   use fw_force_law, only: law_room
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
-   use fw_force_law, only: pair_stuck
-   use fw_force_law, only: prediction_type
+   use fw_coming_to_rest, only: come_to_rest, rest_type
+   use fw_correction, only: march_turn_1d, march_turn_2d, project_turn
+   use fw_force_law, only: force_workspace, law_facts, law_room, pair_mixed, pair_open, &
+      pair_stuck, prediction_type
    use fw_contact_data, only: contact_type
    use fw_fourier, only: fourier_type
    use fw_friction_events, only: follow_events
-   use fw_key, only: key
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_visitor
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
-   use fw_pair_law, only: normal_stiffness_key
-   use fw_pair_law, only: pair_law
+   use fw_pair_law, only: normal_stiffness_key, pair_law
    use fw_sampled_turn, only: settle_samples
-   use fw_settling, only: periodic_tolerance
-   use fw_settling, only: shakedown_turns
+   use fw_settling, only: periodic_tolerance, shakedown_turns
    use fw_slip, only: slip_work
    use fw_threads, only: pairs_for_threads
    use fw_wave_sums, only: wave_table

@@ -2,20 +2,14 @@
 !> harmonics pair by pair.
 submodule(fw_friction) fw_friction_derivative
    use fw_instant_sum, only: instant_sum
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dgemv
-   use fw_march_derivative, only: march_derivative
-   use fw_march_derivative, only: numbers_of_instant
+   use fw_lapack, only: dgemm, dgemv
+   use fw_march_derivative, only: march_derivative, numbers_of_instant
    use fw_memory, only: allocate_zeros
-   use fw_one_direction, only: condition
-   use fw_one_direction, only: follow_one_direction
-   use fw_one_direction, only: project_one_direction
-   use fw_one_direction, only: project_runs
-   use fw_one_direction, only: run_room
+   use fw_one_direction, only: condition, follow_one_direction, project_one_direction, &
+      project_runs, run_room
    use fw_sampled_turn, only: limit_is_unique
    use fw_slip, only: slip_weights
-   use fw_two_directions, only: add_start
-   use fw_two_directions, only: turn_derivative
+   use fw_two_directions, only: add_start, turn_derivative
    implicit none (type, external)
 
    !> Distance from the friction cone, as a part of the largest predicted force, that round-off

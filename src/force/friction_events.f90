@@ -3,13 +3,8 @@
 !> the pieces between them. The same laws as fw_friction, and what laws build on that follow some of
 !> their pairs in another way.
 module fw_friction_events
-   use fw_event_contact, only: event_contact_type
-   use fw_event_contact, only: new_event_contact
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: law_room
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
-   use fw_force_law, only: pair_stuck
+   use fw_event_contact, only: event_contact_type, new_event_contact
+   use fw_force_law, only: force_workspace, law_room, pair_mixed, pair_open, pair_stuck
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law

@@ -6,8 +6,7 @@ module fw_instant_sum
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_wave_sums, only: wave_sums
-   use fw_wave_sums, only: wave_table
+   use fw_wave_sums, only: wave_sums, wave_table
    implicit none (type, external)
    private
 

@@ -1,8 +1,7 @@
 !> Constants of pairs that only some laws have, by the names of their keys: a law declares its own
 !> in `bind_keys` and takes their values when it is built, and nobody else knows them.
 module fw_law_constants
-   use fw_key, only: key_type
-   use fw_key, only: key_visitor
+   use fw_key, only: key_type, key_visitor
    use fw_kinds, only: wp
    implicit none (type, external)
    private

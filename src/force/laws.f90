@@ -3,9 +3,7 @@
 module fw_laws
    use fw_contact_data, only: contact_type
    use fw_force_law, only: law_facts
-   use fw_friction, only: elastic_friction
-   use fw_friction, only: rigid_friction
-   use fw_friction, only: rigid_friction_of_rates
+   use fw_friction, only: elastic_friction, rigid_friction, rigid_friction_of_rates
    use fw_pair_law, only: pair_law
    use fw_regularised, only: regularised_friction
    use fw_rigid_law, only: friction_of_high_order

@@ -12,12 +12,8 @@
 !> are those of all pairs. Pairs side by side fill the vectors of a processor: one group after the
 !> other, which threads share.
 module fw_march_derivative
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
-   use fw_single_product, only: group_count
-   use fw_single_product, only: group_width
-   use fw_single_product, only: lanes => panel_height
-   use fw_single_product, only: multiply_tile
+   use fw_kinds, only: sp, wp
+   use fw_single_product, only: group_count, group_width, lanes => panel_height, multiply_tile
    implicit none (type, external)
    private
 

@@ -4,10 +4,8 @@
 !> Products with the blocks of many harmonics wait for memory: at 192 pairs and 17 harmonics those
 !> with the whole blocks in double precision take 10 times as long.
 module fw_near_derivative
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: pair_mixed
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
+   use fw_force_law, only: force_workspace, pair_mixed
+   use fw_kinds, only: sp, wp
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private

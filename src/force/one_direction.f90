@@ -13,8 +13,7 @@
 module fw_one_direction
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_wave_sums, only: wave_sums
-   use fw_wave_sums, only: wave_table
+   use fw_wave_sums, only: wave_sums, wave_table
    implicit none (type, external)
    private
 

@@ -3,9 +3,7 @@
 module fw_pair_law
    use fw_contact_data, only: contact_type
    use fw_force_law, only: force_law
-   use fw_key, only: key
-   use fw_key, only: key_type
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_type, key_visitor
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
    implicit none (type, external)

@@ -1,15 +1,10 @@
 !> Nonlinear springs, force coefficient * u_r**power, by alternating frequency/time.
 module fw_polynomial_law
-   use fw_force_law, only: force_law
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: law_facts
-   use fw_force_law, only: law_room
-   use fw_force_law, only: pair_mixed
+   use fw_force_law, only: force_law, force_workspace, law_facts, law_room, pair_mixed
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_wave_sums, only: wave_sums
-   use fw_wave_sums, only: wave_table
+   use fw_wave_sums, only: wave_sums, wave_table
    implicit none (type, external)
    private
 

@@ -7,18 +7,13 @@
 !> tangential static load is never carried. For v_0 towards 0 it is the law 'dlft_velocity'.
 module fw_regularised
    use fw_contact_data, only: contact_type
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: law_facts
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
+   use fw_force_law, only: force_workspace, law_facts, pair_mixed, pair_open
    use fw_fourier, only: fourier_type
-   use fw_key, only: key
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_visitor
    use fw_key_range, only: above
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_pair_law, only: normal_stiffness_key
-   use fw_pair_law, only: pair_law
+   use fw_pair_law, only: normal_stiffness_key, pair_law
    implicit none (type, external)
    private
 

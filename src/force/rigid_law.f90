@@ -10,15 +10,10 @@
 !> others, and all normal directions, keep the displacement law with the stiffness k alone.
 module fw_rigid_law
    use fw_event_contact, only: new_event_contact
-   use fw_force_law, only: force_workspace
-   use fw_force_law, only: law_facts
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_open
-   use fw_force_law, only: pair_stuck
-   use fw_force_law, only: prediction_type
+   use fw_force_law, only: force_workspace, law_facts, pair_mixed, pair_open, pair_stuck, &
+      prediction_type
    use fw_fourier, only: fourier_type
-   use fw_friction_events, only: event_room
-   use fw_friction_events, only: friction_by_events
+   use fw_friction_events, only: event_room, friction_by_events
    use fw_kinds, only: wp
    use fw_oscillator, only: new_oscillator
    use fw_oscillator_pair, only: oscillator_pair_type

@@ -2,9 +2,7 @@
 !> (fw_settling).
 module fw_sampled_turn
    use fw_kinds, only: wp
-   use fw_settling, only: invert
-   use fw_settling, only: period_map
-   use fw_settling, only: settle
+   use fw_settling, only: invert, period_map, settle
    implicit none (type, external)
    private
 

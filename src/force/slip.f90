@@ -6,8 +6,7 @@
 !> force. A pair that sticks does not move x: S is exactly zero, not small. At velocity level there
 !> is no x; its rate is what the projection takes away, y - lambda.
 module fw_slip
-   use fw_kinds, only: wp
-   use fw_kinds, only: pi
+   use fw_kinds, only: wp, pi
    implicit none (type, external)
    private
 

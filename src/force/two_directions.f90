@@ -22,8 +22,7 @@ module fw_two_directions
    use fw_instant_sum, only: instant_sum
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_wave_sums, only: wave_sums
-   use fw_wave_sums, only: wave_table
+   use fw_wave_sums, only: wave_sums, wave_table
    implicit none (type, external)
    private
 

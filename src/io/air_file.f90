@@ -3,13 +3,9 @@
 module fw_air_file
    use fw_cyclic_data, only: influence_type
    use fw_cyclic_file, only: read_complex
-   use fw_cyclic_parts, only: add_influence
-   use fw_cyclic_parts, only: finish_influence
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_hdf5, only: dataset_failure
-   use fw_hdf5, only: hdf5_file
+   use fw_cyclic_parts, only: add_influence, finish_influence
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_hdf5, only: dataset_failure, hdf5_file
    use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
    use fw_model_file_parts, only: read_matrix

@@ -3,8 +3,7 @@
 !> Several assignments may fill one array, as mu(1) = 0.3 and mu(2:3) = 2*0.4. No element may be
 !> given twice in a file; an override of the command line replaces what the file gave.
 module fw_array_entries
-   use fw_namelist_data, only: namelist_type, entry_type, section_type, value_count, &
-                               stray_word
+   use fw_namelist_data, only: namelist_type, entry_type, section_type, value_count, stray_word
    use fw_text, only: to_text
    implicit none (type, external)
    private

@@ -1,15 +1,10 @@
 !> Group /bifurcation of a result file: one row for every place where the response turns or its
 !> stability changes.
 module fw_bifurcation_group
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
-   use fw_bifurcation, only: bifurcation_list
-   use fw_bifurcation, only: kind_words
-   use fw_bifurcation, only: way_words
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+   use fw_bifurcation, only: bifurcation_list, kind_words, way_words
    use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
+   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
    use fw_result_labels, only: label_dataset
    use fw_text, only: string_type

@@ -1,10 +1,8 @@
 !> A case: everything that one run needs, validated. Composed of the option types of the layers
 !> that use them; see each for its defaults.
 module fw_case
-   use fw_key, only: key
-   use fw_key, only: key_visitor
-   use fw_key_range, only: at_least
-   use fw_key_range, only: from_to
+   use fw_key, only: key, key_visitor
+   use fw_key_range, only: at_least, from_to
    use fw_kinds, only: wp
    use fw_mode_options, only: mode_options
    use fw_parameter_sweep, only: parameter_sweep

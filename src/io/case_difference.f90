@@ -2,11 +2,7 @@
 module fw_case_difference
    use fw_error, only: error_type
    use fw_namelist, only: parse_namelist
-   use fw_namelist_data, only: entry_type
-   use fw_namelist_data, only: last_entry
-   use fw_namelist_data, only: multiply_out
-   use fw_namelist_data, only: namelist_type
-   use fw_namelist_data, only: value_type
+   use fw_namelist_data, only: entry_type, last_entry, multiply_out, namelist_type, value_type
    implicit none (type, external)
    private
 

@@ -2,23 +2,13 @@
 !> diameter. Files that have `phase = 'advance'` tie u_right = exp(2 pi i k/N) u_left, the other way
 !> round: what they hold is conjugated as it is read.
 module fw_cyclic_file
-   use fw_cyclic_parts, only: check_physical
-   use fw_cyclic_parts, only: check_rows
-   use fw_cyclic_parts, only: cyclic_parts
-   use fw_cyclic_parts, only: nodal_parts
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_hdf5, only: dataset_failure
-   use fw_hdf5, only: has_attribute
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_attribute
-   use fw_hdf5, only: read_dataset
-   use fw_hdf5, only: read_text
+   use fw_cyclic_parts, only: check_physical, check_rows, cyclic_parts, nodal_parts
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_hdf5, only: dataset_failure, has_attribute, hdf5_file, read_attribute, read_dataset, &
+      read_text
    use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    implicit none (type, external)
    private
 

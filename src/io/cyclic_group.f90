@@ -1,11 +1,8 @@
 !> What a result file says of sectors and of natural frequencies.
 module fw_cyclic_group
-   use fw_case, only: analysis_modes
-   use fw_case, only: case_type
+   use fw_case, only: analysis_modes, case_type
    use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
+   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
    use fw_result_labels, only: label_dataset
    implicit none (type, external)

@@ -1,19 +1,11 @@
 !> Facade of the HDF5 layer: files, datasets, attributes and datasets that grow.
 module fw_hdf5
-   use fw_hdf5_append, only: growing_dataset
-   use fw_hdf5_append, only: growing_integer
-   use fw_hdf5_append, only: growing_logical
-   use fw_hdf5_append, only: growing_real
-   use fw_hdf5_attribute, only: has_attribute
-   use fw_hdf5_attribute, only: read_attribute
-   use fw_hdf5_attribute, only: write_attribute
+   use fw_hdf5_append, only: growing_dataset, growing_integer, growing_logical, growing_real
+   use fw_hdf5_attribute, only: has_attribute, read_attribute, write_attribute
    use fw_hdf5_dataset, only: get_shape
-   use fw_hdf5_file, only: dataset_failure
-   use fw_hdf5_file, only: hdf5_file
-   use fw_hdf5_file, only: shape_text
+   use fw_hdf5_file, only: dataset_failure, hdf5_file, shape_text
    use fw_hdf5_read, only: read_dataset
-   use fw_hdf5_text, only: read_text
-   use fw_hdf5_text, only: write_text
+   use fw_hdf5_text, only: read_text, write_text
    use fw_hdf5_write, only: write_dataset
    implicit none (type, external)
    private

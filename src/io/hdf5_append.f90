@@ -7,50 +7,20 @@
 !> Where rows may wait they are gathered here, up to a chunk, and written together: HDF5 takes
 !> as long for a chunk as for a row.
 module fw_hdf5_append
-   use, intrinsic :: iso_c_binding, only: c_int8_t
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use, intrinsic :: iso_c_binding, only: c_size_t
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: iso_c_binding, only: c_int8_t, c_f_pointer, c_loc, c_ptr, c_size_t
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_error, only: error_type
    use fw_hdf5_dataset, only: get_shape
-   use fw_hdf5_file, only: hdf5_file
-   use fw_hdf5_file, only: dataset_failure
-   use fw_hdf5_file, only: shape_text
+   use fw_hdf5_file, only: hdf5_file, dataset_failure, shape_text
    use fw_hdf5_write, only: new_dataset
    use fw_kinds, only: wp
    use fw_text, only: to_text
-   use hdf5, only: hid_t
-   use hdf5, only: hsize_t
-   use hdf5, only: size_t
-   use hdf5, only: h5dclose_f
-   use hdf5, only: h5dget_space_f
-   use hdf5, only: h5dopen_f
-   use hdf5, only: h5dread_f
-   use hdf5, only: h5dset_extent_f
-   use hdf5, only: h5dwrite_f
-   use hdf5, only: h5kind_to_type
-   use hdf5, only: h5_integer_kind
-   use hdf5, only: h5_real_kind
-   use hdf5, only: h5pclose_f
-   use hdf5, only: h5pcreate_f
-   use hdf5, only: h5pset_chunk_cache_f
-   use hdf5, only: h5pset_chunk_f
-   use hdf5, only: h5pset_fill_value_f
-   use hdf5, only: h5p_dataset_access_f
-   use hdf5, only: h5p_dataset_create_f
-   use hdf5, only: h5sclose_f
-   use hdf5, only: h5screate_simple_f
-   use hdf5, only: h5sselect_hyperslab_f
-   use hdf5, only: h5s_select_set_f
-   use hdf5, only: h5s_unlimited_f
-   use hdf5, only: h5tclose_f
-   use hdf5, only: h5tcopy_f
-   use hdf5, only: h5tenum_create_f
-   use hdf5, only: h5tenum_insert_f
-   use hdf5, only: h5tget_size_f
+   use hdf5, only: hid_t, hsize_t, size_t, h5dclose_f, h5dget_space_f, h5dopen_f, h5dread_f, &
+      h5dset_extent_f, h5dwrite_f, h5kind_to_type, h5_integer_kind, h5_real_kind, h5pclose_f, &
+      h5pcreate_f, h5pset_chunk_cache_f, h5pset_chunk_f, h5pset_fill_value_f, &
+      h5p_dataset_access_f, h5p_dataset_create_f, h5sclose_f, h5screate_simple_f, &
+      h5sselect_hyperslab_f, h5s_select_set_f, h5s_unlimited_f, h5tclose_f, h5tcopy_f, &
+      h5tenum_create_f, h5tenum_insert_f, h5tget_size_f
    implicit none (type, external)
    private
 

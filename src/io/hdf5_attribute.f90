@@ -5,39 +5,18 @@
 !> Messages have both, and the path of the file. Many of one dataset take less time where the file
 !> stands at that (`growing_dataset%place`): the object is '.' then.
 module fw_hdf5_attribute
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
+   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
+   use fw_error, only: error_type, fatal_error
    use fw_hdf5_file, only: hdf5_file
-   use fw_hdf5_string, only: get_strings
-   use fw_hdf5_string, only: put_strings
-   use fw_hdf5_string, only: new_string_type
+   use fw_hdf5_string, only: get_strings, put_strings, new_string_type
    use fw_hdf5_write, only: new_space
-   use fw_kinds, only: wp
-   use fw_kinds, only: i8
+   use fw_kinds, only: wp, i8
    use fw_text, only: string_type
-   use hdf5, only: hid_t
-   use hdf5, only: hsize_t
-   use hdf5, only: h5aclose_f
-   use hdf5, only: h5acreate_by_name_f
-   use hdf5, only: h5adelete_by_name_f
-   use hdf5, only: h5aexists_by_name_f
-   use hdf5, only: h5aget_space_f
-   use hdf5, only: h5aget_type_f
-   use hdf5, only: h5aopen_by_name_f
-   use hdf5, only: h5aread_f
-   use hdf5, only: h5awrite_f
-   use hdf5, only: h5kind_to_type
-   use hdf5, only: h5_integer_kind
-   use hdf5, only: h5_real_kind
-   use hdf5, only: h5sclose_f
-   use hdf5, only: h5sget_simple_extent_npoints_f
-   use hdf5, only: h5tclose_f
-   use hdf5, only: h5tget_class_f
-   use hdf5, only: h5t_float_f
-   use hdf5, only: h5t_integer_f
-   use hdf5, only: h5t_string_f
+   use hdf5, only: hid_t, hsize_t, h5aclose_f, h5acreate_by_name_f, h5adelete_by_name_f, &
+      h5aexists_by_name_f, h5aget_space_f, h5aget_type_f, h5aopen_by_name_f, h5aread_f, &
+      h5awrite_f, h5kind_to_type, h5_integer_kind, h5_real_kind, h5sclose_f, &
+      h5sget_simple_extent_npoints_f, h5tclose_f, h5tget_class_f, h5t_float_f, h5t_integer_f, &
+      h5t_string_f
    implicit none (type, external)
    private
 

@@ -2,30 +2,13 @@
 module fw_hdf5_dataset
    use, intrinsic :: iso_c_binding, only: c_ptr
    use fw_error, only: error_type
-   use fw_hdf5_file, only: hdf5_file
-   use fw_hdf5_file, only: dataset_failure
-   use fw_hdf5_file, only: shape_text
+   use fw_hdf5_file, only: hdf5_file, dataset_failure, shape_text
    use fw_text, only: to_text
-   use hdf5, only: hid_t
-   use hdf5, only: hsize_t
-   use hdf5, only: h5dopen_f
-   use hdf5, only: h5dclose_f
-   use hdf5, only: h5dread_f
-   use hdf5, only: h5dget_space_f
-   use hdf5, only: h5dget_type_f
-   use hdf5, only: h5dget_storage_size_f
-   use hdf5, only: h5sget_simple_extent_ndims_f
-   use hdf5, only: h5sget_simple_extent_dims_f
-   use hdf5, only: h5sget_simple_extent_type_f
-   use hdf5, only: h5sclose_f
-   use hdf5, only: h5s_null_f
-   use hdf5, only: h5tget_class_f
-   use hdf5, only: h5tclose_f
-   use hdf5, only: h5t_integer_f
-   use hdf5, only: h5t_float_f
-   use hdf5, only: h5t_string_f
-   use hdf5, only: h5t_compound_f
-   use hdf5, only: h5t_enum_f
+   use hdf5, only: hid_t, hsize_t, h5dopen_f, h5dclose_f, h5dread_f, h5dget_space_f, &
+      h5dget_type_f, h5dget_storage_size_f, h5sget_simple_extent_ndims_f, &
+      h5sget_simple_extent_dims_f, h5sget_simple_extent_type_f, h5sclose_f, h5s_null_f, &
+      h5tget_class_f, h5tclose_f, h5t_integer_f, h5t_float_f, h5t_string_f, h5t_compound_f, &
+      h5t_enum_f
    implicit none (type, external)
    private
 

@@ -4,38 +4,13 @@
 !> dimensions in reversed order, because HDF5 counts the slowest dimension first.
 !> HDF5 itself is not thread-safe here: one thread at a time may use this layer.
 module fw_hdf5_file
-   use, intrinsic :: iso_c_binding, only: c_int8_t
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_error, only: status_io
-   use hdf5, only: h5dont_atexit_f
-   use hdf5, only: hid_t
-   use hdf5, only: hsize_t
-   use hdf5, only: size_t
-   use hdf5, only: h5open_f
-   use hdf5, only: h5eset_auto_f
-   use hdf5, only: h5iis_valid_f
-   use hdf5, only: h5fopen_f
-   use hdf5, only: h5fcreate_f
-   use hdf5, only: h5fclose_f
-   use hdf5, only: h5fflush_f
-   use hdf5, only: h5fis_hdf5_f
-   use hdf5, only: h5fget_file_image_f
-   use hdf5, only: h5f_acc_rdonly_f
-   use hdf5, only: h5f_acc_excl_f
-   use hdf5, only: h5f_acc_trunc_f
-   use hdf5, only: h5f_scope_local_f
-   use hdf5, only: h5p_file_access_f
-   use hdf5, only: h5pclose_f
-   use hdf5, only: h5pcreate_f
-   use hdf5, only: h5pset_fapl_core_f
-   use hdf5, only: h5lexists_f
-   use hdf5, only: h5oexists_by_name_f
-   use hdf5, only: h5t_native_double
+   use, intrinsic :: iso_c_binding, only: c_int8_t, c_loc, c_null_ptr, c_ptr
+   use fw_error, only: error_type, fatal_error, status_input, status_io
+   use hdf5, only: h5dont_atexit_f, hid_t, hsize_t, size_t, h5open_f, h5eset_auto_f, &
+      h5iis_valid_f, h5fopen_f, h5fcreate_f, h5fclose_f, h5fflush_f, h5fis_hdf5_f, &
+      h5fget_file_image_f, h5f_acc_rdonly_f, h5f_acc_excl_f, h5f_acc_trunc_f, h5f_scope_local_f, &
+      h5p_file_access_f, h5pclose_f, h5pcreate_f, h5pset_fapl_core_f, h5lexists_f, &
+      h5oexists_by_name_f, h5t_native_double
    implicit none (type, external)
    private
 

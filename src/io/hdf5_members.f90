@@ -2,12 +2,9 @@
 !> name that is off by a letter would be left out without a word.
 module fw_hdf5_members
    use fw_error, only: error_type
-   use fw_hdf5_file, only: dataset_failure
-   use fw_hdf5_file, only: hdf5_file
-   use fw_text, only: string_type
-   use fw_text, only: to_text
-   use hdf5, only: h5gget_obj_info_idx_f
-   use hdf5, only: h5gn_members_f
+   use fw_hdf5_file, only: dataset_failure, hdf5_file
+   use fw_text, only: string_type, to_text
+   use hdf5, only: h5gget_obj_info_idx_f, h5gn_members_f
    implicit none (type, external)
    private
 

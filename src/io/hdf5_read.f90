@@ -6,18 +6,10 @@
 module fw_hdf5_read
    use, intrinsic :: iso_c_binding, only: c_loc
    use fw_error, only: error_type
-   use fw_hdf5_dataset, only: dataset_type
-   use fw_hdf5_dataset, only: open_dataset
-   use fw_hdf5_dataset, only: read_dataset_raw
-   use fw_hdf5_dataset, only: kind_real
-   use fw_hdf5_dataset, only: kind_integer
-   use fw_hdf5_file, only: hdf5_file
-   use fw_hdf5_file, only: dataset_failure
-   use fw_kinds, only: wp
-   use fw_kinds, only: i8
-   use hdf5, only: h5kind_to_type
-   use hdf5, only: h5_real_kind
-   use hdf5, only: h5_integer_kind
+   use fw_hdf5_dataset, only: dataset_type, open_dataset, read_dataset_raw, kind_real, kind_integer
+   use fw_hdf5_file, only: hdf5_file, dataset_failure
+   use fw_kinds, only: wp, i8
+   use hdf5, only: h5kind_to_type, h5_real_kind, h5_integer_kind
    implicit none (type, external)
    private
 

@@ -4,41 +4,14 @@
 !> Datasets and attributes have the same strings behind different routines of HDF5: `is_attribute`
 !> says which. All procedures leave closing what they were given to the caller.
 module fw_hdf5_string
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_char
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_null_char
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use, intrinsic :: iso_c_binding, only: c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, &
+      c_ptr, c_size_t
    use fw_text, only: string_type
-   use hdf5, only: hid_t
-   use hdf5, only: hsize_t
-   use hdf5, only: size_t
-   use hdf5, only: h5aread_f
-   use hdf5, only: h5awrite_f
-   use hdf5, only: h5aget_type_f
-   use hdf5, only: h5dread_f
-   use hdf5, only: h5dwrite_f
-   use hdf5, only: h5dget_type_f
-   use hdf5, only: h5dvlen_reclaim_f
-   use hdf5, only: h5pclose_f
-   use hdf5, only: h5pcreate_f
-   use hdf5, only: h5pset_buffer_f
-   use hdf5, only: h5p_dataset_xfer_f
-   use hdf5, only: h5p_default_f
-   use hdf5, only: h5screate_simple_f
-   use hdf5, only: h5sclose_f
-   use hdf5, only: h5tclose_f
-   use hdf5, only: h5tcopy_f
-   use hdf5, only: h5tget_cset_f
-   use hdf5, only: h5tget_size_f
-   use hdf5, only: h5tget_strpad_f
-   use hdf5, only: h5tis_variable_str_f
-   use hdf5, only: h5tset_cset_f
-   use hdf5, only: h5t_cset_utf8_f
-   use hdf5, only: h5t_str_spacepad_f
-   use hdf5, only: h5t_string
+   use hdf5, only: hid_t, hsize_t, size_t, h5aread_f, h5awrite_f, h5aget_type_f, h5dread_f, &
+      h5dwrite_f, h5dget_type_f, h5dvlen_reclaim_f, h5pclose_f, h5pcreate_f, h5pset_buffer_f, &
+      h5p_dataset_xfer_f, h5p_default_f, h5screate_simple_f, h5sclose_f, h5tclose_f, h5tcopy_f, &
+      h5tget_cset_f, h5tget_size_f, h5tget_strpad_f, h5tis_variable_str_f, h5tset_cset_f, &
+      h5t_cset_utf8_f, h5t_str_spacepad_f, h5t_string
    implicit none (type, external)
    private
 

@@ -3,21 +3,12 @@
 !> Read are all kinds of strings that fw_hdf5_string knows, written those of variable length.
 module fw_hdf5_text
    use fw_error, only: error_type
-   use fw_hdf5_dataset, only: dataset_type
-   use fw_hdf5_dataset, only: open_dataset
-   use fw_hdf5_dataset, only: kind_string
-   use fw_hdf5_file, only: hdf5_file
-   use fw_hdf5_file, only: dataset_failure
-   use fw_hdf5_string, only: get_strings
-   use fw_hdf5_string, only: put_strings
-   use fw_hdf5_string, only: new_string_type
-   use fw_hdf5_write, only: new_dataset
-   use fw_hdf5_write, only: new_space
+   use fw_hdf5_dataset, only: dataset_type, open_dataset, kind_string
+   use fw_hdf5_file, only: hdf5_file, dataset_failure
+   use fw_hdf5_string, only: get_strings, put_strings, new_string_type
+   use fw_hdf5_write, only: new_dataset, new_space
    use fw_text, only: string_type
-   use hdf5, only: hid_t
-   use hdf5, only: h5dclose_f
-   use hdf5, only: h5sclose_f
-   use hdf5, only: h5tclose_f
+   use hdf5, only: hid_t, h5dclose_f, h5sclose_f, h5tclose_f
    implicit none (type, external)
    private
 

@@ -2,29 +2,14 @@
 !>
 !> A dataset is written once and whole; what grows point by point is fw_hdf5_append's.
 module fw_hdf5_write
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_ptr
+   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
    use fw_error, only: error_type
-   use fw_hdf5_file, only: hdf5_file
-   use fw_hdf5_file, only: dataset_failure
+   use fw_hdf5_file, only: hdf5_file, dataset_failure
    use fw_kinds, only: wp
-   use hdf5, only: hid_t
-   use hdf5, only: hsize_t
-   use hdf5, only: h5dcreate_f
-   use hdf5, only: h5dwrite_f
-   use hdf5, only: h5dclose_f
-   use hdf5, only: h5screate_f
-   use hdf5, only: h5screate_simple_f
-   use hdf5, only: h5sclose_f
-   use hdf5, only: h5s_scalar_f
-   use hdf5, only: h5pcreate_f
-   use hdf5, only: h5pclose_f
-   use hdf5, only: h5pset_create_inter_group_f
-   use hdf5, only: h5p_default_f
-   use hdf5, only: h5p_link_create_f
-   use hdf5, only: h5kind_to_type
-   use hdf5, only: h5_real_kind
-   use hdf5, only: h5_integer_kind
+   use hdf5, only: hid_t, hsize_t, h5dcreate_f, h5dwrite_f, h5dclose_f, h5screate_f, &
+      h5screate_simple_f, h5sclose_f, h5s_scalar_f, h5pcreate_f, h5pclose_f, &
+      h5pset_create_inter_group_f, h5p_default_f, h5p_link_create_f, h5kind_to_type, h5_real_kind, &
+      h5_integer_kind
    implicit none (type, external)
    private
 

@@ -9,7 +9,7 @@ module fw_input
    use fw_kinds, only: i8
    use fw_namelist, only: parse_namelist, parse_override
    use fw_namelist_data, only: namelist_type, value_type, entry_type, add_entry, value_count, &
-                               stray_word, location, is_entry, last_entry
+      stray_word, location, is_entry, last_entry
    use fw_reader_text, only: shown, element_text, dims_text, repeat_hint
    use fw_text, only: string_type, to_text, join
    use fw_text_list, only: append

@@ -2,16 +2,11 @@
 !> array, real and integer, general and symmetric. What can be no structural matrix is refused:
 !> complex (the library works with real matrices), pattern (no values), skew-symmetric.
 module fw_matrix_market
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_error, only: status_io
+   use fw_error, only: error_type, fatal_error, status_input, status_io
    use fw_kinds, only: wp
    use fw_matrix_market_lines, only: line_reader
    use fw_model_file, only: file_model_type
-   use fw_text, only: lower_case
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: lower_case, string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private

@@ -4,17 +4,11 @@
 module fw_matrix_market_lines
    use, intrinsic :: iso_fortran_env, only: iostat_end
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
-   use, intrinsic :: ieee_exceptions, only: ieee_overflow
-   use, intrinsic :: ieee_exceptions, only: ieee_set_flag
-   use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_error, only: status_io
+   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_overflow, ieee_set_flag, &
+      ieee_set_halting_mode
+   use fw_error, only: error_type, fatal_error, status_input, status_io
    use fw_kinds, only: wp
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    implicit none (type, external)
    private
 

@@ -5,22 +5,12 @@
 !> told; what the values must be (finite, symmetric) is checked with those of files later.
 module fw_memory_model
    use fw_contact_data, only: spring_type
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_failure
-   use fw_error, only: status_input
-   use fw_error, only: status_usage
-   use fw_kinds, only: i8
-   use fw_kinds, only: wp
-   use fw_memory_sectors, only: check_memory_sectors
-   use fw_memory_sectors, only: is_sector_part
-   use fw_memory_sectors, only: put_sector_integers
-   use fw_memory_sectors, only: put_sector_reals
-   use fw_memory_sectors, only: sector_integers
-   use fw_memory_sectors, only: sector_reals
+   use fw_error, only: error_type, fatal_error, status_failure, status_input, status_usage
+   use fw_kinds, only: i8, wp
+   use fw_memory_sectors, only: check_memory_sectors, is_sector_part, put_sector_integers, &
+      put_sector_reals, sector_integers, sector_reals
    use fw_model_file, only: file_model_type
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private

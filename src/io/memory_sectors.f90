@@ -5,12 +5,8 @@
 !> the bytes of a file stand.
 module fw_memory_sectors
    use fw_cyclic_data, only: influence_type
-   use fw_cyclic_parts, only: add_influence
-   use fw_cyclic_parts, only: check_physical
-   use fw_cyclic_parts, only: check_rows
-   use fw_cyclic_parts, only: cyclic_parts
-   use fw_cyclic_parts, only: finish_influence
-   use fw_cyclic_parts, only: nodal_parts
+   use fw_cyclic_parts, only: add_influence, check_physical, check_rows, cyclic_parts, &
+      finish_influence, nodal_parts
    use fw_kinds, only: wp
    use fw_text, only: to_text
    use fw_values, only: read_integer

@@ -2,9 +2,7 @@
 !> row for each of them, its limit cycles, and responses that are put together from it.
 module fw_mode_group
    use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
+   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
    use fw_result_labels, only: label_dataset
    implicit none (type, external)

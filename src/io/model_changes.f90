@@ -8,7 +8,7 @@ module fw_model_changes
    use fw_model_file, only: file_model_type
    use fw_model_keys, only: model_options
    use fw_parameters, only: is_of_matrices, modal_damping, rayleigh_mass, rayleigh_stiffness, &
-                            rotation_speed
+      rotation_speed
    implicit none (type, external)
    private
 

@@ -8,26 +8,15 @@ module fw_model_file
    use fw_contact_data, only: spring_type
    use fw_cyclic_file, only: read_cyclic_file
    use fw_cyclic_parts, only: cyclic_parts
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_hdf5, only: dataset_failure
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: has_attribute
-   use fw_hdf5, only: read_attribute
-   use fw_hdf5, only: read_dataset
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_hdf5, only: dataset_failure, hdf5_file, has_attribute, read_attribute, read_dataset
    use fw_kinds, only: wp
    use fw_laws, only: law_words
-   use fw_model_file_parts, only: read_dofs
-   use fw_model_file_parts, only: read_matrix
-   use fw_model_file_parts, only: read_names
-   use fw_model_file_parts, only: read_pair_values
-   use fw_model_file_parts, only: read_positions
-   use fw_model_file_parts, only: read_vector
+   use fw_model_file_parts, only: read_dofs, read_matrix, read_names, read_pair_values, &
+      read_positions, read_vector
    use fw_reader_text, only: words_text
    use fw_spring_file, only: read_spring_file
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    implicit none (type, external)
    private
 

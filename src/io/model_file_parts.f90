@@ -8,15 +8,9 @@
 module fw_model_file_parts
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_error, only: error_type
-   use fw_hdf5, only: dataset_failure
-   use fw_hdf5, only: get_shape
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_dataset
-   use fw_hdf5, only: read_text
-   use fw_hdf5, only: shape_text
+   use fw_hdf5, only: dataset_failure, get_shape, hdf5_file, read_dataset, read_text, shape_text
    use fw_kinds, only: wp
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    use hdf5, only: hsize_t
    implicit none (type, external)
    private

@@ -6,8 +6,7 @@
 module fw_namelist
    use fw_cursor, only: cursor_type
    use fw_error, only: error_type, fatal_error, status_input, status_usage
-   use fw_namelist_data, only: namelist_type, group_type, entry_type, &
-                               add_entry, location
+   use fw_namelist_data, only: namelist_type, group_type, entry_type, add_entry, location
    use fw_namelist_values, only: parse_sections, parse_values
    use fw_text, only: to_text
    implicit none (type, external)

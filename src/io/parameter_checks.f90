@@ -5,13 +5,11 @@ module fw_parameter_checks
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
-   use fw_laws, only: is_rigid
-   use fw_laws, only: law_words
+   use fw_laws, only: is_rigid, law_words
    use fw_model, only: model_type
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-                            is_per_pair, is_per_spring, normal_load, normal_stiffness, &
-                            parameter_key, parameter_words, rotation_speed, static_scale, &
-                            tangential_stiffness
+      is_per_pair, is_per_spring, normal_load, normal_stiffness, parameter_key, parameter_words, &
+      rotation_speed, static_scale, tangential_stiffness
    implicit none (type, external)
    private
 

@@ -7,9 +7,8 @@ module fw_parameter_values
    use fw_model, only: model_type
    use fw_model_forming, only: form_structure
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-                            is_per_pair, is_per_spring, modal_damping, normal_load, &
-                            normal_stiffness, rayleigh_mass, rayleigh_stiffness, rotation_speed, &
-                            static_scale, tangential_stiffness
+      is_per_pair, is_per_spring, modal_damping, normal_load, normal_stiffness, rayleigh_mass, &
+      rayleigh_stiffness, rotation_speed, static_scale, tangential_stiffness
    implicit none (type, external)
    private
 

@@ -7,8 +7,8 @@ module fw_path_checks
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-                            normal_load, normal_stiffness, parameter_words, spring_coefficient, &
-                            static_scale, tangential_stiffness
+      normal_load, normal_stiffness, parameter_words, spring_coefficient, static_scale, &
+      tangential_stiffness
    use fw_values, only: number_text
    implicit none (type, external)
    private

@@ -3,7 +3,7 @@
 !> What Fortran cannot ask of a system is asked through the C library of POSIX.
 module fw_paths
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_ptr, c_size_t, c_loc, &
-                                          c_associated
+      c_associated
    use fw_error, only: error_type, fatal_error, status_io
    implicit none (type, external)
    private

@@ -1,15 +1,11 @@
 !> Group /peak of a result file: one row for every maximum of an observed quantity.
 module fw_peak_group
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
+   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
    use fw_pair_cycle, only: pair_cycle
-   use fw_peak, only: found_words
-   use fw_peak, only: peak_type
+   use fw_peak, only: found_words, peak_type
    use fw_result_labels, only: label_dataset
    use fw_text, only: string_type
    implicit none (type, external)

@@ -6,70 +6,22 @@
 !> A new quantity is one line in `point_quantities`, naming the procedure that gives its numbers.
 module fw_point_quantities
    use fw_case, only: case_type
-   use fw_hdf5, only: growing_integer
-   use fw_hdf5, only: growing_logical
-   use fw_hdf5, only: growing_real
+   use fw_hdf5, only: growing_integer, growing_logical, growing_real
    use fw_kinds, only: wp
-   use fw_parameters, only: is_per_pair
-   use fw_parameters, only: is_per_spring
-   use fw_parameters, only: n_parameter_words
-   use fw_parameters, only: parameter_dataset
-   use fw_parameters, only: parameter_words
+   use fw_parameters, only: is_per_pair, is_per_spring, n_parameter_words, parameter_dataset, &
+      parameter_words
    use fw_patches, only: count_patches
    use fw_point, only: point_type
-   use fw_quantity_conditions, only: always
-   use fw_quantity_conditions, only: asks_stability
-   use fw_quantity_conditions, only: follows_branch
-   use fw_quantity_conditions, only: follows_frequency
-   use fw_quantity_conditions, only: follows_parameter
-   use fw_quantity_conditions, only: goes_over
-   use fw_quantity_conditions, only: has_levels
-   use fw_quantity_conditions, only: is_accurate
-   use fw_quantity_conditions, only: is_controlled
-   use fw_quantity_conditions, only: is_mode
-   use fw_quantity_conditions, only: is_response
-   use fw_quantity_conditions, only: scales_load
-   use fw_quantity_conditions, only: shows_contact
-   use fw_quantity_conditions, only: wears
-   use fw_quantity_values, only: amplitude
-   use fw_quantity_values, only: coefficients
-   use fw_quantity_values, only: control
-   use fw_quantity_values, only: converged
-   use fw_quantity_values, only: cycles
-   use fw_quantity_values, only: damping_ratio
-   use fw_quantity_values, only: depth
-   use fw_quantity_values, only: dissipation
-   use fw_quantity_values, only: error_estimate
-   use fw_quantity_values, only: first_harmonic
-   use fw_quantity_values, only: fold
-   use fw_quantity_values, only: force
-   use fw_quantity_values, only: force_history
-   use fw_quantity_values, only: fraction
-   use fw_quantity_values, only: harmonics
-   use fw_quantity_values, only: history
-   use fw_quantity_values, only: instants
-   use fw_quantity_values, only: iterations
-   use fw_quantity_values, only: load_scale
-   use fw_quantity_values, only: modal_amplitude
-   use fw_quantity_values, only: multiplier_error
-   use fw_quantity_values, only: multipliers
-   use fw_quantity_values, only: nothing
-   use fw_quantity_values, only: omega
-   use fw_quantity_values, only: place
-   use fw_quantity_values, only: residual
-   use fw_quantity_values, only: seconds
-   use fw_quantity_values, only: self_excitation
-   use fw_quantity_values, only: served_by
-   use fw_quantity_values, only: slip_history
-   use fw_quantity_values, only: stable
-   use fw_quantity_values, only: tangent
-   use fw_quantity_values, only: tangent_omega
-   use fw_quantity_values, only: tangent_parameter
-   use fw_quantity_values, only: wear_energy
-   use fw_quantity_values, only: wear_rate
-   use fw_quantity_values, only: wear_volume
-   use fw_response_rows, only: is_of_pairs
-   use fw_response_rows, only: value_words
+   use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
+      follows_parameter, goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
+      scales_load, shows_contact, wears
+   use fw_quantity_values, only: amplitude, coefficients, control, converged, cycles, &
+      damping_ratio, depth, dissipation, error_estimate, first_harmonic, fold, force, &
+      force_history, fraction, harmonics, history, instants, iterations, load_scale, &
+      modal_amplitude, multiplier_error, multipliers, nothing, omega, place, residual, seconds, &
+      self_excitation, served_by, slip_history, stable, tangent, tangent_omega, tangent_parameter, &
+      wear_energy, wear_rate, wear_volume
+   use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
    use fw_text_list, only: words_of

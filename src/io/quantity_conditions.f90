@@ -1,10 +1,6 @@
 !> When the result of a case holds a quantity of a point.
 module fw_quantity_conditions
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_mode
-   use fw_case, only: analysis_point
-   use fw_case, only: analysis_wear
-   use fw_case, only: case_type
+   use fw_case, only: analysis_frf, analysis_mode, analysis_point, analysis_wear, case_type
    use fw_kinds, only: wp
    use fw_parameters, only: harmonic_scale
    use fw_solver_options, only: continuation_arclength

@@ -1,8 +1,7 @@
 !> The numbers of each quantity in a point, laid out as h5py shows them (the last index runs
 !> fastest); not allocated where they are not known. A flag is 1 or 0.
 module fw_quantity_values
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_kinds, only: wp
    use fw_point, only: point_type
    implicit none (type, external)

@@ -2,7 +2,7 @@
 module fw_read_case
    use fw_combinations, only: check_combinations
    use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_modes, analysis_point, &
-                      analysis_resonance, analysis_wear
+      analysis_resonance, analysis_wear
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy

@@ -5,8 +5,7 @@
 module fw_read_contact
    use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
-                              bind_normal_load, bind_laws, bind_march, bind_n_springs, &
-                              bind_springs
+      bind_normal_load, bind_laws, bind_march, bind_n_springs, bind_springs
    use fw_kinds, only: wp
    use fw_laws, only: law_words, is_rigid
    use fw_model_file, only: file_model_type

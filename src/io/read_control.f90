@@ -1,7 +1,6 @@
 !> Group &control: amplitudes that are given in place of the load.
 module fw_read_control
-   use fw_control_options, only: control_options
-   use fw_control_options, only: of_first_harmonic
+   use fw_control_options, only: control_options, of_first_harmonic
    use fw_key, only: key
    use fw_model, only: model_type
    use fw_reader, only: reader_type

@@ -6,26 +6,21 @@
 module fw_read_model
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_hdf5, only: has_attribute
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_attribute
+   use fw_hdf5, only: has_attribute, hdf5_file, read_attribute
    use fw_load_terms, only: load_terms
    use fw_matrix_checks, only: check_matrix, check_skew, check_vector
    use fw_matrix_market, only: read_matrix_market_model
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type, read_model_hdf5
    use fw_model_forming, only: finish_structure, form_matrices, model_origin
-   use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads
-   use fw_model_keys, only: source_words, source_inline, source_hdf5, source_matrix_market, &
-                            source_memory
+   use fw_model_keys, only: model_options, bind_order, bind_matrices, bind_loads, source_words, &
+      source_inline, source_hdf5, source_matrix_market, source_memory
    use fw_paths, only: resolve_path
    use fw_read_nodal, only: finish_nodal
-   use fw_read_waves, only: gather_waves
-   use fw_read_waves, only: read_terms
+   use fw_read_waves, only: gather_waves, read_terms
    use fw_reader, only: reader_type
    use fw_text, only: to_text
-   use fw_trial, only: trial_type
-   use fw_trial, only: try_file
+   use fw_trial, only: trial_type, try_file
    use fw_values, only: quoted_text
    implicit none (type, external)
    private

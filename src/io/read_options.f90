@@ -4,16 +4,16 @@
 !> that need two keys or the analysis, and what follows from other keys where one is left out.
 module fw_read_options
    use fw_case, only: analysis_frf, analysis_mode, analysis_modes, analysis_resonance, &
-                      analysis_time
+      analysis_time
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
-                                   instants_per_event_wave, most_for_accuracy
+      instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
    use fw_mode_options, only: mode_options
    use fw_parameter_sweep, only: parameter_sweep
    use fw_parameters, only: parameter_words
    use fw_reader, only: reader_type
-   use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength
-   use fw_solver_options, only: continuation_natural
+   use fw_solver_options, only: sweep_options, unit_hertz, continuation_arclength, &
+      continuation_natural
    use fw_text, only: to_text
    use fw_values, only: number_text
    implicit none (type, external)

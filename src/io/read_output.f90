@@ -1,8 +1,7 @@
 !> Group &output: the result file and what is observed.
 module fw_read_output
    use fw_case, only: output_options
-   use fw_key, only: key
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_visitor
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_file, only: file_model_type

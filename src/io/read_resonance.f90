@@ -6,11 +6,9 @@ module fw_read_resonance
    use fw_parameter_checks, only: check_parameter
    use fw_parameter_values, only: get_parameter
    use fw_parameters, only: friction_coefficient, harmonic_scale, modal_damping, normal_load, &
-                            normal_stiffness, parameter_words, rotation_speed, static_scale, &
-                            tangential_stiffness
+      normal_stiffness, parameter_words, rotation_speed, static_scale, tangential_stiffness
    use fw_reader, only: reader_type
-   use fw_resonance_options, only: as_factor, condition_phase, resonance_options, &
-                                   spacing_log
+   use fw_resonance_options, only: as_factor, condition_phase, resonance_options, spacing_log
    use fw_solver_options, only: continuation_arclength
    use fw_values, only: number_text
    implicit none (type, external)

@@ -9,9 +9,8 @@ module fw_read_sensitivity
    use fw_parameters, only: friction_coefficient, harmonic_scale, normal_load, parameter_words
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
-   use fw_response_rows, only: dissipation, first_harmonic, is_of_pairs, largest, &
-                               load_scale, mode_damping_ratio, mode_omega, quantity_words, &
-                               resonance_omega, wear_volume
+   use fw_response_rows, only: dissipation, first_harmonic, is_of_pairs, largest, load_scale, &
+      mode_damping_ratio, mode_omega, quantity_words, resonance_omega, wear_volume
    use fw_sensitivity_options, only: sensitivity_options
    use fw_text, only: lower_case, string_type
    use fw_values, only: quoted_text

@@ -3,8 +3,7 @@ module fw_read_waves
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_cyclic_data, only: cyclic_type
    use fw_kinds, only: wp
-   use fw_load_terms, only: add_wave
-   use fw_load_terms, only: load_terms
+   use fw_load_terms, only: add_wave, load_terms
    use fw_load_waves, only: load_waves
    use fw_model_file, only: file_model_type
    use fw_reader, only: reader_type

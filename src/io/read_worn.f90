@@ -4,19 +4,14 @@ module fw_read_worn
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_contact_data, only: contact_type
    use fw_contact_keys, only: bind_worn
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_error, only: status_io
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_dataset
+   use fw_error, only: error_type, fatal_error, status_input, status_io
+   use fw_hdf5, only: hdf5_file, read_dataset
    use fw_kinds, only: wp
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
    use fw_result_target, only: is_result
    use fw_text, only: to_text
-   use fw_trial, only: trial_type
-   use fw_trial, only: try_file
+   use fw_trial, only: trial_type, try_file
    use fw_values, only: quoted_text
    implicit none (type, external)
    private

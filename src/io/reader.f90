@@ -14,8 +14,8 @@ module fw_reader
    use fw_reader_text, only: near, near_part, did_you_mean, shown, to_strings, words_text
    use fw_text, only: string_type, lower_case, to_text
    use fw_text_list, only: append
-   use fw_values, only: range_text, read_logical, read_number, quoted_text
-   use fw_values, only: real_kind, integer_kind, kind_name, kind_text
+   use fw_values, only: range_text, read_logical, read_number, quoted_text, real_kind, &
+      integer_kind, kind_name, kind_text
    implicit none (type, external)
    private
 

@@ -1,10 +1,8 @@
 !> The arrays of the reader: as many values as their shape says, from several assignments.
 submodule (fw_reader) fw_reader_arrays
    use fw_array_entries, only: source_type
-   use fw_reader_text, only: dims_text
-   use fw_reader_text, only: element_text
+   use fw_reader_text, only: dims_text, element_text, number_list
    use fw_key_range, only: range_type
-   use fw_reader_text, only: number_list
    use fw_values, only: number_text
    implicit none (type, external)
 

@@ -2,15 +2,10 @@
 !> its points, one row for each of them.
 module fw_resonance_group
    use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
+   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
    use fw_parameters, only: parameter_words
-   use fw_resonance_options, only: as_words
-   use fw_resonance_options, only: condition_words
-   use fw_resonance_options, only: resonance_options
-   use fw_resonance_options, only: resonance_words
+   use fw_resonance_options, only: as_words, condition_words, resonance_options, resonance_words
    use fw_result_labels, only: label_dataset
    implicit none (type, external)
    private

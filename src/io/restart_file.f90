@@ -5,38 +5,18 @@
 !> structure, whose matrices the file does not hold.
 module fw_restart_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use fw_case, only: analysis_wear
-   use fw_case, only: analysis_words
-   use fw_case, only: case_type
+   use fw_case, only: analysis_wear, analysis_words, case_type
    use fw_case_difference, only: find_difference
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_error, only: status_usage
-   use fw_hdf5, only: get_shape
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_attribute
-   use fw_hdf5, only: read_dataset
+   use fw_error, only: error_type, fatal_error, status_input, status_usage
+   use fw_hdf5, only: get_shape, hdf5_file, read_attribute, read_dataset
    use fw_kinds, only: wp
    use fw_point, only: point_type
-   use fw_restart_rows, only: c_checked_depth
-   use fw_restart_rows, only: c_converged
-   use fw_restart_rows, only: c_largest_rate
-   use fw_restart_rows, only: c_next_cycles
-   use fw_restart_rows, only: c_provisional
-   use fw_restart_rows, only: c_rejected
-   use fw_restart_rows, only: c_spacing
-   use fw_restart_rows, only: c_steps
-   use fw_restart_rows, only: c_reach
-   use fw_restart_rows, only: c_touch
-   use fw_restart_rows, only: c_unsettled
-   use fw_restart_rows, only: n_controls
-   use fw_restart_rows, only: pair_constants
-   use fw_restart_rows, only: pair_keys
+   use fw_restart_rows, only: c_checked_depth, c_converged, c_largest_rate, c_next_cycles, &
+      c_provisional, c_rejected, c_spacing, c_steps, c_reach, c_touch, c_unsettled, n_controls, &
+      pair_constants, pair_keys
    use fw_result_rows, only: row_names
    use fw_result_target, only: is_result
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    use fw_values, only: number_text
    use fw_wear_march, only: wear_march

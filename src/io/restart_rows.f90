@@ -11,11 +11,7 @@
 module fw_restart_rows
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
-   use fw_hdf5, only: growing_dataset
-   use fw_hdf5, only: growing_real
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
+   use fw_hdf5, only: growing_dataset, growing_real, hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
    use fw_text, only: string_type
    use fw_wear_march, only: wear_march

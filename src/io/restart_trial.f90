@@ -2,10 +2,8 @@
 module fw_restart_trial
    use fw_case, only: case_type
    use fw_error, only: error_type
-   use fw_restart_file, only: read_restart
-   use fw_restart_file, only: restart_type
-   use fw_trial, only: trial_type
-   use fw_trial, only: try_file
+   use fw_restart_file, only: read_restart, restart_type
+   use fw_trial, only: trial_type, try_file
    implicit none (type, external)
    private
 

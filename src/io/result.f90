@@ -9,34 +9,21 @@ module fw_result
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_bifurcation, only: bifurcation_list
    use fw_bifurcation_group, only: write_bifurcations
-   use fw_case, only: analysis_modes
-   use fw_case, only: case_type
-   use fw_cyclic_group, only: write_cyclic
-   use fw_cyclic_group, only: write_modes
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_case, only: analysis_modes, case_type
+   use fw_cyclic_group, only: write_cyclic, write_modes
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: sampling_words
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
-   use fw_hdf5, only: write_text
+   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset, write_text
    use fw_kinds, only: wp
-   use fw_mode_group, only: mode_table
-   use fw_mode_group, only: write_mode
+   use fw_mode_group, only: mode_table, write_mode
    use fw_peak, only: peak_type
    use fw_pair_cycle, only: pair_cycle
-   use fw_peak_group, only: write_peak_cycle
-   use fw_peak_group, only: write_peaks
+   use fw_peak_group, only: write_peak_cycle, write_peaks
    use fw_point, only: point_type
-   use fw_resonance_group, only: resonance_table
-   use fw_resonance_group, only: write_resonance
+   use fw_resonance_group, only: resonance_table, write_resonance
    use fw_resonance_options, only: resonance_options
    use fw_result_labels, only: label_dataset
-   use fw_result_part, only: at_work
-   use fw_result_part, only: create_part
-   use fw_result_part, only: delete_part
-   use fw_result_part, only: publish_part
+   use fw_result_part, only: at_work, create_part, delete_part, publish_part
    use fw_result_target, only: result_format
    use fw_result_rows, only: row_set
    use fw_text, only: string_type

@@ -5,8 +5,7 @@
 !> 'mm-tonne-s-N'. Where it says nothing of the kind, only what does not depend on it has units.
 module fw_result_labels
    use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: hdf5_file, write_attribute
    use fw_text, only: string_type
    use fw_text_list, only: words_of
    use fw_point_quantities, only: quantity_type

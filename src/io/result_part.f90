@@ -7,23 +7,12 @@
 !> lock that HDF5 holds on an open file, so a part says on which machine its lock works: nothing
 !> else is removed, nor a part that is whole.
 module fw_result_part
-   use, intrinsic :: iso_c_binding, only: c_char
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_null_char
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_io
-   use fw_hdf5, only: has_attribute
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_attribute
-   use fw_hdf5, only: write_attribute
-   use fw_paths, only: is_locked
-   use fw_paths, only: is_there
-   use fw_paths, only: machine_name
-   use fw_result_target, only: check_replaceable
-   use fw_result_target, only: find_target
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
+   use fw_error, only: error_type, fatal_error, status_io
+   use fw_hdf5, only: has_attribute, hdf5_file, read_attribute, write_attribute
+   use fw_paths, only: is_locked, is_there, machine_name
+   use fw_result_target, only: check_replaceable, find_target
+   use fw_text, only: string_type, to_text
    implicit none (type, external)
    private
 

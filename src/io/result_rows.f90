@@ -1,26 +1,14 @@
 !> The datasets of a result file with one row per solution point, as the table of quantities
 !> declares them.
 module fw_result_rows
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_mode
-   use fw_case, only: analysis_resonance
-   use fw_case, only: analysis_wear
-   use fw_case, only: case_type
+   use fw_case, only: analysis_frf, analysis_mode, analysis_resonance, analysis_wear, case_type
    use fw_error, only: error_type
-   use fw_hdf5, only: get_shape
-   use fw_hdf5, only: growing_dataset
-   use fw_hdf5, only: growing_integer
-   use fw_hdf5, only: growing_logical
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_dataset
-   use fw_hdf5, only: write_attribute
+   use fw_hdf5, only: get_shape, growing_dataset, growing_integer, growing_logical, hdf5_file, &
+      read_dataset, write_attribute
    use fw_kinds, only: wp
    use fw_parameters, only: parameter_words
-   use fw_point, only: point_type
-   use fw_point, only: served_words
-   use fw_point_quantities, only: point_quantities
-   use fw_point_quantities, only: quantity_type
-   use fw_point_quantities, only: unknown_size
+   use fw_point, only: point_type, served_words
+   use fw_point_quantities, only: point_quantities, quantity_type, unknown_size
    use fw_result_labels, only: label_quantity
    use fw_solver_options, only: continuation_arclength
    use fw_text, only: string_type

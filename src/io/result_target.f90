@@ -2,18 +2,10 @@
 !> bears the name, an input of the run above all, is refused.
 module fw_result_target
    use, intrinsic :: iso_c_binding, only: c_null_char
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_error, only: status_io
-   use fw_hdf5, only: has_attribute
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_attribute
+   use fw_error, only: error_type, fatal_error, status_input, status_io
+   use fw_hdf5, only: has_attribute, hdf5_file, read_attribute
    use fw_kinds, only: i8
-   use fw_paths, only: check_writable
-   use fw_paths, only: follow_links
-   use fw_paths, only: is_directory
-   use fw_paths, only: real_path
+   use fw_paths, only: check_writable, follow_links, is_directory, real_path
    use fw_text, only: string_type
    implicit none (type, external)
    private

@@ -3,10 +3,7 @@
 module fw_spring_file
    use fw_contact_data, only: spring_type
    use fw_error, only: error_type
-   use fw_hdf5, only: dataset_failure
-   use fw_hdf5, only: get_shape
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: read_dataset
+   use fw_hdf5, only: dataset_failure, get_shape, hdf5_file, read_dataset
    use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
    use fw_model_file_parts, only: read_pair_values

@@ -1,7 +1,6 @@
 !> Growing lists of texts.
 module fw_text_list
-   use fw_text, only: string_type
-   use fw_text, only: to_text
+   use fw_text, only: string_type, to_text
    implicit none (type, external)
    private
 

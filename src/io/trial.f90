@@ -5,11 +5,8 @@
 !> For programs with one thread at work: between fork and exit the child calls much more than a
 !> program with several threads may.
 module fw_trial
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_long
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use, intrinsic :: iso_c_binding, only: c_int, c_long
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: i8
    use fw_text, only: to_text
    implicit none (type, external)

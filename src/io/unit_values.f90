@@ -11,20 +11,13 @@ module fw_unit_values
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_namelist, only: parse_override
-   use fw_namelist_data, only: add_entry
-   use fw_namelist_data, only: entry_type
-   use fw_namelist_data, only: last_entry
-   use fw_namelist_data, only: value_type
+   use fw_namelist_data, only: add_entry, entry_type, last_entry, value_type
    use fw_reader, only: reader_type
    use fw_reader_text, only: shown
    use fw_records, only: record_list
-   use fw_text, only: lower_case
-   use fw_text, only: to_text
-   use fw_unit_table, only: is_same_kind
-   use fw_unit_table, only: read_unit
-   use fw_unit_table, only: unit_type
-   use fw_values, only: number_text
-   use fw_values, only: read_real
+   use fw_text, only: lower_case, to_text
+   use fw_unit_table, only: is_same_kind, read_unit, unit_type
+   use fw_values, only: number_text, read_real
    implicit none (type, external)
    private
 

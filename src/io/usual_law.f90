@@ -2,18 +2,11 @@
 !> masses and on nodes without mass, where the rest of the case goes with it; else rigid friction
 !> at the instants.
 module fw_usual_law
-   use fw_case, only: analysis_frf
-   use fw_case, only: analysis_mode
-   use fw_case, only: analysis_point
-   use fw_case, only: analysis_resonance
-   use fw_case, only: analysis_time
-   use fw_case, only: analysis_wear
-   use fw_case, only: case_type
-   use fw_harmonics_options, only: method_hbm
-   use fw_harmonics_options, only: sampling_uniform
+   use fw_case, only: analysis_frf, analysis_mode, analysis_point, analysis_resonance, &
+      analysis_time, analysis_wear, case_type
+   use fw_harmonics_options, only: method_hbm, sampling_uniform
    use fw_kinds, only: wp
-   use fw_laws, only: law_words
-   use fw_laws, only: usual_law
+   use fw_laws, only: law_words, usual_law
    use fw_reader, only: reader_type
    use fw_values, only: quoted_text
    implicit none (type, external)

@@ -4,10 +4,8 @@
 !> nothing at all for a number. Numbers are written so that they read back to the same bits.
 module fw_values
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
-   use, intrinsic :: ieee_exceptions, only: ieee_set_flag
-   use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode
-   use, intrinsic :: ieee_exceptions, only: ieee_usual
+   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_set_flag, &
+      ieee_set_halting_mode, ieee_usual
    use fw_key_range, only: range_type
    use fw_kinds, only: wp
    use fw_namelist_data, only: value_type

@@ -4,10 +4,7 @@
 module fw_wear_rows
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file
-   use fw_hdf5, only: write_attribute
-   use fw_hdf5, only: write_dataset
-   use fw_hdf5, only: write_text
+   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset, write_text
    use fw_kinds, only: wp
    use fw_patches, only: number_patches
    use fw_result_labels, only: label_dataset

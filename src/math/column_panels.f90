@@ -3,8 +3,7 @@
 !> takes several times as long for a column, and twice that in double precision. The last panel is
 !> filled up with zeros.
 module fw_column_panels
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
+   use fw_kinds, only: sp, wp
    implicit none (type, external)
    private
 

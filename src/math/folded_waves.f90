@@ -8,8 +8,7 @@
 !> tau are told apart then, and waves of even and odd numbers. Of one row that is faster than a
 !> product with all waves, and needs a quarter of their memory.
 module fw_folded_waves
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

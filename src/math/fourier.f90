@@ -6,13 +6,10 @@
 !> that both transforms are one matrix product over all rows, and kernels run along the rows.
 !> Long transforms of many harmonics go through FFTW instead (see `fft_rows`).
 module fw_fourier
-   use fw_kinds, only: wp
-   use fw_kinds, only: pi
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
+   use fw_kinds, only: wp, pi
+   use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_folded_waves, only: folded_waves
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dgemv
+   use fw_lapack, only: dgemm, dgemv
    use fw_linalg, only: lu_type
    use fw_fft, only: fft_type, has_fftw
    use fw_threads, only: coordinates_for_threads

@@ -2,9 +2,7 @@
 !> that all holds for real structures too.
 module fw_hermitian
    use fw_kinds, only: wp
-   use fw_lapack, only: zgemm
-   use fw_lapack, only: zhegvd
-   use fw_lapack, only: zpotrf
+   use fw_lapack, only: zgemm, zhegvd, zpotrf
    implicit none (type, external)
    private
 

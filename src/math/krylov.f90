@@ -5,14 +5,11 @@
 !> cycle instead of a guess. Both vectors and their products may hold physical units; the only norm
 !> taken is the Euclidean one of the right-hand side's space, so the caller scales where it matters.
 module fw_krylov
-   use fw_interrupt, only: interrupt_type
-   use fw_interrupt, only: must_end
+   use fw_interrupt, only: interrupt_type, must_end
    use fw_kinds, only: wp
    use fw_lapack, only: dgemv
-   use fw_norm, only: is_finite
-   use fw_norm, only: norm_of
-   use fw_tall_product, only: multiply_transposed
-   use fw_tall_product, only: subtract_product
+   use fw_norm, only: is_finite, norm_of
+   use fw_tall_product, only: multiply_transposed, subtract_product
    implicit none (type, external)
    private
 

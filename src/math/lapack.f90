@@ -4,8 +4,7 @@
 !> Arrays are of assumed size, so that a leading block or a column can be passed without a copy; the
 !> shapes are the caller's business, since the routines do not check them.
 module fw_lapack
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
+   use fw_kinds, only: sp, wp
    implicit none (type, external)
    private
 

@@ -1,28 +1,14 @@
 !> Dense linear algebra above LAPACK: factors that are kept and used many times, and symmetric
 !> eigenproblems.
 module fw_linalg
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_failure
+   use fw_error, only: error_type, fatal_error, status_failure
    use fw_floating_point, only: floating_point_scope
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
-   use fw_lapack, only: dgetrf
-   use fw_lapack, only: dgetrs
-   use fw_lapack, only: zgetrf
-   use fw_lapack, only: zgetrs
-   use fw_lapack, only: ztrsv
-   use fw_lapack, only: dpotrf
-   use fw_lapack, only: dsyevd
-   use fw_lapack, only: dsyevr
-   use fw_lapack, only: dsygst
-   use fw_lapack, only: dsygvd
-   use fw_lapack, only: dtrsm
-   use fw_lu_in_parts, only: factor_in_parts
-   use fw_lu_in_parts, only: whole_up_to
-   use fw_small_lu, only: factor_small
-   use fw_small_lu, only: small_up_to
-   use fw_small_lu, only: solve_small
+   use fw_lapack, only: dgetrf, dgetrs, zgetrf, zgetrs, ztrsv, dpotrf, dsyevd, dsyevr, dsygst, &
+      dsygvd, dtrsm
+   use fw_lu_in_parts, only: factor_in_parts, whole_up_to
+   use fw_small_lu, only: factor_small, small_up_to, solve_small
    implicit none (type, external)
    private
 

@@ -5,13 +5,9 @@
 !> dgetrf on a panel, then its swaps and its product on the columns behind it, strip by strip. It
 !> takes some 8 % longer than one call, which shares the packing of its products.
 module fw_lu_in_parts
-   use fw_interrupt, only: interrupt_type
-   use fw_interrupt, only: must_end
+   use fw_interrupt, only: interrupt_type, must_end
    use fw_kinds, only: wp
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dgetrf
-   use fw_lapack, only: dlaswp
-   use fw_lapack, only: dtrsm
+   use fw_lapack, only: dgemm, dgetrf, dlaswp, dtrsm
    implicit none (type, external)
    private
 

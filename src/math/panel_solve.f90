@@ -10,12 +10,9 @@
 !> one product with [-L_pp^-1 L_p<, L_pp^-1], which is what a panel holds. Likewise of U, backwards.
 !> Columns do not touch each other: their numbers are the same however threads share them.
 module fw_panel_solve
-   use fw_column_panels, only: multiply_column
-   use fw_column_panels, only: panel_count
-   use fw_column_panels, only: panel_height
+   use fw_column_panels, only: multiply_column, panel_count, panel_height
    use fw_kinds, only: sp
-   use fw_lapack, only: ctrsm
-   use fw_lapack, only: strsm
+   use fw_lapack, only: ctrsm, strsm
    use omp_lib, only: omp_get_max_threads
    implicit none (type, external)
    private

@@ -2,13 +2,8 @@
 !> memory and half the time of double ones, and a solution, which memory bounds, less still. An
 !> iterative solver in double precision needs no more of a preconditioner than a few digits.
 module fw_preconditioner_lu
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
-   use fw_lapack, only: cgemm
-   use fw_lapack, only: cgetrf
-   use fw_lapack, only: claswp
-   use fw_lapack, only: ctrsm
-   use fw_lapack, only: ctrsv
+   use fw_kinds, only: sp, wp
+   use fw_lapack, only: cgemm, cgetrf, claswp, ctrsm, ctrsv
    use fw_panel_solve, only: panel_factors
    implicit none (type, external)
    private

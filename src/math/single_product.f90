@@ -4,8 +4,7 @@
 !> group, row, group), both filled up with zeros. Panels are independent of each other: threads
 !> share them, and the numbers are the same for any count of threads.
 module fw_single_product
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
+   use fw_kinds, only: sp, wp
    implicit none (type, external)
    private
 

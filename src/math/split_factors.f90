@@ -5,14 +5,10 @@
 !>
 !> Of rank 0 the harmonics differ by nothing. In single precision, all harmonics of P_1 at a time.
 module fw_split_factors
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
-   use fw_lapack, only: cgemm
-   use fw_lapack, only: sgetrf
-   use fw_lapack, only: strsm
+   use fw_kinds, only: sp, wp
+   use fw_lapack, only: cgemm, sgetrf, strsm
    use fw_linalg, only: complex_lu_type
-   use fw_panel_solve, only: group_width
-   use fw_panel_solve, only: panel_factors
+   use fw_panel_solve, only: group_width, panel_factors
    use fw_preconditioner_lu, only: preconditioner_lu_type
    use omp_lib, only: omp_get_max_threads
    implicit none (type, external)

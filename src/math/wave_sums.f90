@@ -17,9 +17,8 @@
 !> The waves are only read, and threads share them; the sums belong to one thread.
 module fw_wave_sums
    use fw_fourier, only: fourier_type
-   use fw_kinds, only: pi
+   use fw_kinds, only: pi, wp
    use fw_folded_waves, only: folded_waves
-   use fw_kinds, only: wp
    implicit none (type, external)
    private
 

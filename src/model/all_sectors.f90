@@ -8,27 +8,19 @@
 !> condensed as those of a wave are. k and N - k differ in every harmonic above 0, where the
 !> amplitudes of the sectors are complex. The load is a wave.
 module fw_all_sectors
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
+   use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_cyclic_data, only: cyclic_type
    use fw_cyclic_relative, only: cyclic_relative
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    use fw_lapack, only: zgemv
    use fw_model, only: model_type
    use fw_ring_fft, only: ring_fft
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
-   use fw_sector_stiffness, only: derive_sector
-   use fw_sector_stiffness, only: form_sector
-   use fw_sector_stiffness, only: harmonic_point
-   use fw_sector_stiffness, only: slopes_of
-   use fw_structure_operator, only: by_frequency
-   use fw_structure_operator, only: lay_out_coefficients
-   use fw_structure_operator, only: structure_operator
-   use fw_structure_operator, only: structure_state
+   use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, slopes_of
+   use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_operator, &
+      structure_state
    use fw_text, only: to_text
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)

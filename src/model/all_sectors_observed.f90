@@ -1,8 +1,6 @@
 !> All sectors at once: what is observed in each of them, and the work of their load, wave by wave.
 submodule(fw_all_sectors) fw_all_sectors_observed
-   use fw_sector_stiffness, only: observed_sector_slope
-   use fw_sector_stiffness, only: recover_sector
-   use fw_sector_stiffness, only: work_of_sector
+   use fw_sector_stiffness, only: observed_sector_slope, recover_sector, work_of_sector
    implicit none (type, external)
 
 contains

@@ -3,18 +3,14 @@
 module fw_condensed_structure
    use fw_kinds, only: wp
    use fw_complex_form, only: coefficients_of
-   use fw_field_slopes, only: follow_frequency
-   use fw_field_slopes, only: work_of_load
+   use fw_field_slopes, only: follow_frequency, work_of_load
    use fw_formed_stiffness, only: harmonic_load
    use fw_plain_slopes, only: recover_modes
-   use fw_real_products, only: harmonic_factors
-   use fw_real_products, only: real_products
+   use fw_real_products, only: harmonic_factors, real_products
    use fw_reduction, only: reduction_type
    use fw_split, only: split_coordinate
-   use fw_structure_operator, only: structure_operator
-   use fw_structure_operator, only: structure_state
-   use fw_whole_field, only: complete_harmonic
-   use fw_whole_field, only: condense_harmonic
+   use fw_structure_operator, only: structure_operator, structure_state
+   use fw_whole_field, only: complete_harmonic, condense_harmonic
    implicit none (type, external)
    private
 

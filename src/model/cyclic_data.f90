@@ -4,8 +4,7 @@
 !> to sector the factor z = exp(-2 pi i k/n_sectors).
 module fw_cyclic_data
    use, intrinsic :: iso_fortran_env, only: int64
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_load_waves, only: load_waves
    implicit none (type, external)
    private

@@ -1,10 +1,8 @@
 !> The keys of group &cyclic.
 module fw_cyclic_keys
    use fw_cyclic_data, only: cyclic_type
-   use fw_key, only: key
-   use fw_key, only: key_visitor
-   use fw_key_range, only: dof_numbers
-   use fw_key_range, only: from_to
+   use fw_key, only: key, key_visitor
+   use fw_key_range, only: dof_numbers, from_to
    implicit none (type, external)
    private
 

@@ -9,8 +9,7 @@ module fw_cyclic_relative
    use fw_model, only: model_type
    use fw_relative, only: relative_type
    use fw_sector, only: sector_rows
-   use fw_sector_relative, only: new_sector_relative
-   use fw_sector_relative, only: sector_relative
+   use fw_sector_relative, only: new_sector_relative, sector_relative
    implicit none (type, external)
    private
 

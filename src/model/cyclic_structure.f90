@@ -3,30 +3,20 @@
 !> every nodal diameter is that of a plain structure with Hermitian matrices; only one basis is kept
 !> for k and N - k, whose matrices are conjugates. Z_r is formed at each frequency.
 module fw_cyclic_structure
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
+   use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_cyclic_data, only: nodal_matrices
    use fw_cyclic_relative, only: cyclic_relative
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_formed_stiffness, only: formed_stiffness
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_sector, only: sector_at
    use fw_sector_means, only: sector_means
    use fw_sector_reduction, only: sector_reduction
-   use fw_sector_stiffness, only: derive_sector
-   use fw_sector_stiffness, only: form_sector
-   use fw_sector_stiffness, only: harmonic_point
-   use fw_sector_stiffness, only: observed_sector_slope
-   use fw_sector_stiffness, only: recover_sector
-   use fw_sector_stiffness, only: slopes_of
-   use fw_sector_stiffness, only: work_of_sector
-   use fw_structure_operator, only: by_frequency
-   use fw_structure_operator, only: lay_out_coefficients
-   use fw_structure_operator, only: structure_operator
-   use fw_structure_operator, only: structure_state
+   use fw_sector_stiffness, only: derive_sector, form_sector, harmonic_point, &
+      observed_sector_slope, recover_sector, slopes_of, work_of_sector
+   use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_operator, &
+      structure_state
    use fw_text, only: to_text
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)

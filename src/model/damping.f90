@@ -7,12 +7,7 @@
 module fw_damping
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dpocon
-   use fw_lapack, only: dpotrf
-   use fw_lapack, only: dsygst
-   use fw_lapack, only: dsyrk
-   use fw_lapack, only: dtrmm
+   use fw_lapack, only: dgemm, dpocon, dpotrf, dsygst, dsyrk, dtrmm
    use fw_linalg, only: diagonalize
    implicit none (type, external)
    private

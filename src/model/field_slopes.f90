@@ -4,8 +4,7 @@
 !>   x = D^-1 (F_i - Z_iq q),    x' = D^-1 (F_i' - Z_iq' q - D' x),
 !>   F^H u = F_q^H q + F_i^H x,  of which the row by q is F_q^H - F_i^H D^-1 Z_iq.
 module fw_field_slopes
-   use fw_formed_stiffness, only: harmonic_load
-   use fw_formed_stiffness, only: load_slope
+   use fw_formed_stiffness, only: harmonic_load, load_slope
    use fw_internal_block, only: internal_block
    use fw_kinds, only: wp
    use fw_reduction, only: reduction_type

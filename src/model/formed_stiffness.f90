@@ -1,20 +1,12 @@
 !> The condensed stiffness as complex matrices, one a harmonic: formed at a frequency, products by
 !> zgemv. For few coordinates, whose matrices stay in the cache, and for many internal modes.
 module fw_formed_stiffness
-   use fw_column_panels, only: multiply_panels
-   use fw_column_panels, only: pack_columns
-   use fw_column_panels, only: panel_count
-   use fw_column_panels, only: panel_height
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
-   use fw_condensed_group, only: condensed_group
-   use fw_condensed_group, only: lanes
+   use fw_column_panels, only: multiply_panels, pack_columns, panel_count, panel_height
+   use fw_complex_form, only: amplitudes_of, coefficients_of
+   use fw_condensed_group, only: condensed_group, lanes
    use fw_internal_block, only: internal_block
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: zgemm
-   use fw_lapack, only: zgemv
+   use fw_kinds, only: sp, wp
+   use fw_lapack, only: dgemm, zgemm, zgemv
    use fw_load_waves, only: load_waves
    use fw_reduction, only: reduction_type
    use fw_threads, only: coordinates_for_threads

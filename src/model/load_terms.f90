@@ -6,12 +6,9 @@
 !> that divisor times the speed then.
 module fw_load_terms
    use fw_divisor, only: common_divisor
-   use fw_key, only: key
-   use fw_key, only: key_visitor
-   use fw_key_range, only: dof_numbers
-   use fw_key_range, only: from_to
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_key, only: key, key_visitor
+   use fw_key_range, only: dof_numbers, from_to
+   use fw_kinds, only: pi, wp
    use fw_load_waves, only: load_waves
    implicit none (type, external)
    private

@@ -1,10 +1,7 @@
 !> The keys of groups &model and &load.
 module fw_model_keys
-   use fw_key, only: key
-   use fw_key, only: key_type
-   use fw_key, only: key_visitor
-   use fw_key_range, only: at_least
-   use fw_key_range, only: from_to
+   use fw_key, only: key, key_type, key_visitor
+   use fw_key_range, only: at_least, from_to
    use fw_kinds, only: wp
    implicit none (type, external)
    private

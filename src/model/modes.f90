@@ -2,9 +2,7 @@
 !> dofs, and a stiffness that holds the structure only in part, are no exceptions.
 module fw_modes
    use fw_kinds, only: wp
-   use fw_linalg, only: has_pivots
-   use fw_linalg, only: solve_symmetric_above
-   use fw_linalg, only: solve_symmetric_eigen
+   use fw_linalg, only: has_pivots, solve_symmetric_above, solve_symmetric_eigen
    implicit none (type, external)
    private
 

@@ -1,7 +1,6 @@
 !> What a sweep goes over in place of the frequency: a parameter of the case, at one frequency.
 module fw_parameter_sweep
-   use fw_key, only: key
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_visitor
    use fw_key_range, only: above
    use fw_kinds, only: wp
    use fw_parameters, only: parameter_words

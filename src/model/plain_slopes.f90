@@ -3,14 +3,11 @@
 !>
 !>   Z'_qq q + Z'_qi x - Z_qi D^-1 (Z'_iq q + D' x).
 module fw_plain_slopes
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
-   use fw_formed_stiffness, only: harmonic_load
-   use fw_formed_stiffness, only: load_slope
+   use fw_complex_form, only: amplitudes_of, coefficients_of
+   use fw_formed_stiffness, only: harmonic_load, load_slope
    use fw_internal_block, only: internal_block
    use fw_kinds, only: wp
-   use fw_real_products, only: harmonic_factors
-   use fw_real_products, only: real_products
+   use fw_real_products, only: harmonic_factors, real_products
    use fw_reduction, only: reduction_type
    use fw_structure_operator, only: by_frequency
    implicit none (type, external)

@@ -16,31 +16,18 @@
 !> once at each frequency (fw_formed_stiffness).
 module fw_plain_structure
    use fw_kinds, only: wp
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
-   use fw_condensed_structure, only: condensed_state
-   use fw_condensed_structure, only: condensed_structure
-   use fw_formed_stiffness, only: form_block
-   use fw_formed_stiffness, only: formed_stiffness
-   use fw_formed_stiffness, only: harmonic_load
-   use fw_dynamic_part, only: dynamic_part
-   use fw_dynamic_part, only: find_dynamic_part
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_complex_form, only: amplitudes_of, coefficients_of
+   use fw_condensed_structure, only: condensed_state, condensed_structure
+   use fw_formed_stiffness, only: form_block, formed_stiffness, harmonic_load
+   use fw_dynamic_part, only: dynamic_part, find_dynamic_part
    use fw_model, only: model_type
-   use fw_plain_slopes, only: derive
-   use fw_plain_slopes, only: derive_formed
-   use fw_plain_slopes, only: slopes_of
-   use fw_real_products, only: harmonic_factors
-   use fw_real_products, only: real_products
-   use fw_reduction, only: held_basis
-   use fw_reduction, only: new_reduction
+   use fw_plain_slopes, only: derive, derive_formed, slopes_of
+   use fw_real_products, only: harmonic_factors, real_products
+   use fw_reduction, only: held_basis, new_reduction
    use fw_relative, only: relative_type
    use fw_split_product, only: split_product
-   use fw_structure_operator, only: by_frequency
-   use fw_structure_operator, only: lay_out_coefficients
-   use fw_structure_operator, only: structure_state
+   use fw_structure_operator, only: by_frequency, lay_out_coefficients, structure_state
    use fw_text, only: to_text
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)

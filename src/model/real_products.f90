@@ -11,8 +11,7 @@
 !> is copied. Rows and columns in use are, when they are first asked for.
 module fw_real_products
    use fw_column_product, only: multiply_columns
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
+   use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_internal_block, only: internal_block
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm

@@ -3,17 +3,12 @@
 module fw_reduction
    use fw_kinds, only: wp
    use fw_load_waves, only: load_waves
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
+   use fw_error, only: error_type, fatal_error, status_input
    use fw_lapack, only: dgemm
-   use fw_linalg, only: diagonalize
-   use fw_linalg, only: has_pivots
-   use fw_linalg, only: solve_symmetric_eigen
+   use fw_linalg, only: diagonalize, has_pivots, solve_symmetric_eigen
    use fw_model, only: model_type
    use fw_relative, only: relative_type
-   use fw_sparse_rows, only: new_sparse_rows
-   use fw_sparse_rows, only: sparse_rows
+   use fw_sparse_rows, only: new_sparse_rows, sparse_rows
    implicit none (type, external)
    private
 

@@ -9,8 +9,7 @@ module fw_sector
    use fw_cyclic_data, only: nodal_matrices
    use fw_damping, only: add_modal_damping
    use fw_error, only: error_type
-   use fw_hermitian, only: complex_part
-   use fw_hermitian, only: real_form
+   use fw_hermitian, only: complex_part, real_form
    use fw_kinds, only: wp
    use fw_model, only: model_type
    implicit none (type, external)

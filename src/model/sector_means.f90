@@ -8,8 +8,7 @@ module fw_sector_means
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_sector, only: sector_at
-   use fw_sector_reduction, only: sector_reduction
-   use fw_sector_reduction, only: static_diagonal
+   use fw_sector_reduction, only: sector_reduction, static_diagonal
    use fw_sector_split, only: split_sector
    implicit none (type, external)
    private

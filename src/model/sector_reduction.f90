@@ -7,14 +7,8 @@
 !> of its own that nothing loads.
 module fw_sector_reduction
    use fw_cyclic_data, only: nodal_matrices
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_hermitian, only: cholesky
-   use fw_hermitian, only: congruence
-   use fw_hermitian, only: product_of
-   use fw_hermitian, only: is_regular
-   use fw_hermitian, only: solve_hermitian_eigen
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_hermitian, only: cholesky, congruence, product_of, is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_lapack, only: zpotrs
    use fw_load_waves, only: load_waves

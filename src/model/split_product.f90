@@ -1,19 +1,14 @@
 !> The product of a step of an iterative solver: Z_n v ~ K v + V S_n V^T v (fw_dynamic_part), of
 !> rows and columns in use. One real matrix in single precision, [K V], serves all harmonics.
 module fw_split_product
-   use fw_complex_form, only: amplitudes_of
-   use fw_complex_form, only: coefficients_of
+   use fw_complex_form, only: amplitudes_of, coefficients_of
    use fw_dynamic_part, only: dynamic_part
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
+   use fw_kinds, only: sp, wp
    use fw_lapack, only: dgemm
    use fw_real_products, only: harmonic_factors
    use fw_reduction, only: reduction_type
-   use fw_single_product, only: group_count
-   use fw_single_product, only: group_width
-   use fw_single_product, only: multiply_panels
-   use fw_single_product, only: panel_count
-   use fw_single_product, only: panel_height
+   use fw_single_product, only: group_count, group_width, multiply_panels, panel_count, &
+      panel_height
    use fw_threads, only: coordinates_for_threads
    implicit none (type, external)
    private

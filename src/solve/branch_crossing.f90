@@ -6,11 +6,9 @@
 !> sides all but touch and their tangents agree, are one curve. It ends well before the place
 !> itself, where dR/dx is singular and tangents are those of round-off.
 module fw_branch_crossing
-   use fw_branch_point, only: branch_point
-   use fw_branch_point, only: metric_type
+   use fw_branch_point, only: branch_point, metric_type
    use fw_branch_step, only: interpolate
-   use fw_corrector, only: corrector_type
-   use fw_corrector, only: differ
+   use fw_corrector, only: corrector_type, differ
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_parameter_system, only: parameter_system

@@ -4,9 +4,7 @@
 module fw_branch_mark
    use fw_branch_point, only: branch_point
    use fw_branch_step, only: interpolate
-   use fw_corrector, only: branch_forcing
-   use fw_corrector, only: corrector_type
-   use fw_corrector, only: max_corrections
+   use fw_corrector, only: branch_forcing, corrector_type, max_corrections
    use fw_error, only: error_type
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp

@@ -6,8 +6,7 @@
 !> the turn that lies on their cubics, with the opposite tangent, is one of theirs.
 module fw_branch_retrace
    use fw_branch_mark, only: share_at
-   use fw_branch_point, only: branch_point
-   use fw_branch_point, only: metric_type
+   use fw_branch_point, only: branch_point, metric_type
    use fw_branch_step, only: interpolate
    use fw_corrector, only: corrector_type
    use fw_error, only: error_type

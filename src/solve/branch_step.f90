@@ -11,8 +11,7 @@
 !>
 !> Only what lies across the tangent counts: along it, errors are those of the parameter s.
 module fw_branch_step
-   use fw_branch_point, only: branch_point
-   use fw_branch_point, only: metric_type
+   use fw_branch_point, only: branch_point, metric_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private

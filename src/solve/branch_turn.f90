@@ -6,14 +6,11 @@
 !> constant along a branch of a piecewise smooth system, the sign of det(dR/dx) dp/ds (Allgower,
 !> Georg 1990, Numerical continuation methods, on piecewise linear ones).
 module fw_branch_turn
-   use fw_branch_point, only: branch_point
-   use fw_branch_point, only: reverse
-   use fw_corrector, only: corrector_type
-   use fw_corrector, only: differ
+   use fw_branch_point, only: branch_point, reverse
+   use fw_corrector, only: corrector_type, differ
    use fw_error, only: error_type
    use fw_kinds, only: wp
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_parameter_system, only: parameter_system
    implicit none (type, external)
    private

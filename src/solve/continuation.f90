@@ -2,22 +2,15 @@
 !> steps (fw_predictor_corrector) one after the other, folds and bounds located on the way, and what
 !> is tried where no step counts.
 module fw_continuation
-   use fw_branch_mark, only: find_fold
-   use fw_branch_mark, only: land
+   use fw_branch_mark, only: find_fold, land
    use fw_branch_point, only: branch_point
    use fw_branch_retrace, only: branch_trail
-   use fw_branch_turn, only: all_around
-   use fw_branch_turn, only: far_ahead
-   use fw_branch_turn, only: leap
-   use fw_branch_turn, only: only_ahead
+   use fw_branch_turn, only: all_around, far_ahead, leap, only_ahead
    use fw_branch_way, only: branch_way
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_parameter_system, only: parameter_system
-   use fw_predictor_corrector, only: bifurcation
-   use fw_predictor_corrector, only: corner
-   use fw_predictor_corrector, only: predictor_corrector
-   use fw_predictor_corrector, only: turning
+   use fw_predictor_corrector, only: bifurcation, corner, predictor_corrector, turning
    use fw_solver_options, only: solver_options
    use fw_text, only: to_text
    implicit none (type, external)

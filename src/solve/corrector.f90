@@ -9,21 +9,17 @@
 module fw_corrector
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_bordered, only: bordered_type
-   use fw_branch_point, only: branch_point
-   use fw_branch_point, only: metric_type
+   use fw_branch_point, only: branch_point, metric_type
    use fw_branch_view, only: branch_view
    use fw_error, only: error_type
    use fw_interrupt, only: stop_run
    use fw_kinds, only: wp
    use fw_linalg, only: lu_type
    use fw_linear_step, only: linear_step_type
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_parameter_system, only: parameter_system
    use fw_plane_system, only: plane_system
-   use fw_solver_options, only: linear_auto
-   use fw_solver_options, only: linear_lu
-   use fw_solver_options, only: solver_options
+   use fw_solver_options, only: linear_auto, linear_lu, solver_options
    implicit none (type, external)
    private
 

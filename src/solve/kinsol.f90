@@ -3,48 +3,20 @@
 !> after Eisenstat and Walker (1996).
 module fw_kinsol
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_funloc
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_long
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use fkinsol_mod, only: fkincreate
-   use fkinsol_mod, only: fkinfree
-   use fkinsol_mod, only: fkingetnumliniters
-   use fkinsol_mod, only: fkingetnumnonlinsolviters
-   use fkinsol_mod, only: fkininit
-   use fkinsol_mod, only: fkinseterrhandlerfn
-   use fkinsol_mod, only: fkinsetfuncnormtol
-   use fkinsol_mod, only: fkinsetjactimesvecfn
-   use fkinsol_mod, only: fkinsetmaxnewtonstep
-   use fkinsol_mod, only: fkinsetmaxsetupcalls
-   use fkinsol_mod, only: fkinsetnummaxiters
-   use fkinsol_mod, only: fkinsetpreconditioner
-   use fkinsol_mod, only: fkinsetscaledsteptol
-   use fkinsol_mod, only: fkinsetuserdata
-   use fkinsol_mod, only: fkinsol
-   use fkinsol_mod, only: kin_linesearch
-   use fsundials_linearsolver_mod, only: fsunlinsolfree
-   use fsundials_linearsolver_mod, only: sun_prec_right
-   use fsundials_linearsolver_mod, only: sunlinearsolver
+   use, intrinsic :: iso_c_binding, only: c_associated, c_f_pointer, c_funloc, c_int, c_loc, &
+      c_long, c_null_ptr, c_ptr
+   use fkinsol_mod, only: fkincreate, fkinfree, fkingetnumliniters, fkingetnumnonlinsolviters, &
+      fkininit, fkinseterrhandlerfn, fkinsetfuncnormtol, fkinsetjactimesvecfn, &
+      fkinsetmaxnewtonstep, fkinsetmaxsetupcalls, fkinsetnummaxiters, fkinsetpreconditioner, &
+      fkinsetscaledsteptol, fkinsetuserdata, fkinsol, kin_linesearch
+   use fsundials_linearsolver_mod, only: fsunlinsolfree, sun_prec_right, sunlinearsolver
    use fsundials_nvector_mod, only: n_vector
-   use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr
-   use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmrsetmaxrestarts
+   use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr, fsunlinsol_spgmrsetmaxrestarts
    use fw_kinds, only: wp
    use fw_newton, only: solver_report
    use fw_solver_options, only: solver_options
-   use fw_sundials, only: callback_fatal
-   use fw_sundials, only: callback_ok
-   use fw_sundials, only: callback_smaller
-   use fw_sundials, only: close_context
-   use fw_sundials, only: ignore_message
-   use fw_sundials, only: open_context
-   use fw_sundials, only: release
-   use fw_sundials, only: values
-   use fw_sundials, only: wrap
+   use fw_sundials, only: callback_fatal, callback_ok, callback_smaller, close_context, &
+      ignore_message, open_context, release, values, wrap
    use fw_system, only: nonlinear_system
    implicit none (type, external)
    private

@@ -5,9 +5,7 @@ module fw_linear_step
    use fw_kinds, only: wp
    use fw_krylov, only: gmres_type
    use fw_linalg, only: lu_type
-   use fw_solver_options, only: linear_auto
-   use fw_solver_options, only: linear_lu
-   use fw_solver_options, only: linear_krylov
+   use fw_solver_options, only: linear_auto, linear_lu, linear_krylov
    use fw_system, only: nonlinear_system
    implicit none (type, external)
    private

@@ -1,8 +1,7 @@
 !> Newton's method with a backtracking line search, for systems that are only piecewise smooth.
 module fw_newton
    use fw_kinds, only: wp
-   use fw_norm, only: is_finite
-   use fw_norm, only: norm_of
+   use fw_norm, only: is_finite, norm_of
    use fw_linear_step, only: linear_step_type
    use fw_solver_options, only: solver_options
    use fw_system, only: nonlinear_system

@@ -1,13 +1,8 @@
 !> Options of the nonlinear solvers. Defaults live here and nowhere else; the words are those
 !> of the namelist, in the order of the constants.
 module fw_solver_options
-   use fw_key, only: key
-   use fw_key, only: key_visitor
-   use fw_key_range, only: above
-   use fw_key_range, only: at_least
-   use fw_key_range, only: below
-   use fw_key_range, only: operator(.and.)
-   use fw_key_range, only: range_type
+   use fw_key, only: key, key_visitor
+   use fw_key_range, only: above, at_least, below, operator(.and.), range_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private

@@ -8,18 +8,11 @@
 !> a corner (fw_branch_turn).
 module fw_predictor_corrector
    use fw_branch_crossing, only: goes_through
-   use fw_branch_point, only: branch_point
-   use fw_branch_point, only: reverse
-   use fw_branch_step, only: allowed_error
-   use fw_branch_step, only: extrapolate
-   use fw_branch_step, only: interpolate
-   use fw_branch_step, only: missed
-   use fw_branch_step, only: misses_of
-   use fw_branch_step, only: step_history
-   use fw_branch_step, only: turns_between
+   use fw_branch_point, only: branch_point, reverse
+   use fw_branch_step, only: allowed_error, extrapolate, interpolate, missed, misses_of, &
+      step_history, turns_between
    use fw_branch_turn, only: turn_at_corner
-   use fw_corrector, only: corrector_type
-   use fw_corrector, only: differ
+   use fw_corrector, only: corrector_type, differ
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_near_response, only: near_response

@@ -4,54 +4,23 @@
 !> iterations do, the system's own preconditioner where it is large.
 module fw_pseudo_bdf
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_double
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_funloc
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_long
-   use, intrinsic :: iso_c_binding, only: c_null_funptr
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use fcvode_mod, only: cv_bdf
-   use fcvode_mod, only: cv_one_step
-   use fcvode_mod, only: fcvode
-   use fcvode_mod, only: fcvodecreate
-   use fcvode_mod, only: fcvodefree
-   use fcvode_mod, only: fcvodegetcurrentstep
-   use fcvode_mod, only: fcvodegetlastorder
-   use fcvode_mod, only: fcvodegetnumerrtestfails
-   use fcvode_mod, only: fcvodegetnumnonlinsolvconvfails
-   use fcvode_mod, only: fcvodegetnumnonlinsolviters
-   use fcvode_mod, only: fcvodeinit
-   use fcvode_mod, only: fcvodeseterrhandlerfn
-   use fcvode_mod, only: fcvodesetinitstep
-   use fcvode_mod, only: fcvodesetjactimes
-   use fcvode_mod, only: fcvodesetmaxord
-   use fcvode_mod, only: fcvodesetpreconditioner
-   use fcvode_mod, only: fcvodesetstablimdet
-   use fcvode_mod, only: fcvodesetstoptime
-   use fcvode_mod, only: fcvodesetuserdata
-   use fcvode_mod, only: fcvodewftolerances
-   use fsundials_linearsolver_mod, only: fsunlinsolfree
-   use fsundials_linearsolver_mod, only: sun_prec_left
-   use fsundials_linearsolver_mod, only: sunlinearsolver
+   use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_funloc, c_int, &
+      c_loc, c_long, c_null_funptr, c_null_ptr, c_ptr
+   use fcvode_mod, only: cv_bdf, cv_one_step, fcvode, fcvodecreate, fcvodefree, &
+      fcvodegetcurrentstep, fcvodegetlastorder, fcvodegetnumerrtestfails, &
+      fcvodegetnumnonlinsolvconvfails, fcvodegetnumnonlinsolviters, fcvodeinit, &
+      fcvodeseterrhandlerfn, fcvodesetinitstep, fcvodesetjactimes, fcvodesetmaxord, &
+      fcvodesetpreconditioner, fcvodesetstablimdet, fcvodesetstoptime, fcvodesetuserdata, &
+      fcvodewftolerances
+   use fsundials_linearsolver_mod, only: fsunlinsolfree, sun_prec_left, sunlinearsolver
    use fsundials_nvector_mod, only: n_vector
    use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr
    use fw_kinds, only: wp
    use fw_pseudo_linear, only: shifted_linear
    use fw_pseudo_scheme, only: pseudo_scheme
    use fw_pseudo_system, only: pseudo_system
-   use fw_sundials, only: callback_fatal
-   use fw_sundials, only: callback_ok
-   use fw_sundials, only: callback_smaller
-   use fw_sundials, only: close_context
-   use fw_sundials, only: ignore_message
-   use fw_sundials, only: open_context
-   use fw_sundials, only: release
-   use fw_sundials, only: values
-   use fw_sundials, only: wrap
+   use fw_sundials, only: callback_fatal, callback_ok, callback_smaller, close_context, &
+      ignore_message, open_context, release, values, wrap
    use fw_text, only: to_text
    implicit none (type, external)
    private

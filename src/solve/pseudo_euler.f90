@@ -3,8 +3,7 @@
 !> matters, so that no error is estimated.
 module fw_pseudo_euler
    use fw_kinds, only: wp
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_pseudo_scheme, only: pseudo_scheme
    use fw_pseudo_system, only: pseudo_system
    implicit none (type, external)

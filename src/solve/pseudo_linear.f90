@@ -6,8 +6,7 @@ module fw_pseudo_linear
    use fw_linear_step, only: lu_up_to
    use fw_linalg, only: lu_type
    use fw_pseudo_system, only: pseudo_system
-   use fw_solver_options, only: linear_auto
-   use fw_solver_options, only: linear_lu
+   use fw_solver_options, only: linear_auto, linear_lu
    implicit none (type, external)
    private
 

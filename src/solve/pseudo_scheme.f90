@@ -4,8 +4,7 @@ module fw_pseudo_scheme
    use fw_kinds, only: wp
    use fw_linear_step, only: linear_step_type
    use fw_pseudo_system, only: pseudo_system
-   use fw_solver_options, only: pseudo_time_options
-   use fw_solver_options, only: solver_options
+   use fw_solver_options, only: pseudo_time_options, solver_options
    implicit none (type, external)
    private
 

@@ -6,20 +6,15 @@
 module fw_pseudo_time
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_pseudo_bdf, only: bdf_scheme
    use fw_pseudo_euler, only: euler_scheme
    use fw_pseudo_rosenbrock, only: rosenbrock_scheme
    use fw_pseudo_runge_kutta, only: runge_kutta_scheme
-   use fw_pseudo_scheme, only: estimate_scales
-   use fw_pseudo_scheme, only: pseudo_scheme
+   use fw_pseudo_scheme, only: estimate_scales, pseudo_scheme
    use fw_pseudo_system, only: pseudo_system
-   use fw_solver_options, only: pseudo_time_options
-   use fw_solver_options, only: scheme_bdf
-   use fw_solver_options, only: scheme_rosenbrock
-   use fw_solver_options, only: scheme_runge_kutta
-   use fw_solver_options, only: solver_options
+   use fw_solver_options, only: pseudo_time_options, scheme_bdf, scheme_rosenbrock, &
+      scheme_runge_kutta, solver_options
    use fw_text, only: to_text
    implicit none (type, external)
    private

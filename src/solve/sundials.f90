@@ -1,19 +1,10 @@
 !> What the solvers of SUNDIALS share: serial vectors over Fortran arrays, a context, silence.
 module fw_sundials
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_double
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_int64_t
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
+   use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_int64_t, &
+      c_loc, c_null_ptr, c_ptr
    use fnvector_serial_mod, only: fn_vmake_serial
-   use fsundials_context_mod, only: fsuncontext_create
-   use fsundials_context_mod, only: fsuncontext_free
-   use fsundials_nvector_mod, only: fn_vdestroy
-   use fsundials_nvector_mod, only: fn_vgetarraypointer
-   use fsundials_nvector_mod, only: n_vector
+   use fsundials_context_mod, only: fsuncontext_create, fsuncontext_free
+   use fsundials_nvector_mod, only: fn_vdestroy, fn_vgetarraypointer, n_vector
    use fw_kinds, only: wp
    implicit none (type, external)
    private

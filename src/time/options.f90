@@ -1,7 +1,6 @@
 !> Options of time integration (group &time). Defaults live here and nowhere else.
 module fw_time_options
-   use fw_key, only: key
-   use fw_key, only: key_visitor
+   use fw_key, only: key, key_visitor
    use fw_key_range, only: at_least
    implicit none (type, external)
    private

@@ -1,7 +1,6 @@
 !> What is kept of one period: samples at the starts of its steps and means over them.
 module fw_period_record
-   use fw_kinds, only: wp
-   use fw_kinds, only: pi
+   use fw_kinds, only: wp, pi
    implicit none (type, external)
    private
 

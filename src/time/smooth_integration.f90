@@ -3,47 +3,23 @@
 !> uniform instants from its dense output. For structures with a regular mass whose highest
 !> frequency is not far above that of the load; others go through fw_time_stepper.
 module fw_smooth_integration
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_double
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_funloc
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_long
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use fcvode_mod, only: cv_adams
-   use fcvode_mod, only: cv_normal
-   use fcvode_mod, only: fcvode
-   use fcvode_mod, only: fcvodecreate
-   use fcvode_mod, only: fcvodefree
-   use fcvode_mod, only: fcvodeinit
-   use fcvode_mod, only: fcvodeseterrfile
-   use fcvode_mod, only: fcvodesetlinearsolver
-   use fcvode_mod, only: fcvodesetmaxnumsteps
-   use fcvode_mod, only: fcvodesetstoptime
-   use fcvode_mod, only: fcvodesetuserdata
-   use fcvode_mod, only: fcvodesstolerances
+   use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_funloc, c_int, &
+      c_loc, c_long, c_null_ptr, c_ptr
+   use fcvode_mod, only: cv_adams, cv_normal, fcvode, fcvodecreate, fcvodefree, fcvodeinit, &
+      fcvodeseterrfile, fcvodesetlinearsolver, fcvodesetmaxnumsteps, fcvodesetstoptime, &
+      fcvodesetuserdata, fcvodesstolerances
    use fnvector_serial_mod, only: fn_vmake_serial
-   use fsundials_context_mod, only: fsuncontext_create
-   use fsundials_context_mod, only: fsuncontext_free
-   use fsundials_linearsolver_mod, only: fsunlinsolfree
-   use fsundials_linearsolver_mod, only: sunlinearsolver
-   use fsundials_matrix_mod, only: fsunmatdestroy
-   use fsundials_matrix_mod, only: sunmatrix
-   use fsundials_nvector_mod, only: fn_vdestroy
-   use fsundials_nvector_mod, only: fn_vgetarraypointer
-   use fsundials_nvector_mod, only: n_vector
+   use fsundials_context_mod, only: fsuncontext_create, fsuncontext_free
+   use fsundials_linearsolver_mod, only: fsunlinsolfree, sunlinearsolver
+   use fsundials_matrix_mod, only: fsunmatdestroy, sunmatrix
+   use fsundials_nvector_mod, only: fn_vdestroy, fn_vgetarraypointer, n_vector
    use fsunlinsol_dense_mod, only: fsunlinsol_dense
    use fsunmatrix_dense_mod, only: fsundensematrix
    use fw_interrupt, only: must_end
-   use fw_kinds, only: i8
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: i8, pi, wp
    use fw_linalg, only: lu_type
    use fw_load_waves, only: load_waves
-   use fw_period_record, only: new_period_record
-   use fw_period_record, only: period_record
+   use fw_period_record, only: new_period_record, period_record
    use fw_periodic_state, only: period_map
    use fw_time_structure, only: time_structure
    implicit none (type, external)

@@ -12,11 +12,8 @@
 !> directions see the rate d/h.
 module fw_step_operator
    use fw_kinds, only: wp
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_input
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dgemv
+   use fw_error, only: error_type, fatal_error, status_input
+   use fw_lapack, only: dgemm, dgemv
    use fw_linalg, only: lu_type
    use fw_time_structure, only: time_structure
    implicit none (type, external)

@@ -7,13 +7,9 @@
 !> an orthogonal projection and follow the others without inertia.
 module fw_time_structure
    use fw_kinds, only: wp
-   use fw_contact_data, only: contact_type
-   use fw_contact_data, only: spring_type
-   use fw_error, only: error_type
-   use fw_error, only: fatal_error
-   use fw_error, only: status_failure
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dsyevd
+   use fw_contact_data, only: contact_type, spring_type
+   use fw_error, only: error_type, fatal_error, status_failure
+   use fw_lapack, only: dgemm, dsyevd
    use fw_laws, only: new_law
    use fw_load_waves, only: load_waves
    use fw_model, only: model_type

@@ -1,23 +1,16 @@
 !> Periodic response by integration in time, with the method that the structure needs: the
 !> reference for harmonic balance on the same model, contact laws and loads.
 module fw_time_solution
-   use fw_interrupt, only: interrupt_type
-   use fw_interrupt, only: stop_run
+   use fw_interrupt, only: interrupt_type, stop_run
    use fw_kinds, only: wp
    use fw_error, only: error_type
-   use fw_period_record, only: averaged_coefficients
-   use fw_period_record, only: largest_sample
-   use fw_period_record, only: period_record
-   use fw_period_record, only: sampled_coefficients
-   use fw_periodic_state, only: find_periodic_state
-   use fw_periodic_state, only: periodic_report
+   use fw_period_record, only: averaged_coefficients, largest_sample, period_record, &
+      sampled_coefficients
+   use fw_periodic_state, only: find_periodic_state, periodic_report
    use fw_point, only: point_type
-   use fw_smooth_integration, only: is_smooth
-   use fw_smooth_integration, only: new_smooth_integration
-   use fw_smooth_integration, only: smooth_integration
+   use fw_smooth_integration, only: is_smooth, new_smooth_integration, smooth_integration
    use fw_time_options, only: time_options
-   use fw_time_stepper, only: new_time_stepper
-   use fw_time_stepper, only: time_stepper
+   use fw_time_stepper, only: new_time_stepper, time_stepper
    use fw_time_structure, only: time_structure
    implicit none (type, external)
    private

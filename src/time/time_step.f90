@@ -1,8 +1,6 @@
 !> The step of fw_time_stepper: contact problem, changes of state, update and record.
 submodule(fw_time_stepper) fw_time_step
-   use fw_contact_step, only: state_open
-   use fw_contact_step, only: state_slip
-   use fw_contact_step, only: state_stick
+   use fw_contact_step, only: state_open, state_slip, state_stick
    use fw_lapack, only: dgemv
    implicit none (type, external)
 

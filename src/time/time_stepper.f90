@@ -15,16 +15,12 @@
 !> nodes may chatter; impacts on contact with mass are plastic by assumption.
 module fw_time_stepper
    use fw_interrupt, only: must_end
-   use fw_kinds, only: wp
-   use fw_kinds, only: pi
-   use fw_contact_step, only: contact_problem
-   use fw_contact_step, only: new_contact_problem
+   use fw_kinds, only: wp, pi
+   use fw_contact_step, only: contact_problem, new_contact_problem
    use fw_error, only: error_type
-   use fw_period_record, only: new_period_record
-   use fw_period_record, only: period_record
+   use fw_period_record, only: new_period_record, period_record
    use fw_periodic_state, only: period_map
-   use fw_step_operator, only: new_step_operator
-   use fw_step_operator, only: step_operator
+   use fw_step_operator, only: new_step_operator, step_operator
    use fw_time_structure, only: time_structure
    implicit none (type, external)
    private

@@ -14,8 +14,7 @@ module fw_resonance
    use fw_point, only: point_type
    use fw_recovery, only: recover_point
    use fw_wear_options, only: follow_range
-   use fw_wear_step, only: wear_state
-   use fw_wear_step, only: wear_stepper
+   use fw_wear_step, only: wear_state, wear_stepper
    use fw_wear_system, only: wear_system
    implicit none (type, external)
    private

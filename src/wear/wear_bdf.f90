@@ -8,50 +8,20 @@
 !> depths; the vibration follows them.
 module fw_wear_bdf
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode
-   use, intrinsic :: ieee_exceptions, only: ieee_set_flag
-   use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode
-   use, intrinsic :: ieee_exceptions, only: ieee_usual
-   use, intrinsic :: iso_c_binding, only: c_associated
-   use, intrinsic :: iso_c_binding, only: c_double
-   use, intrinsic :: iso_c_binding, only: c_f_pointer
-   use, intrinsic :: iso_c_binding, only: c_funloc
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_loc
-   use, intrinsic :: iso_c_binding, only: c_long
-   use, intrinsic :: iso_c_binding, only: c_null_ptr
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use fida_mod, only: fidacreate
-   use fida_mod, only: fidafree
-   use fida_mod, only: fidagetnumprecsolves
-   use fida_mod, only: fidainit
-   use fida_mod, only: fidaseterrhandlerfn
-   use fida_mod, only: fidasetid
-   use fida_mod, only: fidasetinitstep
-   use fida_mod, only: fidasetmaxstep
-   use fida_mod, only: fidasetpreconditioner
-   use fida_mod, only: fidasetstoptime
-   use fida_mod, only: fidasetsuppressalg
-   use fida_mod, only: fidasetuserdata
-   use fida_mod, only: fidasolve
-   use fida_mod, only: fidawftolerances
-   use fida_mod, only: ida_one_step
-   use fsundials_linearsolver_mod, only: fsunlinsolfree
-   use fsundials_linearsolver_mod, only: sun_prec_left
-   use fsundials_linearsolver_mod, only: sunlinearsolver
+   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_set_flag, &
+      ieee_set_halting_mode, ieee_usual
+   use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_funloc, c_int, &
+      c_loc, c_long, c_null_ptr, c_ptr
+   use fida_mod, only: fidacreate, fidafree, fidagetnumprecsolves, fidainit, fidaseterrhandlerfn, &
+      fidasetid, fidasetinitstep, fidasetmaxstep, fidasetpreconditioner, fidasetstoptime, &
+      fidasetsuppressalg, fidasetuserdata, fidasolve, fidawftolerances, ida_one_step
+   use fsundials_linearsolver_mod, only: fsunlinsolfree, sun_prec_left, sunlinearsolver
    use fsundials_nvector_mod, only: n_vector
    use fsunlinsol_spgmr_mod, only: fsunlinsol_spgmr
    use fw_kinds, only: wp
    use fw_linear_step, only: linear_step_type
-   use fw_sundials, only: callback_fatal
-   use fw_sundials, only: callback_ok
-   use fw_sundials, only: callback_smaller
-   use fw_sundials, only: close_context
-   use fw_sundials, only: ignore_message
-   use fw_sundials, only: open_context
-   use fw_sundials, only: release
-   use fw_sundials, only: values
-   use fw_sundials, only: wrap
+   use fw_sundials, only: callback_fatal, callback_ok, callback_smaller, close_context, &
+      ignore_message, open_context, release, values, wrap
    use fw_wear_system, only: wear_system
    implicit none (type, external)
    private

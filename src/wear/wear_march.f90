@@ -20,12 +20,8 @@ module fw_wear_march
    use fw_solver_options, only: scheme_bdf
    use fw_text, only: to_text
    use fw_wear_bdf, only: bdf_integrator
-   use fw_wear_options, only: wear_explicit
-   use fw_wear_options, only: wear_options
-   use fw_wear_options, only: wear_pseudo_time
-   use fw_wear_step, only: wear_state
-   use fw_wear_step, only: wear_step_report
-   use fw_wear_step, only: wear_stepper
+   use fw_wear_options, only: wear_explicit, wear_options, wear_pseudo_time
+   use fw_wear_step, only: wear_state, wear_step_report, wear_stepper
    use fw_wear_system, only: wear_system
    use fw_wear_touch, only: touch_guard
    use fw_newton, only: solver_report

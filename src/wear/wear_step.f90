@@ -3,18 +3,12 @@
 module fw_wear_step
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use fw_kinds, only: wp
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
-   use fw_newton, only: tight_forcing
+   use fw_newton, only: newton_solver, solver_report, tight_forcing
    use fw_solver_options, only: scheme_rosenbrock
-   use fw_wear_rosenbrock, only: rosenbrock_order
-   use fw_wear_rosenbrock, only: rosenbrock_step
-   use fw_wear_options, only: wear_explicit
-   use fw_wear_options, only: wear_options
-   use fw_wear_options, only: wear_pseudo_time
+   use fw_wear_rosenbrock, only: rosenbrock_order, rosenbrock_step
+   use fw_wear_options, only: wear_explicit, wear_options, wear_pseudo_time
    use fw_wear_system, only: wear_system
-   use fw_wear_tableau, only: new_tableau
-   use fw_wear_tableau, only: tableau_type
+   use fw_wear_tableau, only: new_tableau, tableau_type
    implicit none (type, external)
    private
 

@@ -27,10 +27,8 @@ module fw_wear_system
    use fw_balance_state, only: balance_state
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type
-   use fw_force_law, only: pair_mixed
-   use fw_force_law, only: pair_stuck
-   use fw_kinds, only: i8
-   use fw_kinds, only: wp
+   use fw_force_law, only: pair_mixed, pair_stuck
+   use fw_kinds, only: i8, wp
    use fw_lapack, only: dgemm
    use fw_tall_product, only: multiply_transposed
    implicit none (type, external)

@@ -8,10 +8,7 @@
 !> The program ends with status 1 where one of them does not hold.
 program closed_forms
    use, intrinsic :: iso_fortran_env, only: output_unit
-   use fretwear, only: error_type
-   use fretwear, only: session_type
-   use fretwear, only: silent_observer
-   use fretwear, only: wp
+   use fretwear, only: error_type, session_type, silent_observer, wp
    implicit none (type, external)
 
    real(wp), parameter :: pi = acos(-1.0_wp)

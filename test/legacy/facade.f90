@@ -2,8 +2,7 @@
 !>
 !>    facade sector_16.h5 out.txt
 module host_observer
-   use fretwear, only: observer_type
-   use fretwear, only: point_type
+   use fretwear, only: observer_type, point_type
    implicit none (type, external)
    private
 

@@ -1,7 +1,6 @@
 !> Small analytic systems for the tests of the solvers, written for obviousness.
 module small_systems
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan
-   use, intrinsic :: ieee_arithmetic, only: ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_kinds, only: wp
    use fw_pseudo_system, only: pseudo_system
    implicit none (type, external)

@@ -2,9 +2,7 @@
 module support_forces
    use fw_force_law, only: force_workspace
    use fw_fourier, only: fourier_type
-   use fw_friction, only: friction_room
-   use fw_friction, only: rigid_friction
-   use fw_friction, only: rigid_friction_of_rates
+   use fw_friction, only: friction_room, rigid_friction, rigid_friction_of_rates
    use fw_kinds, only: wp
    use fw_pair_law, only: pair_law
    implicit none (type, external)

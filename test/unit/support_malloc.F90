@@ -11,8 +11,7 @@
 #define NEXT '__libc_'
 #endif
 module support_malloc
-   use, intrinsic :: iso_c_binding, only: c_ptr
-   use, intrinsic :: iso_c_binding, only: c_size_t
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int64
    implicit none (type, external)
    private

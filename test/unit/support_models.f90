@@ -4,10 +4,8 @@ module support_models
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_kinds, only: wp
    use fw_laws, only: law_words
-   use fw_case, only: case_type
-   use fw_case, only: analysis_point
-   use fw_contact_data, only: contact_type
-   use fw_contact_data, only: spring_type
+   use fw_case, only: case_type, analysis_point
+   use fw_contact_data, only: contact_type, spring_type
    use fw_error, only: error_type
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state

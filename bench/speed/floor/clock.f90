@@ -1,7 +1,6 @@
 !> Processor time of the program: what other programs take of the processor does not count.
 module floor_clock
-   use, intrinsic :: iso_c_binding, only: c_int
-   use, intrinsic :: iso_c_binding, only: c_long
+   use, intrinsic :: iso_c_binding, only: c_int, c_long
    use fw_kinds, only: wp
    implicit none (type, external)
    private

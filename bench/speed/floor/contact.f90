@@ -1,20 +1,15 @@
 !> The arithmetic of the pairs that a sweep cannot do without, by the library's own kernels, alone:
 !> transforms and marches of a residual, derivatives of the marches and their products.
 module floor_contact
-   use floor_blas, only: sgemm
-   use floor_blas, only: sgemv
+   use floor_blas, only: sgemm, sgemv
    use floor_trace, only: snapshot_type
    use fw_balance_problem, only: balance_problem
-   use fw_correction, only: march_turn_1d
-   use fw_correction, only: march_turn_2d
+   use fw_correction, only: march_turn_1d, march_turn_2d
    use fw_fft, only: fft_type
    use fw_instant_sum, only: instant_sum
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dgemv
-   use fw_march_derivative, only: march_derivative
-   use fw_march_derivative, only: numbers_of_instant
+   use fw_kinds, only: sp, wp
+   use fw_lapack, only: dgemm, dgemv
+   use fw_march_derivative, only: march_derivative, numbers_of_instant
    use fw_sampled_turn, only: limit_is_unique
    use fw_two_directions, only: turn_derivative
    use fw_wave_sums, only: wave_table

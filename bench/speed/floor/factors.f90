@@ -2,18 +2,11 @@
 !> matrix a harmonic, or a real one for harmonic 0 and a complex one for all others with a part of
 !> low rank. By LAPACK, or by the kernels of the library that read packed factors.
 module floor_factors
-   use floor_blas, only: cgemv
-   use floor_blas, only: strsv
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
-   use fw_lapack, only: cgemm
-   use fw_lapack, only: cgetrf
-   use fw_lapack, only: ctrsm
-   use fw_lapack, only: ctrsv
-   use fw_lapack, only: sgetrf
+   use floor_blas, only: cgemv, strsv
+   use fw_kinds, only: sp, wp
+   use fw_lapack, only: cgemm, cgetrf, ctrsm, ctrsv, sgetrf
    use fw_linalg, only: complex_lu_type
-   use fw_panel_solve, only: group_width
-   use fw_panel_solve, only: panel_factors
+   use fw_panel_solve, only: group_width, panel_factors
    use fw_preconditioner_lu, only: preconditioner_lu_type
    implicit none (type, external)
    private

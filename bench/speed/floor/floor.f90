@@ -8,27 +8,18 @@
 !> comma-separated values for each part: its name, the number of calls, the processor time in the
 !> library and that of the floor [s].
 program floor
-   use, intrinsic :: iso_fortran_env, only: error_unit
-   use, intrinsic :: iso_fortran_env, only: output_unit
+   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use floor_clock, only: processor_time
-   use floor_replay, only: new_replay
-   use floor_replay, only: replay_type
-   use floor_system, only: measured_system
-   use floor_system, only: new_measured_system
-   use floor_trace, only: event_type
-   use floor_trace, only: n_parts
-   use floor_trace, only: part_guess
-   use floor_trace, only: part_names
-   use floor_trace, only: part_newton
-   use floor_trace, only: part_recover
+   use floor_replay, only: new_replay, replay_type
+   use floor_system, only: measured_system, new_measured_system
+   use floor_trace, only: event_type, n_parts, part_guess, part_names, part_newton, part_recover
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
    use fw_case, only: case_type
    use fw_error, only: error_type
    use fw_guess, only: stuck_guess
    use fw_kinds, only: wp
-   use fw_newton, only: newton_solver
-   use fw_newton, only: solver_report
+   use fw_newton, only: newton_solver, solver_report
    use fw_point, only: point_type
    use fw_problem, only: build_system
    use fw_read_case, only: read_case

@@ -4,29 +4,18 @@
 !>
 !> Entries are made up, but for the sizes: nothing here branches on them.
 module floor_matrices
-   use floor_blas, only: cgemv
-   use floor_blas, only: sgemm
-   use fw_column_panels, only: column_height => panel_height
-   use fw_column_panels, only: column_panels => panel_count
-   use fw_column_panels, only: multiply_column
+   use floor_blas, only: cgemv, sgemm
+   use fw_column_panels, only: column_height => panel_height, column_panels => panel_count, &
+      multiply_column
    use fw_column_product, only: multiply_columns
-   use fw_condensed_group, only: condensed_group
-   use fw_condensed_group, only: lanes
-   use fw_kinds, only: sp
-   use fw_kinds, only: wp
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dgemv
-   use fw_lapack, only: zgemm
-   use fw_lapack, only: zgemv
+   use fw_condensed_group, only: condensed_group, lanes
+   use fw_kinds, only: sp, wp
+   use fw_lapack, only: dgemm, dgemv, zgemm, zgemv
    use fw_linalg, only: complex_lu_type
    use fw_plain_structure, only: plain_structure
-   use fw_single_product, only: group_count
-   use fw_single_product, only: group_width
-   use fw_single_product, only: multiply_panels
-   use fw_single_product, only: panel_count
-   use fw_single_product, only: panel_height
-   use fw_tall_product, only: multiply_transposed
-   use fw_tall_product, only: subtract_product
+   use fw_single_product, only: group_count, group_width, multiply_panels, panel_count, &
+      panel_height
+   use fw_tall_product, only: multiply_transposed, subtract_product
    implicit none (type, external)
    private
 

@@ -5,18 +5,9 @@ module floor_replay
    use floor_factors, only: factor_kernels
    use floor_matrices, only: matrix_kernels
    use floor_system, only: measured_system
-   use floor_trace, only: event_type
-   use floor_trace, only: n_parts
-   use floor_trace, only: part_apply
-   use floor_trace, only: part_build
-   use floor_trace, only: part_condense
-   use floor_trace, only: part_linearize
-   use floor_trace, only: part_newton
-   use floor_trace, only: part_pinned
-   use floor_trace, only: part_precondition
-   use floor_trace, only: part_recover
-   use floor_trace, only: part_residual
-   use floor_trace, only: trace_type
+   use floor_trace, only: event_type, n_parts, part_apply, part_build, part_condense, &
+      part_linearize, part_newton, part_pinned, part_precondition, part_recover, part_residual, &
+      trace_type
    use fw_kinds, only: wp
    use fw_plain_structure, only: plain_structure
    implicit none (type, external)

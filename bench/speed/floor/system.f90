@@ -1,20 +1,9 @@
 !> A balance whose calls are timed and written down.
 module floor_system
-   use floor_clock, only: processor_time
-   use floor_clock, only: time_of_reading
-   use floor_trace, only: event_type
-   use floor_trace, only: n_parts
-   use floor_trace, only: part_apply
-   use floor_trace, only: part_build
-   use floor_trace, only: part_condense
-   use floor_trace, only: part_linearize
-   use floor_trace, only: part_newton
-   use floor_trace, only: part_pinned
-   use floor_trace, only: part_precondition
-   use floor_trace, only: part_residual
-   use floor_trace, only: trace_type
-   use fw_balance_state, only: balance_state
-   use fw_balance_state, only: new_balance_state
+   use floor_clock, only: processor_time, time_of_reading
+   use floor_trace, only: event_type, n_parts, part_apply, part_build, part_condense, &
+      part_linearize, part_newton, part_pinned, part_precondition, part_residual, trace_type
+   use fw_balance_state, only: balance_state, new_balance_state
    use fw_error, only: error_type
    use fw_force_law, only: pair_mixed
    use fw_kinds, only: wp

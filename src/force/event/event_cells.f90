@@ -3,13 +3,9 @@
 !> roots of N. They are the same for all pairs.
 module fw_event_cells
    use fw_event_polynomial, only: fill_waves
-   use fw_event_stages, only: cosine_and_sine
-   use fw_event_stages, only: n_points
-   use fw_event_stages, only: new_rule
-   use fw_event_stages, only: rule_type
+   use fw_event_stages, only: cosine_and_sine, n_points, new_rule, rule_type
    use fw_fourier, only: fourier_type
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

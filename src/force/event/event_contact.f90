@@ -4,15 +4,13 @@
 !> wave of the highest harmonic are enough. With two, steps of slip are as wide as their tolerance
 !> allows.
 module fw_event_contact
-   use fw_event_cells, only: cells_type
-   use fw_event_cells, only: new_cells
+   use fw_event_cells, only: cells_type, new_cells
    use fw_event_curves, only: curves_type
    use fw_event_pair, only: event_pair_type
    use fw_event_planar, only: planar_pair_type
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
-   use fw_lapack, only: dgemm
-   use fw_lapack, only: dgemv
+   use fw_lapack, only: dgemm, dgemv
    use fw_threads, only: pairs_for_threads
    implicit none (type, external)
    private

@@ -2,15 +2,9 @@
 !> |P - z|**2 - R**2, z being the position that it sticks at.
 module fw_event_exit
    use fw_event_cells, only: cells_type
-   use fw_event_motion, only: instant_type
-   use fw_event_motion, only: motion_type
-   use fw_event_motion, only: on_cone
-   use fw_event_motion, only: point_of
-   use fw_event_motion, only: stretch_type
-   use fw_event_segment, only: new_segment
-   use fw_event_segment, only: segment_type
-   use fw_event_slide, only: first_guess
-   use fw_event_slide, only: summit
+   use fw_event_motion, only: instant_type, motion_type, on_cone, point_of, stretch_type
+   use fw_event_segment, only: new_segment, segment_type
+   use fw_event_slide, only: first_guess, summit
    use fw_event_stages, only: n_points
    use fw_kinds, only: wp
    implicit none (type, external)

@@ -10,8 +10,7 @@
 !>
 !> Moments are stored for m = -2 degree..2 degree: C even, S odd.
 module fw_event_moments
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_wave_sums, only: add_wave_products
    implicit none (type, external)
    private

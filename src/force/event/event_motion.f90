@@ -2,8 +2,7 @@
 !> (2) and N = -y_n with two derivatives, R = mu N, at the points of the cells and at any angle.
 module fw_event_motion
    use fw_event_cells, only: cells_type
-   use fw_event_stages, only: cosine_and_sine
-   use fw_event_stages, only: n_points
+   use fw_event_stages, only: cosine_and_sine, n_points
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    implicit none (type, external)

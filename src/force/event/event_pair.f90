@@ -11,16 +11,9 @@
 module fw_event_pair
    use fw_event_curves, only: curves_type
    use fw_event_moments, only: moments_type
-   use fw_event_path, only: path_type
-   use fw_event_path, only: phase_backward
-   use fw_event_path, only: phase_forward
-   use fw_event_path, only: phase_open
-   use fw_event_path, only: phase_stick
-   use fw_event_polynomial, only: differentiate
-   use fw_event_polynomial, only: fill_waves
-   use fw_event_polynomial, only: value_of
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_event_path, only: path_type, phase_backward, phase_forward, phase_open, phase_stick
+   use fw_event_polynomial, only: differentiate, fill_waves, value_of
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

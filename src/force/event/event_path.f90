@@ -18,10 +18,8 @@
 module fw_event_path
    use fw_event_curves, only: curves_type
    use fw_event_polynomial, only: value_and_slope
-   use fw_event_roots, only: find_roots
-   use fw_event_roots, only: root_between
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_event_roots, only: find_roots, root_between
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

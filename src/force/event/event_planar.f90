@@ -10,18 +10,13 @@
 module fw_event_planar
    use fw_event_cells, only: cells_type
    use fw_event_motion, only: motion_type
-   use fw_event_planar_derivative, only: new_derivative
-   use fw_event_planar_derivative, only: planar_derivative_type
+   use fw_event_planar_derivative, only: new_derivative, planar_derivative_type
    use fw_event_planar_force, only: planar_force_type
    use fw_event_planar_path, only: planar_path_type
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
-   use fw_settling, only: invert
-   use fw_settling, only: period_map
-   use fw_settling, only: periodic_tolerance
-   use fw_settling, only: settle
-   use fw_settling, only: shakedown_turns
+   use fw_settling, only: invert, period_map, periodic_tolerance, settle, shakedown_turns
    implicit none (type, external)
    private
 

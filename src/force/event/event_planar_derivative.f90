@@ -5,24 +5,15 @@
 !>
 !>   dtheta = -(t.(dP - dz) - dR)/pull.
 module fw_event_planar_derivative
-   use fw_event_cells, only: cells_type
-   use fw_event_cells, only: instant_of
+   use fw_event_cells, only: cells_type, instant_of
    use fw_event_moments, only: moments_type
-   use fw_event_motion, only: instant_type
-   use fw_event_motion, only: motion_type
-   use fw_event_motion, only: stretch_type
+   use fw_event_motion, only: instant_type, motion_type, stretch_type
    use fw_event_planar_force, only: first_instant
-   use fw_event_planar_path, only: phase_slip
-   use fw_event_planar_path, only: phase_stick
-   use fw_event_planar_path, only: piece_type
-   use fw_event_planar_path, only: planar_path_type
-   use fw_event_planar_tangent, only: new_tangent
-   use fw_event_planar_tangent, only: tangent_type
+   use fw_event_planar_path, only: phase_slip, phase_stick, piece_type, planar_path_type
+   use fw_event_planar_tangent, only: new_tangent, tangent_type
    use fw_event_polynomial, only: fill_waves
    use fw_event_slide, only: pulls
-   use fw_event_stages, only: direction_of
-   use fw_event_stages, only: n_points
-   use fw_event_stages, only: n_stages
+   use fw_event_stages, only: direction_of, n_points, n_stages
    use fw_fourier, only: fourier_type
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm

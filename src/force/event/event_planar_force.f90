@@ -5,25 +5,14 @@
 !> In stick T = P - z, so that with the sets chi the coefficients are G(chi_stick) P less those of z
 !> on the sticks; in slip T = R t at the Gauss points; F_n = -G(chi_contact) N.
 module fw_event_planar_force
-   use fw_event_cells, only: cells_type
-   use fw_event_cells, only: instant_of
-   use fw_event_cells, only: waves_of_step
+   use fw_event_cells, only: cells_type, instant_of, waves_of_step
    use fw_event_moments, only: moments_type
-   use fw_event_motion, only: instant_type
-   use fw_event_motion, only: motion_type
-   use fw_event_motion, only: stretch_type
-   use fw_event_planar_path, only: phase_stick
-   use fw_event_planar_path, only: piece_type
-   use fw_event_planar_path, only: planar_path_type
+   use fw_event_motion, only: instant_type, motion_type, stretch_type
+   use fw_event_planar_path, only: phase_stick, piece_type, planar_path_type
    use fw_event_polynomial, only: fill_waves
    use fw_event_slide, only: pulls
-   use fw_event_stages, only: angle_at
-   use fw_event_stages, only: cosine_and_sine
-   use fw_event_stages, only: direction_of
-   use fw_event_stages, only: n_points
-   use fw_event_stages, only: n_stages
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_event_stages, only: angle_at, cosine_and_sine, direction_of, n_points, n_stages
+   use fw_kinds, only: pi, wp
    use fw_lapack, only: dgemm
    implicit none (type, external)
    private

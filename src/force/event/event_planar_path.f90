@@ -13,18 +13,12 @@
 !> the derivatives of z and phi by the position at the start of the turn.
 module fw_event_planar_path
    use fw_event_cells, only: cells_type
-   use fw_event_exit, only: find_exit
-   use fw_event_exit, only: is_pushed
-   use fw_event_motion, only: instant_type
-   use fw_event_motion, only: motion_type
-   use fw_event_motion, only: stretch_type
+   use fw_event_exit, only: find_exit, is_pushed
+   use fw_event_motion, only: instant_type, motion_type, stretch_type
    use fw_event_roots, only: find_roots
-   use fw_event_slide, only: slide_along
-   use fw_event_slide, only: slide_type
-   use fw_event_stages, only: direction_of
-   use fw_event_stages, only: n_points
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_event_slide, only: slide_along, slide_type
+   use fw_event_stages, only: direction_of, n_points
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

@@ -13,19 +13,11 @@
 !> Inputs are the coefficients of P_x, P_y and y_n = -N, and then the two components of z at the
 !> start of the turn.
 module fw_event_planar_tangent
-   use fw_event_cells, only: cells_type
-   use fw_event_cells, only: waves_at
-   use fw_event_cells, only: waves_of_step
-   use fw_event_motion, only: instant_type
-   use fw_event_motion, only: motion_type
-   use fw_event_motion, only: stretch_type
+   use fw_event_cells, only: cells_type, waves_at, waves_of_step
+   use fw_event_motion, only: instant_type, motion_type, stretch_type
    use fw_event_planar_path, only: piece_type
    use fw_event_slide, only: landing_slope
-   use fw_event_stages, only: cosine_and_sine
-   use fw_event_stages, only: direction_of
-   use fw_event_stages, only: n_points
-   use fw_event_stages, only: n_stages
-   use fw_event_stages, only: eliminate
+   use fw_event_stages, only: cosine_and_sine, direction_of, n_points, n_stages, eliminate
    use fw_kinds, only: wp
    implicit none (type, external)
    private

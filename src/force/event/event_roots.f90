@@ -8,8 +8,7 @@
 !> max|p| <= max|samples|/cos(pi degree/n) (Ehlich and Zeller 1964), and sum m**k (|c_m| + |s_m|).
 module fw_event_roots
    use fw_event_polynomial, only: value_and_slope
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

@@ -1,8 +1,7 @@
 !> The motion of a pair between two instants as the quintic through P, N and their two derivatives
 !> at both: the first guess of where stick ends between two points of a stretch.
 module fw_event_segment
-   use fw_event_motion, only: instant_type
-   use fw_event_motion, only: motion_type
+   use fw_event_motion, only: instant_type, motion_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private

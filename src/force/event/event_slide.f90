@@ -5,16 +5,9 @@
 !> z = P - R t no longer moves. At velocity level phi is the angle of P, and the pull |P| - R.
 module fw_event_slide
    use fw_event_cells, only: cells_type
-   use fw_event_motion, only: instant_type
-   use fw_event_motion, only: motion_type
-   use fw_event_motion, only: point_of
-   use fw_event_motion, only: stretch_type
-   use fw_event_stages, only: angle_at
-   use fw_event_stages, only: cosine_and_sine
-   use fw_event_stages, only: direction_of
-   use fw_event_stages, only: n_points
-   use fw_event_stages, only: solve_step
-   use fw_event_stages, only: stages_type
+   use fw_event_motion, only: instant_type, motion_type, point_of, stretch_type
+   use fw_event_stages, only: angle_at, cosine_and_sine, direction_of, n_points, solve_step, &
+      stages_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private

@@ -9,8 +9,7 @@
 !> Norsett, Wanner 1993, II.7). R may vanish: where a pair lands nothing is divided by it, and the
 !> polynomial follows the one solution that is smooth there.
 module fw_event_stages
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    implicit none (type, external)
    private
 

@@ -10,18 +10,12 @@
 module fw_oscillator_pair
    use fw_event_curves, only: curves_type
    use fw_event_pair, only: event_pair_type
-   use fw_event_path, only: phase_open
-   use fw_event_path, only: phase_stick
-   use fw_event_polynomial, only: differentiate
-   use fw_event_polynomial, only: fill_waves
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_event_path, only: phase_open, phase_stick
+   use fw_event_polynomial, only: differentiate, fill_waves
+   use fw_kinds, only: pi, wp
    use fw_oscillator, only: oscillator_type
    use fw_oscillator_search, only: wave_type
-   use fw_oscillator_turn, only: newton_step
-   use fw_oscillator_turn, only: side_of
-   use fw_oscillator_turn, only: turn_type
-   use fw_oscillator_turn, only: waves_type
+   use fw_oscillator_turn, only: newton_step, side_of, turn_type, waves_type
    implicit none (type, external)
    private
 

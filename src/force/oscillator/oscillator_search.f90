@@ -7,14 +7,8 @@
 !> bounded by its energy where a cell begins; cells without a certificate are halved.
 module fw_oscillator_search
    use fw_event_polynomial, only: value_and_slope
-   use fw_event_roots, only: bounds_type
-   use fw_event_roots, only: changes_sign
-   use fw_event_roots, only: keeps_sign
-   use fw_event_roots, only: knot_type
-   use fw_event_roots, only: monotone
-   use fw_event_roots, only: new_bounds
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_event_roots, only: bounds_type, changes_sign, keeps_sign, knot_type, monotone, new_bounds
+   use fw_kinds, only: pi, wp
    use fw_oscillator, only: oscillator_type
    implicit none (type, external)
    private

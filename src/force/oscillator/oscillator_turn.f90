@@ -6,17 +6,11 @@
 !> slips until x' = 0. There it sticks if |P - k x| <= Q and turns round if not. Stick ends where
 !> P - k x leaves -Q..Q. Angles where Q changes its sign are given.
 module fw_oscillator_turn
-   use fw_event_path, only: phase_backward
-   use fw_event_path, only: phase_forward
-   use fw_event_path, only: phase_open
-   use fw_event_path, only: phase_stick
+   use fw_event_path, only: phase_backward, phase_forward, phase_open, phase_stick
    use fw_event_polynomial, only: value_and_slope
-   use fw_kinds, only: pi
-   use fw_kinds, only: wp
+   use fw_kinds, only: pi, wp
    use fw_oscillator, only: oscillator_type
-   use fw_oscillator_search, only: first_root
-   use fw_oscillator_search, only: motion_type
-   use fw_oscillator_search, only: wave_type
+   use fw_oscillator_search, only: first_root, motion_type, wave_type
    implicit none (type, external)
    private
 
