@@ -5,6 +5,7 @@ module fw_frequency_response
    use fw_adaptive, only: adaptive_solver
    use fw_branch, only: branch_source
    use fw_bifurcation, only: bifurcation_list
+   use fw_bifurcation_group, only: bifurcation_group
    use fw_case, only: analysis_frf, analysis_time, case_type
    use fw_control_branch, only: control_branch
    use fw_controlled_response, only: controlled_response
@@ -13,6 +14,7 @@ module fw_frequency_response
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
    use fw_peak, only: peak_type
+   use fw_peak_group, only: peak_group
    use fw_peak_cycle, only: cycle_keeper
    use fw_peak_finder, only: peak_finder
    use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_peaks, remark_range, &
@@ -185,10 +187,13 @@ contains
       subroutine keep(list, n_solved, iterations)
          type(bifurcation_list), intent(in) :: list
          integer, intent(in) :: n_solved, iterations
+         type(bifurcation_group) :: group
 
          call summary%describe_bifurcations(list, n_solved, iterations)
-         call writer%add_bifurcations(list, case%harmonics%n_harmonics, case%model%unit_system, &
-                                      error, frequency_of(case))
+         group%list = list
+         group%n_harmonics = case%harmonics%n_harmonics
+         group%omega = frequency_of(case)
+         call writer%add(group, error)
       end subroutine keep
 
    end subroutine keep_bifurcations
@@ -239,6 +244,7 @@ contains
       type(summary_type), intent(inout) :: summary
       type(error_type), allocatable, intent(out) :: error
       type(peak_type), allocatable :: peaks(:)
+      type(peak_group) :: group
       type(point_type) :: highest
 
       if (case%over%is_wanted() .or. case%control%is_wanted()) return
@@ -259,8 +265,11 @@ contains
          call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
       end select
       call remark_peaks(peaks, case%model%observe_name, is_undamped(case), summary%remarks)
-      call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, &
-                            keeper%omega, keeper%cycle, error)
+      call move_alloc(peaks, group%peaks)
+      group%n_harmonics = case%harmonics%n_harmonics
+      group%omega = keeper%omega
+      if (allocated(keeper%cycle)) group%cycle = keeper%cycle
+      call writer%add(group, error)
    end subroutine find_peaks
 
    !> The one frequency of a sweep over another parameter [rad/s]; 0 where there is none.

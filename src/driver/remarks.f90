@@ -10,6 +10,7 @@ module fw_remarks
    use fw_laws, only: facts_of, law_under_accuracy, law_words, is_of_high_order
    use fw_parameters, only: modal_damping, rayleigh_mass, rayleigh_stiffness
    use fw_peak, only: found_bound, found_unresolved, peak_type
+   use fw_result_group, only: group_writer, result_group
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
@@ -25,14 +26,25 @@ module fw_remarks
    real(wp), parameter :: round_off = 1.0e-9_wp
 
    !> Names by which programs know remarks, and their texts.
-   type :: remark_list
+   type, extends(result_group) :: remark_list
       type(string_type), allocatable :: name(:), text(:)
    contains
+      procedure :: write => write_remarks
       procedure :: add
       procedure :: count => count_remarks
    end type remark_list
 
 contains
+
+   !> Nothing where there is none.
+   subroutine write_remarks(self, to)
+      class(remark_list), intent(in) :: self
+      type(group_writer), intent(inout) :: to
+
+      if (self%count() == 0) return
+      call to%put('/remarks/name', self%name)
+      call to%put('/remarks/text', self%text)
+   end subroutine write_remarks
 
    !> A name for programs and a text for people.
    subroutine add(self, name, text)

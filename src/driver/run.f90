@@ -115,9 +115,7 @@ contains
       outcome%status = state%status()
       outcome%out_of_time = observer%run_out
       call summary%remark_instants()
-      if (.not. allocated(error) .and. summary%remarks%count() > 0) then
-         call writer%add_remarks(summary%remarks%name, summary%remarks%text, error)
-      end if
+      if (.not. allocated(error)) call writer%add(summary%remarks, error)
       if (allocated(error)) then
          if (state%n_points == 0) then
             ! A result without points is none.

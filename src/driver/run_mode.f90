@@ -121,7 +121,7 @@ contains
       call curve%watch%remark(summary%remarks)
       call remark_jump(curve%jumped_at, case%mode%start, summary%remarks)
       call synthesize(case%mode%synthesis, curve%table)
-      call writer%add_mode(curve%table, case%model%unit_system, error)
+      call writer%add(curve%table, error)
       call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
                                  state%all_converged())
       call curve%sensitivity%describe(derivatives)

@@ -25,7 +25,7 @@ module fw_wear_response
       wear_observer
    use fw_wear_options, only: wear_energy, wear_explicit, wear_pseudo_time
    use fw_wear_recorder, only: friction_energy, wear_recorder
-   use fw_wear_rows, only: start_wear, state_halved, state_outcome
+   use fw_wear_group, only: wear_halved, wear_outcome, wear_patches
    use fw_wear_step, only: new_wear_stepper, wear_state
    use fw_wear_system, only: new_wear_system, wear_system
    implicit none (type, external)
@@ -134,6 +134,8 @@ contains
       type(summary_type), intent(inout), target :: summary
       type(run_state), intent(inout), target :: state
       type(error_type), allocatable, intent(out) :: error
+      type(wear_patches) :: patches
+      type(wear_outcome) :: outcome
 
       recorder%case => case
       recorder%state => state
@@ -141,9 +143,12 @@ contains
       recorder%writer => writer
       recorder%summary => summary
       call system_clock(recorder%clock)
-      call start_wear(writer%file, case%contact, cycles_units(case), error)
-      if (.not. allocated(error)) call state_outcome(writer%file, &
-         steady_words(steady_not_reached), 'incomplete', error)
+      patches%contact => case%contact
+      patches%cycles_units = cycles_units(case)
+      call writer%add(patches, error)
+      outcome%steady_state = trim(steady_words(steady_not_reached))
+      outcome%ending = 'incomplete'
+      if (.not. allocated(error)) call writer%add(outcome, error)
    end subroutine start_recorder
 
    !> From the vibration of the unworn joint, at its resonance where that is to be followed.
@@ -225,6 +230,7 @@ contains
       type(wear_run), intent(inout) :: run
       type(restart_type), intent(in) :: restart
       type(error_type), allocatable, intent(out) :: error
+      type(wear_outcome) :: outcome
 
       associate (march => run%march, recorder => run%recorder, summary => run%recorder%summary)
          call recorder%observer%on_message('wear: '//march%ending)
@@ -243,8 +249,9 @@ contains
          call recorder%finer%remark(recorder%case, summary)
          call remark_steps(recorder%case, march, depth_of(run%system, run%state), summary)
          call recorder%finer%finish()
-         call state_outcome(recorder%writer%file, trim(steady_words(march%steady)), &
-                            march%ending, error)
+         outcome%steady_state = trim(steady_words(march%steady))
+         outcome%ending = march%ending
+         call recorder%writer%add(outcome, error)
       end associate
    end subroutine report_end
 
@@ -344,6 +351,7 @@ contains
       type(wear_march), target :: halved
       type(silent_observer) :: silent
       type(wear_state) :: end_state
+      type(wear_halved) :: profile
       real(wp) :: change
       integer :: n
 
@@ -377,8 +385,9 @@ contains
       if (change > large_change) call recorder%summary%remarks%add('profile depends on steps', &
          'steps of half the size move the worn profile by '//to_text(100.0_wp*change)// &
          ' % of its largest depth')
-      call state_halved(recorder%writer%file, end_state%x(n + 1:), change, &
-                        recorder%case%model%unit_system, error)
+      profile%depth = end_state%x(n + 1:)
+      profile%change = change
+      call recorder%writer%add(profile, error)
    end subroutine compare_halved
 
    !> Nothing is kept of the states on the way.

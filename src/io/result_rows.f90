@@ -9,7 +9,7 @@ module fw_result_rows
    use fw_parameters, only: parameter_words
    use fw_point, only: point_type, served_words
    use fw_point_quantities, only: point_quantities, quantity_type, unknown_size
-   use fw_result_labels, only: label_quantity
+   use fw_result_group, only: label_dataset
    use fw_solver_options, only: continuation_arclength
    use fw_text, only: string_type
    use hdf5, only: hsize_t
@@ -244,7 +244,8 @@ contains
       if (allocated(error)) return
       self%dataset%waits = .true.
       place = self%dataset%place(file)
-      call label_quantity(place, self%quantity, case%model%unit_system, error)
+      call label_dataset(place, '.', trim(self%quantity%unit), self%quantity%dimensions, &
+                         trim(self%quantity%long_name), case%model%unit_system, error)
       if (allocated(error)) return
       if (self%quantity%names_parameter) then
          call write_attribute(place, '.', 'name', trim(parameter_words(case%over%number)), error)
