@@ -6,7 +6,7 @@ module fw_frequency_response
    use fw_branch, only: branch_source
    use fw_bifurcation, only: bifurcation_list
    use fw_bifurcation_group, only: bifurcation_group
-   use fw_case, only: analysis_frf, analysis_time, case_type
+   use fw_case, only: analyses, case_type
    use fw_control_branch, only: control_branch
    use fw_controlled_response, only: controlled_response
    use fw_error, only: error_type, status_stopped
@@ -87,7 +87,7 @@ contains
                call remark_range(case, finder%modes, summary%remarks)
                in_order = finder%in_order
             end if
-            if (case%analysis == analysis_frf .and. case%sweep%stability .and. in_order) then
+            if (analyses(case%analysis)%is_sweep .and. case%sweep%stability .and. in_order) then
                call changes%start(source, strategy, observer)
                call sinks%add(changes)
             end if
@@ -285,7 +285,7 @@ contains
       type(case_type), intent(in) :: case
       class(point_strategy), allocatable, intent(out) :: strategy
 
-      if (case%analysis == analysis_time) then
+      if (analyses(case%analysis)%is_integrated) then
          allocate (time_strategy :: strategy)
       else if (case%control%is_wanted()) then
          allocate (controlled_response :: strategy)
@@ -322,7 +322,7 @@ contains
       type is (one_level)
          ! A linear structure leaves no unknowns, and no branch that could turn back; nor does a
          ! structure at rest.
-         along_branch = case%analysis == analysis_frf .and. strategy%level%system%n > 0 .and. &
+         along_branch = analyses(case%analysis)%is_sweep .and. strategy%level%system%n > 0 .and. &
                         case%sweep%continuation == continuation_arclength
          if (along_branch) along_branch = is_shaken(case)
          if (along_branch) then

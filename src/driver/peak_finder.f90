@@ -6,7 +6,7 @@
 !> lies there and is narrow for the interval. After the sweep a few more solutions find the maxima;
 !> rows do not change by it.
 module fw_peak_finder
-   use fw_case, only: analysis_time, case_type
+   use fw_case, only: analyses, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_hidden_resonance, only: hides_mode, hides_resonance, turns_back
@@ -206,7 +206,7 @@ contains
 
       if (.not. self%is_active) return
       ! There a point depends on those before, or takes too long.
-      if (case%contact%memory == memory_carried .or. case%analysis == analysis_time) return
+      if (case%contact%memory == memory_carried .or. analyses(case%analysis)%is_integrated) return
       if (.not. self%in_order) call suspect_all(self)
       budget = min(max(least_budget, self%n_rows/budget_share), most_budget)
       ! In the order of what they may find: resonances that no row shows, ends of the range,

@@ -1,7 +1,7 @@
 !> What is allowed and seldom meant: it is said, in the summary and in the result, and never ends a
 !> run.
 module fw_remarks
-   use fw_case, only: analysis_mode, case_type
+   use fw_case, only: analyses, case_type
    use fw_force_law, only: law_facts
    use fw_joint_modes, only: held_stiffness, joint_mode_type, most_dofs, state_sliding
    use fw_kinds, only: pi, wp
@@ -91,7 +91,7 @@ contains
             trim(law_words(case%contact%law))//"' does not take")
       end if
       ! A mode has none.
-      if (.not. (is_shaken(case) .or. case%analysis == analysis_mode)) then
+      if (.not. (is_shaken(case) .or. analyses(case%analysis)%is_free)) then
          call remarks%add('no load', 'no vibratory load acts: the response is that at rest; '// &
                           'set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       end if

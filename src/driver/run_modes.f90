@@ -1,7 +1,7 @@
 !> Runs analysis 'modes', and lists the natural frequencies that a sweep covers.
 module fw_run_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-   use fw_case, only: analysis_mode, analysis_modes, case_type
+   use fw_case, only: analyses, case_type
    use fw_cyclic_group, only: modes_group
    use fw_error, only: error_type
    use fw_kinds, only: pi, wp
@@ -85,13 +85,13 @@ contains
       integer :: j
 
       allocate (lines(0))
-      if (case%analysis == analysis_modes) return
+      if (.not. analyses(case%analysis)%has_points) return
       if (most_of(case) > most_checked) then
          call append(lines, "! natural frequencies: see analysis 'modes' (more than "// &
                      to_text(most_checked)//' dofs)')
          return
       end if
-      if (case%analysis == analysis_mode) then
+      if (analyses(case%analysis)%is_free) then
          range = [0.0_wp, huge(1.0_wp)]
       else
          range = case%sweep%range()
@@ -101,7 +101,7 @@ contains
                               diameters_of(case))
       if (allocated(ignored)) return
       text = ' within the sweep'
-      if (case%analysis == analysis_mode) text = ''
+      if (analyses(case%analysis)%is_free) text = ''
       call append(lines, '! natural frequencies ['//trim(unit_words(case%sweep%unit))//']'// &
                   text//':')
       do j = 1, size(modes%nodal_diameter)

@@ -1,7 +1,7 @@
 !> How the point at a frequency is solved: with the harmonics of the case, with as many as it needs,
 !> to a given accuracy, or by integration in time.
 module fw_strategy
-   use fw_case, only: analysis_time, case_type
+   use fw_case, only: analyses, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_interrupt, only: interrupt_type
@@ -213,7 +213,8 @@ contains
       type(case_type), intent(in) :: case
 
       keeps_cycles = case%output%contact .and. case%contact%n_pairs > 0 .and. &
-                     (case%contact%memory == memory_carried .or. case%analysis == analysis_time)
+                     (case%contact%memory == memory_carried .or. &
+                      analyses(case%analysis)%is_integrated)
    end function keeps_cycles
 
 end module fw_strategy

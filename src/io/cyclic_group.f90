@@ -1,6 +1,6 @@
 !> What a result file says of sectors and of natural frequencies.
 module fw_cyclic_group
-   use fw_case, only: analysis_modes, case_type
+   use fw_case, only: analyses, case_type
    use fw_kinds, only: wp
    use fw_result_group, only: group_writer, result_group
    implicit none (type, external)
@@ -31,7 +31,7 @@ contains
       associate (cyclic => case%model%cyclic)
          if (.not. cyclic%is_cyclic) return
          call to%note('/', 'n_sectors', cyclic%n_sectors)
-         if (case%analysis == analysis_modes) return
+         if (.not. analyses(case%analysis)%has_points) return
          call to%note('/', 'engine_order', cyclic%engine_order)
          if (cyclic%is_mistuned) call to%note('/', 'mistuned', 1)
          call to%put('/cyclic/nodal_diameter', &

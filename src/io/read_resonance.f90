@@ -1,6 +1,6 @@
 !> Group &resonance: which parameter a resonance is followed over, and whether the case has it.
 module fw_read_resonance
-   use fw_case, only: analysis_resonance, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    use fw_parameter_checks, only: check_parameter
@@ -28,8 +28,8 @@ contains
       !> The parameter that changes from point to point; left alone where none does.
       integer, intent(inout) :: varied
 
-      call options%bind_keys(reader, analysis == analysis_resonance)
-      if (analysis /= analysis_resonance) return
+      call options%bind_keys(reader, analyses(analysis)%is_resonance)
+      if (.not. analyses(analysis)%is_resonance) return
       varied = options%parameter
       if (.not. reader%given(group, 'parameter')) then
          call reader%refuse(group, 'parameter', "is missing: name what the resonance is "// &
@@ -92,7 +92,7 @@ contains
       real(wp), allocatable :: values(:)
       character(len(parameter_words)) :: name
 
-      if (case%analysis /= analysis_resonance) return
+      if (.not. analyses(case%analysis)%is_resonance) return
       call check_parameter(case, case%resonance%parameter, 'resonance%parameter', error)
       if (allocated(error)) return
       call get_parameter(case, case%resonance%parameter, values)

@@ -1,6 +1,6 @@
 !> Group &sensitivity: which derivatives are wanted, and whether the case has them.
 module fw_read_sensitivity
-   use fw_case, only: analysis_mode, analysis_resonance, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_key, only: key
    use fw_key_range, only: at_least
@@ -105,9 +105,9 @@ contains
       associate (options => case%sensitivity)
          if (.not. options%is_wanted()) return
          options%has_harmonics = reader%given('harmonics', 'n_harmonics')
-         if (case%analysis == analysis_resonance) options%further = [resonance_omega]
+         if (analyses(case%analysis)%is_resonance) options%further = [resonance_omega]
          if (case%control%is_wanted()) options%further = [load_scale]
-         if (case%analysis == analysis_mode) options%further = [mode_omega, mode_damping_ratio]
+         if (analyses(case%analysis)%is_free) options%further = [mode_omega, mode_damping_ratio]
          if (size(options%quantities) > 0) return
          options%quantities = [first_harmonic, largest]
          if (is_cyclic_mode(case)) options%quantities = [first_harmonic]
@@ -121,7 +121,7 @@ contains
    pure logical function is_cyclic_mode(case)
       type(case_type), intent(in) :: case
 
-      is_cyclic_mode = case%analysis == analysis_mode .and. case%model%cyclic%is_cyclic
+      is_cyclic_mode = analyses(case%analysis)%is_free .and. case%model%cyclic%is_cyclic
    end function is_cyclic_mode
 
    !> Refuse what has no derivative, or none that the program knows.
@@ -134,7 +134,7 @@ contains
       if (.not. case%sensitivity%is_wanted()) return
       do k = 1, size(case%sensitivity%parameters)
          call check_parameter(case, case%sensitivity%parameters(k), asks, error)
-         if (case%analysis == analysis_mode .and. .not. allocated(error) .and. &
+         if (analyses(case%analysis)%is_free .and. .not. allocated(error) .and. &
              case%sensitivity%parameters(k) == harmonic_scale) then
             call fatal_error(error, asks//" = '"//trim(parameter_words(harmonic_scale))// &
                              "': no vibratory load acts on a nonlinear mode; leave it out", &

@@ -5,7 +5,7 @@
 !> structure, whose matrices the file does not hold.
 module fw_restart_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use fw_case, only: analysis_wear, analysis_words, case_type
+   use fw_case, only: analyses, analysis_words, case_type
    use fw_case_difference, only: find_difference
    use fw_error, only: error_type, fatal_error, status_input, status_usage
    use fw_hdf5, only: get_shape, hdf5_file, read_attribute, read_dataset
@@ -73,7 +73,7 @@ contains
       type(hdf5_file) :: file
       type(error_type), allocatable :: ignored
 
-      if (case%analysis /= analysis_wear) then
+      if (.not. analyses(case%analysis)%wears) then
          call fatal_error(error, "--restart continues a run of analysis = 'wear', but this "// &
                           "case has analysis = '"//trim(analysis_words(case%analysis))//"'", &
                           status_usage)

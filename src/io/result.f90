@@ -7,7 +7,7 @@
 module fw_result
    use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
-   use fw_case, only: analysis_modes, case_type
+   use fw_case, only: analyses, case_type
    use fw_contact_data, only: contact_type
    use fw_cyclic_group, only: write_cyclic
    use fw_error, only: error_type, fatal_error, status_input
@@ -96,7 +96,7 @@ contains
       if (allocated(case%model%unit_system)) self%unit_system = case%model%unit_system
       call write_head(self, case, error)
       ! Natural frequencies are no points.
-      if (.not. allocated(error) .and. case%analysis /= analysis_modes) then
+      if (.not. allocated(error) .and. analyses(case%analysis)%has_points) then
          call self%rows%create(self%file, case, error)
       end if
       if (.not. allocated(error)) call flush_file(self, error)

@@ -1,7 +1,7 @@
 !> The datasets of a result file with one row per solution point, as the table of quantities
 !> declares them.
 module fw_result_rows
-   use fw_case, only: analysis_frf, analysis_mode, analysis_resonance, analysis_wear, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type
    use fw_hdf5, only: get_shape, growing_dataset, growing_integer, growing_logical, hdf5_file, &
       read_dataset, write_attribute
@@ -99,14 +99,14 @@ contains
       type(case_type), intent(in) :: case
 
       expected_rows = 1
-      if (case%analysis == analysis_wear) then
+      if (analyses(case%analysis)%wears) then
          ! The state before any wear is a row of its own.
          expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
-      else if (case%analysis == analysis_mode) then
+      else if (analyses(case%analysis)%is_free) then
          expected_rows = case%mode%n_points
-      else if (case%analysis == analysis_resonance) then
+      else if (analyses(case%analysis)%is_resonance) then
          expected_rows = case%resonance%n_points
-      else if (case%analysis == analysis_frf) then
+      else if (analyses(case%analysis)%is_sweep) then
          expected_rows = max(1, case%sweep%n_points)
          if (case%control%is_wanted()) expected_rows = expected_rows*size(case%control%amplitude)
          if (case%sweep%continuation == continuation_arclength) then

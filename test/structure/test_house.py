@@ -19,7 +19,7 @@ LIMITS = {
     "modules used by one file, at most": (33, 2),
     "files that name forces%pairs": (41, 0),
     "files that name case_type": (61, 0),
-    "files that name an analysis": (24, 0),
+    "files that name an analysis": (5, 0),
     "files with select type": (16, 0),
 }
 
