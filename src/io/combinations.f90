@@ -7,7 +7,7 @@ module fw_combinations
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    use fw_memory, only: require_memory
-   use fw_path_checks, only: check_parameter_sweep
+   use fw_parameter_checks, only: check_parameter_sweep
    use fw_rules, only: apply_rules
    use fw_solver_options, only: scheme_implicit_euler
    use fw_text, only: to_text

@@ -5,8 +5,7 @@ module fw_read_resonance
    use fw_kinds, only: wp
    use fw_parameter_checks, only: check_parameter
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient, harmonic_scale, modal_damping, normal_load, &
-      normal_stiffness, parameter_words, rotation_speed, static_scale, tangential_stiffness
+   use fw_parameters, only: is_of_loads, not_negative, parameter_words, parameters, positive
    use fw_reader, only: reader_type
    use fw_resonance_options, only: as_factor, condition_phase, resonance_options, spacing_log
    use fw_solver_options, only: continuation_arclength
@@ -69,20 +68,21 @@ contains
       end associate
    end subroutine check_ends
 
-   !> Factors and stiffnesses of zero leave nothing to follow.
+   !> Factors of loads and stiffnesses of zero leave nothing to follow.
    pure logical function needs_more(options)
       type(resonance_options), intent(in) :: options
 
-      needs_more = any(options%parameter == [harmonic_scale, static_scale, tangential_stiffness, &
-                                             normal_stiffness])
+      needs_more = is_of_loads(options%parameter)
+      if (options%parameter > 0) needs_more = needs_more .or. &
+         parameters(options%parameter)%sign == positive
    end function needs_more
 
    !> What has no meaning below zero, but may be zero.
    pure logical function is_never_below(options)
       type(resonance_options), intent(in) :: options
 
-      is_never_below = any(options%parameter == [friction_coefficient, normal_load, &
-                                                 modal_damping, rotation_speed])
+      is_never_below = .false.
+      if (options%parameter > 0) is_never_below = parameters(options%parameter)%sign == not_negative
    end function is_never_below
 
    !> Refuse what a resonance over a parameter cannot be made of.

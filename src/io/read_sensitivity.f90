@@ -5,7 +5,8 @@ module fw_read_sensitivity
    use fw_key, only: key
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
-   use fw_parameter_checks, only: check_parameter
+   use fw_parameter_checks, only: check_parameter, pairs_of
+   use fw_parameter_values, only: get_parameter
    use fw_parameters, only: friction_coefficient, harmonic_scale, normal_load, parameter_words
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
@@ -161,20 +162,14 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: parameter
       type(error_type), allocatable, intent(out) :: error
-      logical :: slides(case%contact%n_pairs), closes(case%contact%n_pairs)
+      real(wp), allocatable :: values(:)
       logical :: begins(case%contact%n_pairs)
 
       if (all(parameter /= [friction_coefficient, normal_load])) return
-      associate (c => case%contact)
-         ! Pairs without friction of their own do not count.
-         slides = any(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)
-         closes = c%side_1(3, :) /= 0 .or. c%side_2(3, :) /= 0
-         if (parameter == friction_coefficient) then
-            begins = slides .and. .not. c%mu > 0.0_wp
-         else
-            begins = slides .and. .not. closes .and. .not. c%normal_load > 0.0_wp
-         end if
-      end associate
+      ! Pairs without friction of their own do not count.
+      call get_parameter(case, parameter, values)
+      begins = pairs_of(case%contact, friction_coefficient) .and. &
+               pairs_of(case%contact, parameter) .and. .not. values > 0.0_wp
       if (any(begins)) call fatal_error(error, "sensitivity%parameters = '"// &
          trim(parameter_words(parameter))//"': it is 0 at a pair, where friction begins and "// &
          'the derivative is one-sided; leave it out, or give a small value', status_input)
