@@ -62,7 +62,8 @@ contains
       if (is_of_matrices(number)) then
          self%case = case
       else if (.not. is_of_loads(number)) then
-         ! Loads are moved by factors of the state, all else by other laws or matrices. Matrices are large, and stay.
+         ! Loads are moved by factors of the state, all else by other laws or matrices. Matrices
+         ! are large, and stay.
          self%case%contact = case%contact
          self%case%springs = case%springs
          self%case%harmonics%filter_harmonics = case%harmonics%filter_harmonics
