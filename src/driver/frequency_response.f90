@@ -17,8 +17,8 @@ module fw_frequency_response
    use fw_peak_group, only: peak_group
    use fw_peak_cycle, only: cycle_keeper
    use fw_peak_finder, only: peak_finder
-   use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_peaks, remark_range, &
-      remark_stability
+   use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_open, remark_peaks, &
+      remark_range, remark_stability
    use fw_result, only: result_writer
    use fw_point, only: point_type
    use fw_run_state, only: run_state
@@ -246,6 +246,8 @@ contains
       type(peak_type), allocatable :: peaks(:)
       type(peak_group) :: group
       type(point_type) :: highest
+      real(wp) :: open(2)
+      integer :: n_open
 
       if (case%over%is_wanted() .or. case%control%is_wanted()) return
       select type (source)
@@ -263,6 +265,8 @@ contains
          call keeper%solve_at_peak(case, finder, strategy, observer, peaks, error)
          if (allocated(error)) return
          call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
+         call finder%find_open(open, n_open)
+         call remark_open(open, n_open, summary%remarks)
       end select
       call remark_peaks(peaks, case%model%observe_name, is_undamped(case), summary%remarks)
       call move_alloc(peaks, group%peaks)

@@ -16,7 +16,7 @@ module fw_remarks
    implicit none (type, external)
    private
 
-   public :: remark_list, remark_input, remark_range, remark_peaks, remark_stability
+   public :: remark_list, remark_input, remark_range, remark_peaks, remark_open, remark_stability
    public :: remark_condensed, remark_undetermined, is_shaken, is_undamped
 
    !> Friction coefficients above it are no dry friction of metals.
@@ -273,6 +273,19 @@ contains
       if (n_open > 0) call remarks%add('peak not resolved', to_text(n_open)// &
          ' of '//to_text(size(peaks))//' maxima are not resolved: '//remedy)
    end subroutine remark_peaks
+
+   !> Of rows that are too far apart for the resonances of a joint that opens.
+   subroutine remark_open(range, n_open, remarks)
+      !> Where they may lie [rad/s], and in how many intervals between rows.
+      real(wp), intent(in) :: range(2)
+      integer, intent(in) :: n_open
+      type(remark_list), intent(inout) :: remarks
+
+      if (n_open > 0) call remarks%add('another peak', 'in '//to_text(n_open)//' intervals '// &
+         'between '//to_text(rounded(range(1)))//' and '//to_text(rounded(range(2)))// &
+         ' rad/s a resonance of the joint, which opens within the period, may lie between the '// &
+         'points and be the highest: take more points there')
+   end subroutine remark_open
 
    !> Of a branch of a small structure that could not be taken whole.
    subroutine remark_condensed(remarks)
