@@ -60,21 +60,36 @@ contains
    end subroutine state_halved
 
    !> Whether a steady state was reached, on the group and at the root of the file.
-   subroutine state_outcome(file, steady_state, ending, error)
+   subroutine state_outcome(file, steady_state, ending, error, counts)
       type(hdf5_file), intent(in) :: file
       !> 'reached', 'not reached' or 'none: gross slip'.
       character(*), intent(in) :: steady_state
       !> In words, how the run ended.
       character(*), intent(in) :: ending
       type(error_type), allocatable, intent(out) :: error
+      !> Steps that were left to the implicit scheme, leaps, jumps of the vibration.
+      integer, intent(in), optional :: counts(3)
 
       if (file%id < 0) return
       !$omp critical (fretwear_io)
       call write_attribute(file, '/wear', 'steady_state', steady_state, error)
+      if (present(counts)) call write_counts(file, counts, error)
       if (.not. allocated(error)) call write_attribute(file, '/wear', 'ending', ending, error)
       if (.not. allocated(error)) call write_attribute(file, '/', 'steady_state', steady_state, &
                                                        error)
       !$omp end critical (fretwear_io)
    end subroutine state_outcome
+
+   !> Steps that went otherwise than by the scheme of the case.
+   subroutine write_counts(file, counts, error)
+      type(hdf5_file), intent(in) :: file
+      integer, intent(in) :: counts(3)
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (.not. allocated(error)) call write_attribute(file, '/wear', 'n_implicit', counts(1), &
+                                                       error)
+      if (.not. allocated(error)) call write_attribute(file, '/wear', 'n_leaps', counts(2), error)
+      if (.not. allocated(error)) call write_attribute(file, '/wear', 'n_jumps', counts(3), error)
+   end subroutine write_counts
 
 end module fw_wear_rows
