@@ -360,12 +360,14 @@ contains
    end subroutine describe_accuracy
 
    !> What became of the wear.
-   subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth)
+   subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth, otherwise)
       class(summary_type), intent(inout) :: self
       character(*), intent(in) :: steady_state
       integer, intent(in) :: n_steps, n_rejected
       !> Cycles covered, and largest depth at their end [length].
       real(wp), intent(in) :: cycles, depth
+      !> Steps that were left to the implicit scheme, and leaps.
+      integer, intent(in) :: otherwise(2)
       character(40) :: text
 
       write (text, '(es13.6, a, es13.6)') depth, ' after ', cycles
@@ -373,6 +375,10 @@ contains
       call add_line(self%work, 'largest depth', trim(adjustl(text))//' cycles')
       call add_line(self%work, 'wear steps', to_text(n_steps)//', '//to_text(n_rejected)// &
                     ' repeated')
+      if (otherwise(1) > 0) call add_line(self%work, '', to_text(otherwise(1))// &
+                                          ' of them implicit')
+      if (otherwise(2) > 0) call add_line(self%work, '', to_text(otherwise(2))// &
+                                          ' of them over what no other step passes')
    end subroutine describe_wear
 
    !> What a nonlinear mode is, and where it slips and keeps itself alive.

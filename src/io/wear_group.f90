@@ -35,6 +35,9 @@ module fw_wear_group
    type, extends(result_group) :: wear_outcome
       !> 'reached', 'not reached' or 'none: gross slip', and in words how the run ended.
       character(:), allocatable :: steady_state, ending
+      !> Steps that were left to the implicit scheme, leaps, jumps of the vibration (3), where the
+      !> run has come to its end.
+      integer, allocatable :: counts(:)
    contains
       procedure :: write => write_outcome
    end type wear_outcome
@@ -68,6 +71,10 @@ contains
       call to%note('/wear', 'steady_state', self%steady_state)
       call to%note('/wear', 'ending', self%ending)
       call to%note('/', 'steady_state', self%steady_state)
+      if (.not. allocated(self%counts)) return
+      call to%note('/wear', 'n_implicit', self%counts(1))
+      call to%note('/wear', 'n_leaps', self%counts(2))
+      call to%note('/wear', 'n_jumps', self%counts(3))
    end subroutine write_outcome
 
 end module fw_wear_group
