@@ -17,7 +17,7 @@ module fw_remarks
    private
 
    public :: remark_list, remark_input, remark_range, remark_peaks, remark_open, remark_stability
-   public :: remark_condensed, remark_undetermined, is_shaken, is_undamped
+   public :: remark_condensed, remark_undetermined, remark_unused, is_shaken, is_undamped
 
    !> Friction coefficients above it are no dry friction of metals.
    real(wp), parameter :: highest_friction = 2.0_wp
@@ -95,10 +95,36 @@ contains
          call remarks%add('no load', 'no vibratory load acts: the response is that at rest; '// &
                           'set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       end if
+      call remark_unused(case, remarks)
       call remark_harmonics(case, remarks)
       call remark_law(case, remarks)
       call remark_tail(case, remarks)
    end subroutine remark_input
+
+   !> What was given and has no effect.
+   subroutine remark_unused(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+
+      if (allocated(case%unread)) then
+         if (size(case%unread) > 0) call remarks%add('not read', 'the model file holds '// &
+            trim(list_of(case%unread))//', which nothing reads; fw_run --parts lists what is read')
+      end if
+   end subroutine remark_unused
+
+   !> `a, b, c and 7 more`.
+   pure function list_of(names) result(text)
+      type(string_type), intent(in) :: names(:)
+      character(300) :: text
+      integer, parameter :: most = 5
+      integer :: i
+
+      text = names(1)%text
+      do i = 2, min(size(names), most)
+         text = trim(text)//', '//names(i)%text
+      end do
+      if (size(names) > most) text = trim(text)//' and '//to_text(size(names) - most)//' more'
+   end function list_of
 
    !> Whether a vibratory load acts.
    pure logical function is_shaken(case)

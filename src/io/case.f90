@@ -96,6 +96,8 @@ module fw_case
       character(:), allocatable :: namelist
       !> Absolute paths of the files it was read from: no result replaces them.
       type(string_type), allocatable :: inputs(:)
+      !> What stands in the model file and nothing reads.
+      type(string_type), allocatable :: unread(:)
       !> Result file of a wear run that is to be continued; not allocated to start anew. No key of
       !> the namelist.
       character(:), allocatable :: restart

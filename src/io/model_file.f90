@@ -6,7 +6,7 @@
 module fw_model_file
    use fw_air_file, only: read_air_file
    use fw_contact_data, only: spring_type
-   use fw_cyclic_file, only: read_cyclic_file
+   use fw_cyclic_file, only: count_sectors, read_cyclic_file
    use fw_cyclic_parts, only: cyclic_parts
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hdf5, only: dataset_failure, hdf5_file, has_attribute, read_attribute, read_dataset
@@ -16,11 +16,12 @@ module fw_model_file
       read_positions, read_vector
    use fw_reader_text, only: words_text
    use fw_spring_file, only: read_spring_file
+   use fw_strangers, only: find_strangers
    use fw_text, only: string_type, to_text
    implicit none (type, external)
    private
 
-   public :: file_model_type, read_model_hdf5
+   public :: file_model_type, list_unread, read_model_hdf5
 
    ! What a file must say of itself in its attributes, so that any other HDF5 file is told apart.
    character(*), parameter :: format_name = 'fretwear-model'
@@ -34,6 +35,8 @@ module fw_model_file
       character(:), allocatable :: title, unit_system
       !> Paths of the files it was read from.
       type(string_type), allocatable :: files(:)
+      !> What stands in the file and nothing reads.
+      type(string_type), allocatable :: unread(:)
       !> Structure (n_dof, n_dof), not checked for symmetry.
       real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
       !> Stiffness per square of the rotation speed (n_dof, n_dof) [force/length/(rad/s)**2].
@@ -95,6 +98,9 @@ contains
       model%files(1)%text = path
       ! In this order: the mass gives n_dof, the dofs of side 1 the number of pairs.
       call read_header(file, model, error)
+      if (.not. allocated(error)) call count_sectors(file, model%cyclic%n_sectors, error)
+      if (.not. allocated(error)) call find_strangers(file, model%cyclic%n_sectors, model%unread, &
+                                                      error)
       if (.not. allocated(error)) call read_cyclic_file(file, model%cyclic, error)
       if (.not. allocated(error)) call read_structure(file, model, error)
       if (.not. allocated(error)) call read_air_file(file, model%order(), &
@@ -106,6 +112,24 @@ contains
       if (.not. allocated(error)) call read_observed(file, model, error)
       call file%close(ignored)
    end subroutine read_model_hdf5
+
+   !> What stands in a model file and nothing reads; an error where that is refused.
+   subroutine list_unread(path, unread, error)
+      character(*), intent(in) :: path
+      type(string_type), allocatable, intent(out) :: unread(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: ignored
+      type(hdf5_file) :: file
+      integer :: n_sectors
+
+      ! HDF5 and functions of texts serve one thread at a time.
+      !$omp critical (fretwear_io)
+      call file%open_read(path, error)
+      if (.not. allocated(error)) call count_sectors(file, n_sectors, error)
+      if (.not. allocated(error)) call find_strangers(file, n_sectors, unread, error)
+      call file%close(ignored)
+      !$omp end critical (fretwear_io)
+   end subroutine list_unread
 
    !> Format and version, which are required, title and system of units, which are not.
    subroutine read_header(file, model, error)

@@ -219,6 +219,7 @@ contains
       call read_structure(reader, path, case, raw, error, memory_model)
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)
+      if (allocated(raw%unread)) case%unread = raw%unread
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep, case%over)
       if (.not. reader%failed()) call vary_matrices(case, error)
