@@ -21,7 +21,7 @@ module fw_mode_start
    implicit none (type, external)
    private
 
-   public :: mode_start
+   public :: mode_start, node
 
    !> Frequencies of linear modes with stuck and with sliding pairs [rad/s].
    type :: joint_frequencies
@@ -354,8 +354,7 @@ contains
                           'damping', status_input)
          return
       end if
-      call new_mode_system(self%balance, self%case%mode%control, self%omega, &
-                           self%case%mode%end*maxval(abs(real(shape, wp))), self%system)
+      call new_mode_system(self%balance, self%case%mode%control, self%omega, self%system)
       call scale_mode(self, x, shape)
    end subroutine take_mode
 
@@ -368,22 +367,27 @@ contains
       type(error_type), allocatable :: ignored
       real(wp), allocatable :: q(:)
       complex(wp), allocatable :: amplitude(:, :)
-      real(wp) :: modal
+      real(wp) :: modal, size_of_shape
       integer :: m
 
       m = size(shape)
       associate (fourier => self%problem%fourier, system => self%system)
          system%amplitude = 1.0_wp
          modal = 1.0_wp
-         if (system%control /= control_observed) modal = sqrt(real(dot_product(shape, &
-                                                              matmul(system%mass, shape)), wp))
+         size_of_shape = 1.0_wp
+         if (system%control /= control_observed) then
+            modal = sqrt(real(dot_product(shape, matmul(system%mass, shape)), wp))
+            size_of_shape = norm2(abs(shape))
+         end if
+         system%inertia = self%omega**2*norm2(abs(matmul(system%mass, shape)))/size_of_shape
+         call system%measure_by(size_of_shape/modal, &
+                                self%case%mode%end*maxval(abs(real(shape, wp)))/modal)
          allocate (amplitude(m, fourier%n_retained), source=(0.0_wp, 0.0_wp))
          amplitude(:, system%first) = shape/modal
          allocate (q(size(x)), self%y(system%n))
          call to_real(fourier, m, amplitude, q)
          if (fourier%has_constant()) q(:m) = x(:m)
          call system%from_balance(q, self%omega, self%self_excitation, self%y)
-         system%inertia = self%omega**2*norm2(abs(matmul(system%mass, shape)))/modal
          call system%remember(self%y)
          system%static_load = static_size(self%balance)
          call system%set_parameter(log(self%case%mode%start), ignored)

@@ -16,7 +16,7 @@ module fw_run_mode
    use fw_mode_onset, only: onset_finder
    use fw_mode_path, only: mode_path
    use fw_mode_remarks, only: remark_internal, remark_jump
-   use fw_mode_start, only: mode_start
+   use fw_mode_start, only: mode_start, node
    use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
@@ -358,7 +358,9 @@ contains
       m = start%problem%structure%n_coordinates
       associate (f => start%problem%fourier)
          first = sum(start%system%observed*start%system%motion(y))
-         if (.not. abs(first) > 0.0_wp) return
+         ! At a node its phase is round-off.
+         if (.not. abs(first) > node*norm2(abs(start%system%observed))* &
+             norm2(abs(start%system%motion(y)))) return
          first = first/abs(first)
          allocate (amplitude(m, f%n_retained))
          call amplitudes_of(f%harmonic, f%column, m, y, m, amplitude)
@@ -474,7 +476,7 @@ contains
          point%self_excitation = row%self_excitation
          point%modal_amplitude = row%modal_amplitude
          point%first_harmonic = hypot(row%first(1, :), row%first(2, :))
-         row%force = modal_force(curve%start, y)*system%amplitude/row%modal_amplitude
+         row%force = modal_force(curve%start, y)*system%length()/row%modal_amplitude
          if (report%converged) call curve%onset%note(system, y)
          if (report%converged .and. served_by == served_by_newton) then
             call curve%watch%note(system, y)
@@ -494,7 +496,7 @@ contains
       call curve%table%add(row)
    end subroutine add_row
 
-   !> |U_1^H F| for the vibratory load of the case, over the amplitude.
+   !> |U_1^H F| for the vibratory load of the case, over the size of the motion.
    real(wp) function modal_force(start, y) result(force)
       type(mode_start), intent(in) :: start
       real(wp), intent(in) :: y(:)
