@@ -12,8 +12,8 @@
 !> row a^T U_1, whose real part is the amplitude and whose imaginary part the phase. Unknowns are
 !> those of the balance over a size of their own, A times a unit of motion for harmonics above 0,
 !> then omega and xi over a frequency; equations are over that size; the parameter is ln A. So a
-!> step means the same over decades and in any units, and a curve below the onset of slip is constant
-!> but for A.
+!> step means the same over decades and in any units, and a curve below the onset of slip is
+!> constant but for A.
 !>
 !> The motion may be shifted in time, so that the derivative by the unknowns of the balance alone is
 !> singular at every solution: it is never solved with, only with its two borders. The structure

@@ -98,10 +98,10 @@ contains
          do j = 1, len(b)
             rows(j, 0) = min(rows(j, 1) + 1, rows(j - 1, 0) + 1, &
                              rows(j - 1, 1) + merge(0, 1, a(i:i) == b(j:j)))
-            if (i > 1 .and. j > 1) then
-               if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) then
-                  rows(j, 0) = min(rows(j, 0), rows(j - 2, 2) + 1)
-               end if
+            if (i == 1 .or. j == 1) cycle
+            if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) then
+               ! max: a compiler that does not see the line above warns of an index below 0.
+               rows(j, 0) = min(rows(j, 0), rows(max(j - 2, 0), 2) + 1)
             end if
          end do
       end do

@@ -1,7 +1,7 @@
 !> Analysis 'mode': a nonlinear mode over its amplitude, its limit cycles, and responses near its
 !> resonance that are put together from it.
 module fw_run_mode
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of, coefficients_of
@@ -15,7 +15,7 @@ module fw_run_mode
    use fw_mode_options, only: control_observed
    use fw_mode_onset, only: onset_finder
    use fw_mode_path, only: mode_path
-   use fw_mode_remarks, only: remark_internal, remark_jump
+   use fw_mode_remarks, only: remark_internal, remark_jump, remark_no_onset
    use fw_mode_start, only: mode_start, node
    use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
@@ -120,6 +120,10 @@ contains
       call remark_internal(curve%start, curve%table, summary%remarks)
       call curve%watch%remark(summary%remarks)
       call remark_jump(curve%jumped_at, case%mode%start, summary%remarks)
+      if (state%is_incomplete .and. curve%begins .and. curve%start%problem%n_pairs > 0 .and. &
+          ieee_is_nan(curve%table%onset_amplitude)) then
+         call remark_no_onset(exp(curve%end_p), case%mode%end, summary%remarks)
+      end if
       call synthesize(case%mode%synthesis, curve%table)
       call writer%add(curve%table, error)
       call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
