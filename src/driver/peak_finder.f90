@@ -299,6 +299,8 @@ contains
          if (.not. allocated(error)) call look_beyond(self, case, budget, more, error)
          if (.not. allocated(error)) call look_past(self, case, budget, more, error)
       end do
+      ! What was solved for widths and branches may tell of corners.
+      if (.not. allocated(error)) call climb(self, case, budget, error)
       ! What becomes a row now is known here already.
       self%is_active = .false.
    end subroutine search

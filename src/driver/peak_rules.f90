@@ -83,10 +83,11 @@ contains
       real(wp), intent(out) :: promise
       logical, intent(out) :: done
       real(wp) :: curvature, vertex, share, mean
-      logical :: left_is_known, right_is_known
+      logical :: left_is_known, right_is_known, is_high
 
       share = near
-      if (samples%item(k)%at%amplitude(i) >= near*highest_of(samples, i)) share = nearest
+      is_high = samples%item(k)%at%amplitude(i) >= near*highest_of(samples, i)
+      if (is_high) share = nearest
       associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
                  right => samples%item(k + 1)%at)
          call vertex_of(left, middle, right, i, vertex, promise, curvature)
@@ -107,7 +108,10 @@ contains
             if (.not. done) return
          end if
          done = left_is_known .and. right_is_known
-         if (done) return
+         if (done) then
+            if (is_high) call find_corner(samples, k, i, mean, omega, promise, done)
+            return
+         end if
          if (right_is_known) then
             omega = beside(left, middle, i, mean, curvature, share)
          else
@@ -116,6 +120,116 @@ contains
          done = abs(omega - middle%omega) <= same_frequency*middle%omega
       end associate
    end subroutine find_next
+
+   !> Where to solve next for a peak that may be a corner, which three samples show as a parabola that
+   !> it is not; `done` where five bear out the parabola, or leave no room for a corner that is higher
+   !> than the tolerance.
+   pure subroutine find_corner(samples, k, i, mean, omega, promise, done)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      !> Position of the three [length].
+      real(wp), intent(in) :: mean
+      real(wp), intent(inout) :: omega, promise
+      logical, intent(out) :: done
+      !> Of the tolerance: a third difference says little of a corner.
+      real(wp), parameter :: borne_out = 0.2_wp
+      real(wp) :: gain, place, most
+      integer :: direction
+
+      most = 0.0_wp
+      do direction = -1, 1, 2
+         call bound_corner(samples, k, i, direction, mean, place, gain)
+         if (gain <= most) cycle
+         most = gain
+         omega = place
+      end do
+      done = most <= small_gain .or. misses_parabola(samples, k, i, mean) <= borne_out*small_gain
+      if (done) return
+      associate (middle => samples%item(k)%at)
+         promise = (1.0_wp + most)*swing_of(middle, i, mean)
+         done = abs(omega - middle%omega) <= same_frequency*middle%omega
+      end associate
+   end subroutine find_corner
+
+   !> How much higher than sample k the response may be on one side: up to where the lines through
+   !> the two samples before and the two behind meet, if it bends down elsewhere.
+   pure subroutine bound_corner(samples, k, i, direction, mean, omega, gain)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i, direction
+      real(wp), intent(in) :: mean
+      !> [rad/s], and relative to the height.
+      real(wp), intent(out) :: omega, gain
+      real(wp) :: rise, fall, way, share
+
+      omega = samples%item(k)%at%omega
+      gain = 0.0_wp
+      associate (before => samples%item(k - direction)%at, middle => samples%item(k)%at, &
+                 behind => samples%item(k + direction)%at)
+         way = abs(behind%omega - middle%omega)
+         if (way <= same_frequency*middle%omega .or. &
+             abs(middle%omega - before%omega) <= same_frequency*middle%omega) return
+         rise = (middle%amplitude(i) - before%amplitude(i))/abs(middle%omega - before%omega)
+         ! Of the part that lies on the line behind, if one is known, and of all else.
+         share = 0.5_wp
+         gain = rise*way*share
+         if (k + 2*direction >= 1 .and. k + 2*direction <= samples%n) then
+            associate (last => samples%item(k + 2*direction)%at)
+               fall = (behind%amplitude(i) - last%amplitude(i))/ &
+                      max(abs(last%omega - behind%omega), tiny(1.0_wp))
+            end associate
+            if (rise + fall > 0.0_wp) share = ((behind%amplitude(i) - middle%amplitude(i))/way &
+                                               + fall)/(rise + fall)
+            share = min(max(share, margin), 1.0_wp - margin)
+            gain = rise*way*share
+         end if
+         omega = middle%omega + direction*share*way
+         gain = gain/swing_of(middle, i, mean)
+      end associate
+   end subroutine bound_corner
+
+   !> How much the parabola through a maximum and its neighbours may miss between them, relative to
+   !> the height: what the samples beyond say of its third difference.
+   pure real(wp) function misses_parabola(samples, k, i, mean) result(missed)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      real(wp), intent(in) :: mean
+      real(wp) :: s(4), g(4), third, swing
+      integer :: direction, j, side
+
+      missed = 0.0_wp
+      swing = swing_of(samples%item(k)%at, i, mean)
+      do direction = -1, 1, 2
+         if (k + 2*direction < 1 .or. k + 2*direction > samples%n) cycle
+         do j = 1, 4
+            associate (at => samples%item(k + direction*(j - 2))%at)
+               s(j) = at%omega**2 - samples%item(k)%at%omega**2
+               g(j) = (swing/swing_of(at, i, mean))**2
+            end associate
+         end do
+         if (abs(s(4) - s(3)) <= same_frequency*samples%item(k)%at%omega**2) cycle
+         third = abs(divided_difference(s, g))
+         do side = 1, 2
+            associate (middle => 0.5_wp*(s(side) + s(side + 1)))
+               missed = max(missed, 0.5_wp*third*abs(product(middle - s(:3))))
+            end associate
+         end do
+      end do
+   end function misses_parabola
+
+   !> Of third order, of four points.
+   pure real(wp) function divided_difference(s, g) result(third)
+      real(wp), intent(in) :: s(4), g(4)
+      real(wp) :: d(4)
+      integer :: order, j
+
+      d = g
+      do order = 1, 3
+         do j = 4, order + 1, -1
+            d(j) = (d(j) - d(j - 1))/(s(j) - s(j - order))
+         end do
+      end do
+      third = d(4)
+   end function divided_difference
 
    !> Whether the response falls behind a neighbour of the peak faster than any resonance does: it
    !> jumps there.
