@@ -19,6 +19,7 @@ from .plot import KINDS, Choices, fitting
 from .plot.style import label, units_of
 from .plot.table import plot_table
 from .result import Result
+from .shown import dissipation, highest
 from .study.table import is_table, read_table
 
 __all__ = ["add_arguments", "main", "render_report", "render_study", "write_report"]
@@ -242,32 +243,32 @@ def _numbers(result: Result) -> str:
 def _peak_numbers(result: Result) -> list[tuple[str, object, str]]:
     rows: list[tuple[str, object, str]] = []
     for name in result.observed if result.n_points else ():
-        try:
-            peak = result.peak(name)
-            omega, height = result.maximum(name)
-        except InputError:  # not one point converged: said at the top of the page
+        top = highest(result, name)
+        if top is None:  # not one point converged: said at the top of the page
             break
-        rows += [(f"peak of {name}", height,
+        peak, what = result.peak(name), "peak" if top.is_peak else "largest value"
+        rows += [(f"{what} of {name}" + (f", {top.words}" if top.words else ""), top.height,
                   units_of(result, "amplitude")),
-                 _place_of(result, peak, omega)]
+                 _place_of(result, peak, top.place, what)]
         if "sensitivity/deviation/largest" in result:
             spread = result["sensitivity/deviation/largest"][peak, result.index(name)]
             rows.append((f"standard deviation of the amplitude, at point {peak + 1}",
                          float(spread), units_of(result, "amplitude")))
         if name == result.observed[0] and "contact/fraction" in result:
             shares = result.fraction[peak].mean(axis=0)
-            rows += [(f"pairs and period in {state}, at this peak", float(share), "")
+            rows += [(f"pairs and period in {state}, at this {what}", float(share), "")
                      for state, share in zip(("stick", "slip", "open"), shares)]
-            rows.append(("friction energy per cycle, at this peak",
-                         float(result.dissipation[peak].sum()),
+            rows.append((f"friction energy per cycle, at this {what}",
+                         float(dissipation(result)[peak].sum()),
                          units_of(result, "contact/dissipation")))
     return rows
 
 
-def _place_of(result: Result, peak: int, omega: float) -> tuple[str, object, str]:
+def _place_of(result: Result, peak: int, place: float, what: str) -> tuple[str, object, str]:
     if "parameter" in result:
-        return f"{result.parameter_name} of this peak, point {peak + 1}", result.parameter[peak], ""
-    return f"frequency of this peak, near point {peak + 1}", omega / (2.0 * np.pi), "Hz"
+        name = result.parameter_name
+        return f"{name} of this {what}, point {peak + 1}", result.parameter[peak], ""
+    return f"frequency of this {what}, near point {peak + 1}", place, "Hz"
 
 
 def _wear_numbers(result: Result) -> list[tuple[str, object, str]]:
@@ -312,7 +313,8 @@ def _points(result: Result) -> str:
     if "contact/fraction" in result:
         head += ["stick", "slip", "open",
                  label("dissipation", units_of(result, "contact/dissipation"))]
-        columns += [*result.fraction[shown].mean(axis=1).T, result.dissipation[shown].sum(axis=1)]
+        columns += [*result.fraction[shown].mean(axis=1).T,
+                    dissipation(result)[shown].sum(axis=1)]
     if "floquet/stable" in result:
         head.append("stable")
         columns.append(np.array(["no", "yes", "?"])[result.stable[shown]])

@@ -59,12 +59,13 @@ class ResonanceTrack:
     def optimum(self) -> tuple[float, float] | None:
         """Parameter and amplitude where the resonance is smallest between the ends, by the
         polynomial through the smallest point and up to four around it; None where an end is
-        smaller."""
+        smaller, or where points beside it have failed."""
         parameter, amplitude = self.parameter[self.converged], self.amplitude[self.converged]
         if amplitude.size < 3:
             return None
         k = int(np.argmin(amplitude))
-        if k in (0, amplitude.size - 1):
+        rows = np.flatnonzero(self.converged)
+        if k in (0, amplitude.size - 1) or rows[k + 1] - rows[k - 1] != 2:
             return None
         near = slice(max(k - 2, 0), k + 3)
         # About the middle, in steps: far from 0 the coefficients would lose their digits.

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .result import STATES, Result
+from .shown import dissipation
 
-__all__ = ["choose_point", "pair_areas", "pair_fields", "synthesis"]
+__all__ = ["choose_point", "pair_areas", "pair_fields", "status_words", "synthesis"]
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,12 @@ def choose_point(result: Result, number: int | None) -> int:
     if number == 0 or abs(number) > n:
         raise InputError(f"{result.name}: point {number}: there are {n}, counted from 1")
     return number - 1 if number > 0 else n + number
+
+
+def status_words(result: Result, point: int) -> str:
+    """What the title of a picture of one point has to add: nothing where it has converged."""
+    known = "converged" in result and point < len(result.converged)
+    return ", not converged" if known and not result.converged[point] else ""
 
 
 def synthesis(n_coefficients: int, tau: Floats) -> Floats:
@@ -53,7 +60,8 @@ def pair_fields(result: Result, point: int) -> dict[str, tuple[Floats, str]]:
     -------
     dict
         Values (n_pairs) and their units by name: stick, slip, open (shares of the period),
-        pressure (mean over the period), dissipation (per area and cycle), wear_depth, wear_rate.
+        pressure (mean over the period), dissipation (per area and cycle; zero where there is only
+        round-off), wear_depth, wear_rate.
     """
     found: dict[str, tuple[Floats, str]] = {}
     area = pair_areas(result)
@@ -63,7 +71,7 @@ def pair_fields(result: Result, point: int) -> dict[str, tuple[Floats, str]]:
     if "contact/force" in result and point < len(result.force) and area is not None:
         found["pressure"] = (-result.force[point, 0, :, 2] / area,
                              _ratio(result, "contact/force", "contact/area"))
-        found["dissipation"] = (result.dissipation[point] / area,
+        found["dissipation"] = (dissipation(result)[point] / area,
                                 _ratio(result, "contact/dissipation", "contact/area"))
     if "wear/depth" in result:
         found["wear_depth"] = result.depth[point], result.units("wear/depth")

@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
+
 from .analyses import run
 from .case import Case
-from .errors import AbsentError, RunInterrupted, RunStopped
+from .errors import RunInterrupted, RunStopped
 from .result import Result
+from .shown import highest
 
 __all__ = ["add_arguments", "main"]
 
@@ -53,12 +56,11 @@ def _print_summary(result: Result) -> None:
         print(f"{'converged':17} {int(result.converged.sum())} of {result.n_points} points")
     if "peak/omega" in result:
         for name in result.observed[:_LISTED]:
-            try:
-                omega, amplitude = result.maximum(name)
-            except AbsentError:
-                continue
-            print(f"{'peak ' + name:17} {amplitude:.6E} at {omega:.6E} rad/s "
-                  f"({omega / 6.283185307179586:.6E} Hz)")
+            top = highest(result, name)
+            if top is not None:
+                print(f"{'peak ' + name:17} {top.height:.6E} at "
+                      f"{2.0 * np.pi * top.place:.6E} rad/s ({top.place:.6E} Hz)"
+                      + (f", {top.words}" if top.words else ""))
     for remark in result.remarks:
         print(f"{'remark':17} {remark}")
     print(f"{'time':17} {result.elapsed:.3f} s")

@@ -55,9 +55,28 @@ def test_slider_of_the_command_line(case: fw.Case) -> None:
     assert settings_of([slider, whole], [0.30000000000000004, 5.0]) == {
         "contact": {"mu": 0.3}, "harmonics": {"n_harmonics": 5}}
     for wrong, word in (("contact%mu", "low:high"), ("contact%mu=1:0", "lower one first"),
-                        ("model%source=0:1", "one number")):
+                        ("model%source=0:1", "one number"),
+                        ("contact%mu=0.6:0.9", "mu is 0.5 in the case"),
+                        ("contact%slip_speed=0.1:0.9", "no value in the case")):
         with pytest.raises(InputError, match=word):
             read_slider(wrong, case)
+
+
+def test_sliders_start_where_the_model_file_has_them(case: fw.Case, tmp_path: Path) -> None:
+    """A key that the namelist does not name starts at its value in the model, and a page where
+    nothing has been moved is the case, to the last bit."""
+    model = fw.Model([[1.0]], None, [[1.0]], contact=fw.ContactPairs(
+        [[1, 0, 0]], mu=0.2512345, normal_load=1.0, tangential_stiffness=1.0), cosine=[1.0],
+        observe={"tip": 1})
+    model.to_hdf5(tmp_path / "model.h5")
+    of_file = fw.Case(tmp_path / "model.h5", sweep={"start": 0.6, "end": 1.6, "n_points": 5},
+                      structure={"modal_damping": 0.02}, contact={"law": "penalty"})
+    slider = read_slider("contact%mu=0.1:0.9", of_file)
+    assert slider.value == 0.2512345
+    usual = usual_sliders(of_file)
+    assert {one.key: one.value for one in usual}["contact%mu"] == 0.2512345
+    assert settings_of(usual, [one.value for one in usual]) == {}
+    assert settings_of([slider], [0.3]) == {"contact": {"mu": 0.3}}
 
 
 class _Answers:

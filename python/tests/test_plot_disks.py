@@ -111,19 +111,30 @@ def test_campbell_diagram(modes: Result, folder: Path) -> None:
 
 
 def test_damping_curve(wave: Result, folder: Path) -> None:
-    double = run(DISK, folder / "double.h5", "sweep%n_points=3", "load%harmonic_scale=2")
-    found = read_damping([double, wave], "u6")
+    """The curve joins peaks; a sweep that is highest at its end is a ring beside it."""
+    wide = "sweep%end=1.5", "sweep%n_points=21"  # the peak lies below the end of the example
+    once = run(DISK, folder / "once.h5", *wide)
+    double = run(DISK, folder / "double.h5", *wide, "load%harmonic_scale=2")
+    found = read_damping([double, wave, once], "u6")
     load = 0.5 * np.hypot(1.0, 0.2)  # cosine 0.5 and sine -0.1, at dof 5
-    assert found[:, 0] == pytest.approx([load, 2.0 * load])
+    assert found[:, 0] == pytest.approx([load, load, 2.0 * load])
     assert found[:, 1] == pytest.approx(0.08)
+    assert found[:, 4].tolist() == [0.0, 1.0, 1.0]
     largest = np.abs(wave.harmonic(1, "u6")).max()
     assert found[0, 2] == pytest.approx(largest / load)
-    upper, _ = plot_damping([double, wave], "u6").axes
-    assert upper.lines[0].get_xdata() == pytest.approx(found[:, 0] / 0.08)
-    in_proportion, peaks = plot_force([double, wave], "u6").axes[0].lines
+    (located,) = [one for one in once.peaks
+                  if one.observed == "u6" and one.found_by != "end of the sweep"]
+    assert found[1, 2] * load == pytest.approx(np.hypot(*located.coefficients[1:3]))
+    for axes, column in zip(plot_damping([double, wave, once], "u6").axes, (2, 3)):
+        peaks, ring = axes.lines
+        assert peaks.get_xdata() == pytest.approx(found[1:, 0] / 0.08)
+        assert peaks.get_ydata() == pytest.approx(found[1:, column])
+        assert ring.get_ydata() == pytest.approx(found[:1, column])
+        assert ring.get_markerfacecolor() == "white"
+    in_proportion, peaks, _ = plot_force([double, wave, once], "u6").axes[0].lines
     assert peaks.get_xdata() == pytest.approx([1.0, 2.0])     # two dofs: by the factor
-    assert peaks.get_ydata() == pytest.approx(found[:, 2] * found[:, 0])
-    assert in_proportion.get_ydata()[1] == pytest.approx(2.0 * load * found[0, 2])
+    assert peaks.get_ydata() == pytest.approx(found[1:, 2] * found[1:, 0])
+    assert in_proportion.get_ydata()[1] == pytest.approx(2.0 * load * found[1, 2])
 
 
 def test_envelope_of_sweeps(wave: Result, folder: Path) -> None:

@@ -8,6 +8,7 @@ A family is a module of this folder, with
     SMALL     seeds that `make test` runs
     COLUMNS   {key: heading} of the counts, in their order
     ZERO      keys that have to stay 0
+    ALSO      files beside program and module whose change makes the counts anew (may be absent)
     trial(seed, program, folder)   the counts of one case: {key: number}, with `kind`, the row of
                                    the table (one row without it), and `notes`, lines for the screen
 
@@ -125,7 +126,8 @@ def main():
 
     def counted(program):
         program = program.resolve()
-        state = STATE / f"{options.name}-{digest(program, Path(family.__file__))}.jsonl"
+        files = (program, Path(family.__file__), *sorted(getattr(family, "ALSO", ())))
+        state = STATE / f"{options.name}-{digest(*files)}.jsonl"
         return added_up(trials(options.name, seeds, program, options.jobs, state))
 
     before = counted(options.before) if options.before else None

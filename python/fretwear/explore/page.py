@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from ..case import Case
 from ..errors import AbsentError
-from ..plot.style import label, scale, units_of
+from ..plot.style import label, largest_of, scale, units_of
 from ..result import STATES, Result
+from ..shown import dissipation, highest, known_to, loop_of
 from .figures import (
     LOOPS,
     WRAPPED,
@@ -162,8 +163,11 @@ class Page:
         self._draw_curve()
         if not self._first.data["x"] and answer.is_final:
             self._first.data = dict(self._curve.data)
-        place, height = self._highest()
-        text = f"highest {height:.4g} {units_of(result, 'amplitude')} at {place:.5g} Hz"
+        top = highest(result, self._observed.value)
+        text = "no point has converged"
+        if top is not None:
+            text = (f"highest {top.height:.4g} {units_of(result, 'amplitude')} at {top.place:.5g} "
+                    f"Hz {top.words}").rstrip()
         if not answer.is_final:
             text += " (few points; more follow)"
         self._say(f"{text}; {answer.seconds:.2f} s" + (f". {answer.words}" if answer.words else ""))
@@ -184,11 +188,6 @@ class Page:
     def _amplitude(self) -> NDArray[np.float64]:
         assert self._result is not None
         return self._result.amplitude_of(self._observed.value)
-
-    def _highest(self) -> tuple[float, float]:
-        assert self._result is not None
-        omega, height = self._result.maximum(self._observed.value)
-        return omega / (2.0 * np.pi), height
 
     def _draw(self) -> None:
         self._draw_curve()
@@ -232,16 +231,19 @@ class Page:
         except AbsentError as absent:
             self._loop_title.text = str(absent)
             return
-        moved, length = scale(float(np.abs(cycle.displacement).max()),
+        pairs = np.argsort(-dissipation(result)[point], kind="stable")[:LOOPS]
+        size, limit = float(np.abs(result.amplitude[point]).max()), known_to(result)
+        loops = [loop_of(cycle, pair, size, limit) for pair in pairs]
+        moved, length = scale(largest_of(*(loop.displacement for loop in loops)),
                               units_of(result, "amplitude"))
-        pressed, force = scale(float(np.abs(cycle.force).max()), units_of(result, "contact/force"))
-        pairs = np.argsort(-result.dissipation[point], kind="stable")[:LOOPS]
-        for source, pair in zip(self._loops, pairs):
-            c = int(np.argmax(np.ptp(cycle.displacement[:, pair], axis=0)))
-            source.data = {"x": (moved * cycle.displacement[:, pair, c]).tolist(),
-                           "y": (pressed * cycle.force[:, pair, c]).tolist()}
+        pressed, force = scale(largest_of(*(loop.force for loop in loops)),
+                               units_of(result, "contact/force"))
+        for source, loop in zip(self._loops, loops):
+            source.data = {"x": (moved * loop.displacement).tolist(),
+                           "y": (pressed * loop.force).tolist()}
         self._loop_title.text = (f"pairs {', '.join(str(pair + 1) for pair in pairs)} at "
-                                 f"{result.frequency[point]:.5g} Hz")
+                                 f"{result.frequency[point]:.5g} Hz"
+                                 + ("" if any(loop.moves for loop in loops) else ", at rest"))
         self._loop.xaxis.axis_label = label("relative displacement", length)
         self._loop.yaxis.axis_label = label("contact force", force)
 

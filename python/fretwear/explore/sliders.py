@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from .._native import namelist_values
 from ..case import Case
 from ..errors import InputError
@@ -21,6 +23,10 @@ _USUAL = {
     "model%rotation_speed": "rotation speed [rad/s]",
     "harmonics%n_harmonics": "harmonics",
 }
+#: Keys whose values may stand in the model file, by their names as parts of a case.
+_PARTS = {f"contact%{name}": f"contact/{name}" for name in (
+    "mu", "normal_load", "gap", "tangential_stiffness", "normal_stiffness")}
+_PARTS["spring%coefficient"] = "spring/coefficient"
 #: How far a slider goes on both sides of the value of the case, as a factor.
 _REACH = 4.0
 _MOST_HARMONICS = 15
@@ -57,8 +63,9 @@ class Slider:
 
 
 def usual_sliders(case: Case) -> list[Slider]:
-    """Sliders of what most people turn, as far as the case has one value for all pairs."""
-    values = namelist_values(case.namelist())
+    """Sliders of what most people turn, as far as the case, model file included, has one value
+    for all pairs."""
+    values = _values(case)
     found = []
     for key, title in _USUAL.items():
         value = _single(values, key)
@@ -78,7 +85,7 @@ def read_slider(text: str, case: Case) -> Slider:
     Raises
     ------
     InputError
-        It cannot be read, or the case has no single number there.
+        It cannot be read, the case has no single number there, or one outside of the range.
     """
     key, _, limits = text.partition("=")
     low_text, _, high_text = limits.partition(":")
@@ -89,28 +96,46 @@ def read_slider(text: str, case: Case) -> Slider:
                          "contact%mu=0.1:0.8") from None
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise InputError(f"slider '{text}': its ends must be finite, the lower one first")
-    values = namelist_values(case.namelist())
+    values = _values(case)
+    if not values.get(key):
+        raise InputError(f"slider '{text}': {key} has no value in the case, from which the page "
+                         "could start; give it one there")
     value = _single(values, key)
-    if key in values and value is None:
+    if value is None:
         raise InputError(f"slider '{text}': {key} is {', '.join(values[key][:3])} in the case; "
                          "a slider needs one number")
+    if not low <= value <= high:
+        raise InputError(f"slider '{text}': {key} is {value:.6g} in the case, from which the page "
+                         "starts; the range must enclose it")
     title = _USUAL.get(key, key)
-    if value is None:
-        value = low
-    if key in values and _is_whole(values[key][0]) and low == int(low) and high == int(high):
-        return Slider(key, title, low, high, 1, min(max(value, low), high), True)
+    if _is_whole(values[key][0]) and low == int(low) and high == int(high):
+        return Slider(key, title, low, high, 1, value, True)
     return _even(key, title, low, high, value)
 
 
 def settings_of(sliders: list[Slider], values: list[float]) -> dict[str, Any]:
-    """Groups of a case with the values of its sliders."""
+    """Groups of a case with the values of its sliders; nothing of those that stand where the case
+    has them."""
     groups: dict[str, Any] = {}
     for slider, value in zip(sliders, values):
+        if abs(value - slider.value) <= 0.5 * 10.0**-slider.decimals:
+            continue
         group, _, key = slider.key.partition("%")
         # The group &model is called `structure` in Python, where `model` is the first argument.
         place = groups.setdefault("structure" if group == "model" else group, {})
         place[key] = round(value) if slider.is_whole else round(value, slider.decimals)
     return groups
+
+
+def _values(case: Case) -> dict[str, list[str]]:
+    """Texts by key: those of the namelist, and what the case has read from its model."""
+    found = namelist_values(case.namelist())
+    with case.open() as session:
+        for key, part in _PARTS.items():
+            # As typed where the namelist has it: whole numbers look so.
+            if key not in found and len(numbers := np.unique(session.part(part))):
+                found[key] = [repr(float(number)) for number in numbers]
+    return found
 
 
 def _single(values: dict[str, list[str]], key: str) -> float | None:

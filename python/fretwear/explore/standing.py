@@ -20,6 +20,7 @@ from ..cycle import run_again
 from ..errors import AbsentError, FretwearError
 from ..plot.style import label, scale, units_of
 from ..result import STATES, Result
+from ..shown import dissipation, known_to, loop_of
 from .figures import (
     LOOPS,
     WRAPPED,
@@ -211,7 +212,8 @@ def _loops(result: Result) -> dict[str, Any]:
     """Loops of the pairs that dissipate most at each point, by a run that keeps histories."""
     n_loops = min(LOOPS, result.n_pairs)
     known = _with_periods(result)
-    pairs = np.argsort(-result.dissipation, axis=1, kind="stable")[:, :n_loops]
+    pairs = np.argsort(-dissipation(result), axis=1, kind="stable")[:, :n_loops]
+    sizes, limit = np.abs(result.amplitude).max(axis=1), known_to(result)
     moved = np.zeros((result.n_points, n_loops, _INSTANTS + 1))
     force = np.zeros_like(moved)
     for point in range(result.n_points):
@@ -225,9 +227,8 @@ def _loops(result: Result) -> dict[str, Any]:
             continue
         instants = np.linspace(0.0, len(cycle.displacement) - 1, _INSTANTS + 1).round().astype(int)
         for j, pair in enumerate(pairs[point]):
-            c = int(np.argmax(np.ptp(cycle.displacement[:, pair], axis=0)))
-            moved[point, j] = cycle.displacement[instants, pair, c]
-            force[point, j] = cycle.force[instants, pair, c]
+            loop = loop_of(cycle, pair, float(sizes[point]), limit)
+            moved[point, j], force[point, j] = loop.displacement[instants], loop.force[instants]
     by, length = scale(float(np.nanmax(np.abs(moved), initial=0.0)), units_of(result, "amplitude"))
     times, newton = scale(float(np.nanmax(np.abs(force), initial=0.0)),
                           units_of(result, "contact/force"))

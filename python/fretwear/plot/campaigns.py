@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .._native import namelist_values
 from ..errors import AbsentError, InputError
 from ..result import Result
+from ..shown import highest
 from .disks import rotation_speed
 from .style import (
     CURVE,
@@ -109,9 +110,10 @@ def read_damping(sources: Sequence[Source], observe: str | None = None) -> NDArr
 
     Returns
     -------
-    (n_results, 4) array
+    (n_results, 5) array
         Amplitude of the load [F], mean interference of the pairs [L] (0: none), largest amplitude
-        of harmonic 1 of the observed quantity over the load [L/F], where it is [Hz].
+        of harmonic 1 of the observed quantity over the load [L/F], where it is [Hz], and 1 where
+        that is a peak, 0 where it is an end of the sweep or where points failed beside it.
     """
     rows = []
     for result in (as_result(source) for source in sources):
@@ -122,12 +124,11 @@ def read_damping(sources: Sequence[Source], observe: str | None = None) -> NDArr
             gap: Floats = session.part("contact/gap")
         if load == 0.0:
             raise InputError(f"{result.name}: has no load that vibrates")
-        size = np.where(result.converged, np.abs(result.harmonic(1, observe)), -np.inf)
-        at = int(np.argmax(size))
-        if not np.isfinite(size[at]):
+        top = highest(result, observe, "first_harmonic")
+        if top is None:
             raise InputError(f"{result.name}: no point converged")
-        rows.append((load, -float(gap.mean()) if len(gap) else 0.0, size[at] / load,
-                     result.frequency[at]))
+        rows.append((load, -float(gap.mean()) if len(gap) else 0.0, top.height / load, top.place,
+                     float(top.is_peak)))
     return np.array(sorted(rows))
 
 
@@ -135,7 +136,8 @@ def plot_damping(sources: Sequence[Source], observe: str | None = None) -> Figur
     """Peak amplitude over the load, and its frequency, against the load: where friction damps best.
 
     Against the load over the interference, where pairs have one: only that counts for an elastic
-    law. The amplitude is that of harmonic 1, without the static displacement.
+    law. The amplitude is that of harmonic 1, without the static displacement. Sweeps that are
+    highest at an end, or beside points that failed, have no peak: rings off the curve.
 
     Parameters
     ----------
@@ -152,10 +154,13 @@ def plot_damping(sources: Sequence[Source], observe: str | None = None) -> Figur
     order = np.argsort(abscissa)
     figure = new_figure(7.6, 5.8)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    upper.loglog(abscissa[order], found[order, 2], "o-", color=CURVE, markersize=4.0)
+    _draw_peaks(upper, abscissa[order], found[order, 2], found[order, 4], CURVE)
     name = results[0].observed[results[0].index(observe)]
     upper.set_ylabel(label(f"peak of {name} over load", _ratio(length, force)))
-    lower.semilogx(abscissa[order], found[order, 3], "o-", color=PALETTE[1], markersize=4.0)
+    upper.set(xscale="log", yscale="log")
+    _draw_peaks(lower, abscissa[order], found[order, 3], found[order, 4], PALETTE[1])
+    if not found[:, 4].all():
+        upper.legend(frameon=False, fontsize=8)
     lower.set_ylabel("frequency of the peak [Hz]")
     lower.set_xlabel(label("load over interference", _ratio(force, length)) if preloaded
                      else label("load", force))
@@ -163,6 +168,15 @@ def plot_damping(sources: Sequence[Source], observe: str | None = None) -> Figur
         tidy(axes)
     figure.suptitle("Damping curve", fontsize=11)
     return figure
+
+
+def _draw_peaks(axes: Axes, x: Floats, y: Floats, is_peak: Floats, colour: str) -> None:
+    """Peaks joined by a curve; rings for sweeps that have none."""
+    peaks = is_peak > 0.0
+    axes.plot(x[peaks], y[peaks], "o-", color=colour, markersize=4.0, label="peak")
+    if not peaks.all():
+        axes.plot(x[~peaks], y[~peaks], "o", color=colour, markersize=5.0, markerfacecolor="white",
+                  label="largest, no peak: an end of the sweep, or points failed")
 
 
 def plot_force(sources: Sequence[Source], observe: str | None = None) -> Figure:
@@ -174,7 +188,7 @@ def plot_force(sources: Sequence[Source], observe: str | None = None) -> Figure:
         See `plot_damping`.
     """
     results: list[Result] = [as_result(source) for source in sources]
-    load, _, compliance, frequency = read_damping(results, observe).T
+    load, _, compliance, frequency, is_peak = read_damping(results, observe).T
     length, force = units_of(results[0], "amplitude"), units_of(results[0], "contact/force")
     height = compliance * load
     by_factor = _unit_load(results)
@@ -183,13 +197,15 @@ def plot_force(sources: Sequence[Source], observe: str | None = None) -> Figure:
         load, compliance = load / by_factor, compliance * by_factor
     figure = new_figure(7.6, 5.2)
     axes = figure.subplots()
-    axes.plot([0.0, load[-1]], [0.0, compliance[0] * load[-1]], "--", color="0.6", linewidth=1.2,
-              label="in proportion to the smallest load")
-    axes.plot(load, height, "o-", color=CURVE, markersize=4.0, label="peak")
+    first = int(np.argmax(is_peak))  # without any peak the smallest load
+    name = "the smallest load" if first == 0 else "the smallest load with a peak"
+    axes.plot([0.0, load[-1]], [0.0, compliance[first] * load[-1]], "--", color="0.6",
+              linewidth=1.2, label=f"in proportion to {name}")
+    _draw_peaks(axes, load, height, is_peak, CURVE)
     for k in (0, len(load) - 1):
         axes.annotate(f"{frequency[k]:.5g} Hz", (load[k], height[k]), xytext=(4, -12),
                       textcoords="offset points", fontsize=8, annotation_clip=False)
-    top = max(float(height.max()), compliance[0] * load[-1])
+    top = max(float(height.max()), compliance[first] * load[-1])
     axes.set_xlim(0.0, 1.08 * load[-1])
     axes.set_ylim(0.0, 1.08 * top)
     name = results[0].observed[results[0].index(observe)]

@@ -6,13 +6,15 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..cycle import Cycle
 from ..errors import InputError
 from ..result import DIRECTIONS, Result
-from ..rows import choose_point, synthesis
+from ..rows import choose_point, status_words, synthesis
+from ..shown import Loop, dissipation, known_to, loop_of
 from .style import (
     CURVE,
     PALETTE,
@@ -33,6 +35,8 @@ Floats = NDArray[np.float64]
 
 #: Instants of a period of an observed quantity.
 _INSTANTS = 256
+#: Harmonics below this part of the largest are round-off: double precision times a condition.
+_ROUND_OFF = 1e-13
 #: Pairs drawn unless others are asked for.
 _MOST_PAIRS = 6
 
@@ -60,20 +64,20 @@ def _chosen(result: Result, cycle: Cycle, point: int, pairs: Sequence[int] | Non
     if len(there) < result.dissipation.shape[1]:
         # Kept are those that dissipate most already.
         return sorted(range(len(there)), key=there.__getitem__)
-    order = np.argsort(-result.dissipation[point], kind="stable")
+    order = np.argsort(-dissipation(result)[point], kind="stable")
     return [there.index(pair) for pair in sorted(order[:_MOST_PAIRS].tolist())]
 
 
-def _direction(cycle: Cycle, pair: int) -> int:
-    """Tangential direction in which a pair moves more; the normal of one that has no other."""
-    extent = np.ptp(cycle.displacement[:, pair], axis=0)
-    return int(np.argmax(extent[:2])) if extent[:2].any() else 2
+def _loops(result: Result, cycle: Cycle, point: int, drawn: Sequence[int]) -> list[Loop]:
+    """Loops of the pairs to draw, at rest where they move by round-off."""
+    size, limit = float(np.abs(result.amplitude[point]).max(initial=0.0)), known_to(result)
+    return [loop_of(cycle, pair, size, limit) for pair in drawn]
 
 
 def _at(result: Result, point: int, cycle: Cycle | None = None) -> str:
     if cycle is not None and cycle.frequency != result.frequency[point]:
         return f"the peak, {cycle.frequency:.6g} Hz"
-    return f"point {point + 1}, {result.frequency[point]:.6g} Hz"
+    return f"point {point + 1}, {result.frequency[point]:.6g} Hz{status_words(result, point)}"
 
 
 def _at_peak(result: Result, cycle: Cycle, column: int) -> Floats | None:
@@ -104,7 +108,8 @@ def plot_hysteresis(source: Source, point: int | None = None,
         Point from 0; the peak without it, or the point of the largest amplitude.
     pairs : sequence of int, optional
         Pairs from 0; the six that dissipate most without it. Of the two tangential directions
-        the one of larger motion is drawn, of a pair without any the normal one.
+        the one of larger motion is drawn, of a pair without any the normal one. A pair that moves
+        by no more than round-off is at rest: a straight line.
     """
     result = as_result(source)
     cycle = _cycle_of(result, point, pairs)
@@ -114,16 +119,19 @@ def plot_hysteresis(source: Source, point: int | None = None,
     rows = math.ceil(len(drawn) / columns)
     figure = new_figure(max(3.3 * columns + 0.8, 5.6), max(2.9 * rows + 0.6, 3.8))
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, pair in zip(panels, drawn):
-        c = _direction(cycle, pair)
-        axes.plot(cycle.displacement[:, pair, c], cycle.force[:, pair, c], color=CURVE)
-        axes.set_title(f"{pair_name(result, int(cycle.pairs[pair]))}, {DIRECTIONS[c]}",
+    loops = _loops(result, cycle, point, drawn)
+    for axes, pair, loop in zip(panels, drawn, loops):
+        axes.plot(loop.displacement, loop.force, color=CURVE)
+        axes.set_title(f"{pair_name(result, int(cycle.pairs[pair]))}, "
+                       f"{DIRECTIONS[loop.direction]}" + ("" if loop.moves else ", at rest"),
                        fontsize=10)
         tidy(axes)
     # One unit for all panels, so that they can be compared.
     moved = largest_of(*(line.get_xdata() for axes in panels for line in axes.lines))
     pressed = largest_of(*(line.get_ydata() for axes in panels for line in axes.lines))
-    for axes in panels[:len(drawn)]:
+    for axes, loop in zip(panels, loops):
+        if not loop.moves:
+            _room(axes, float(loop.displacement[0]), moved)
         length = scale_axis(axes.xaxis, moved, units_of(result, "amplitude"))
         force = scale_axis(axes.yaxis, pressed, units_of(result, "contact/force"))
         axes.locator_params(axis="x", nbins=5)
@@ -133,6 +141,15 @@ def plot_hysteresis(source: Source, point: int | None = None,
     figure.supylabel(label("contact force", force), fontsize=10)
     figure.suptitle(f"Hysteresis at {_at(result, point, cycle)}", fontsize=11)
     return figure
+
+
+def _room(axes: Axes, middle: float, extent: float) -> None:
+    """Give a pair at rest the width of the others; without any, no numbers along the axis."""
+    if extent > 0.0:
+        axes.set_xlim(middle - extent, middle + extent)
+    else:
+        axes.set_xlim(-1.0, 1.0)
+        axes.set_xticks([0.0])
 
 
 def plot_cycle(source: Source, point: int | None = None, pairs: Sequence[int] | None = None,
@@ -173,12 +190,13 @@ def plot_cycle(source: Source, point: int | None = None, pairs: Sequence[int] | 
     panels[0].set_ylabel(label(name, scale_axis(panels[0].yaxis, largest_of(history), units)))
     panels[0].set_title(f"One cycle at {_at(result, point, cycle)}", fontsize=11)
     if cycle is not None:
-        for k, pair in enumerate(_chosen(result, cycle, point, pairs)):
-            c = _direction(cycle, pair)
-            panels[1].plot(cycle.degrees, cycle.displacement[:, pair, c],
+        drawn = _chosen(result, cycle, point, pairs)
+        for k, (pair, loop) in enumerate(zip(drawn, _loops(result, cycle, point, drawn))):
+            panels[1].plot(cycle.degrees, loop.displacement,
                            color=PALETTE[k % len(PALETTE)], linestyle=("-", "--")[k // 6 % 2],
                            label=f"{pair_name(result, int(cycle.pairs[pair]))}, "
-                                 f"{DIRECTIONS[c]}")
+                                 f"{DIRECTIONS[loop.direction]}"
+                                 + ("" if loop.moves else ", at rest"))
         moved = largest_of(*(line.get_ydata() for line in panels[1].lines))
         panels[1].set_ylabel(label("relative displacement",
                                    scale_axis(panels[1].yaxis, moved, units)))
@@ -200,8 +218,8 @@ def plot_harmonics(source: Source, point: int | None = None, observe: str | None
     figure = new_figure(8.0, 3.6)
     axes = figure.subplots()
     shown = np.array(size)
-    # Harmonics that vanish by symmetry have no place on a logarithmic axis.
-    present = shown > 1e-16 * shown.max()
+    # Harmonics that vanish by symmetry, and round-off, have no place on a logarithmic axis.
+    present = shown > _ROUND_OFF * shown.max()
     axes.bar(np.flatnonzero(present), shown[present], color=CURVE, width=0.6)
     axes.set_yscale("log")
     axes.set_ylim(bottom=0.3 * shown[present].min())

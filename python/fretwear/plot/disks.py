@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .._native import namelist_values
 from ..errors import AbsentError
 from ..result import Result
-from ..rows import choose_point, synthesis
+from ..rows import choose_point, status_words, synthesis
 from .style import (
     CURVE,
     PALETTE,
@@ -151,7 +151,8 @@ def plot_wave(source: Source, point: int | None = None, observe: str | None = No
     axes.set_title(f"Engine order {order}: {abs(signed)} nodal diameters"
                    + (", towards higher sectors" if signed > 0 and 2 * signed < n else
                       ", towards lower sectors" if signed < 0 else "")
-                   + f", at {result.frequency[point]:.6g} Hz", fontsize=11)
+                   + f", at {result.frequency[point]:.6g} Hz{status_words(result, point)}",
+                   fontsize=11)
     return figure
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..result import Result
-from ..rows import choose_point, pair_areas, pair_fields
+from ..rows import choose_point, pair_areas, pair_fields, status_words
+from ..shown import without_round_off
 from .style import (
     Floats,
     ScaledFormatter,
@@ -185,7 +186,7 @@ def plot_flanks(source: Source, point: int | None = None) -> Figure:
                          ".true.")
     title = f"Contact at point {point + 1}"
     if point < result.n_points:
-        title += f", {result.frequency[point]:.6g} Hz"
+        title += f", {result.frequency[point]:.6g} Hz{status_words(result, point)}"
     return plot_maps(result, fields, title)
 
 
@@ -217,9 +218,12 @@ def plot_maps(result: Result, fields: Mapping[str, tuple[Floats, str]], title: s
     for number, (name, (values, units)) in enumerate(fields.items()):
         block, column = divmod(number, columns)
         text, colours = _SHOWN.get(name, (name, "viridis"))
+        values = without_round_off(values)
         share = name in ("stick", "slip", "open")
         factor, shown_units = (1.0, "") if share else scale(largest_of(values), units)
-        limits = (0.0, 1.0) if share else (min(0.0, values.min()), max(values.max(), 1e-300))
+        # Where all is zero the bar goes up to one: nothing is coloured as if it were something.
+        top = float(values.max())
+        limits = (0.0, 1.0) if share else (min(0.0, float(values.min())), top if top > 0.0 else 1.0)
         shown = [panels[block * len(flanks) + row, column] for row in range(len(flanks))]
         for axes, flank in zip(shown, flanks):
             drawn = _draw_map(axes, flank, _cells(flank, area), values, colours, limits,

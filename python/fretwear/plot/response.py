@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..errors import AbsentError, InputError
+from ..errors import InputError
 from ..result import STATES, Result
+from ..shown import Highest, Maximum, dissipation, highest_of, maxima_of
 from .style import (
     CURVE,
     FAILED,
@@ -59,8 +60,8 @@ class Response:
         1 stable, 0 unstable, -1 undecided or not known.
     units : str
         Of the amplitude; "" where they are not known.
-    maximum : (float, float) or None
-        Where the curve is highest [Hz], and how high, between the points too.
+    maxima : tuple of Maximum
+        Those that the run has found, between the points too [Hz].
     deviation : (n_points,) or None
         Standard deviation of the amplitude to first order, of runs with `sensitivity%deviation`.
     bifurcations : tuple of (str, float, float)
@@ -79,7 +80,7 @@ class Response:
     dissipation: Floats | None = None
     stable: NDArray[np.int_] | None = None
     units: str = ""
-    maximum: tuple[float, float] | None = None
+    maxima: tuple[Maximum, ...] = ()
     bifurcations: tuple[tuple[str, float, float], ...] = ()
     deviation: Floats | None = None
     parameter: str = ""
@@ -100,6 +101,11 @@ class Response:
         """Whether frequencies turn back, so that nothing is a function of them."""
         step = np.diff(self.frequency)
         return bool((step > 0).any() and (step < 0).any())
+
+    @property
+    def highest(self) -> Highest | None:
+        """Where the curve is highest, and whether that is a peak; None where nothing converged."""
+        return highest_of(self.frequency, self.amplitude, self.converged, self.maxima)
 
     @property
     def peak(self) -> int:
@@ -127,7 +133,7 @@ def read_response(source: Source, observe: str | None = None) -> Response:
                              "frequency response)")
     column = result.index(observe)
     fraction = result.fraction if "contact/fraction" in result else None
-    loss = result.dissipation if "contact/dissipation" in result else None
+    loss = dissipation(result) if "contact/dissipation" in result else None
     # Rows of a resonance over a parameter have frequencies of their own.
     over = "" if "parameter" not in result or "resonance/phase" in result else (
         result.parameter_name)
@@ -137,7 +143,7 @@ def read_response(source: Source, observe: str | None = None) -> Response:
         None if fraction is None else fraction.mean(axis=1),
         None if loss is None else loss.sum(axis=1),
         result.stable if "floquet/stable" in result else None, units_of(result, "amplitude"),
-        None if over else _maximum(result, column),
+        () if over else maxima_of(result, column),
         tuple((b.kind, b.frequency if b.parameter is None else b.parameter,
                float(b.amplitude[column])) for b in result.bifurcations),
         _deviation(result, column), over,
@@ -150,21 +156,18 @@ def _deviation(result: Result, column: int) -> Floats | None:
     return np.asarray(result["sensitivity/deviation/largest"][:, column])
 
 
-def _maximum(result: Result, column: int) -> tuple[float, float] | None:
-    try:
-        omega, height = result.maximum(column)
-    except AbsentError:  # nothing has converged
-        return None
-    return omega / (2.0 * np.pi), height
-
-
 def half_power_damping(response: Response) -> float:
     """Damping ratio (f2 - f1) / (2 f_peak) from the width of the peak at 1/sqrt(2) of its height.
 
     Exact for a lightly damped linear mode; for a friction peak it is the viscous damping that
     gives a peak of the same width. The flanks are interpolated linearly between converged points,
-    so the sweep must resolve the peak. NaN where it does not reach the level on both sides.
+    so the sweep must resolve the peak. NaN where it does not reach the level on both sides, where
+    the highest point is at an end of the sweep, where points failed beside it, and where the run
+    itself knows no width of its peak.
     """
+    highest = response.highest
+    if highest is None or not (highest.is_peak and highest.has_width):
+        return float("nan")
     keep = response.converged & np.isfinite(response.amplitude)
     order = np.argsort(response.frequency[keep], kind="stable")
     f, a = response.frequency[keep][order], response.amplitude[keep][order]
@@ -203,14 +206,18 @@ def friction_damping(response: Response, linear: Response | None = None, *,
     Returns
     -------
     float or None
-        Damping ratio [-]; None where neither definition can be evaluated.
+        Damping ratio [-]; None where neither definition can be evaluated, or where a highest point
+        is no peak.
     """
+    highest = response.highest
+    if highest is None or not highest.is_peak:
+        return None
     peak = response.peak
     omega, amplitude = 2.0 * np.pi * response.frequency[peak], response.amplitude[peak]
     if modal_mass is not None and response.dissipation is not None:
         energy = 0.5 * modal_mass * (omega * amplitude) ** 2
         return float(response.dissipation[peak] / (4.0 * np.pi * energy))
-    if linear is None:
+    if linear is None or linear.highest is None:
         return None
     stuck, at = half_power_damping(linear), linear.peak
     ratio = linear.frequency[at] / response.frequency[peak]
@@ -224,7 +231,8 @@ def plot_response(source: Source, observe: str | None = None, *, linear: Source 
 
     The peak is annotated with its shift from the stuck peak and the equivalent damping ratio of
     friction as ``friction_damping`` defines it (the half-power width of the peak where that cannot
-    be evaluated). Points that did not converge are crosses, unstable ones are drawn thin
+    be evaluated); a highest point at an end of the sweep, or beside points that failed, is a ring
+    without these. Points that did not converge are crosses, unstable ones are drawn thin
     and dashed on shaded ground, those whose stability is undecided are ringed. Folds, period
     doublings and other bifurcations have markers. With `sensitivity%deviation` a band shows the
     amplitude give or take its standard deviation. The lower panel shows stick, slip and open
@@ -283,7 +291,8 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
         _draw_undecided(axes, response, good)
     _draw_bifurcations(axes, response)
     bad = ~response.converged
-    largest = float(np.nanmax(good, initial=response.maximum[1] if response.maximum else 0.0))
+    highest = response.highest
+    largest = float(np.nanmax(good, initial=highest.height if highest else 0.0))
     if stuck is not None:
         largest = max(largest, float(np.nanmax(stuck.amplitude[stuck.converged], initial=0.0)))
     if response.deviation is not None:
@@ -294,13 +303,13 @@ def _draw_amplitude(axes: Axes, response: Response, stuck: Response | None) -> f
         height = np.clip(height, 0.0, largest or np.inf)
         largest = max(largest, height[bad].max())
         axes.plot(response.frequency[bad], height[bad], "x", color=FAILED, markersize=6,
-                  label=f"not converged ({bad.sum()})")
+                  clip_on=False, zorder=5, label=f"not converged ({bad.sum()})")
     axes.set_ylabel(label(f"amplitude of {response.name}",
                           scale_axis(axes.yaxis, largest, response.units)))
-    # Above a band there is no room at its sides for what is written.
-    axes.set_ylim(0.0, (1.12 if response.deviation is None else 1.3) * largest or None)
+    axes.set_ylim(0.0, 1.06 * largest or None)
     tidy(axes)
-    axes.legend(frameon=False, loc="upper left")
+    axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0,
+                fontsize=9)
     return largest
 
 
@@ -336,29 +345,40 @@ def _draw_bifurcations(axes: Axes, response: Response) -> None:
 
 def _annotate_peak(axes: Axes, response: Response, stuck: Response | None,
                    modal_mass: float | None, largest: float) -> None:
-    """What the peak is, in the unit of an axis that shows values up to `largest`."""
-    peak = response.peak
-    f, a = response.maximum or (response.frequency[peak], response.amplitude[peak])
+    """What the highest place is, in the unit of an axis that shows values up to `largest`; a ring
+    in place of a dot, and no damping, where it is no peak."""
+    highest = response.highest
+    assert highest is not None  # the caller has looked whether a point has converged
     factor, units = scale(largest, response.units)
-    height = f"{factor * a:.4g} {units}".strip()
-    if response.parameter:
-        lines = [f"largest {height} at {f:.{_digits(response.frequency)}f}"]
-    else:
-        lines = [f"peak {height} at {f:.{_digits(response.frequency)}f} Hz"]
-    if stuck is not None and not response.parameter:
-        shift = 100.0 * (f / stuck.frequency[stuck.peak] - 1.0)
-        lines.append(f"shift {shift:+.3f} %")
-    damping = (None if response.parameter
-               else friction_damping(response, stuck, modal_mass=modal_mass))
+    name = "peak" if highest.is_peak and not response.parameter else "largest"
+    text = (f"{name} {factor * highest.height:.4g} {units}".strip()
+            + f" at {highest.place:.{_digits(response.frequency)}f}"
+            + ("" if response.parameter else " Hz"))
+    lines = [text + (f",\n{highest.words}" if highest.words else "")]
+    if not response.parameter and highest.is_peak:
+        lines += _damping_words(response, stuck, modal_mass, highest)
+    axes.plot(highest.place, highest.height, "o", color=CURVE, markersize=6,
+              markerfacecolor=CURVE if highest.is_peak else "white")
+    # Above the panel, where it covers no curve.
+    axes.text(1.0, 1.02, "\n".join(lines), transform=axes.transAxes, ha="right", va="bottom",
+              fontsize=9, bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": "0.8"})
+
+
+def _damping_words(response: Response, stuck: Response | None, modal_mass: float | None,
+                   highest: Highest) -> list[str]:
+    """How far the peak has moved and what friction damps, each as far as it is known."""
+    lines = []
+    linear = None if stuck is None else stuck.highest
+    if linear is not None and linear.is_peak:
+        lines.append(f"shift {100.0 * (highest.place / linear.place - 1.0):+.3f} %")
+    damping = friction_damping(response, stuck, modal_mass=modal_mass)
     if damping is not None:
-        lines.append(f"friction damping {100.0 * damping:.4f} %")
-    elif not (response.is_branch or response.parameter) and np.isfinite(
-            width := half_power_damping(response)):
+        how = "its energy" if modal_mass is not None else "the heights of both peaks"
+        lines.append(f"damping ratio of friction {100.0 * damping:.4f} %, by {how}")
+    elif not response.is_branch and np.isfinite(width := half_power_damping(response)):
         # Of a peak that friction bends to one side it is a width, and no damping.
         lines.append(f"half-power width {200.0 * width:.4f} % of the frequency")
-    axes.plot(f, a, "o", color=CURVE, markersize=6)
-    axes.text(0.985, 0.97, "\n".join(lines), transform=axes.transAxes, ha="right", va="top",
-              bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": "0.8"})
+    return lines
 
 
 def _digits(frequency: Floats) -> int:

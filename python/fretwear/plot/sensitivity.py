@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from ..rows import choose_point
+from ..rows import choose_point, status_words
 from .style import PALETTE, Source, as_result, new_figure, tidy
 
 __all__ = ["plot_sensitivity"]
@@ -56,5 +56,5 @@ def plot_sensitivity(source: Source, point: int | None = None,
         tidy(axes)
     panels[-1].set_xlabel("per cent of the quantity for one per cent of the parameter")
     figure.suptitle(f"Sensitivity at {result.omega[point]:.6g} rad/s, {result.frequency[point]:.6g}"
-                    " Hz", fontsize=11)
+                    f" Hz{status_words(result, point)}", fontsize=11)
     return figure

@@ -7,10 +7,12 @@ from matplotlib.figure import Figure
 
 from ..errors import AbsentError, InputError
 from ..result import Result
-from ..rows import choose_point, pair_fields
+from ..rows import choose_point, pair_fields, status_words
+from ..shown import without_round_off
 from .flanks import plot_maps
 from .style import (
     CURVE,
+    FAILED,
     PALETTE,
     Source,
     as_result,
@@ -40,7 +42,8 @@ def _worn(source: Source) -> Result:
 
 
 def _when(result: Result, step: int) -> str:
-    return f"step {step + 1} of {len(result.depth)}, {result.cycles[step]:.4g} {_abscissa(result)}"
+    return (f"step {step + 1} of {len(result.depth)}, {result.cycles[step]:.4g} "
+            f"{_abscissa(result)}{status_words(result, step)}")
 
 
 def _abscissa(result: Result) -> str:
@@ -78,7 +81,7 @@ def plot_wear_bars(source: Source, step: int | None = None) -> Figure:
     """
     result = _worn(source)
     step = choose_point(result, None) if step is None else step
-    depth = result.depth[step]
+    depth = without_round_off(result.depth[step])
     patch = (result["contact/patch"] if "contact/patch" in result
              else np.full(len(depth), "contact"))
     names = list(dict.fromkeys(str(name) for name in patch))
@@ -132,9 +135,16 @@ def plot_wear_evolution(source: Source) -> Figure:
     else:
         label_y(panels[1], "largest depth\nper cycle", units)
     if has_amplitude:
-        panels[2].plot(cycles, result.amplitude[:, 0], ".-", color=CURVE)
+        failed = ~result.converged
+        amplitude = np.where(failed, np.nan, result.amplitude[:, 0])
+        panels[2].plot(cycles, amplitude, ".-", color=CURVE)
+        if failed.any():
+            # Where the vibration of a step was not found: at the height of the axis, as a place.
+            panels[2].plot(cycles[failed], np.zeros(failed.sum()), "x", color=FAILED, markersize=6,
+                           clip_on=False, label=f"not converged ({failed.sum()})")
+            panels[2].legend(frameon=False, fontsize=8)
         panels[2].set_ylabel(label(f"amplitude\nof {result.observed[0]}", scale_axis(
-            panels[2].yaxis, largest_of(result.amplitude[:, 0]), units_of(result, "amplitude"))))
+            panels[2].yaxis, largest_of(amplitude), units_of(result, "amplitude"))))
     positive = cycles[cycles > 0.0]
     if positive.size and positive[-1] > 100.0 * positive[0]:
         # The rate falls over decades of cycles; the start, at zero, stays in the picture.
