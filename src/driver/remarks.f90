@@ -105,11 +105,23 @@ contains
    subroutine remark_unused(case, remarks)
       type(case_type), intent(in) :: case
       type(remark_list), intent(inout) :: remarks
+      integer :: n
 
       if (allocated(case%unread)) then
          if (size(case%unread) > 0) call remarks%add('not read', 'the model file holds '// &
             trim(list_of(case%unread))//', which nothing reads; fw_run --parts lists what is read')
       end if
+      if (case%idle_contact) call remarks%add('no pairs', '&contact is given, but there are no '// &
+         'contact pairs, and it has no effect: contact%n_pairs and side_1 give some')
+      if (case%idle_spring) call remarks%add('no springs', '&spring is given, but there are no '// &
+         'springs, and it has no effect: spring%n_springs and side_1 give some')
+      n = 0
+      associate (c => case%contact)
+         if (c%n_pairs > 0) n = count(abs(c%gap) > 0.0_wp .and. c%side_1(3, :) == 0 .and. &
+                                      c%side_2(3, :) == 0)
+      end associate
+      if (n > 0) call remarks%add('gap not used', 'contact%gap has no effect on '//to_text(n)// &
+         ' pairs, which have no normal dof: contact%normal_load presses them')
    end subroutine remark_unused
 
    !> `a, b, c and 7 more`.

@@ -14,8 +14,8 @@ module fw_contact_keys
    implicit none (type, external)
    private
 
-   public :: ask_laws, bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, bind_normal_load, &
-             bind_laws, bind_march, bind_worn, bind_n_springs, bind_springs
+   public :: ask_laws, bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
+             bind_normal_load, bind_laws, bind_march, bind_worn, bind_n_springs, bind_springs
 
    !> More pairs or springs are taken for a mistake.
    integer, parameter :: most = 1000000

@@ -33,6 +33,7 @@ module fw_law_constants
    contains
       procedure :: bind
       procedure :: offer
+      procedure :: offer_all
       procedure :: first_unused
       procedure :: set
       procedure :: get
@@ -93,19 +94,40 @@ contains
       end if
    end subroutine note_law
 
-   !> What the model has for a constant (n_pairs), if anything: it holds where the case gives none.
+   !> What the model has for a constant (n_pairs): it holds where the case gives none.
    subroutine offer(self, name, values)
       class(law_constants), intent(inout) :: self
       character(*), intent(in) :: name
-      real(wp), allocatable, intent(in) :: values(:)
+      real(wp), intent(in) :: values(:)
       type(constant_type) :: new
+      integer :: k
 
-      if (.not. allocated(values)) return
       if (.not. allocated(self%offered)) allocate (self%offered(0))
       new%name = name
-      new%values = values
-      self%offered = [self%offered, new]
+      k = place_of(self%offered, name)
+      if (k == 0) then
+         self%offered = [self%offered, new]
+         k = size(self%offered)
+      end if
+      self%offered(k)%values = values
    end subroutine offer
+
+   !> All that another one offers, repeated where it is of the pairs of one sector of some.
+   subroutine offer_all(self, other, n_pairs, n_sectors)
+      class(law_constants), intent(inout) :: self
+      type(law_constants), intent(in) :: other
+      !> Of a sector.
+      integer, intent(in) :: n_pairs, n_sectors
+      integer :: j, k
+
+      if (.not. allocated(other%offered)) return
+      do k = 1, size(other%offered)
+         associate (values => other%offered(k)%values)
+            call self%offer(trim(other%offered(k)%name), &
+                            [(values, j=1, merge(n_sectors, 1, size(values) == n_pairs))])
+         end associate
+      end do
+   end subroutine offer_all
 
    !> A constant of the model that the law of the case has not taken; blank where there is none.
    pure subroutine first_unused(self, name)

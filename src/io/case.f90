@@ -98,6 +98,8 @@ module fw_case
       type(string_type), allocatable :: inputs(:)
       !> What stands in the model file and nothing reads.
       type(string_type), allocatable :: unread(:)
+      !> Groups &contact and &spring that are given where there are no pairs and no springs.
+      logical :: idle_contact = .false., idle_spring = .false.
       !> Result file of a wear run that is to be continued; not allocated to start anew. No key of
       !> the namelist.
       character(:), allocatable :: restart

@@ -56,8 +56,9 @@ contains
                           '/cyclic', status_input)
          return
       else if (has_attribute(file, group, 'phase')) then
-         call fatal_error(error, file%path//': attribute phase of /cyclic is that of matrices of '// &
-                          'nodal diameters, and there are none: remove it', status_input)
+         call fatal_error(error, file%path//': attribute phase of /cyclic is that of '// &
+                          'matrices of nodal diameters, and there are none: remove it', &
+                          status_input)
          return
       end if
       ! Sectors that only contact joins have neither.

@@ -3,9 +3,9 @@
 module fw_hdf5_members
    use fw_hdf5_file, only: hdf5_file
    use fw_text, only: string_type
-   use hdf5, only: h5aget_name_by_idx_f, h5aget_num_attrs_f, h5gn_members_f, &
-      h5lget_name_by_idx_f, h5i_dataset_f, h5i_group_f, h5iget_type_f, h5oclose_f, h5oopen_f, &
-      h5_index_name_f, h5_iter_inc_f, hid_t, hsize_t
+   use hdf5, only: h5aget_name_by_idx_f, h5aget_num_attrs_f, h5gn_members_f, h5lget_name_by_idx_f, &
+      h5i_dataset_f, h5i_group_f, h5iget_type_f, h5oclose_f, h5oopen_f, h5_index_name_f, &
+      h5_iter_inc_f, hid_t, hsize_t
    implicit none (type, external)
    private
 

@@ -9,7 +9,8 @@ module fw_parts
    implicit none (type, external)
    private
 
-   public :: part_type, model_parts, write_parts
+   public :: part_type, is_of_kind, law_constant_names, model_parts, names_to_put, part_to_put, &
+             put_name, write_parts
 
    type :: part_type
       !> Path from the root. K stands for a nodal diameter, M for the number of a sector or of a
@@ -40,14 +41,14 @@ module fw_parts
       part_type('damping', 'real', 'dof dof', '', 'viscous, symmetric'), &
       part_type('stiffness_rotation', 'real', 'dof dof', '', &
                 'added to the stiffness for each (rad/s)^2 of model%rotation_speed'), &
-      part_type('coriolis', 'real', 'dof dof', '', 'skew: force of velocities for each rad/s of '// &
-                'model%rotation_speed; of cyclic structures, any other takes &cyclic '// &
-                'n_sectors = 1, engine_order = 0')]
+      part_type('coriolis', 'real', 'dof dof', '', &
+                'skew: force of velocities for each rad/s of model%rotation_speed')]
 
    type(part_type), parameter :: of_pairs(*) = [ &
       part_type('contact/side_1', 'integer', 'pair 3', with_pairs, &
                 'dof numbers of t1, t2, n, from 1: negative with the sign turned, 0 for none'), &
-      part_type('contact/side_2', 'integer', 'pair 3', with_pairs, 'of the other side, 0: ground'), &
+      part_type('contact/side_2', 'integer', 'pair 3', with_pairs, &
+                'of the other side, 0: ground'), &
       part_type('contact/sector_2', 'integer', 'pair', '', &
                 'sector of side 2, counted from that of side 1'), &
       part_type('contact/mu', 'real', 'one_or pair', '', 'friction coefficient'), &
@@ -90,7 +91,8 @@ module fw_parts
                 'displacements in front of the coordinates of every nodal diameter, which take '// &
                 'the place of matrices and interfaces of a sector'), &
       part_type('cyclic@phase', 'text', '', '', '"delay" (without it): matrices of nodal '// &
-                'diameters are of u_right = exp(-2 pi i K/N) u_left; "advance": of the other sign'), &
+                'diameters are of u_right = exp(-2 pi i K/N) u_left; "advance": of the other '// &
+                'sign'), &
       part_type('cyclic/left', 'integer', 'interface', '', 'dofs from 1 of one interface'), &
       part_type('cyclic/right', 'integer', 'interface', '', &
                 'of the other, which moves as the left one of the next sector; negative: with '// &
@@ -98,12 +100,13 @@ module fw_parts
 
    type(part_type), parameter :: of_diameters(*) = [ &
       part_type('nodal_diameter/K/mass', 'complex', 'order order', 'with its group', &
-                'Hermitian; K = 0, 1, .. N/2 as far as harmonics need them, rigid laws take the '// &
-                'mean of all that are there'), &
+                'Hermitian; K = 0, 1, .. N/2 as far as harmonics need them, rigid laws take '// &
+                'the mean of all that are there'), &
       part_type('nodal_diameter/K/stiffness', 'complex', 'order order', 'with its group', &
                 'Hermitian'), &
       part_type('nodal_diameter/K/damping', 'complex', 'order order', '', 'Hermitian'), &
-      part_type('nodal_diameter/K/stiffness_rotation', 'complex', 'order order', '', 'Hermitian'), &
+      part_type('nodal_diameter/K/stiffness_rotation', 'complex', 'order order', '', &
+                'Hermitian'), &
       part_type('nodal_diameter/K/coriolis', 'complex', 'order order', '', &
                 'skew-Hermitian, for each rad/s'), &
       part_type('nodal_diameter/K/load/static', 'complex', 'order', '', &
@@ -114,7 +117,8 @@ module fw_parts
       part_type('nodal_diameter/K/observe/matrix', 'complex', 'quantity order', '', &
                 'rows of the quantities of /observe/name'), &
       part_type('aero/sector/M', 'complex', 'motion motion', '', &
-                'forces of the air by the motion of sector M, counted from that which feels them'), &
+                'forces of the air by the motion of sector M, counted from the one that feels '// &
+                'them'), &
       part_type('aero/nodal_diameter/M', 'complex', 'motion motion', '', &
                 'in place of these: by signed nodal diameters'), &
       part_type('aero/modes', 'real', 'motion dof', '', &
@@ -125,8 +129,8 @@ module fw_parts
       part_type('mesh/cells', 'integer', 'cell 8', with_mesh, 'corners of the cells: points '// &
                 'from 0 in the order of VTK, -1 behind the last one'), &
       part_type('mesh/body', 'integer', 'cell', with_mesh, 'body of each cell'), &
-      part_type('mesh/kind', 'integer', 'cell', '', 'type of each cell by its number in VTK: 5, '// &
-                '9, 10, 12, 13, 14; hexahedra (12) without it'), &
+      part_type('mesh/kind', 'integer', 'cell', '', 'type of each cell by its number in VTK: '// &
+                '5, 9, 10, 12, 13, 14; hexahedra (12) without it'), &
       part_type('mesh/facets', 'integer', 'facet 4', with_mesh, &
                 'facets in contact, points in cyclic order'), &
       part_type('mesh/pair', 'integer', 'facet', with_mesh, 'pair of each facet, from 0'), &
@@ -143,16 +147,100 @@ contains
                of_diameters, of_mesh]
    end function model_parts
 
+   !> The name by which a calling program gives a part; empty of those that only files have.
+   pure function put_name(name) result(text)
+      !> Of a row of the table.
+      character(*), intent(in) :: name
+      character(:), allocatable :: text
+      character(*), parameter :: of_files(*) = [character(17) :: '@format', '@format_version', &
+         '@parameters', '@disk_parameters', 'contact@law', 'observe/name', 'observe/dof', &
+         'observe/matrix', 'cyclic@n_physical', 'cyclic@phase']
+      integer :: at
+
+      text = ''
+      if (any(of_files == name) .or. index(name, 'mesh/') == 1) return
+      text = trim(name)
+      at = index(name, '@')
+      if (at == 1) text = trim(name(2:))
+      if (at > 1) text(at:at) = '/'
+   end function put_name
+
+   !> The part that a calling program names; a blank one where there is none of that name.
+   function part_to_put(name) result(part)
+      character(*), intent(in) :: name
+      type(part_type) :: part
+      character(*), parameter :: numbered(*) = [character(20) :: 'nodal_diameter/', &
+         'aero/sector/', 'aero/nodal_diameter/']
+      type(part_type), allocatable :: parts(:)
+      character(:), allocatable :: pattern
+      integer :: i, n
+
+      pattern = name
+      do i = 1, size(numbered)
+         n = len_trim(numbered(i))
+         if (index(name, numbered(i)(:n)) /= 1) cycle
+         pattern = name(:n)//merge('K', 'M', i == 1)// &
+                   name(n + index(name(n + 1:)//'/', '/'):)
+      end do
+      part = part_type('', '', '', '', '')
+      parts = model_parts()
+      do i = 1, size(parts)
+         if (put_name(parts(i)%name) == pattern .and. len(pattern) > 0) part = parts(i)
+      end do
+   end function part_to_put
+
+   !> Whether a part is given as numbers of a kind: complex ones as pairs of reals.
+   pure logical function is_of_kind(part, kind)
+      type(part_type), intent(in) :: part
+      character(*), intent(in) :: kind
+
+      is_of_kind = part%kind == kind .or. (kind == 'real' .and. part%kind == 'complex')
+   end function is_of_kind
+
+   !> Names of the parts of a kind that calling programs give: `a, b, c`.
+   function names_to_put(kind) result(text)
+      !> Such as real.
+      character(*), intent(in) :: kind
+      character(:), allocatable :: text
+      type(part_type), allocatable :: parts(:)
+      integer :: i
+
+      parts = model_parts()
+      text = ''
+      do i = 1, size(parts)
+         if (len(put_name(parts(i)%name)) == 0) cycle
+         if (.not. is_of_kind(parts(i), kind)) cycle
+         if (len(text) > 0) text = text//', '
+         text = text//put_name(parts(i)%name)
+      end do
+   end function names_to_put
+
+   !> Keys of the constants of pairs that laws declare.
+   function keys_of_laws() result(keys)
+      type(key_type), allocatable :: keys(:)
+      type(contact_type) :: contact
+      type(reader_type) :: nobody
+
+      call ask_laws(nobody, contact)
+      call move_alloc(contact%constants%named, keys)
+   end function keys_of_laws
+
+   !> Their names.
+   function law_constant_names() result(names)
+      character(24), allocatable :: names(:)
+      type(key_type), allocatable :: keys(:)
+
+      keys = keys_of_laws()
+      names = keys%name
+   end function law_constant_names
+
    !> Constants of pairs that laws declare.
    function of_laws() result(parts)
       type(part_type), allocatable :: parts(:)
       type(key_type), allocatable :: keys(:)
-      type(contact_type) :: contact
-      type(reader_type) :: nobody
       integer :: k
 
-      call ask_laws(nobody, contact)
-      keys = contact%constants%named
+      keys = keys_of_laws()
       allocate (parts(size(keys)))
       do k = 1, size(keys)
          parts(k) = part_type('contact/'//keys(k)%name, 'real', 'one_or pair', '', &

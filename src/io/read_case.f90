@@ -327,6 +327,11 @@ contains
       end if
       call read_springs(reader, raw%springs, case%model%cyclic%n_solved(), case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
+      ! A number of 0 was meant.
+      case%idle_contact = case%contact%n_pairs == 0 .and. reader%has_group('contact') .and. &
+                          .not. reader%given('contact', 'n_pairs')
+      case%idle_spring = case%springs%n_springs == 0 .and. reader%has_group('spring') .and. &
+                         .not. reader%given('spring', 'n_springs')
       call read_loads(reader, options, raw, terms)
       wanted = case%sensitivity%parameters
       if (case%varied > 0) then

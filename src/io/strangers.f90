@@ -6,8 +6,9 @@ module fw_strangers
    use fw_error, only: error_type, fatal_error
    use fw_hdf5, only: hdf5_file
    use fw_hdf5_members, only: kind_of, list_attributes, list_members
+   use fw_part_names, only: hint_for, is_number
    use fw_parts, only: model_parts, part_type
-   use fw_text, only: edit_distance, lower_case, string_type, to_text
+   use fw_text, only: lower_case, string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private
@@ -20,17 +21,16 @@ module fw_strangers
       character(150) :: words
    end type not_offered_type
 
+   character(*), parameter :: of_air = 'forces of the air do not depend on frequency here: '// &
+      'give those of the frequency that matters as /aero/sector/M or /aero/nodal_diameter/K'
+   character(*), parameter :: of_damping = 'damping is viscous here: give /damping, or '// &
+      'model%modal_damping in the case'
+
    type(not_offered_type), parameter :: not_offered(*) = [ &
-      not_offered_type('aero/frequency', 'forces of the air do not depend on frequency here: give '// &
-                       'those of the frequency that matters as /aero/sector/M or '// &
-                       '/aero/nodal_diameter/K'), &
-      not_offered_type('aero/matrix', 'forces of the air do not depend on frequency here: give '// &
-                       'those of the frequency that matters as /aero/sector/M or '// &
-                       '/aero/nodal_diameter/K'), &
-      not_offered_type('structural_damping', 'damping is viscous here: give /damping, or '// &
-                       'model%modal_damping in the case'), &
-      not_offered_type('hysteretic_damping', 'damping is viscous here: give /damping, or '// &
-                       'model%modal_damping in the case'), &
+      not_offered_type('aero/frequency', of_air), &
+      not_offered_type('aero/matrix', of_air), &
+      not_offered_type('structural_damping', of_damping), &
+      not_offered_type('hysteretic_damping', of_damping), &
       not_offered_type('gyroscopic', 'give the matrix for each rad/s as /coriolis'), &
       not_offered_type('polynomial', 'give nonlinear springs as /spring')]
 
@@ -55,7 +55,6 @@ module fw_strangers
       procedure :: judge
       procedure :: judge_attributes
       procedure :: names_in
-      procedure :: hint_for
       procedure :: is_meant
    end type search_type
 
@@ -85,21 +84,27 @@ contains
       character(*), intent(in) :: group, pattern
       type(error_type), allocatable, intent(out) :: error
       type(string_type), allocatable :: members(:), known(:)
+      integer, allocatable :: place(:)
       integer :: i, k
 
       call self%judge_attributes(group, pattern, error)
       if (allocated(error)) return
       call list_members(self%file, '/'//group, members)
       call self%names_in(pattern, known)
+      allocate (place(size(members)), source=0)
       do i = 1, size(members)
-         do k = size(known), 1, -1
-            if (self%is_meant(members(i)%text, known(k)%text)) exit
+         do k = 1, size(known)
+            if (self%is_meant(members(i)%text, known(k)%text)) place(i) = k
          end do
-         if (k > 0) then
-            call self%judge(joined(group, members(i)%text), joined(pattern, known(k)%text), error)
-         else
-            call refuse_or_note(self, group, pattern, members(i)%text, known, error)
-         end if
+         if (place(i) > 0) cycle
+         call refuse_or_note(self, group, pattern, members(i)%text, known, error)
+         if (allocated(error)) return
+      end do
+      ! What is in them may be wrong for the want of a part that has another name here.
+      do i = 1, size(members)
+         if (place(i) == 0) cycle
+         call self%judge(joined(group, members(i)%text), joined(pattern, known(place(i))%text), &
+                         error)
          if (allocated(error)) return
       end do
    end subroutine walk
@@ -139,7 +144,7 @@ contains
       do i = 1, size(names)
          if (any(self%parts%name == pattern//'@'//names(i)%text)) cycle
          if (is_label(names(i)%text)) cycle
-         hint = self%hint_for(names(i)%text, pattern, is_attribute=.true.)
+         hint = hint_for(self%parts, names(i)%text, pattern, is_attribute=.true.)
          if (len(hint) > 0 .or. is_closed(self, pattern)) then
             call fatal_error(error, self%file%path//': attribute '//names(i)%text//' of /'// &
                              object//' is nothing that is read'//hint//'; expected there:'// &
@@ -182,7 +187,7 @@ contains
          call refuse(self, name, 'is there, but '//trim(not_offered(k)%words), error)
          return
       end if
-      hint = self%hint_for(member, pattern, is_attribute=.false.)
+      hint = hint_for(self%parts, member, pattern, is_attribute=.false.)
       if (len(hint) == 0 .and. .not. is_closed(self, pattern)) then
          call append(self%unread, '/'//name)
          return
@@ -239,13 +244,6 @@ contains
       end do
    end function is_meant
 
-   !> Whether a name of the table stands for numbers.
-   pure logical function is_number(known)
-      character(*), intent(in) :: known
-
-      is_number = known == 'K' .or. known == 'M'
-   end function is_number
-
    !> First and last number that a name of the table stands for. Nodal diameters above N/2 are the
    !> conjugates of others: what a file says of them would not count.
    pure function numbers(self, known) result(range)
@@ -270,92 +268,6 @@ contains
          text = 'a number from '//to_text(range(1))//' to '//to_text(range(2))
       end if
    end function shown
-
-   !> ` (did you mean /damping?)`, or nothing: the nearest part of the same group, an attribute
-   !> in the place of a dataset or the other way round, or a part of that name in another group.
-   pure function hint_for(self, word, pattern, is_attribute) result(hint)
-      class(search_type), intent(in) :: self
-      character(*), intent(in) :: word, pattern
-      !> Whether the word is that of an attribute.
-      logical, intent(in) :: is_attribute
-      character(:), allocatable :: hint, row
-      integer :: best, cost, i, last
-
-      hint = ''
-      best = huge(best)
-      do i = 1, size(self%parts)
-         call compare(word, trim(self%parts(i)%name), pattern, is_attribute, cost, last)
-         if (cost >= best) cycle
-         best = cost
-         row = self%parts(i)%name(:last)
-         hint = '/'//row
-         if (index(row, '@') > 0) hint = 'attribute '//row(index(row, '@') + 1:)//' of /'// &
-                                         row(:index(row, '@') - 1)
-      end do
-      if (len(hint) > 0) hint = ' (did you mean '//hint//'?)'
-   end function hint_for
-
-   !> How far a word in a group is from a row of the table, and how much of its path is meant.
-   pure subroutine compare(word, row, pattern, is_attribute, cost, last)
-      character(*), intent(in) :: word, row, pattern
-      logical, intent(in) :: is_attribute
-      !> Less is nearer; huge: another word.
-      integer, intent(out) :: cost, last
-      !> Of the other kind, in another group.
-      integer, parameter :: kind_apart = 100, group_apart = 1000
-      integer :: first, at
-      logical :: row_is_attribute, in_group
-
-      cost = huge(cost)
-      last = len(row)
-      at = index(row, '@')
-      first = len(pattern) + merge(2, 1, len(pattern) > 0 .or. at == 1)
-      in_group = len(pattern) == 0 .or. index(row, pattern//'/') == 1 .or. &
-                 index(row, pattern//'@') == 1
-      if (in_group) then
-         ! A path in one word.
-         if (scan(row(first:), '/@') > 0 .and. plain(word) == plain(row(first:))) cost = 0
-         if (cost == 0) return
-         last = first + scan(row(first:)//'/', '/@') - 2
-         row_is_attribute = at == first - 1 .and. at > 0
-         if (is_number(row(first:last))) return
-         if (is_near(plain(word), plain(row(first:last)))) then
-            cost = edit_distance(plain(word), plain(row(first:last)))
-            if (row_is_attribute .eqv. is_attribute) return
-            cost = cost + kind_apart
-            ! What a generator leaves of itself is nothing that a case could lack.
-            if (index(row, 'parameters') > 0) cost = huge(cost)
-            return
-         end if
-         if (last == len(row)) return
-         last = len(row)
-      end if
-      if (index(row, 'mesh/') > 0 .or. scan(row, '/@') < 2 .or. is_attribute .and. at == 0) return
-      if (plain(word) == plain(row(scan(row, '/@', back=.true.) + 1:))) cost = group_apart
-   end subroutine compare
-
-   !> Whether two names are the same but for a slip: a letter of four is wrong or left out, two are
-   !> swapped, or the name stands with other words.
-   pure logical function is_near(word, known)
-      character(*), intent(in) :: word, known
-      character(*), parameter :: matrices(*) = [character(9) :: 'mass', 'stiffness', 'damping', &
-         'coriolis']
-
-      is_near = edit_distance(word, known) <= max(1, min(len(word), len(known))/4)
-      if (any(matrices == known)) is_near = is_near .or. index('_'//word//'_', '_'//known//'_') > 0
-   end function is_near
-
-   !> Letters only: what people write in other ways is the same name.
-   pure function plain(word) result(text)
-      character(*), intent(in) :: word
-      character(len(word)) :: text
-      integer :: i
-
-      text = lower_case(word)
-      do i = 1, len(text)
-         if (scan(text(i:i), '-. /@') > 0) text(i:i) = '_'
-      end do
-   end function plain
 
    !> Whether an attribute is a label.
    pure logical function is_label(name)

@@ -23,7 +23,7 @@ read, remarked; *silent* are those that are neither. What is a slip has to be re
 that is as near as any; *not named* are those where it is not. Sound files have to run without a
 remark of what is not read.
 """
-COUNT = 3000
+COUNT = 2000
 SMALL = tuple(range(60))
 COLUMNS = {"refused": "refused", "named": "with the name meant", "remarked": "remarked",
            "unnamed": "not named", "silent": "silent", "blamed": "sound and blamed",
@@ -93,8 +93,8 @@ def datasets(kind, draw):
               "observe/matrix": np.eye(1, N), "cyclic/left": [1], "cyclic/right": [-4],
               "aero/modes": np.eye(2, N)}
     parts |= {f"load/{name}": 0.1 * np.ones(N) for name in NODAL["load"]}
-    parts |= {f"aero/{draw.choice(['sector', 'nodal_diameter'])}/{m}": pairs_of(0.01 * np.eye(2))
-              for m in (0,)}
+    of_air = draw.choice(["sector", "nodal_diameter"])
+    parts |= {f"aero/{of_air}/{m}": pairs_of(0.01 * np.eye(2)) for m in range(-2, 3)}
     parts |= {"mesh/points": np.zeros((8, 3)), "mesh/cells": np.arange(8)[None],
               "mesh/body": [0], "mesh/kind": [12], "mesh/facets": [[0, 1, 2, 3]],
               "mesh/pair": [0], "mesh/basis": np.zeros((24, N))}
@@ -186,7 +186,7 @@ def make_strange(draw, file, strange):
         if strange == "place":
             name = draw.choice([name for name in sets if "/" in name and "mesh/" not in name])
             word, group = name.split("/")[-1], draw.choice(groups)
-            if word in names(group) or word.isdigit() or word in names(group, "attributes"):
+            if word in names(group) or is_number(word) or word in names(group, "attributes"):
                 continue
             file.copy(name, f"{group}/{word}")
             return group, word, False, None
@@ -221,7 +221,7 @@ def wrong_kind(draw, file, groups, sets):
     """Another object under a name that is known."""
     way = draw.choice(["attribute", "dataset", "group", "flat", "link"])
     if way == "attribute": # of a dataset
-        name = draw.choice([name for name in sets if not name.split("/")[-1].isdigit()])
+        name = draw.choice([name for name in sets if not is_number(name.split("/")[-1])])
         group, _, word = name.rpartition("/")
         file[group or "/"].attrs[word] = 1.0
         return group, word, True, word
@@ -281,14 +281,14 @@ def judge(found, told, refused, text, remark):
     if not refused:
         # Beside what is read anyone may keep data of his own.
         own = meant is None and group in ("", "mesh") and place in remark
-        own = own or "parameters" in word and place in remark
+        own = own or ("parameters" in word and place in remark)
         found["remarked" if own else "silent"] = 1
         return
     if place not in text:
         found["silent"] = 1
         return
     found["refused"] = 1
-    if meant is None or meant.isdigit():
+    if meant is None or is_number(meant):
         return
     both = names(group) + names(group, "attributes")
     least = min(distance(tidy(word), tidy(name)) for name in both)
@@ -296,6 +296,10 @@ def judge(found, told, refused, text, remark):
     named = re.search(r"did you mean (?:attribute )?/?([\w/]+)", text)
     last = named[1].split("/")[-1] if named else ""
     found["named" if last in near else "unnamed"] = 1
+
+
+def is_number(word):
+    return word.lstrip("-").isdigit()
 
 
 def tidy(word):
