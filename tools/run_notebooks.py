@@ -18,7 +18,7 @@ RANDOM = re.compile(r"\b[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}\b")
 
 
 def same_names(text: str) -> str:
-    """Tables of xarray have parts with random names: numbered, the same run leaves the same file."""
+    """Numbers for the random names in tables of xarray: the same run leaves the same file."""
     names: dict[str, str] = {}
     return RANDOM.sub(lambda found: names.setdefault(found[0], f"part-{len(names) + 1}"), text)
 
