@@ -6,12 +6,21 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import nbformat
 from nbclient import NotebookClient
 
 ROOT = Path(__file__).resolve().parents[1]
+#: Names that no two runs have in common.
+RANDOM = re.compile(r"\b[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}\b")
+
+
+def same_names(text: str) -> str:
+    """Numbers for the random names in tables of xarray: the same run leaves the same file."""
+    names: dict[str, str] = {}
+    return RANDOM.sub(lambda found: names.setdefault(found[0], f"part-{len(names) + 1}"), text)
 
 
 def main() -> None:
@@ -29,7 +38,7 @@ def main() -> None:
         notebook.metadata = {"kernelspec": notebook.metadata.get("kernelspec", {}),
                              "language_info": {"name": "python"}}
         notebook.nbformat_minor = 4
-        path.write_text(nbformat.writes(notebook) + "\n")
+        path.write_text(same_names(nbformat.writes(notebook)) + "\n")
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size // 1000} kB")
 
 

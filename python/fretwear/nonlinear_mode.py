@@ -47,7 +47,8 @@ class NonlinearMode:
         What the amplitudes are: 'observed', of the first harmonic of the first observed quantity,
         or 'modal'.
     amplitude, omega, damping_ratio : (n_points,)
-        Amplitude, angular frequency [rad/s] and damping ratio.
+        Amplitude, angular frequency [rad/s] and damping ratio xi/(2 omega). Where the shape changes
+        with the amplitude this is not F/(2 m a) of a forced motion: see `forced_damping_ratio`.
     converged : (n_points,)
         Whether the point is a solution.
     stuck_omega, stuck_damping_ratio : float
@@ -56,6 +57,9 @@ class NonlinearMode:
         Amplitude from which on a pair slips or separates; NaN where none does.
     limit_cycles : tuple of LimitCycle
         In the order along the curve.
+    modal_mass : (n_points,)
+        Mass of the mode at the first observed quantity, as its shape is at each amplitude: the
+        modal amplitude over that of the first harmonic, squared.
     """
 
     number: int
@@ -68,6 +72,26 @@ class NonlinearMode:
     stuck_damping_ratio: float
     onset: float
     limit_cycles: tuple[LimitCycle, ...]
+    modal_mass: Floats
+
+    def forced_damping_ratio(self, mass: float | None = None) -> Floats:
+        """F/(2 m a) of the forced motion at its phase resonance (n_points), as it is measured.
+
+        F drives the first observed quantity, a is its acceleration, and m is one mass for all
+        amplitudes. It is `damping_ratio` times `modal_mass` over m, as far as other modes take no
+        part.
+
+        Parameters
+        ----------
+        mass : float, optional
+            The m of the measurement; the modal mass at the lowest amplitude without it.
+        """
+        if mass is None:
+            good = np.flatnonzero(self.converged)
+            if not len(good):
+                return np.full(len(self.amplitude), np.nan)
+            mass = float(self.modal_mass[good[np.argmin(self.amplitude[good])]])
+        return np.asarray(self.damping_ratio * self.modal_mass / mass)
 
     @property
     def frequency(self) -> Floats:
@@ -80,8 +104,10 @@ def read_mode(result: ResultFile) -> NonlinearMode:
     damping = result["mode/damping_ratio"]
     control = namelist_values(result.namelist).get("mode%control", ["observed"])[0]
     modal = control == "modal"
-    amplitude = (result["mode/modal_amplitude"] if modal
-                 else result["mode/first_harmonic"][:, 0])
+    modal_amplitude, observed = result["mode/modal_amplitude"], result["mode/first_harmonic"][:, 0]
+    amplitude = modal_amplitude if modal else observed
+    with np.errstate(divide="ignore", invalid="ignore"):  # at a node of the mode
+        mass = (modal_amplitude / observed)**2
     with result.open() as file:
         facts = dict(file["mode"].attrs)
     if "number" not in facts:
@@ -94,4 +120,5 @@ def read_mode(result: ResultFile) -> NonlinearMode:
     return NonlinearMode(
         int(facts["number"]), control, amplitude, result["omega"], damping,
         result["converged"].astype(bool), float(facts["stuck_omega"]),
-        float(facts["stuck_damping_ratio"]), float(facts["onset_amplitude"]), tuple(cycles))
+        float(facts["stuck_damping_ratio"]), float(facts["onset_amplitude"]), tuple(cycles),
+        np.asarray(mass))

@@ -232,3 +232,46 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table.write_text("amplitude, frequenzy\n1, 2\n")
     assert main(arguments) == 3
     assert "frequenzy" in capsys.readouterr().err
+
+
+def shaped(values: Any = (0.07, 0.4), **groups: Any) -> fw.Case:
+    """Friction at the second mass changes the shape of the mode at the first."""
+    contact = fw.ContactPairs([[2, 0, 0]], mu=1.0, normal_load=values[0],
+                              tangential_stiffness=values[1])
+    model = fw.Model(np.diag([1.0, 0.5]), None, [[1.0, -0.2], [-0.2, 0.8]], contact=contact,
+                     cosine=[1.0, 0.0], observe={"drive": 1})
+    return fw.Case(model, case={"analysis": "mode"}, contact={"law": "penalty"},
+                   structure={"rayleigh_mass": 0.004}, solver={"tolerance": 1e-11},
+                   harmonics={"n_harmonics": 3}, mode={"start": 0.1, "end": 10.0}).replace(**groups)
+
+
+@pytest.mark.parametrize("kind", ["mode", "forced"])
+def test_either_damping_gives_the_same_parameters(kind: str) -> None:
+    """And damping ratios of the one kind, taken for the other, do not."""
+    truth, mass = (0.1, 0.5), 1.05
+    amplitude = np.geomspace(0.4, 6.0, 8)
+    mode = fw.run(shaped(truth, mode={
+        "amplitudes": amplitude.tolist(), "start": 0.4, "end": 6.0, "n_points": 8,
+        "continuation": "natural"})).mode
+    damping = mode.damping_ratio if kind == "mode" else mode.forced_damping_ratio(mass)
+    kinds: dict[str, Any] = {"mode": {}, "forced": {"damping": "forced", "mass": mass}}
+
+    def calibrated(taken_for: str) -> fw.design.Calibration:
+        data = ModeData(amplitude, mode.frequency, damping, frequency_deviation=1e-4,
+                        damping_deviation=1e-5, **kinds[taken_for])
+        return calibrate(shaped(), data, over=OVER, bounds=[(0.02, 0.5), (0.1, 2.0)])
+
+    right = calibrated(kind)
+    assert right.converged and right.is_exact is (kind == "mode")
+    np.testing.assert_allclose(right.values, truth, rtol=1e-5)
+    other = calibrated("forced" if kind == "mode" else "mode")
+    assert np.abs(other.values / np.array(truth) - 1.0).max() > 0.02
+    assert other.chi_square > 100.0 * other.freedom
+
+
+def test_which_damping_is_said() -> None:
+    for wrong in ({"damping": "forced"}, {"mass": 2.0}, {"damping": "forced", "mass": 0.0}):
+        with pytest.raises(InputError, match="mass = "):
+            ModeData([1.0], [0.2], [0.01], **wrong)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="'mode' or 'forced'"):
+        ModeData([1.0], [0.2], [0.01], damping="viscous")

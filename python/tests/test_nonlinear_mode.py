@@ -131,3 +131,48 @@ def test_backbone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", paths[0], "--kind", "backbone", "-o", out]) == 0
     assert main(["plot", paths[1], paths[1], "--kind", "backbone", "-o", out]) == 3
     assert "no result is of a mode" in capsys.readouterr().err
+
+
+def two_masses(**groups: Any) -> fw.Case:
+    """Friction at the second mass changes the shape of a mode that is driven at the first."""
+    contact = fw.ContactPairs([[2, 0, 0]], mu=1.0, normal_load=0.1, tangential_stiffness=0.5)
+    model = fw.Model(np.diag([1.0, 0.5]), None, [[1.0, -0.2], [-0.2, 0.8]], contact=contact,
+                     cosine=[1.0, 0.0], observe={"drive": 1})
+    return fw.Case(model, contact={"law": "penalty"}, harmonics={"n_harmonics": 5},
+                   structure={"rayleigh_mass": 0.004}).replace(**groups)
+
+
+def test_two_damping_ratios(tmp_path: Path) -> None:
+    """F/(2 m a) of phase resonances is the ratio of the mode times its modal mass over m."""
+    track = fw.run(two_masses(
+        case={"analysis": "resonance"}, sweep={"start": 0.5, "end": 1.5, "n_points": 100},
+        resonance={"parameter": "load%harmonic_scale", "start": 0.02, "end": 0.3, "n_points": 9,
+                   "condition": "phase"})).resonance
+    assert track.converged.all()
+    rows = [0.01, *track.first_harmonic.tolist()]
+    result = fw.run(two_masses(case={"analysis": "mode"}, mode={
+        "amplitudes": rows, "start": rows[0], "end": rows[-1], "n_points": len(rows),
+        "continuation": "natural"}))
+    mode = result.mode
+    # The stuck mode, by its eigenvector.
+    root = np.diag([1.0, 0.5**-0.5])
+    shape = np.linalg.eigh(root @ np.array([[1.0, -0.2], [-0.2, 1.3]]) @ root)[1][:, 0]
+    assert mode.modal_mass[0] == pytest.approx(1.0 / shape[0]**2, rel=1e-9)
+    measured = track.parameter / (2.0 * mode.modal_mass[0] * track.omega**2 * track.first_harmonic)
+    # Other modes take part where friction damps by a per cent, and less where it is small.
+    assert mode.forced_damping_ratio()[1:] == pytest.approx(measured, rel=0.015)
+    assert mode.forced_damping_ratio()[-1] == pytest.approx(measured[-1], rel=2e-4)
+    assert mode.forced_damping_ratio(2.0 * mode.modal_mass[0])[-1] == pytest.approx(
+        0.5 * measured[-1], rel=2e-4)
+    assert abs(mode.damping_ratio[-1] / measured[-1] - 1.0) > 0.1
+    lower = plot_mode(result).axes[1]
+    assert "ξ/(2ω)" in lower.get_ylabel()
+    (dashed,) = [line for line in lower.lines if line.get_linestyle() == "--"]
+    assert "F/(2ma)" in str(dashed.get_label())
+    assert dashed.get_ydata() == pytest.approx(mode.forced_damping_ratio())
+
+
+def test_one_damping_ratio_has_one_curve(fluttering: fw.Result) -> None:
+    """Of one mass the shape stays, and both are the same."""
+    np.testing.assert_allclose(fluttering.mode.forced_damping_ratio(),
+                               fluttering.mode.damping_ratio, rtol=1e-12)

@@ -37,6 +37,9 @@ def test_it_is_kept_with_what_it_shows(path: Path) -> None:
     assert any("image/png" in output.get("data", {}) for output in shown)
     assert all(output["output_type"] != "error" for output in shown)
     assert len(text) < 600_000 and str(ROOT) not in text
+    # Names that every run draws anew would make each run a change.
+    assert not re.search(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", text)
+    assert not any("id" in cell for cell in json.loads(text)["cells"])
 
 
 def test_the_notebook_of_the_sector_shows_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:

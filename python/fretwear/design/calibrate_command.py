@@ -39,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "and load, where it is the amplitude that was held")
     parser.add_argument("--observe", metavar="NAME",
                         help="observed quantity of responses (default: the first)")
+    parser.add_argument("--forced-mass", type=float, metavar="M",
+                        help="damping ratios of modes are F/(2 M a) of forced motions, not those "
+                             "of the mode")
     parser.add_argument("--max-evaluations", type=int, default=200, metavar="N",
                         help="default: 200")
 
@@ -48,7 +51,7 @@ def main(options: argparse.Namespace) -> int:
     case = read_case(options)
     if not options.data:
         raise InputError("name a table of measured numbers with --data")
-    data = [read_table(path, case, options.observe) for path in options.data]
+    data = [read_table(path, case, options.observe, options.forced_mass) for path in options.data]
     found = calibrate(case, data, over=options.over, bounds=options.bounds, start=options.start,
                       factors=options.kind == "factor",
                       max_evaluations=options.max_evaluations, progress=not options.quiet)
@@ -58,7 +61,8 @@ def main(options: argparse.Namespace) -> int:
     return 0 if found.converged else _NOT_CONVERGED
 
 
-def read_table(path: str | Path, case: Case, observe: str | None = None) -> Measured:
+def read_table(path: str | Path, case: Case, observe: str | None = None,
+               forced_mass: float | None = None) -> Measured:
     """Measured numbers of a table of text, as the analysis of the case has them.
 
     Raises
@@ -73,7 +77,10 @@ def read_table(path: str | Path, case: Case, observe: str | None = None) -> Meas
         raise InputError(f"case%analysis = '{analysis}': measured numbers are of 'mode' or 'frf'")
     columns = _read_columns(path, *_COLUMNS[analysis])
     if analysis == "mode":
-        return ModeData(**columns)  # type: ignore[arg-type]
+        damping = "mode" if forced_mass is None else "forced"
+        return ModeData(**columns, damping=damping, mass=forced_mass)  # type: ignore[arg-type]
+    if forced_mass is not None:
+        raise InputError("--forced-mass goes with damping ratios of modes")
     if "load" in columns:
         return ControlData(**columns, observe=observe)  # type: ignore[arg-type]
     return ResponseData(**columns, observe=observe)  # type: ignore[arg-type]

@@ -113,9 +113,16 @@ class ModeData(Measured):
     frequency : (n,), optional
         [Hz]
     damping_ratio : (n,), optional
-        Fraction of critical damping.
+        Fraction of critical damping, as `damping` says.
     frequency_deviation, damping_deviation : float or (n,), optional
         Standard deviations; all or none.
+    damping : {'mode', 'forced'}
+        What `damping_ratio` holds: that of the mode, xi/(2 omega), as a decay shows it, or
+        F/(2 m a) of forced motions at phase resonance, F driving the first observed quantity.
+        Where the shape of the mode changes with the amplitude these are different numbers, and the
+        case is asked for the same one.
+    mass : float, optional
+        The m of the measurement, for 'forced'.
     case : Case, optional
         With `analysis = 'mode'`; its amplitudes are set here.
     """
@@ -123,7 +130,14 @@ class ModeData(Measured):
     def __init__(self, amplitude: ArrayLike, frequency: ArrayLike | None = None,
                  damping_ratio: ArrayLike | None = None, *,
                  frequency_deviation: Deviation = None, damping_deviation: Deviation = None,
+                 damping: str = "mode", mass: float | None = None,
                  case: Case | None = None) -> None:
+        if damping not in ("mode", "forced"):
+            raise InputError(f"damping = {damping!r}: must be 'mode' or 'forced'")
+        if (damping == "forced") != (mass is not None) or (mass is not None and not mass > 0.0):
+            raise InputError(f"mass = {mass!r}: must be a positive number with damping = 'forced', "
+                             "the m of F/(2 m a), and is given with nothing else")
+        self.damping, self.mass = damping, mass
         self.amplitude: Floats = array("amplitude", amplitude, (None,))
         if not len(self.amplitude) or (self.amplitude <= 0.0).any():
             raise InputError("amplitude: must be positive numbers")
@@ -143,7 +157,9 @@ class ModeData(Measured):
         case = self._curve(case)
         if not self._is_asked:
             self._is_asked = True
-            self.is_exact = _has_derivatives(unknowns.case_at(values, case), unknowns.keys)
+            # Of the modal mass the library gives no derivative.
+            self.is_exact = (self.damping == "mode" or "damping_ratio" not in self.labels) and (
+                _has_derivatives(unknowns.case_at(values, case), unknowns.keys))
         if slopes and self.is_exact:
             case = differentiated(case, unknowns.keys, [])
         found, jacobian = self._at(unknowns, values, case, slopes=slopes and self.is_exact)
@@ -165,7 +181,9 @@ class ModeData(Measured):
             ) -> tuple[Floats, Floats | None]:
         result = run(unknowns.case_at(values, case), in_memory=True)
         mode = result.mode
-        curves = {"frequency": mode.frequency, "damping_ratio": mode.damping_ratio}
+        damping = (mode.damping_ratio if self.damping == "mode"
+                   else mode.forced_damping_ratio(self.mass))
+        curves = {"frequency": mode.frequency, "damping_ratio": damping}
         names = list(dict.fromkeys(self.labels))
         rows = np.searchsorted(np.unique(self.amplitude), self.amplitude)
         found = np.concatenate([curves[name][rows] for name in names])

@@ -17,6 +17,7 @@ __all__ = ["plot_calibration", "plot_optimum"]
 
 #: Half length of a tangent, as a part of the range of the parameter (or of its logarithm).
 _TANGENT = 0.06
+_FORCED = "damping ratio F/(2ma)"
 _NAMES = {"frequency": "frequency [Hz]", "damping_ratio": "damping ratio",
           "amplitude": "amplitude", "load": "load factor"}
 
@@ -93,7 +94,8 @@ def plot_calibration(found: Calibration, data: Measured | Sequence[Measured]) ->
             rows = np.array([label == name for label in one.labels])
             _draw(panels[name], one, rows, predicted, PALETTE[k % len(PALETTE)])
     for name, axes in panels.items():
-        axes.set_ylabel(_NAMES[name])
+        forced = {one.damping == "forced" for one in sets if isinstance(one, ModeData)}
+        axes.set_ylabel(_FORCED if name == "damping_ratio" and forced == {True} else _NAMES[name])
         if name == "amplitude":
             label_y(axes, "amplitude", "")
         if name in ("amplitude", "load"):

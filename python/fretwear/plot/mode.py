@@ -3,20 +3,36 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from .style import CURVE, FAILED, Source, as_result, label, new_figure, tidy, units_of
+from ..nonlinear_mode import NonlinearMode
+from .style import CURVE, FAILED, Floats, Source, as_result, label, new_figure, tidy, units_of
 
 __all__ = ["plot_mode"]
 
 #: Colours of limit cycles, unstable and stable, and of the onset.
 _CYCLE = (FAILED, "#009e73")
 _ONSET = "0.4"
+#: Damping ratios that differ by less, as a part of the largest, are one curve.
+_SAME = 1e-3
+
+
+def _draw_forced(axes: Axes, mode: NonlinearMode, amplitude: Floats) -> None:
+    """What a forced measurement would call the damping ratio, where the shape changes."""
+    forced = np.where(np.isfinite(amplitude), mode.forced_damping_ratio(), np.nan)
+    largest = np.nanmax(np.abs(mode.damping_ratio[mode.converged]))
+    if np.nanmax(np.abs(forced - mode.damping_ratio), initial=0.0) > _SAME * largest:
+        axes.plot(amplitude, forced, "--", color=CURVE, linewidth=1.2,
+                  label="of the forced motion, F/(2ma), m of the lowest amplitude")
 
 
 def plot_mode(source: Source) -> Figure:
     """Frequency and damping ratio against the amplitude, which has a logarithmic axis.
+
+    Dashed, where it differs: F/(2 m a) of a forced motion, with the modal mass m of the lowest
+    amplitude.
 
     The dotted line is the onset of slip or separation; circles are limit cycles, full where they
     are stable.
@@ -39,6 +55,7 @@ def plot_mode(source: Source) -> Figure:
             axes.axvline(mode.onset, color=_ONSET, linestyle=":", linewidth=1.2,
                          label=f"onset, {mode.onset:.3g}")
         tidy(axes)
+    _draw_forced(panels[1], mode, amplitude)
     if (mode.damping_ratio < 0.0).any():
         panels[1].axhline(0.0, color="black", linewidth=0.8)
     for cycle in mode.limit_cycles:
@@ -50,14 +67,14 @@ def plot_mode(source: Source) -> Figure:
     panels[0].set_xscale("log")
     panels[0].set_ylabel("frequency [rad/s]")
     panels[0].ticklabel_format(axis="y", useOffset=False)
-    panels[1].set_ylabel("damping ratio")
+    panels[1].set_ylabel("damping ratio of the mode, ξ/(2ω)")
     if mode.control == "modal":
         text, units = "modal amplitude", units_of(result, "mode/modal_amplitude")
     else:
         text = f"first harmonic of {result.observed[0]}"
         units = units_of(result, "mode/first_harmonic")
     panels[1].set_xlabel(label(text, units))
-    if mode.onset > 0.0 or mode.limit_cycles:
+    if panels[1].get_legend_handles_labels()[1]:
         panels[1].legend(frameon=False, fontsize=8)
     figure.suptitle(f"Nonlinear mode {mode.number}, {mode.stuck_omega:.6g} rad/s with stuck pairs",
                     fontsize=11)
