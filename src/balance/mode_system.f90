@@ -57,7 +57,7 @@ module fw_mode_system
       !> Unknowns of harmonic 0, which come first (0 or n_coordinates).
       integer :: n_static = 0
       !> Columns of cosine and sine of harmonic 1.
-      integer, private :: cosine = 1, sine = 2
+      integer :: cosine = 1, sine = 2
       !> Unknowns of the balance and residual at the last point.
       real(wp), allocatable, private :: q(:), r(:)
       !> Rows a of the amplitude and of the phase (n_coordinates, 2): that of the phase is another

@@ -20,7 +20,7 @@ module fw_stuck_modes
    implicit none (type, external)
    private
 
-   public :: stuck_modes, find_stuck_modes
+   public :: stuck_modes, find_stuck_modes, add_slopes
 
    type :: stuck_modes
       !> Of the elastic modes without damping in ascending order: frequencies [rad/s] (n_modes).
@@ -77,13 +77,13 @@ contains
       held = .false.
       first = 1
       if (present(slides)) first = merge(3, 1, slides)
-      call add_laws(system, h, first, modes%stiffness, held)
+      call add_slopes(system, h, first, modes%stiffness, held)
       modes%free = pack([(j, j=1, m)], .not. held)
       call solve_undamped(modes, done)
    end subroutine find_stuck_modes
 
    !> Slopes of all laws; rigid pairs that bear hold their coordinates.
-   subroutine add_laws(system, h, first, block, held)
+   subroutine add_slopes(system, h, first, block, held)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: h
       !> The first component of pairs that holds.
@@ -114,7 +114,7 @@ contains
             end do
          end associate
       end do
-   end subroutine add_laws
+   end subroutine add_slopes
 
    !> Pairs: stuck, whatever slipped on the way to rest. Springs: the slope at their elongation.
    real(wp) function slope_of(system, law, element, component) result(slope)

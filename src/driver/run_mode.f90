@@ -215,9 +215,12 @@ contains
       real(wp), parameter :: smaller = 0.1_wp
       integer, parameter :: most_smaller = 8
       real(wp) :: amplitude
+      real(wp), allocatable :: mu(:)
       integer :: k
 
-      call curve%onset%begin(curve%start%system, curve%start%y, case%mode%start, amplitude)
+      allocate (mu(curve%start%problem%n_pairs), source=1.0_wp)
+      if (case%contact%n_pairs == size(mu)) mu = case%contact%mu
+      call curve%onset%begin(curve%start%system, curve%start%y, case%mode%start, mu, amplitude)
       ! The sliding mode is the limit of high amplitudes.
       if (curve%start%slides) amplitude = case%mode%end
       do k = 1, most_smaller
@@ -226,7 +229,7 @@ contains
          if (allocated(error)) return
          if (report%converged .and. (curve%start%slides .or. curve%start%problem%n_pairs == 0)) exit
          if (report%converged) then
-            if (curve%onset%is_stuck(curve%start%system)) exit
+            if (curve%onset%is_stuck(curve%start%system, y)) exit
          end if
          ! About another position, or springs: nearer to the linear mode.
          amplitude = merge(1.0_wp/smaller, smaller, curve%start%slides)*amplitude
