@@ -19,17 +19,17 @@ one after the other and all together: factors that are even powers of two, which
 the input.
 
 The judge is the case itself: every number of the result file times its own factor, to 1e-9 of the
-largest of its dataset (1e-2 along branches, where the places of points are what round-off makes of
-the steps), the status, and the words of all messages and remarks, without their numbers. *Other
-words* are runs that end or remark otherwise, *other numbers* those whose rows are as many and
-differ, *other rows* those that are not as many. Optima are those of the Python package of today,
-whatever program is counted beside it.
+largest of its dataset, the status, and the words of all messages and remarks, without their
+numbers. To 1e-5 only a resonance over a parameter, whose frequency at a corner is good to a
+millionth, and to 1e-2 branches, where the places of points are what round-off makes of the steps.
+*Other words* are runs that end or remark otherwise, *other numbers* those whose rows are as many
+and differ, *other rows* those that are not as many. Optima are those of the Python package of
+today, whatever program is counted beside it.
 """
-COUNT = 240
+COUNT = 96
 SMALL = (0, 1, 2, 3, 4, 5, 6, 8, 9, 10)
 COLUMNS = {"runs": "runs in other units", "same": "the same", "in_words": "of these in words",
-           "words": "other words", "rows": "other rows", "numbers": "other numbers",
-           "worst": "worst difference below 1e-9, in 1e-12"}
+           "words": "other words", "rows": "other rows", "numbers": "other numbers"}
 ZERO = ("words", "rows", "numbers")
 
 #: Powers of two of force, length and time.
@@ -38,6 +38,8 @@ UNITS = ((-40, 0, 0), (50, 0, 0), (0, -20, 0), (0, 24, 0), (0, 0, -16), (0, 0, 2
 #: Directions of branches and curvatures are had by differences over 1e-7 of the frequency; where
 #: points lie along a branch, round-off of their steps grows from one to the next.
 SAME, SAME_DIRECTION, SAME_BRANCH = 1e-9, 3e-6, 1e-2
+#: The frequency of a resonance that is a corner is good to a millionth.
+SAME_CORNER = 1e-5
 #: Of a case as it is drawn, where all is of the order of one, what is less is none.
 ROUND_OFF = 1e-6
 #: Exponents of force, length and time of the keys that are drawn.
@@ -163,12 +165,12 @@ def difference(now, before, scale):
 
 
 def compared(one, other, units, same=SAME):
-    """What differs, and by how much: a word of COLUMNS, a number and a note."""
+    """What differs, a word of COLUMNS, and where."""
     if one[:2] != other[:2]:
         words = sorted(set(other[1]) ^ set(one[1]))
-        return "words", 0.0, f"{one[0]}/{other[0]} {words}"
+        return "words", f"{one[0]}/{other[0]} {words}"
     if one[2].keys() != other[2].keys():
-        return "rows", 0.0, str(sorted(one[2].keys() ^ other[2].keys()))
+        return "rows", str(sorted(one[2].keys() ^ other[2].keys()))
     worst, at = 0.0, ""
     good = np.atleast_1d(one[2].get("converged", True)).astype(bool)
     for name, before in one[2].items():
@@ -177,7 +179,7 @@ def compared(one, other, units, same=SAME):
             continue
         now = other[2][name]
         if np.shape(now) != np.shape(before):
-            return "rows", 0.0, f"{name}: {np.shape(before)}, {np.shape(now)}"
+            return "rows", f"{name}: {np.shape(before)}, {np.shape(now)}"
         if len(np.atleast_1d(before)) == len(good):
             now, before = np.atleast_1d(now)[good], np.atleast_1d(before)[good]
         error = difference(now, before, factor(dims, units))
@@ -185,7 +187,7 @@ def compared(one, other, units, same=SAME):
             error *= min(1.0, same / SAME_DIRECTION)
         if error > worst:
             worst, at = error, name
-    return ("numbers" if worst > same else "same"), worst, f"{at}: {worst:.1e}"
+    return ("numbers" if worst > same else "same"), f"{at}: {worst:.1e}"
 
 
 def optimum(folder, groups, units):
@@ -197,7 +199,7 @@ def optimum(folder, groups, units):
     bounds = (0.1 * abs(start) * scale, 10.0 * abs(start) * scale)
     try:
         found = fw.optimise(path, minimise="max_amplitude", over=f"contact%{key}", bounds=bounds,
-                            start=abs(start) * scale)
+                            start=abs(start) * scale, scan=False, max_evaluations=20)
     except FretwearError as error:
         return 1, wordy(str(error).splitlines()), {}
     words = wordy([found.word, found.doubt])
@@ -214,19 +216,16 @@ def trial(seed, program, folder):
         return run(program, folder, name, groups, units)
 
     one = found("one", (0, 0, 0))
-    counts = {"kind": kind, "runs": 0, "worst": 0, "notes": []}
-    if one[0]:
-        counts["notes"].append(f"{one[0]} {one[1]}"[:400])
+    counts = {"kind": kind, "runs": 0, "notes": []}
     is_branch = any(group.get("continuation") == "arclength" for group in groups.values())
-    same = SAME_BRANCH if is_branch else SAME
+    same = SAME_BRANCH if is_branch else SAME_CORNER if kind == "resonance" else SAME
     every = UNITS[::3] if kind == "optimum" else UNITS
     for units in every:
-        word, error, note = compared(one, found("other", units), units, same)
+        word, note = compared(one, found("other", units), units, same)
         counts["runs"] += 1
         counts[word] = counts.get(word, 0) + 1
         if word == "same":
             counts["in_words"] = counts.get("in_words", 0) + int(one[0] != 0)
-            counts["worst"] = max(counts["worst"], int(error * 1e12))
         else:
             law = groups.get("contact", {}).get("law", "spring")
             counts["notes"].append(f"{kind}, {law}, {units}: {word}, {note}"[:300])
