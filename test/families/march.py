@@ -23,6 +23,8 @@ LEVELS, SAMPLES = 12, 512
 RESOLVED, FEWEST, MOST = 0.06, 2048, 131072
 #: Plain periods before Newton's method, its steps, and the change over a period that is none.
 PERIODS, STEPS, CLOSED = 6, 25, 1e-9
+#: Motion of a mass, as a part of the largest, that is rest.
+AT_REST = 1e-6
 PLASTIC, ON_MASS, SMOOTH, SPRING = range(4)
 
 
@@ -217,9 +219,9 @@ class March:
         """All dofs (n_dof, SAMPLES) of what was kept."""
         tau = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
         whole, wave = self.free
-        n = len(self.masses)
-        return (whole[:, None] + (wave[:, None] * np.exp(1j * tau)).real
-                + self.spread @ kept[:, :n].T + self.by_force @ kept[:, self.size:self.size + self.m].T)
+        moved = self.spread @ kept[:, :len(self.masses)].T
+        forced = self.by_force @ kept[:, self.size:self.size + self.m].T
+        return whole[:, None] + (wave[:, None] * np.exp(1j * tau)).real + moved + forced
 
     def state_of(self, coefficients):
         """State at the start of the period of an answer (2H+1, n_dof)."""
@@ -323,6 +325,9 @@ class March:
             motion = self.motion(kept)
             stands = kept[:, self.size + self.m:][:, self.plastic]
             self.rests = bool(np.any(np.ptp(stands, axis=0) <= 1e-9 * self.scale(x)[self.size:]))
+            moves = np.ptp(motion, axis=1)
+            held = np.reshape(self.joint.rows, (self.m, -1))[self.constant]
+            self.rests |= bool(np.any(np.abs(held) @ moves <= AT_REST * moves.max()))
             if before is not None:
                 own = error(motion, before)
                 if own <= wanted:
