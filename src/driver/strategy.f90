@@ -41,6 +41,8 @@ module fw_strategy
       real(wp) :: tolerance = 0.0_wp
       !> From one guess, with no more iterations than these (0: as the case has it).
       integer :: most_iterations = 0
+      !> Iterations from which on no other way is begun, if these are fewer than for any point.
+      integer :: most_work = huge(1)
    contains
       procedure :: place
       procedure :: describe => describe_request

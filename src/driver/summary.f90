@@ -337,12 +337,13 @@ contains
    end subroutine describe_harmonics
 
    !> What the points took to be accurate.
-   subroutine describe_accuracy(self, worst, accuracy, known)
+   subroutine describe_accuracy(self, worst, accuracy, n_claimed, n_short)
       class(summary_type), intent(inout) :: self
-      !> Largest estimate of the error, and what was asked for.
+      !> Largest estimate of the error among the points with a claim, and what was asked for.
       real(wp), intent(in) :: worst, accuracy
-      !> Whether there is an estimate.
-      logical, intent(in) :: known
+      !> Points with a claim, and converged ones without.
+      integer, intent(in) :: n_claimed, n_short
+      character(:), allocatable :: words
       character(10) :: text(2)
 
       write (text(1), '(es8.1)') worst
@@ -351,12 +352,16 @@ contains
                     to_text(self%harmonics(2)))
       call add_line(self%work, 'instants', to_text(self%instants(1))//' to '// &
                     to_text(self%instants(2)))
-      if (known) then
-         call add_line(self%work, 'error', 'at most '//trim(adjustl(text(1)))//' by estimate, '// &
-                       trim(adjustl(text(2)))//' asked for')
-      else
+      if (n_claimed + n_short == 0) then
          call add_line(self%work, 'error', 'not known: no point converged')
+         return
       end if
+      words = 'nothing is claimed, '
+      if (n_claimed > 0) words = 'at most '//trim(adjustl(text(1)))//' by estimate, '
+      words = words//trim(adjustl(text(2)))//' asked for'
+      if (n_claimed > 0 .and. n_short > 0) words = words//'; nothing is claimed at '// &
+         to_text(n_short)//' of '//to_text(n_claimed + n_short)//' points'
+      call add_line(self%work, 'error', words)
    end subroutine describe_accuracy
 
    !> What became of the wear.
