@@ -100,17 +100,29 @@ class Joint:
                 self.state = tuple(np.split(better, (n, 2 * n)))
         return found
 
+    def start(self, motion):
+        """From coefficients (0, c1, s1, ..) of the dofs."""
+        order = np.arange(1, motion.shape[1] // 2 + 1)
+        u = motion[:, 0] + motion[:, 1::2].sum(axis=1)
+        # A pair that never slips stays where it was assembled.
+        self.state = (u, self.omega * motion[:, 2::2] @ order, np.zeros(self.n_pairs))
+
+
+def rate_by_time(groups, depth, motion):
+    """Depth of a cycle of the vibration next to a motion."""
+    joint = Joint(groups)
+    joint.start(motion)
+    return joint.rate(depth)
+
 
 def worn_by_time(groups, cycles, motion):
     """Depths after so many cycles, by the classical method of order 4.
 
-    motion: coefficients (0, c1, s1, ..) of the dofs, from which the first integration starts: of
-    several vibrations the one that is meant.
+    motion: coefficients of the dofs, from which the first integration starts: of several vibrations
+    the one that is meant.
     """
     joint = Joint(groups)
-    order = np.arange(1, motion.shape[1] // 2 + 1)
-    u = motion[:, 0] + motion[:, 1::2].sum(axis=1)
-    joint.state = (u, joint.omega * motion[:, 2::2] @ order, u[joint.t])
+    joint.start(motion)
     depth, h = np.zeros(joint.n_pairs), cycles / STAGES
     for _ in range(STAGES):
         a = joint.rate(depth)
