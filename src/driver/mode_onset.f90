@@ -34,6 +34,8 @@ module fw_mode_onset
       !> What departs in solutions above the onset, to begin a search with: shares and sliding.
       type(onset_bracket), private :: shares, sliding
       integer, private :: n_above = 0
+      !> Whether the bound is known, so that what does not converge needs no more trials.
+      logical, private :: bounded = .false.
       type(onset_departure), private :: departure
    contains
       procedure :: begin
@@ -158,26 +160,28 @@ contains
       if (self%n_low == 0) return
       call find_bound(path%system, self%low(1), self%y(:, 1), self%departure%mu, bound, y, known)
       if (.not. known) bound = huge(1.0_wp)
-      call find_first_slip(self, path, onset, found, error)
+      self%bounded = known
+      if (known) call look_at_bound(self, path, bound, y, found, error)
       if (allocated(error)) return
-      if (found .and. (.not. known .or. coarse*onset >= bound)) then
-         onset = min(onset, beside*bound)
+      if (known .and. found) then
+         onset = bound
+         if (coarse*self%low(1) >= bound) onset = min(bound, between(self, path%system))
          return
       end if
-      if (known) call look_at_bound(self, path, bound, y, found, error)
-      if (.not. allocated(error) .and. .not. (known .and. found)) call close_in(self, path, error)
+      call find_first_slip(self, path, onset, found, error)
+      if (allocated(error) .or. found) return
+      call close_in(self, path, error)
       if (allocated(error)) return
-      onset = min(bound, self%low(1))
+      onset = self%low(1)
       if (self%above > self%low(1) .and. self%above <= coarse*coarse*self%low(1)) then
-         onset = min(bound, between(self, path%system))
-      else if (known) then
-         onset = bound
+         onset = between(self, path%system)
       end if
+      onset = min(bound, onset)
    end subroutine find
 
-   !> Just below the bound of the stuck motion: whether that sticks, or nothing says the contrary. A
-   !> solution that slips there, though the bound would allow it to stick, shows that the assembly
-   !> does not lead to it.
+   !> Just below the bound of the stuck motion: whether that sticks, or nothing says the contrary.
+   !> Solutions that slip below it, though the bound would allow them to stick, show that the
+   !> assembly does not lead to what it allows.
    subroutine look_at_bound(self, path, bound, motion, sticks, error)
       type(onset_finder), intent(inout) :: self
       type(mode_path), intent(inout) :: path
@@ -189,17 +193,23 @@ contains
       type(solver_report) :: report
       real(wp) :: below, y(size(motion))
 
-      sticks = .true.
       below = bound/beside
-      ! What slips or did not converge below proves nothing: there may be several motions.
+      ! What slips above the bound only leaves nothing to ask.
+      sticks = self%high >= bound .or. self%low(1) >= below
+      if (self%low(1) < below) then
+         y = motion
+         call solve_near(path, below, y, report, error)
+         if (allocated(error)) return
+         if (report%converged) then
+            ! What slips below it is another motion then.
+            if (self%departure%by_sliding(path%system, below, y) <= 0.0_wp) sticks = .true.
+            if (sticks) call judge(self, path%system, below, y)
+            sticks = sticks .and. self%low(1) >= below
+         end if
+      end if
+      if (.not. sticks) return
       self%high = beside*bound
       self%above = self%high
-      if (below <= self%low(1)) return
-      y = motion
-      call solve_near(path, below, y, report, error)
-      if (allocated(error) .or. .not. report%converged) return
-      call judge(self, path%system, below, y)
-      sticks = self%low(1) >= below
    end subroutine look_at_bound
 
    !> About a position that does not move: the onset to all digits, unless the pair that slips there
@@ -221,11 +231,7 @@ contains
       call look(self, path, onset, error)
       if (allocated(error) .or. self%low(1) < onset .or. path%iterations > before) return
       call bisect(self, path%system, fine, onset, high)
-      if (self%high <= coarse*onset) then
-         found = .true.
-         return
-      end if
-      call look(self, path, coarse*onset, error)
+      if (self%high > coarse*onset) call look(self, path, coarse*onset, error)
       found = self%high <= coarse*onset*(1.0_wp + epsilon(1.0_wp))
    end subroutine find_first_slip
 
@@ -319,7 +325,7 @@ contains
       y = position(self, amplitude)
       call solve_near(path, amplitude, y, report, error)
       if (allocated(error)) return
-      if (.not. report%converged .and. amplitude > self%low(1)) then
+      if (.not. (report%converged .or. self%bounded) .and. amplitude > self%low(1)) then
          call path%restart(log(self%low(1)), self%y(:, 1))
          call path%reach(log(amplitude), y, report, reached, error)
          if (allocated(error)) return

@@ -31,8 +31,8 @@ module fw_shakedown_bound
    end type shakedown_type
 
    !> Rows times squared unknowns of a step that take no time, and instants of a period.
-   real(wp), parameter :: light = 1.0e8_wp
-   integer, parameter :: fewest = 96, most = 2880
+   real(wp), parameter :: light = 5.0e5_wp
+   integer, parameter :: fewest = 96, most = 1440
 
 contains
 
@@ -44,8 +44,8 @@ contains
       logical, intent(out) :: done
       !> Part of the amplitude that the weight of the limits may take, growth of the weight of the
       !> amplitude, and steps for each.
-      real(wp), parameter :: small = 1.0e-9_wp, growth = 8.0_wp
-      integer, parameter :: most_steps = 60
+      real(wp), parameter :: small = 1.0e-7_wp, growth = 30.0_wp
+      integer, parameter :: most_steps = 25
       real(wp) :: weight, rows
       integer :: k, n_time
 
