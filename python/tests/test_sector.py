@@ -266,3 +266,17 @@ def test_the_lock_holds_the_blade_along_its_slot(full: FullModel, reduced: Reduc
 def test_a_negative_lock_is_refused() -> None:
     with pytest.raises(ValueError, match=r"Retention: retention = -1\.0"):
         Retention(-1.0)
+
+
+def test_what_a_sector_takes_is_said_before(capsys: pytest.CaptureFixture[str]) -> None:
+    """768 pairs: a quarter of an hour and 16 GB, within a factor of two."""
+    from fretwear.sector.cli import _say_what_it_takes
+    from fretwear.sector.model import needs
+
+    seconds, memory = needs(147_882, 3 * 768)
+    assert 450.0 < seconds < 1800.0 and 8e9 < memory < 32e9
+    _say_what_it_takes(147_882, 3 * 768)
+    said = capsys.readouterr().err
+    assert "147882 degrees of freedom" in said and "min and" in said and "GB" in said
+    _say_what_it_takes(28_000, 48)  # the default
+    assert capsys.readouterr().err == ""

@@ -75,7 +75,9 @@ def plot_mode(source: Source) -> Figure:
         units = units_of(result, "mode/first_harmonic")
     panels[1].set_xlabel(label(text, units))
     if panels[1].get_legend_handles_labels()[1]:
-        panels[1].legend(frameon=False, fontsize=8)
+        # Above the panel, where it covers no curve.
+        panels[1].legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0),
+                         borderaxespad=0.0, ncols=2)
     figure.suptitle(f"Nonlinear mode {mode.number}, {mode.stuck_omega:.6g} rad/s with stuck pairs",
                     fontsize=11)
     return figure

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from .. import __version__
 from .._progress import stages
 from .._words import near_options
-from .model import FullModel, ReducedModel, build_full, reduce_model
+from .model import FullModel, ReducedModel, build_full, needs, reduce_model
 from .model_file import write_model
 from .parameters import (
     Discretisation,
@@ -35,6 +35,8 @@ __all__ = ["main"]
 _GROUPS: tuple[type, ...] = (Geometry, Material, Retention, Discretisation)
 _USAGE, _BAD_PARAMETER, _NOT_WRITTEN = 2, 3, 5
 _RPM = math.pi / 30.0
+#: What takes longer [s], or more [bytes], is said before it begins.
+_LONG, _MUCH = 60.0, 2.0e9
 
 
 class _Parser(argparse.ArgumentParser):
@@ -65,7 +67,8 @@ def _run(options: argparse.Namespace) -> int:
         if not Path(target).absolute().parent.is_dir():
             raise FileNotFoundError(f"no folder to write {target} into")
     started = time.perf_counter()
-    full = build_full(parameters, stages(quiet=options.quiet))
+    full = build_full(parameters, stages(quiet=options.quiet),
+                      None if options.quiet else _say_what_it_takes)
     reduced = reduce_model(full)
     mesh = recovery_mesh(full)[0] if options.mesh else None
     write_model(reduced, options.output, options.title, mesh)
@@ -76,6 +79,16 @@ def _run(options: argparse.Namespace) -> int:
     if not options.quiet:
         _summary(full, reduced, options.output, time.perf_counter() - started)
     return 0
+
+
+def _say_what_it_takes(n_dof: int, n_contact: int) -> None:
+    """Time and memory, where they are worth a word."""
+    seconds, memory = needs(n_dof, n_contact)
+    if seconds > _LONG or memory > _MUCH:
+        print(f"fretwear.sector: {n_dof} degrees of freedom and {n_contact} contact coordinates "
+              f"take some {max(1, round(seconds / 60.0))} min and {memory / 1e9:.0f} GB, or up to "
+              "twice that (a coarser mesh takes less: --airfoil-rows, --blade-columns, "
+              "--disk-rows)", file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:
