@@ -81,10 +81,6 @@ contains
          do j = 1, size(raw%load_harmonic)
             if (raw%load_harmonic(j) == 0) then
                if (allocated(raw%harmonic_cosine)) static = static + raw%harmonic_cosine(:, j)
-               if (allocated(raw%harmonic_sine)) then
-                  if (any(abs(raw%harmonic_sine(:, j)) > 0.0_wp)) call reader%refuse_model( &
-                     'a load harmonic_sine in harmonic 0, which has none: must be 0')
-               end if
                cycle
             end if
             w = waves%place(raw%load_harmonic(j), 0)

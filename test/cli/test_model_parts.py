@@ -131,16 +131,6 @@ def test_input_without_an_effect_is_remarked(fw_run, old, new, name):
     assert name in remarks(fw_run)
 
 
-def test_a_sine_of_harmonic_0_is_refused(case):
-    def add(file):
-        file["load/harmonic"] = [0]
-        file["load/harmonic_cosine"] = [[1.0, 0.0]]
-        file["load/harmonic_sine"] = [[0.0, 1.0]]
-
-    change(case, add)
-    assert "harmonic_sine in harmonic 0" in case.refused()
-
-
 def test_loads_of_no_harmonic_are_refused(case):
     def add(file):
         file["load/harmonic"] = np.zeros(0, dtype=int)

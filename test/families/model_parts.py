@@ -12,8 +12,8 @@ TEXT = """
 Model files of a sector (matrices, pairs, springs, loads of any harmonic, observed quantities,
 interfaces, forces of the air, a mesh) and of matrices of nodal diameters, of which parts that may
 be absent are left out at random. One object of each is made a stranger: a name one edit or a swap
-of two letters away from that of a part (`slip`), the same name written in other letters or as one
-word with its group (`spelling`), the name of a part in another group (`place`), another kind of
+of two letters away from that of a part (`slip`), the same name written in other letters or in
+the plural (`spelling`), the name of a part in another group (`place`), another kind of
 object under a name (`kind`: a group, a dataset, an attribute, a link that leads nowhere), or a word
 of its own (`far`). It stands in the place of the part, or beside it. And whole files (`sound`).
 
