@@ -25,7 +25,8 @@ contains
       character(:), allocatable, intent(in) :: unit_system
       type(error_type), allocatable, intent(out) :: error
       ! Components of the peaks side by side: a write of `peaks%omega` would copy them unseen.
-      real(wp), allocatable :: coefficients(:, :), omega(:), amplitude(:), width(:)
+      real(wp), allocatable :: coefficients(:, :), omega(:), amplitude(:), width(:), &
+                               tolerance(:)
       integer, allocatable :: observed(:), found_by(:)
       type(string_type) :: words(size(found_words))
       integer :: k, n
@@ -48,11 +49,15 @@ contains
       ! Negative stands for unknown inside the program, NaN in a file.
       width = peaks%bandwidth
       where (width < 0.0_wp) width = ieee_value(1.0_wp, ieee_quiet_nan)
+      tolerance = peaks%tolerance
+      where (tolerance < 0.0_wp) tolerance = ieee_value(1.0_wp, ieee_quiet_nan)
       call write_dataset(file, '/peak/omega', omega, error)
       if (allocated(error)) return
       call write_dataset(file, '/peak/amplitude', amplitude, error)
       if (allocated(error)) return
       call write_dataset(file, '/peak/bandwidth', width, error)
+      if (allocated(error)) return
+      call write_dataset(file, '/peak/tolerance', tolerance, error)
       if (allocated(error)) return
       call write_dataset(file, '/peak/coefficients', coefficients, error)
       if (allocated(error)) return
@@ -67,6 +72,7 @@ contains
       if (.not. allocated(error)) call label(file, 'omega')
       if (.not. allocated(error)) call label(file, 'amplitude')
       if (.not. allocated(error)) call label(file, 'bandwidth')
+      if (.not. allocated(error)) call label(file, 'tolerance')
       if (.not. allocated(error)) call label(file, 'coefficients')
       if (.not. allocated(error)) call label(file, 'observed')
       if (.not. allocated(error)) call label(file, 'found_by')

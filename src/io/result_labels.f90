@@ -32,6 +32,7 @@ module fw_result_labels
       label_type('/peak/omega', 'rad/s', 'peak', 'angular frequency of the maximum'), &
       label_type('/peak/amplitude', '<length>', 'peak', 'largest magnitude over the period'), &
       label_type('/peak/bandwidth', 'rad/s', 'peak', 'width at half of the power'), &
+      label_type('/peak/tolerance', '1', 'peak', 'amplitude known to this part of it'), &
       label_type('/peak/coefficients', '<length>', 'peak coefficient', &
                  'Fourier coefficients 0, c1, s1, ... of the quantity'), &
       label_type('/peak/observed', '', 'peak', 'observed quantity, its column from 0'), &
