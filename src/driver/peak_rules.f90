@@ -33,22 +33,51 @@ module fw_peak_rules
 contains
 
    !> Whether sample k is a maximum of quantity i: the first of the highest among neighbours that
-   !> differ by round-off, above what lies next to these.
+   !> differ by round-off, above what lies next to these on both sides.
    pure logical function is_maximum(samples, k, i)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
       real(wp) :: rise
-      integer :: below(2)
 
       is_maximum = .false.
       if (k <= 1 .or. k >= samples%n) return
-      associate (middle => samples%item(k)%at)
-         rise = max(round_off*swing_of(middle, i, middle%mean(i)), &
-                    negligible*maxval(middle%amplitude))
-      end associate
-      below = [place_below(samples, k, i, -1, rise), place_below(samples, k, i, 1, rise)]
-      is_maximum = all(below >= 0) .and. any(below > 0)
+      rise = rise_of(samples, k, i)
+      if (place_below(samples, k, i, -1, rise) < 0) return
+      if (place_below(samples, k, i, 1, rise) < 0) return
+      ! What is level up to an end of the range is highest there.
+      is_maximum = is_lower(samples, k, i, -1, rise) .and. is_lower(samples, k, i, 1, rise)
    end function is_maximum
+
+   !> What two amplitudes next to sample k may differ by without a meaning.
+   pure real(wp) function rise_of(samples, k, i) result(rise)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+
+      associate (at => samples%item(k)%at)
+         rise = max(round_off*swing_of(at, i, at%mean(i)), negligible*maxval(at%amplitude))
+      end associate
+   end function rise_of
+
+   !> Whether the first sample in a direction that differs from sample k by more than the rise is
+   !> lower; false where none differs.
+   pure logical function is_lower(samples, k, i, direction, rise)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i, direction
+      real(wp), intent(in) :: rise
+      real(wp) :: change
+      integer :: j
+
+      is_lower = .false.
+      j = k + direction
+      do while (j >= 1 .and. j <= samples%n)
+         change = samples%item(j)%at%amplitude(i) - samples%item(k)%at%amplitude(i)
+         if (abs(change) > rise) then
+            is_lower = change < 0.0_wp
+            return
+         end if
+         j = j + direction
+      end do
+   end function is_lower
 
    !> The first sample from k on in a direction that is lower by more than the rise: 0 where there
    !> is none, below 0 where a higher one comes first.
@@ -121,9 +150,9 @@ contains
       end associate
    end subroutine find_next
 
-   !> Where to solve next for a peak that may be a corner, which three samples show as a parabola that
-   !> it is not; `done` where five bear out the parabola, or leave no room for a corner that is higher
-   !> than the tolerance.
+   !> Where to solve next for a peak that may be a corner, which three samples show as a parabola
+   !> that it is not; `done` where five bear out the parabola, or leave no room for a corner that
+   !> is higher than the tolerance.
    pure subroutine find_corner(samples, k, i, mean, omega, promise, done)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
@@ -502,16 +531,15 @@ contains
       end do
    end function highest_of
 
-   !> Whether the amplitude rises towards an end of the range, which this sample stands on.
+   !> Whether the amplitude rises towards an end of the range, which this sample stands on: by more
+   !> than round-off, or it is none that another way to the same solutions comes to.
    pure logical function is_bound(samples, k, i)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
-      integer :: inside
 
       is_bound = (k == 1 .or. k == samples%n) .and. samples%item(k)%at%amplitude(i) > 0.0_wp
       if (.not. is_bound .or. samples%n == 1) return
-      inside = merge(2, samples%n - 1, k == 1)
-      is_bound = samples%item(k)%at%amplitude(i) >= samples%item(inside)%at%amplitude(i)
+      is_bound = is_lower(samples, k, i, merge(1, -1, k == 1), rise_of(samples, k, i))
    end function is_bound
 
    !> The maxima of every quantity by ascending frequency, and the ends of the range where the
@@ -574,6 +602,9 @@ contains
          if (.not. done .or. has_gap .or. any(failed > samples%item(k - 1)%at%omega .and. &
                                  failed < samples%item(k + 1)%at%omega)) then
             peak%found_by = found_unresolved
+         else if (at%amplitude(i) >= near*highest_of(samples, i)) then
+            ! Lower ones may hide a corner.
+            peak%tolerance = small_gain
          end if
       end associate
    end function describe

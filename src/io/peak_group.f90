@@ -45,6 +45,8 @@ contains
                      'largest magnitude over the period')
          call to%put('/peak/bandwidth', [unknown_below(self%peaks%bandwidth)], 'rad/s', 'peak', &
                      'width at half of the power')
+         call to%put('/peak/tolerance', [unknown_below(self%peaks%tolerance)], '1', 'peak', &
+                     'amplitude known to this part of it')
          call to%put('/peak/coefficients', coefficients, '<length>', 'peak coefficient', &
                      'Fourier coefficients 0, c1, s1, ... of the quantity')
          ! Places count from 0 in a file, from 1 here.
