@@ -59,13 +59,12 @@ contains
       type(mode_choice), intent(out) :: choice
       type(mode_search) :: search
       complex(wp), allocatable :: basis(:, :), u(:)
-      integer, allocatable :: place(:)
       integer :: j
 
       search%number = number
       search%near = near
       if (is_proportional(pencil, rest, n_looked_at(rest, search))) then
-         call list_at_rest(pencil, rest, search, place)
+         call list_at_rest(pencil, rest, search)
       else
          call search_all(pencil, rest, search, basis)
       end if
@@ -80,10 +79,9 @@ contains
          if (j == choice%number) cycle
          if (search%found(j)%is_nearly(choice%mode, same)) choice%twin = j
       end do
-      if (allocated(place)) then
-         choice%from_rest = place(choice%number)
-      else if (rest_leads_to(rest, search, choice, allocated(basis))) then
-         choice%from_rest = choice%number
+      choice%from_rest = choice%mode%at_rest
+      if (choice%from_rest == 0) then
+         if (rest_leads_to(rest, search, choice, allocated(basis))) choice%from_rest = choice%number
       end if
       if (.not. allocated(basis)) return
       choice%part = of_projection
@@ -98,7 +96,6 @@ contains
       !> Ascending [rad/s].
       real(wp), allocatable, intent(out) :: omega(:)
       type(mode_search) :: search
-      integer, allocatable :: place(:)
       complex(wp), allocatable :: basis(:, :)
       integer :: j
 
@@ -106,7 +103,7 @@ contains
       if (size(omega) == 0 .or. size(pencil%m, 1) > most_listed) return
       search%number = huge(search%number)
       if (is_proportional(pencil, rest, size(omega))) then
-         call list_at_rest(pencil, rest, search, place)
+         call list_at_rest(pencil, rest, search)
       else
          call search_all(pencil, rest, search, basis)
       end if
@@ -140,21 +137,18 @@ contains
       end do
    end function is_proportional
 
-   !> Those of the modes at rest that oscillate, and where they stand.
-   subroutine list_at_rest(pencil, rest, search, place)
+   !> Those of the modes at rest that oscillate.
+   subroutine list_at_rest(pencil, rest, search)
       type(mode_pencil), intent(in) :: pencil
       type(modes_at_rest), intent(in) :: rest
       type(mode_search), intent(inout) :: search
-      integer, allocatable, intent(out) :: place(:)
       type(self_excited_mode) :: mode
-      logical :: oscillates
       integer :: j
 
-      allocate (place(0))
       do j = 1, size(rest%omega)
          mode = mode_from_rest(pencil, rest%omega(j), rest%shape(:, j))
-         call search%keep(mode, oscillates)
-         if (oscillates) place = [place, j]
+         mode%at_rest = j
+         call search%keep(mode)
          if (search%has_enough()) return
       end do
    end subroutine list_at_rest
@@ -224,6 +218,9 @@ contains
 
       j = choice%number
       leads = j <= size(rest%omega)
+      if (.not. leads) return
+      ! Of one frequency at rest any shape in their plane is a mode there, of no use here.
+      leads = count(abs(rest%omega - rest%omega(j)) <= same*rest%omega(j)) == 1
       if (.not. leads) return
       if (is_projected) then
          shape_of = (0.0_wp, 0.0_wp)

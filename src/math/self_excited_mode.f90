@@ -23,6 +23,8 @@ module fw_self_excited_mode
       real(wp) :: omega = 0.0_wp, self_excitation = 0.0_wp
       !> U of any size (n).
       complex(wp), allocatable :: shape(:)
+      !> The mode at rest that it is, 0: none.
+      integer :: at_rest = 0
    contains
       procedure :: is_overdamped
       procedure :: is_nearly

@@ -54,6 +54,8 @@ module fw_self_excited_modes
    real(wp), parameter :: massless = 1.0e-12_wp
    !> Modes in a bracket of this part of its frequency have one frequency.
    real(wp), parameter :: one_frequency = 1.0e-9_wp
+   !> The search ends at a mode that is this part above the one that is wanted.
+   real(wp), parameter :: beyond = 1.0e-5_wp
    !> Of the frequency of a mode at the end of its bracket.
    real(wp), parameter :: round_off = 1.0e-11_wp
    !> Doublings of the highest frequency, far beyond what any damping asks for.
@@ -121,15 +123,17 @@ contains
       class(mode_search), intent(in) :: self
       integer :: j
 
-      if (self%near > 0.0_wp) then
-         has_enough = .false.
-         if (self%n_found == 0) return
-         j = self%nearest_to(self%near)
-         has_enough = j < self%n_found .and. self%found(self%n_found)%omega - self%near > &
-                      abs(self%found(j)%omega - self%near)
-      else
-         has_enough = self%n_found > self%number
-      end if
+      has_enough = .false.
+      if (self%n_found == 0) return
+      j = self%number
+      if (self%near > 0.0_wp) j = self%nearest_to(self%near)
+      if (j >= self%n_found) return
+      ! The next one is not of the same frequency.
+      associate (last => self%found(self%n_found)%omega, wanted => self%found(j)%omega)
+         has_enough = last > (1.0_wp + beyond)*wanted
+         if (self%near > 0.0_wp) has_enough = has_enough .and. &
+                                              last - self%near > abs(wanted - self%near)
+      end associate
    end function has_enough
 
    subroutine sample_at(self, omega, sample)
@@ -229,14 +233,12 @@ contains
    end subroutine take_together
 
    !> One more, unless it does not oscillate.
-   subroutine keep(self, mode, oscillates)
+   subroutine keep(self, mode)
       class(mode_search), intent(inout) :: self
       type(self_excited_mode), intent(in) :: mode
-      logical, intent(out), optional :: oscillates
       type(self_excited_mode), allocatable :: longer(:)
       integer :: j
 
-      if (present(oscillates)) oscillates = .not. mode%is_overdamped()
       if (mode%is_overdamped()) then
          self%n_overdamped = self%n_overdamped + 1
          return
