@@ -14,9 +14,10 @@ module fw_undetermined
    public :: find_undetermined, damps_all
 
    !> Of the sizes of K and theta M: eigenvalues are good to some thousand times epsilon.
-   real(wp), parameter :: round_off = 1.0e-12_wp
+   !> A load finds what is far less.
+   real(wp), parameter :: round_off = 1.0e-12_wp, nothing = 2.0_wp*epsilon(1.0_wp)
    !> Parts of a load, and of the motion at a joint, that are none.
-   real(wp), parameter :: no_load = 1.0e-12_wp, no_motion = 1.0e-8_wp
+   real(wp), parameter :: no_load = 2.0e-15_wp, no_motion = 1.0e-8_wp
    !> Coordinates whose blocks take no time beside what solves for them.
    integer, parameter :: most_coordinates = 500
 
@@ -113,7 +114,9 @@ contains
          v = load
          if (meets(system, h, kept, lu, matrix, sizes, v)) then
             if (abs(dot_product(v, load)) > no_load*norm2(abs(load))) then
-               n_driven = n_driven + 1
+               ! What couples it, by however little, makes a motion of it.
+               if (abs(dot_product(v, matmul(matrix, v))) <= &
+                   nothing*dot_product(abs(v), matmul(sizes, abs(v)))) n_driven = n_driven + 1
                return
             end if
             n_idle = n_idle + 1
@@ -121,7 +124,8 @@ contains
          end if
       end if
       v = [(cmplx(cos(real(j**2, wp)), sin(real(3*j, wp)), wp), j=1, n)]
-      if (meets(system, h, kept, lu, matrix, sizes, v)) n_idle = n_idle + 1
+      if (.not. meets(system, h, kept, lu, matrix, sizes, v)) return
+      if (abs(dot_product(v, load)) <= no_load*norm2(abs(load))) n_idle = n_idle + 1
    end subroutine judge
 
    !> Whether v tends to a motion without forces, which moves no nonlinear spring.
