@@ -95,6 +95,8 @@ def test_sweeps_of_other_frequencies_are_interpolated(coarse: Result, tmp_path: 
     other = _copy(coarse, tmp_path / "half.h5")
     with h5py.File(other, "r+") as file:
         for name in coarse:
+            if name.startswith("peak/"):
+                continue  # Rows of peaks are no points.
             if name not in ("observed/name", "contact/position", "contact/area", "contact/patch"):
                 kept = file[name][::2]
                 del file[name]

@@ -166,7 +166,7 @@ contains
       order = pack(order, values(order) > massless*maxval(abs(values)))
       square = 1.0_wp/values(order) - shift
       ! Rigid motions have no frequency and do not count.
-      self%rest%rigid = vectors(:, pack(order, square <= rigid*shift))
+      self%rest%rigid_motions = vectors(:, pack(order, square <= rigid*shift))
       order = pack(order, square > rigid*shift)
       square = 1.0_wp/values(order) - shift
       self%omega = sqrt(square)

@@ -293,12 +293,16 @@ contains
       class(mode_start), intent(inout) :: self
       type(stuck_modes), intent(inout) :: modes
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: name
+      ! Texts that functions return are kept in static memory: a variable here.
+      character(:), allocatable :: name, left_out
 
       call modes%choose(self%case%mode%number, self%case%mode%near)
       associate (choice => modes%choice)
          self%number = choice%number
          name = '&mode number = '//to_text(choice%number)
+         left_out = ''
+         if (choice%n_overdamped > 0) left_out = ' that oscillate; '// &
+            to_text(choice%n_overdamped)//' with damping ratios of 1 and more do not count'
          if (.not. choice%done) then
             call fatal_error(error, "case%analysis = 'mode': the linear modes with closed "// &
                              'pairs stuck were not found: check mass, stiffness and damping of '// &
@@ -310,8 +314,7 @@ contains
                              'damping', status_input)
          else if (choice%number > choice%n_modes) then
             call fatal_error(error, name//': the structure with its closed pairs stuck has '// &
-                             to_text(choice%n_modes)//' elastic modes'// &
-                             overdamped(choice%n_overdamped), status_input)
+                             to_text(choice%n_modes)//' elastic modes'//left_out, status_input)
          else if (choice%twin > 0) then
             call fatal_error(error, name//': modes '//to_text(min(choice%twin, choice%number))// &
                              ' and '//to_text(max(choice%twin, choice%number))//' with stuck '// &
@@ -321,16 +324,6 @@ contains
          end if
       end associate
    end subroutine choose
-
-   !> What numbers leave out.
-   pure function overdamped(n) result(text)
-      integer, intent(in) :: n
-      character(:), allocatable :: text
-
-      text = ''
-      if (n > 0) text = ' that oscillate; '//to_text(n)// &
-                        ' with damping ratios of 1 and more do not count'
-   end function overdamped
 
    !> The mode with its damping, and the system of its curve at the lowest amplitude.
    subroutine take_mode(self, modes, x, error)

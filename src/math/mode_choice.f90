@@ -16,7 +16,7 @@ module fw_mode_choice
       real(wp), allocatable :: omega(:)
       complex(wp), allocatable :: shape(:, :)
       !> Rigid motions (n, n_rigid).
-      complex(wp), allocatable :: rigid(:, :)
+      complex(wp), allocatable :: rigid_motions(:, :)
       !> K + shift M is positive definite.
       real(wp) :: shift = 0.0_wp
    end type modes_at_rest
@@ -178,7 +178,7 @@ contains
       if (size(pencil%m, 1) <= most_dofs) then
          search%pencil = pencil
       else
-         basis = joined(rest%rigid, rest%shape(:, :n_looked_at(rest, search)))
+         basis = joined(rest%rigid_motions, rest%shape(:, :n_looked_at(rest, search)))
          search%pencil%k = congruence(basis, pencil%k, basis)
          search%pencil%m = congruence(basis, pencil%m, basis)
          search%pencil%c = congruence(basis, pencil%c, basis)
@@ -224,7 +224,7 @@ contains
       if (.not. leads) return
       if (is_projected) then
          shape_of = (0.0_wp, 0.0_wp)
-         shape_of(size(rest%rigid, 2) + j) = (1.0_wp, 0.0_wp)
+         shape_of(size(rest%rigid_motions, 2) + j) = (1.0_wp, 0.0_wp)
       else
          shape_of = rest%shape(:, j)
       end if

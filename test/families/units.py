@@ -62,7 +62,7 @@ DATASETS = (
     (r"amplitude|coefficients|first_harmonic|largest|depth|gap|relative_displacement", LENGTH),
     (r"dissipation|energy", (1, 1, 0)), (r"force$", FORCE),
     (r"^parameter$|phase|is_|converged|fraction|damping_ratio|scale|cycles|share|state|stable|fold|"
-     r"multiplier", NONE))
+     r"multiplier|tolerance", NONE))
 
 
 def dims_of(name):
