@@ -14,8 +14,8 @@ os.environ["PYTHONPATH"] = os.pathsep.join([*_package, os.environ.get("PYTHONPAT
 
 #: Test files that take longest, in that order: two processes share the files, and one that begins
 #: last with minutes to go keeps the other waiting. (`--durations` tells; builds by fpm lead.)
-LONGEST = ("test/builds/test_fpm.py", "test/cyclic/test_cyclic_family.py",
-           "test/families/test_families.py")
+LONGEST = ("test/builds/test_fpm.py", "test/structure/test_toys.py",
+           "test/cyclic/test_cyclic_family.py", "test/families/test_families.py")
 
 
 def pytest_collection_modifyitems(items):

@@ -22,6 +22,8 @@ module fw_cli
       logical :: keys = .false., keys_as_json = .false.
       !> Show which keys do not go together.
       logical :: rules = .false.
+      !> Show the parts of a model file and do nothing.
+      logical :: parts = .false.
       logical :: quiet = .false.
       logical :: verbose = .false.
       logical :: help = .false.
@@ -72,7 +74,7 @@ contains
          i = i + 1
       end do
       if (options%help .or. options%version .or. options%keys .or. &
-          options%rules) return
+          options%rules .or. options%parts) return
       if (options%quiet .and. options%verbose) then
          call fatal_error(error, '-q and -v exclude each other'//hint, status_usage)
       else if (.not. allocated(options%input)) then
@@ -202,6 +204,8 @@ contains
          options%check = .true.
       case ('--rules')
          options%rules = .true.
+      case ('--parts')
+         options%parts = .true.
       case ('-q', '--quiet')
          options%quiet = .true.
       case ('-v', '--verbose')
@@ -218,15 +222,15 @@ contains
    pure logical function is_flag(name)
       character(*), intent(in) :: name
 
-      is_flag = any(name == [character(9) :: '--check', '--rules', '--quiet', '--verbose', &
-                             '--help', '--version'])
+      is_flag = any(name == [character(9) :: '--check', '--rules', '--parts', '--quiet', &
+                             '--verbose', '--help', '--version'])
    end function is_flag
 
    function near(name) result(text)
       character(*), intent(in) :: name
       character(:), allocatable :: text
       character(*), parameter :: names(*) = [character(9) :: '--set', '--output', '--restart', &
-         '--keys', '--rules', '--check', '--quiet', '--verbose', '--help', '--version']
+         '--keys', '--rules', '--parts', '--check', '--quiet', '--verbose', '--help', '--version']
       type(string_type) :: options(size(names))
       integer :: i
 

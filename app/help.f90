@@ -26,6 +26,7 @@ contains
          '  --keys [GROUP]         what every key accepts and means, its unit and its default;', &
          '                         --keys=json for programs', &
          '  --rules                which keys do not go together, and what to use instead', &
+         '  --parts                what a model file may hold, as a table', &
          '  --check                validate, print the effective input and the natural', &
          '                         frequencies within the sweep, run nothing', &
          '  -q                     errors only', &

@@ -15,6 +15,7 @@ program fw_run_program
    use fw_reader_text, only: printable
    use fw_restart_trial, only: try_restart
    use fw_rules, only: write_rules
+   use fw_parts, only: write_parts
    use fw_run, only: check_case, run_case
    use fw_run_modes, only: list_in_range
    use fw_text, only: string_type
@@ -46,6 +47,8 @@ contains
             call show_keys(options, error)
          else if (options%rules) then
             call write_rules(output_unit)
+         else if (options%parts) then
+            call write_parts(output_unit)
          else if (options%version) then
             call describe_blas(blas)
             write (output_unit, '(a)') 'fw_run '//version, 'BLAS: '//trim(blas)

@@ -4,8 +4,9 @@
     write_keys.py [--check] [PROGRAM]
 
 Writes the tables of docs/user-guide.md, between their marks, and python/fretwear/settings.py from
-`fw_run --keys=json`, and the table of keys that do not go together from `fw_run --rules`. With
---check nothing is written; the status is 1 where a file differs.
+`fw_run --keys=json`, the table of keys that do not go together from `fw_run --rules` and the parts
+of a model file from `fw_run --parts`. With --check nothing is written; the status is 1 where a file
+differs.
 """
 
 from __future__ import annotations
@@ -64,6 +65,17 @@ def rules(program: str) -> str:
     for asks, remedies in rows.items():
         lines += [f"| {quoted(asks)} | {'; '.join(map(quoted, forbids))} | {coded(remedy)} |"
                   for remedy, forbids in remedies.items()]
+    return "\n".join(lines)
+
+
+def parts(program: str) -> str:
+    """What a model file may hold, as Markdown."""
+    shown = subprocess.run([program, "--parts"], check=True, capture_output=True, text=True)
+    code = re.compile(r"\w+%\w+|&\w+|(?<!\w)/\w+(?:/\w+)*|'[^']+'|coefficient \* \w+\*\*power")
+    lines = shown.stdout.splitlines()
+    for k, line in enumerate(lines[2:], 2):
+        start, meaning = line.rsplit(" | ", 1)
+        lines[k] = f"{start} | {code.sub(lambda found: f'`{found[0]}`', meaning)}"
     return "\n".join(lines)
 
 
@@ -140,10 +152,11 @@ def coded_unit(key: dict[str, Any]) -> str:
     return "`unit`" if "unit" in key else ""
 
 
-def guide(groups: Keys, together: str, text: str) -> str:
+def guide(groups: Keys, together: str, of_models: str, text: str) -> str:
     """The guide with its tables renewed."""
     for group, content in groups.items():
         text = put(text, f"keys of {group}", "end of keys", table(content["keys"]))
+    text = put(text, "parts of a model file", "end of parts", of_models)
     return put(text, "rules", "end of rules", together)
 
 
@@ -248,7 +261,8 @@ def main() -> int:
     arguments = parser.parse_args()
     groups = declared(arguments.program)
     stale = 0
-    written = ((GUIDE, guide(groups, rules(arguments.program), GUIDE.read_text())),
+    written = ((GUIDE, guide(groups, rules(arguments.program), parts(arguments.program),
+                            GUIDE.read_text())),
                (SETTINGS, settings(groups)))
     for path, text in written:
         if path.read_text() == text:

@@ -5,6 +5,7 @@
 module fw_python
    use fw_error, only: error_type, status_ok
    use fw_kinds, only: i8, wp
+   use fw_model_file, only: list_unread
    use fw_python_parts, only: case_part, namelist_words, quantity_lines
    use fw_python_session, only: handle_of, handle_type, new_handle
    use fw_text, only: join, string_type
@@ -16,7 +17,7 @@ module fw_python
    public :: new_model, put_reals, put_integers, put_texts, observe
    public :: give_case, prepare, check_case, run_case, run_piece, copy_session
    public :: start, solve, count_frequencies, frequencies
-   public :: count_values, get_values, count_bytes, get_bytes, parse_namelist
+   public :: count_values, get_values, count_bytes, get_bytes, parse_namelist, unread_parts
 
 contains
 
@@ -376,14 +377,40 @@ contains
       integer, intent(out) :: status
       type(string_type), allocatable :: words(:)
       type(error_type), allocatable :: error
+
+      call namelist_words(from_bytes(text), words, error)
+      call answer(words, error, bytes, n_found, status)
+   end subroutine parse_namelist
+
+   !> What stands in a model file and nothing reads, as parse_namelist gives its words; refused as
+   !> a run refuses it.
+   subroutine unread_parts(n_path, path, n, bytes, n_found, status)
+      integer, intent(in) :: n_path, n
+      integer(1), intent(in) :: path(n_path)
+      integer(1), intent(inout) :: bytes(n)
+      integer(i8), intent(out) :: n_found
+      integer, intent(out) :: status
+      type(string_type), allocatable :: words(:)
+      type(error_type), allocatable :: error
+
+      call list_unread(from_bytes(path), words, error)
+      call answer(words, error, bytes, n_found, status)
+   end subroutine unread_parts
+
+   !> Words with null bytes behind them as far as there is room, or the message of an error.
+   subroutine answer(words, error, bytes, n_found, status)
+      type(string_type), allocatable, intent(inout) :: words(:)
+      type(error_type), allocatable, intent(in) :: error
+      integer(1), intent(inout) :: bytes(:)
+      integer(i8), intent(out) :: n_found
+      integer, intent(out) :: status
       integer(i8) :: first
       integer :: i
 
-      call namelist_words(from_bytes(text), words, error)
       status = status_ok
       if (allocated(error)) then
          status = error%status
-         deallocate (words)
+         if (allocated(words)) deallocate (words)
          allocate (words(1))
          words(1)%text = error%message
       end if
@@ -391,10 +418,10 @@ contains
       do i = 1, size(words)
          first = n_found + 1_i8
          n_found = n_found + len(words(i)%text, kind=i8) + 1_i8
-         if (n_found <= n) bytes(first:n_found) = transfer(words(i)%text//char(0), 0_1, &
-                                                           len(words(i)%text) + 1)
+         if (n_found <= size(bytes)) bytes(first:n_found) = &
+            transfer(words(i)%text//char(0), 0_1, len(words(i)%text) + 1)
       end do
-   end subroutine parse_namelist
+   end subroutine answer
 
    pure function from_bytes(bytes) result(text)
       integer(1), intent(in) :: bytes(:)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .errors import FretwearError, InputError, NotBuiltError, OutputError
 
 __all__ = ["NOT_CONVERGED", "STOPPED", "Session", "functions", "join_texts", "library_version",
-           "namelist_values", "raise_status", "routines"]
+           "namelist_values", "raise_status", "routines", "unread_parts"]
 
 OK, USAGE, INPUT, NOT_CONVERGED, IO, STOPPED = 0, 2, 3, 4, 5, 6
 
@@ -80,12 +80,7 @@ def namelist_values(text: str) -> dict[str, list[str]]:
     InputError
         It is no namelist.
     """
-    core, given = routines(), _bytes(text)
-    n, status = core.parse_namelist(given, np.zeros(0, dtype=np.int8))
-    buffer = np.zeros(n, dtype=np.int8)
-    core.parse_namelist(given, buffer)
-    words = buffer.tobytes().decode(errors="surrogateescape").split("\0")[:-1]
-    raise_status(status, "".join(words))
+    words = _words(routines().parse_namelist, text)
     found: dict[str, list[str]] = {}
     k = 0
     while k < len(words):
@@ -93,6 +88,22 @@ def namelist_values(text: str) -> dict[str, list[str]]:
         found[key] = words[k + 2:k + 2 + n]
         k += 2 + n
     return found
+
+
+def unread_parts(path: str) -> list[str]:
+    """What stands in a model file and nothing reads; raises InputError as a run does."""
+    return _words(routines().unread_parts, path)
+
+
+def _words(ask: Any, text: str) -> list[str]:
+    """The words that a routine answers a text with: first how long they are, then the words."""
+    given = _bytes(text)
+    n, status = ask(given, np.zeros(0, dtype=np.int8))
+    buffer = np.zeros(n, dtype=np.int8)
+    ask(given, buffer)
+    words = buffer.tobytes().decode(errors="surrogateescape").split("\0")[:-1]
+    raise_status(status, "".join(words))
+    return words
 
 
 class Session:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._arguments import array, dofs, text, whole
 from ._namelist import literal
-from ._native import Session
-from .errors import InputError, OutputError
+from ._native import Session, unread_parts
+from .errors import InputError, NotBuiltError, OutputError
 from .model_file import FORMAT, strings, write_model_file
 from .sectors import Sectors, read_sectors
 
@@ -306,7 +307,12 @@ class Model:
         OutputError
             The file cannot be read.
         InputError
-            It is no model file, or what it holds does not fit.
+            It is no model file, or what it holds does not fit, or is nothing that is read.
+
+        Warns
+        -----
+        UserWarning
+            The file holds data beside the model, which are left out.
         """
         try:
             file = h5py.File(path, "r")
@@ -317,6 +323,7 @@ class Model:
             kind = _text(file.attrs.get("format", ""))
             if kind != FORMAT:
                 raise InputError(f"{path}: format is '{kind}', expected '{FORMAT}'")
+            _warn_of_strangers(path)
             for name in ("mass", "stiffness"):
                 if name not in file and "nodal_diameter" not in file:
                     raise InputError(f"{path}: dataset /{name} is missing")
@@ -518,15 +525,12 @@ def _springs_of(file: h5py.File) -> list[Spring]:
     if "spring" not in file:
         return []
     group = file["spring"]
-    if strange := sorted(set(group) - set(_SPRING)):
-        raise InputError(f"dataset /spring/{strange[0]}: is nothing that is read, expected "
-                         f"{', '.join(_SPRING)}")
     for name in ("side_1", "coefficient"):
         if name not in group:
             raise InputError(f"dataset /spring/{name} is missing")
     n = group["side_1"].shape
     values = {}
-    for name in group:
+    for name in (name for name in _SPRING if name in group):
         if group[name].shape not in ((), n):
             raise InputError(f"dataset /spring/{name}: has shape {group[name].shape}, expected {n}")
         values[name] = np.broadcast_to(group[name][()], n).tolist()
@@ -566,6 +570,16 @@ def _read_only(values: Floats) -> Floats:
     view = values.view()
     view.flags.writeable = False
     return view
+
+
+def _warn_of_strangers(path: str | Path) -> None:
+    """What nothing reads, as a run tells it."""
+    try:
+        names = unread_parts(str(path))
+    except NotBuiltError:
+        return   # nothing can be run with the model either
+    if names:
+        warnings.warn(f"{path}: holds {', '.join(names)}, which nothing reads", stacklevel=3)
 
 
 def _text(value: object) -> str:

@@ -248,10 +248,6 @@ def read_sectors(file: h5py.File) -> Sectors | None:
 
 
 def _read_air(group: h5py.Group) -> Air:
-    for name in ("frequency", "matrix"):
-        if name in group:
-            raise InputError(f"/aero/{name}: is there, but forces of the air do not depend on "
-                             "frequency here")
     parts: dict[str, Any] = {
         argument: {int(m): _complexes(matrix[()]) for m, matrix in group[name].items()}
         for argument, name in (("by_sector", "sector"), ("by_diameter", "nodal_diameter"))

@@ -14,6 +14,7 @@ import scipy.sparse.linalg as spl
 from program import run
 from project import PROGRAM
 
+from fretwear._native import unread_parts
 from fretwear.disk import (
     DiskParameters,
     FullDisk,
@@ -104,6 +105,7 @@ def test_the_committed_model_is_the_generated_one(reduced: ReducedDisk, tmp_path
     assert read_parameters(path) == DiskParameters()
     begin = time.perf_counter()
     assert main(["-o", str(tmp_path / "disk.h5"), "-q"]) == 0
+    assert unread_parts(str(tmp_path / "disk.h5")) == []
     assert time.perf_counter() - begin < 30.0
     with h5py.File(path) as committed, h5py.File(tmp_path / "disk.h5") as made:
         for name in ("mass", "stiffness", "load/cosine", "contact/area", "observe/matrix"):

@@ -16,6 +16,7 @@ from skfem.helpers import ddot, dot, eye, sym_grad, trace
 from skfem.models.elasticity import lame_parameters
 
 import fretwear as fw
+from fretwear._native import unread_parts
 from fretwear.cli import main
 from fretwear.export import export_mesh
 
@@ -112,6 +113,7 @@ def _import(folder: Path, target: str, *options: str) -> Path:
               for word in (f"--{name}", str(folder / file))]
     path = folder / target
     assert main(["import", *inputs, *tables, "-o", str(path), *options]) == 0
+    assert unread_parts(str(path)) == []
     return path
 
 

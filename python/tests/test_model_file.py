@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+from fretwear._native import unread_parts
 from fretwear.sector import ReducedModel, generate, read_parameters, write_model
 from fretwear.sector.cli import main
 
@@ -56,6 +57,7 @@ def test_layout(reduced: ReducedModel, tmp_path: Path) -> None:
         assert np.array_equal(file["stiffness"][()], reduced.stiffness)
         # Force and observed displacement are conjugate.
         assert file["observe/matrix"][0] == pytest.approx(file["load/cosine"][()], rel=1e-12)
+    assert unread_parts(str(path)) == []
     assert not list(tmp_path.glob("*.part"))
 
 

@@ -47,10 +47,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: side_1(:), side_2(:), sector_2(:)
       logical, allocatable :: moving(:)
+      logical :: drops
       integer :: i, c, n_pairs, n_rows, n_springs
 
       ! Before the rows are numbered: what never moves needs none.
       call find_moving_dofs(model, contact, springs, moving)
+      drops = skip_idle .and. damps(model, moving)
       allocate (self%row(3, contact%n_pairs), source=0)
       allocate (self%idle(3, contact%n_pairs), source=.false.)
       ! Pairs and springs of all sectors are those of the first.
@@ -64,7 +66,7 @@ contains
             if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
             self%idle(c, i) = .not. (moving(abs(contact%side_1(c, i))) .or. &
                                      moving(abs(contact%side_2(c, i))))
-            if (self%idle(c, i) .and. skip_idle) then
+            if (self%idle(c, i) .and. drops) then
                self%n_idle = self%n_idle + 1
                cycle
             end if
@@ -176,6 +178,23 @@ contains
          return
       end do
    end subroutine turn_joint
+
+   !> Whether what never moves is damped. If not, a harmonic may meet one of its modes, whose motion
+   !> nothing determines: that shows where its contact is in the equations only.
+   pure logical function damps(model, moving)
+      type(model_type), intent(in) :: model
+      logical, intent(in) :: moving(0:)
+      real(wp), parameter :: least_ratio = 1.0e-9_wp
+      integer :: i
+
+      damps = .true.
+      if (model%cyclic%is_cyclic) return
+      do i = 1, model%n_dof
+         if (moving(i)) cycle
+         damps = damps .and. model%damping(i, i)**2 >= &
+                 least_ratio**2*abs(model%stiffness(i, i)*model%mass(i, i))
+      end do
+   end function damps
 
    !> Dofs that a load can reach through the matrices, the pairs and the springs (0:n_dof; entry
    !> 0, the ground, never moves). What no load reaches stays at rest exactly.

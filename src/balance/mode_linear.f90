@@ -30,7 +30,7 @@ contains
          na = active%n_active
          do k = 1, 2
             call self%balance%derivative_by(parameters(k), self%q, slope)
-            slope = self%frequency_unit/self%amplitude*slope
+            slope = self%frequency_unit/self%length()*slope
             call gather(active%used(:na), size(self%mass, 1), slope, self%columns(:n_linear, k))
             self%active_rows(:na, k) = self%rows(active%used(:na), k)
          end do
@@ -74,9 +74,9 @@ contains
       n = self%balance%n
       nl = self%balance%active%n_linear
       self%scratch(:nl) = solution(:nl)
-      call scale_static(self, self%static_unit/self%amplitude)
+      call scale_static(self, self%static_unit/self%length())
       call self%balance%expand(r(:n), self%scratch(:nl), step(:n))
-      step(:self%n_static) = self%amplitude/self%static_unit*step(:self%n_static)
+      step(:self%n_static) = self%length()/self%static_unit*step(:self%n_static)
       step(n + 1:) = solution(nl + 1:)
    end procedure expand
 
@@ -96,7 +96,7 @@ contains
 
       nl = self%balance%active%n_linear
       self%scratch(:nl) = vector(:nl)
-      call scale_static(self, self%static_unit/self%amplitude)
+      call scale_static(self, self%static_unit/self%length())
       call self%balance%apply(self%scratch(:nl), product(:nl))
       product(:nl) = product(:nl) + vector(nl + 1)*self%columns(:nl, 1) + &
                      vector(nl + 2)*self%columns(:nl, 2)
@@ -127,7 +127,7 @@ contains
       n = self%balance%active%n_linear
       na = self%balance%active%n_active
       if (n > 0) call self%balance%assemble(matrix)
-      if (self%n_static > 0) matrix(:n, :na) = self%static_unit/self%amplitude*matrix(:n, :na)
+      if (self%n_static > 0) matrix(:n, :na) = self%static_unit/self%length()*matrix(:n, :na)
       matrix(:n, n + 1:n + 2) = self%columns(:n, :)
       matrix(n + 1:n + 2, :n + 2) = 0.0_wp
       c = (self%cosine - 1)*na
@@ -185,7 +185,7 @@ contains
       call self%balance%precondition(vector(:nl))
       vector(c + 1:c + na) = real(self%active(:na), wp)
       vector(s + 1:s + na) = -aimag(self%active(:na))
-      if (self%n_static > 0) vector(:na) = self%amplitude/self%static_unit*vector(:na)
+      if (self%n_static > 0) vector(:na) = self%length()/self%static_unit*vector(:na)
    end procedure precondition
 
    !> Solve in `active` and the condition, which becomes delta; coordinates that joined since are
@@ -215,8 +215,8 @@ contains
       end associate
    end subroutine solve_bordered
 
-   ! d/d ln A of R(A psi, u_0)/A: J (A psi)/A - R/A; the conditions do not see A. Asked for where
-   ! nothing leaves the linear problem.
+   ! d/d ln A of R(A psi, u_0)/A, A the size: J (A psi)/A - R/A; the conditions do not see A. Asked
+   ! for where nothing leaves the linear problem.
    module procedure parameter_derivative
       integer :: n
 
@@ -224,7 +224,7 @@ contains
       self%scratch(:self%n_static) = 0.0_wp
       self%scratch(self%n_static + 1:) = x(self%n_static + 1:n)
       call self%balance%apply(self%scratch, dr(:n))
-      dr(:n) = dr(:n) - self%r/self%amplitude
+      dr(:n) = dr(:n) - self%r/self%length()
       dr(n + 1:) = 0.0_wp
    end procedure parameter_derivative
 

@@ -1,10 +1,10 @@
 !> Options of a nonlinear mode (group &mode). Defaults live here and nowhere else.
 module fw_mode_options
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: above, at_least
+   use fw_key_range, only: above, at_least, from_to
    use fw_kinds, only: wp
-   use fw_solver_options, only: continuation_arclength, continuation_words, unit_rad_per_second, &
-      unit_words
+   use fw_solver_options, only: continuation_arclength, continuation_words, most_points, &
+      unit_rad_per_second, unit_words
    implicit none (type, external)
    private
 
@@ -71,7 +71,7 @@ contains
                               'first observed quantity, or modal, sqrt(U^H M U) of it'), &
                           self%control, control_words)
       call keys%bind(key('n_points', 'points, even in the logarithm; of a branch: sets its '// &
-                         'longest step', at_least(2)), self%n_points)
+                         'longest step', from_to(2, most_points)), self%n_points)
       call keys%bind_word(key('continuation', 'points at given amplitudes, or a branch through '// &
                               'folds'), self%continuation, continuation_words)
       call keys%bind(key('max_points', 'points of a branch at most', at_least(2), &

@@ -61,7 +61,7 @@ contains
       do p = 1, merge(size(finder%parameters), 0, done)
          call slopes%find(system%balance, finder%parameters(p), slope)
          r = 0.0_wp
-         r(:size(q)) = reshape(slope%residual, [size(q)])/system%amplitude
+         r(:size(q)) = reshape(slope%residual, [size(q)])/system%length()
          v = 0.0_wp
          if (norm2(r) > 0.0_wp) then
             call finder%linear%solve_prepared(system, r, krylov_tolerance, v, done)

@@ -10,9 +10,10 @@
 !>
 !> b being the row of the first observed quantity and V the motion of a point before: one complex
 !> row a^T U_1, whose real part is the amplitude and whose imaginary part the phase. Unknowns are
-!> those of the balance over a size of their own, the amplitude A for harmonics above 0, then omega
-!> and xi over a frequency; equations are over A; the parameter is ln A. So a step means the same
-!> over decades, and a curve below the onset of slip is constant but for A.
+!> those of the balance over a size of their own, A times a unit of motion for harmonics above 0,
+!> then omega and xi over a frequency; equations are over that size; the parameter is ln A. So a
+!> step means the same over decades and in any units, and a curve below the onset of slip is
+!> constant but for A.
 !>
 !> The motion may be shifted in time, so that the derivative by the unknowns of the balance alone is
 !> singular at every solution: it is never solved with, only with its two borders. The structure
@@ -37,15 +38,18 @@ module fw_mode_system
       integer :: control = control_observed
       !> exp of the parameter, in the unit of the control.
       real(wp) :: amplitude = 1.0_wp
+      !> Size of the motion per unit of amplitude: 1, or a length over a modal amplitude, so that
+      !> unknowns have no unit and count alike whatever the units of the model are.
+      real(wp) :: motion_unit = 1.0_wp
       !> Unit of omega and xi among the unknowns [rad/s].
       real(wp) :: frequency_unit = 1.0_wp
-      !> Norm of the inertia of the stuck mode per unit of amplitude, to which residuals are
+      !> Norm of the inertia of the stuck mode per size of the motion, to which residuals are
       !> compared, and norm of the static load.
       real(wp) :: inertia = 1.0_wp, static_load = 0.0_wp
       !> Size of the harmonic 0 among the unknowns [length].
       real(wp) :: static_unit = 1.0_wp
-      !> Place of harmonic 1 among those in use, its M, nothing being condensed (n_coordinates,
-      !> n_coordinates), and the row b (n_coordinates).
+      !> Place of harmonic 1 among those in use, its M times the square of the motion's unit,
+      !> nothing being condensed (n_coordinates, n_coordinates), and the row b (n_coordinates).
       integer :: first = 1
       complex(wp), allocatable :: mass(:, :), observed(:)
       !> M V over its modal amplitude (n_coordinates).
@@ -53,7 +57,7 @@ module fw_mode_system
       !> Unknowns of harmonic 0, which come first (0 or n_coordinates).
       integer :: n_static = 0
       !> Columns of cosine and sine of harmonic 1.
-      integer, private :: cosine = 1, sine = 2
+      integer :: cosine = 1, sine = 2
       !> Unknowns of the balance and residual at the last point.
       real(wp), allocatable, private :: q(:), r(:)
       !> Rows a of the amplitude and of the phase (n_coordinates, 2): that of the phase is another
@@ -69,6 +73,8 @@ module fw_mode_system
    contains
       procedure :: set_parameter
       procedure :: parameter_derivative
+      procedure :: measure_by
+      procedure :: length
       procedure :: to_balance
       procedure :: from_balance
       procedure :: remember
@@ -144,11 +150,11 @@ module fw_mode_system
 contains
 
    !> Take a balance of which nothing is condensed in harmonic 1; V is set by `remember`.
-   subroutine new_mode_system(balance, control, frequency_unit, static_unit, self)
+   subroutine new_mode_system(balance, control, frequency_unit, self)
       type(balance_state), intent(inout), target :: balance
       integer, intent(in) :: control
-      !> [rad/s] and [length]
-      real(wp), intent(in) :: frequency_unit, static_unit
+      !> [rad/s]
+      real(wp), intent(in) :: frequency_unit
       type(mode_system), intent(out) :: self
       complex(wp), allocatable :: unused(:, :, :), observe(:, :)
       integer :: m
@@ -158,7 +164,6 @@ contains
       balance%load_share = 0.0_wp
       self%control = control
       self%frequency_unit = frequency_unit
-      self%static_unit = static_unit
       self%n = balance%n + 2
       self%reduced = balance%reduced
       m = balance%problem%structure%n_coordinates
@@ -178,6 +183,23 @@ contains
                 self%active(m), source=(0.0_wp, 0.0_wp))
    end subroutine new_mode_system
 
+   !> Units of the motion per unit of amplitude, and of the static position.
+   subroutine measure_by(self, motion_unit, static_unit)
+      class(mode_system), intent(inout) :: self
+      real(wp), intent(in) :: motion_unit, static_unit
+
+      self%mass = (motion_unit/self%motion_unit)**2*self%mass
+      self%motion_unit = motion_unit
+      self%static_unit = static_unit
+   end subroutine measure_by
+
+   !> Size of the motion at the present amplitude.
+   pure real(wp) function length(self)
+      class(mode_system), intent(in) :: self
+
+      length = self%amplitude*self%motion_unit
+   end function length
+
    !> Unknowns of the balance, frequency and self-excitation from those of the mode.
    pure subroutine to_balance(self, y, q, omega, self_excitation)
       class(mode_system), intent(in) :: self
@@ -190,7 +212,7 @@ contains
       n = size(q)
       ! Harmonic 0 is the first of those retained.
       q(:self%n_static) = self%static_unit*y(:self%n_static)
-      q(self%n_static + 1:) = self%amplitude*y(self%n_static + 1:n)
+      q(self%n_static + 1:) = self%length()*y(self%n_static + 1:n)
       omega = self%frequency_unit*y(n + 1)
       self_excitation = self%frequency_unit*y(n + 2)
    end subroutine to_balance
@@ -204,7 +226,7 @@ contains
 
       n = size(q)
       y(:self%n_static) = q(:self%n_static)/self%static_unit
-      y(self%n_static + 1:n) = q(self%n_static + 1:)/self%amplitude
+      y(self%n_static + 1:n) = q(self%n_static + 1:)/self%length()
       y(n + 1) = omega/self%frequency_unit
       y(n + 2) = self_excitation/self%frequency_unit
    end subroutine from_balance
@@ -242,7 +264,7 @@ contains
       call zgemv('N', m, m, one, self%mass, m, vector, 1, zero, product, 1)
    end subroutine multiply_mass
 
-   !> U_1 over the amplitude, of unknowns of the mode.
+   !> U_1 over its size, of unknowns of the mode.
    pure function motion(self, y) result(shape)
       class(mode_system), intent(in) :: self
       real(wp), intent(in) :: y(:)
@@ -262,12 +284,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       self%amplitude = exp(parameter)
-      self%reference = max(self%inertia, static_share*self%static_load/self%amplitude)
+      self%reference = max(self%inertia, static_share*self%static_load/self%length())
       associate (unused => allocated(error))
       end associate
    end subroutine set_parameter
 
-   !> Of the balance over A, then the conditions in units of a force over A.
+   !> Of the balance over the size of the motion, then the conditions in the same units.
    subroutine residual(self, x, r)
       class(mode_system), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:)
@@ -284,7 +306,7 @@ contains
          return
       end if
       call self%balance%residual(self%q, self%r)
-      r(:n) = self%r/self%amplitude
+      r(:n) = self%r/self%length()
       call set_rows(self, x)
       associate (shape => self%motion(x))
          r(n + 1) = real(sum(self%rows(:, 1)*shape), wp)

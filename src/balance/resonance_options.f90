@@ -2,10 +2,10 @@
 !> and nowhere else.
 module fw_resonance_options
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: at_least
+   use fw_key_range, only: at_least, from_to
    use fw_kinds, only: wp
    use fw_parameters, only: parameter_words, rotation_speed
-   use fw_solver_options, only: continuation_natural, continuation_words
+   use fw_solver_options, only: continuation_natural, continuation_words, most_points
    implicit none (type, external)
    private
 
@@ -70,8 +70,8 @@ contains
                      self%start, needed=is_resonance)
       call keys%bind(key('end', 'last value, or factor', absent='required', only=only), &
                      self%end, needed=is_resonance)
-      call keys%bind(key('n_points', 'values; of a branch: sets its longest step', at_least(2)), &
-                     self%n_points)
+      call keys%bind(key('n_points', 'values; of a branch: sets its longest step', &
+                         from_to(2, most_points)), self%n_points)
       call keys%bind_word(key('spacing', 'even steps, or even in the logarithm'), self%spacing, &
                           spacing_words)
       call keys%bind_word(key('as', 'what start and end are: values, or factors of those of '// &

@@ -2,35 +2,44 @@
 !> their springs, rigid ones held; nonlinear springs as their slopes. Nonlinear modes start from
 !> them, and are them below the onset of slip.
 !>
-!> First those without damping, which are numbered; then the one in question with its damping and
-!> the self-excitation xi that cancels it,
+!> First those without damping and with the Hermitian part of K; then the one in question among
+!> those with all of it (fw_mode_choice), and the self-excitation xi that cancels its damping,
 !>
 !>   (K - theta M + i omega C) U = 0,   theta = omega^2 + i omega xi,   exact whatever the damping.
 !>
-!> Of a cyclic structure they are waves of the nodal diameter of harmonic 1, with Hermitian K and M;
-!> what the air adds to K and Coriolis forces to C is left to the mode in question, too.
+!> Of a cyclic structure they are waves of the nodal diameter of harmonic 1, with Hermitian M; what
+!> the air adds to K and Coriolis forces to C tells the two directions apart.
 module fw_stuck_modes
    use fw_balance_state, only: balance_state
    use fw_force_law, only: pair_open
-   use fw_hermitian, only: real_form, solve_hermitian_eigen
+   use fw_hermitian, only: solve_hermitian_eigen
    use fw_kinds, only: wp
-   use fw_linalg, only: lu_type, solve_symmetric_eigen
+   use fw_linalg, only: solve_symmetric_eigen
+   use fw_mode_choice, only: choose_mode, list_modes, mode_choice, mode_from_rest, modes_at_rest
+   use fw_self_excited_mode, only: mode_pencil, refine_mode, self_excited_mode
    implicit none (type, external)
    private
 
-   public :: stuck_modes, find_stuck_modes
+   public :: stuck_modes, find_stuck_modes, add_slopes
 
    type :: stuck_modes
-      !> Of the elastic modes in ascending order: frequencies [rad/s] (n_modes) and shapes in the
-      !> coordinates, of any size (n_coordinates, n_modes).
+      !> Of the elastic modes without damping in ascending order: frequencies [rad/s] (n_modes).
       real(wp), allocatable :: omega(:)
-      complex(wp), allocatable :: shape(:, :)
       !> K with its stuck pairs, M and C of the coordinates, rows of the observed quantities.
       complex(wp), allocatable, private :: stiffness(:, :), mass(:, :), damping(:, :)
       complex(wp), allocatable :: observe(:, :)
       !> Coordinates that rigid pairs do not hold.
       integer, allocatable, private :: free(:)
+      !> Those without damping in the coordinates that are free, and all matrices of these.
+      type(modes_at_rest), private :: rest
+      type(mode_pencil), private :: pencil
+      !> What `choose` has chosen.
+      type(mode_choice) :: choice
    contains
+      procedure :: choose
+      procedure :: list
+      procedure :: frequency
+      procedure :: shape_of
       procedure :: refine
    end type stuck_modes
 
@@ -68,13 +77,13 @@ contains
       held = .false.
       first = 1
       if (present(slides)) first = merge(3, 1, slides)
-      call add_laws(system, h, first, modes%stiffness, held)
+      call add_slopes(system, h, first, modes%stiffness, held)
       modes%free = pack([(j, j=1, m)], .not. held)
       call solve_undamped(modes, done)
    end subroutine find_stuck_modes
 
    !> Slopes of all laws; rigid pairs that bear hold their coordinates.
-   subroutine add_laws(system, h, first, block, held)
+   subroutine add_slopes(system, h, first, block, held)
       type(balance_state), intent(in) :: system
       integer, intent(in) :: h
       !> The first component of pairs that holds.
@@ -105,7 +114,7 @@ contains
             end do
          end associate
       end do
-   end subroutine add_laws
+   end subroutine add_slopes
 
    !> Pairs: stuck, whatever slipped on the way to rest. Springs: the slope at their elongation.
    real(wp) function slope_of(system, law, element, component) result(slope)
@@ -131,34 +140,39 @@ contains
    subroutine solve_undamped(self, done)
       type(stuck_modes), intent(inout) :: self
       logical, intent(out) :: done
-      complex(wp), allocatable :: k(:, :), m(:, :), vectors(:, :)
+      complex(wp), allocatable :: k(:, :), vectors(:, :)
       real(wp), allocatable :: values(:), square(:)
       real(wp) :: shift
       integer, allocatable :: order(:)
       integer :: j, trial
 
-      k = self%stiffness(self%free, self%free)
+      self%pencil%k = self%stiffness(self%free, self%free)
+      self%pencil%m = self%mass(self%free, self%free)
+      self%pencil%c = self%damping(self%free, self%free)
       ! Forces of the air are not Hermitian.
-      k = 0.5_wp*(k + conjg(transpose(k)))
-      m = self%mass(self%free, self%free)
+      k = 0.5_wp*(self%pencil%k + conjg(transpose(self%pencil%k)))
       done = size(self%free) > 0
       if (.not. done) return
-      do trial = 1, size(shift_trials)
-         shift = shift_trials(trial)*norm2(abs(k))/max(norm2(abs(m)), tiny(1.0_wp))
-         call solve_pencil(m, k + shift*m, values, vectors, done)
-         if (done) exit
-      end do
+      associate (m => self%pencil%m)
+         do trial = 1, size(shift_trials)
+            shift = shift_trials(trial)*norm2(abs(k))/max(norm2(abs(m)), tiny(1.0_wp))
+            call solve_pencil(m, k + shift*m, values, vectors, done)
+            if (done) exit
+         end do
+      end associate
       if (.not. done) return
       ! In descending order of the values: ascending frequencies.
       order = [(j, j=size(values), 1, -1)]
       order = pack(order, values(order) > massless*maxval(abs(values)))
       square = 1.0_wp/values(order) - shift
       ! Rigid motions have no frequency and do not count.
+      self%rest%rigid = vectors(:, pack(order, square <= rigid*shift))
       order = pack(order, square > rigid*shift)
       square = 1.0_wp/values(order) - shift
       self%omega = sqrt(square)
-      allocate (self%shape(size(self%stiffness, 1), size(order)), source=(0.0_wp, 0.0_wp))
-      self%shape(self%free, :) = vectors(:, order)
+      self%rest%omega = self%omega
+      self%rest%shape = vectors(:, order)
+      self%rest%shift = shift
    end subroutine solve_undamped
 
    !> Real matrices have real modes, and take a quarter of the time.
@@ -177,83 +191,78 @@ contains
       end if
    end subroutine solve_pencil
 
-   !> A mode with its damping, by Newton's method on the complex shape, omega and xi, which starts
-   !> at the one without; b^T U = 1 holds throughout.
-   subroutine refine(self, number, row, omega, self_excitation, shape, done)
-      class(stuck_modes), intent(in) :: self
+   !> Take the mode of a number, or the one nearest to a frequency, among those that oscillate.
+   subroutine choose(self, number, near)
+      class(stuck_modes), intent(inout) :: self
       integer, intent(in) :: number
+      !> 0: by number [rad/s].
+      real(wp), intent(in) :: near
+
+      call choose_mode(self%pencil, self%rest, number, near, self%choice)
+   end subroutine choose
+
+   !> Frequencies of all modes that oscillate, as they are numbered [rad/s].
+   subroutine list(self, omega)
+      class(stuck_modes), intent(in) :: self
+      real(wp), allocatable, intent(out) :: omega(:)
+
+      call list_modes(self%pencil, self%rest, omega)
+   end subroutine list
+
+   !> About its frequency: that without damping where Newton's method starts there [rad/s].
+   pure real(wp) function frequency(self)
+      class(stuck_modes), intent(in) :: self
+
+      frequency = self%choice%mode%omega
+      if (self%choice%from_rest > 0) frequency = self%omega(self%choice%from_rest)
+   end function frequency
+
+   !> About its shape, of any size (n_coordinates).
+   pure function shape_of(self) result(shape)
+      class(stuck_modes), intent(in) :: self
+      complex(wp) :: shape(size(self%stiffness, 1))
+
+      shape = (0.0_wp, 0.0_wp)
+      if (self%choice%from_rest > 0) then
+         shape(self%free) = self%rest%shape(:, self%choice%from_rest)
+      else
+         shape(self%free) = self%choice%mode%shape
+      end if
+   end function shape_of
+
+   !> The chosen mode exactly, b^T U = 1.
+   subroutine refine(self, row, omega, self_excitation, shape, done)
+      class(stuck_modes), intent(in) :: self
       !> The row b (n_coordinates).
       complex(wp), intent(in) :: row(:)
       !> [rad/s]
       real(wp), intent(out) :: omega, self_excitation
       !> U (n_coordinates).
       complex(wp), intent(out) :: shape(:)
+      !> False where Newton's method came to another one.
       logical, intent(out) :: done
-      integer, parameter :: most_steps = 30
-      !> Steps of this part of the unknowns are round-off.
-      real(wp), parameter :: small = 1.0e-13_wp
-      type(lu_type) :: lu
-      complex(wp) :: u(size(self%free))
-      complex(wp), dimension(size(self%free), size(self%free)) :: k, m, c
-      real(wp) :: step(2*size(self%free) + 2)
-      logical :: singular
-      integer :: j, n
+      type(self_excited_mode) :: mode
 
-      n = size(self%free)
-      k = self%stiffness(self%free, self%free)
-      m = self%mass(self%free, self%free)
-      c = self%damping(self%free, self%free)
-      u = self%shape(self%free, number)/sum(row*self%shape(:, number))
-      omega = self%omega(number)
-      self_excitation = real(dot_product(u, matmul(c, u)), wp)/real(dot_product(u, matmul(m, u)), &
-                                                                    wp)
-      done = .false.
-      call lu%reserve(2*n + 2)
-      do j = 1, most_steps
-         call fill(k, m, c, row(self%free), omega, self_excitation, u, &
-                   lu%matrix(:2*n + 2, :2*n + 2), step)
-         call lu%factor(singular)
-         if (singular) return
-         call lu%solve(step)
-         u = u - cmplx(step(:n), step(n + 1:2*n), wp)
-         omega = omega - step(2*n + 1)
-         self_excitation = self_excitation - step(2*n + 2)
-         done = norm2(step(:2*n)) <= small*norm2(abs(u)) .and. &
-                maxval(abs(step(2*n + 1:))) <= small*abs(omega)
-         if (done) exit
-      end do
-      ! Ill-conditioned modes stop short of round-off of their best digits.
-      if (.not. done) done = maxval(abs(step(2*n + 1:))) <= sqrt(small)*abs(omega)
+      associate (choice => self%choice, b => row(self%free))
+         done = choice%from_rest > 0
+         if (done) then
+            associate (phi => self%rest%shape(:, choice%from_rest))
+               mode = mode_from_rest(self%pencil, self%omega(choice%from_rest), phi/sum(b*phi))
+            end associate
+            call refine_mode(self%pencil, b, mode, done)
+            done = done .and. mode%is_nearly(choice%mode, choice%part)
+         end if
+         if (.not. done) then
+            ! Another row b, another way.
+            mode = choice%mode
+            call refine_mode(self%pencil, b, mode, done)
+            done = done .and. mode%is_nearly(choice%mode, choice%part)
+         end if
+      end associate
+      omega = mode%omega
+      self_excitation = mode%self_excitation
       shape = (0.0_wp, 0.0_wp)
-      shape(self%free) = u
+      shape(self%free) = mode%shape
    end subroutine refine
-
-   !> Matrix and residual of a step in real and imaginary parts: of (K - theta M + i omega C) U,
-   !> theta = omega^2 + i omega xi, then of b^T U - 1.
-   subroutine fill(k, m, c, row, omega, xi, u, matrix, r)
-      complex(wp), intent(in) :: k(:, :), m(:, :), c(:, :), row(:), u(:)
-      real(wp), intent(in) :: omega, xi
-      real(wp), intent(out) :: matrix(:, :), r(:)
-      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
-      complex(wp) :: z(size(u), size(u)), part(size(u)), condition
-      integer :: n
-
-      n = size(u)
-      z = k - cmplx(omega**2, omega*xi, wp)*m + i*omega*c
-      matrix = 0.0_wp
-      matrix(:2*n, :2*n) = real_form(z)
-      part = i*matmul(c, u) - cmplx(2.0_wp*omega, xi, wp)*matmul(m, u)
-      matrix(:n, 2*n + 1) = real(part, wp)
-      matrix(n + 1:2*n, 2*n + 1) = aimag(part)
-      part = -i*omega*matmul(m, u)
-      matrix(:n, 2*n + 2) = real(part, wp)
-      matrix(n + 1:2*n, 2*n + 2) = aimag(part)
-      matrix(2*n + 1:, :2*n) = real_form(reshape(row, [1, n]))
-      part = matmul(z, u)
-      r(:n) = real(part, wp)
-      r(n + 1:2*n) = aimag(part)
-      condition = sum(row*u) - 1.0_wp
-      r(2*n + 1:) = [real(condition, wp), aimag(condition)]
-   end subroutine fill
 
 end module fw_stuck_modes

@@ -9,7 +9,7 @@ module fw_text
    implicit none (type, external)
    private
 
-   public :: to_text, lower_case, nearest_word, join, string_type
+   public :: to_text, lower_case, nearest_word, edit_distance, join, string_type
 
    !> A text of its own length, for lists of texts.
    type :: string_type
@@ -82,25 +82,30 @@ contains
       end do
    end function nearest_word
 
-   !> Levenshtein distance, one row at a time.
-   !> Least number of letters to insert, delete or replace that turns one word into the other.
+   !> Least number of letters to insert, delete or replace, or of neighbours to swap, that turns one
+   !> word into the other.
    pure integer function edit_distance(a, b) result(distance)
       character(*), intent(in) :: a, b
-      integer :: row(0:len(b)), i, j, diagonal, above
+      integer :: rows(0:len(b), 0:2), i, j
 
-      row = [(j, j=0, len(b))]
+      ! Columns of `rows`: this row of the table, and the two above it.
+      rows = 0
+      rows(:, 0) = [(j, j=0, len(b))]
       do i = 1, len(a)
-         ! `diagonal` saves the entry of the row above before it is overwritten.
-         diagonal = row(0)
-         row(0) = i
+         rows(:, 2) = rows(:, 1)
+         rows(:, 1) = rows(:, 0)
+         rows(0, 0) = i
          do j = 1, len(b)
-            above = row(j)
-            row(j) = min(above + 1, row(j - 1) + 1, &
-                         diagonal + merge(0, 1, a(i:i) == b(j:j)))
-            diagonal = above
+            rows(j, 0) = min(rows(j, 1) + 1, rows(j - 1, 0) + 1, &
+                             rows(j - 1, 1) + merge(0, 1, a(i:i) == b(j:j)))
+            if (i == 1 .or. j == 1) cycle
+            if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) then
+               ! max: a compiler that does not see the line above warns of an index below 0.
+               rows(j, 0) = min(rows(j, 0), rows(max(j - 2, 0), 2) + 1)
+            end if
          end do
       end do
-      distance = row(len(b))
+      distance = rows(len(b), 0)
    end function edit_distance
 
    !> The texts of a list with a separator between them.

@@ -3,6 +3,7 @@
 !> Started from the points before, from the linear solution scaled to the amplitude, and where these
 !> fail along a path: from the last solution by halves of the way, or from a small amplitude up.
 module fw_controlled_response
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_balance_problem, only: balance_problem
    use fw_balance_state, only: balance_state
@@ -60,6 +61,11 @@ module fw_controlled_response
       integer :: iterations = 0, served_by = served_by_none
       !> The present point cannot be: what is observed rests where the load acts.
       logical :: is_node = .false.
+      !> Where no load gives the present amplitude: the largest that one does, and the amplitudes on
+      !> both sides of a jump with its load; 0 where that is not so.
+      real(wp) :: limit = 0.0_wp, jump(3) = 0.0_wp
+      !> Points that were not found, and no reason was either.
+      integer :: n_unexplained = 0
       !> What of the amplitude stands still in the linear solution, under static loads.
       real(wp) :: rest = 0.0_wp
       !> Largest vibratory load [force], 0 where it is not known so, and what holds and what carries
@@ -81,7 +87,7 @@ module fw_controlled_response
       procedure :: turn_to_positive
    end type controlled_response
 
-   ! Ways to a point that its guesses do not reach (fw_control_ways).
+   ! Ways to a point that its guesses do not reach (fw_control_ways, fw_control_load).
    interface
       !> First half of the way from the last point, which may take halves of its own, then the rest.
       recursive module subroutine approach(self, place, amplitude, depth, report, error)
@@ -108,6 +114,23 @@ module fw_controlled_response
          type(solver_report), intent(out) :: report
          type(error_type), allocatable, intent(out) :: error
       end subroutine by_first_harmonic
+
+      !> By responses to given loads, where friction holds what is observed.
+      module subroutine search_loads(self, place, amplitude, report, error)
+         class(controlled_response), intent(inout) :: self
+         real(wp), intent(in) :: place, amplitude
+         !> Of the ways before on entry, which stays where none is tried.
+         type(solver_report), intent(inout) :: report
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine search_loads
+
+      !> Why the amplitude was not found, where that is known; left unallocated otherwise.
+      module subroutine explain(self, case, request, note)
+         class(controlled_response), intent(in) :: self
+         type(case_type), intent(in) :: case
+         type(point_request), intent(in) :: request
+         character(:), allocatable, intent(inout) :: note
+      end subroutine explain
 
       !> Whether other guesses lead to another load of the same amplitude; the solution stays.
       module subroutine look_for_others(self, request, error)
@@ -188,6 +211,8 @@ contains
       self%control%interrupt => request%interrupt
       self%iterations = 0
       self%is_node = .false.
+      self%limit = 0.0_wp
+      self%jump = 0.0_wp
       call reach(self, request%place(), request%amplitude, request%fallback, report, error)
       if (report%interrupted .and. .not. allocated(error)) call stop_run(request%interrupt, error)
       if (allocated(error)) return
@@ -199,16 +224,9 @@ contains
       if (allocated(error)) return
       point%iterations = self%iterations
       if (report%converged) point%served_by = self%served_by
-      if (.not. report%converged .and. self%rest >= request%amplitude) then
-         point%note = 'control: at '//trim(request%describe())//' static loads alone move '// &
-                      case%model%observe_name(case%control%observed)%text//' by '// &
-                      to_text(self%rest)//', more than the amplitude '// &
-                      to_text(request%amplitude)//'; give a larger one, or control%of = '// &
-                      "'first_harmonic'"
-      else if (self%is_node) then
-         point%note = 'control: at '//trim(request%describe())//' '// &
-                      case%model%observe_name(case%control%observed)%text//' rests under the '// &
-                      'load (a node): no load gives it an amplitude; observe another place'
+      if (.not. report%converged) call explain(self, case, request, point%note)
+      if (.not. (report%converged .or. allocated(point%note))) then
+         self%n_unexplained = self%n_unexplained + 1
       end if
       call system_clock(clock_end)
       point%seconds = real(clock_end - clock, wp)/real(rate, wp)
@@ -228,7 +246,9 @@ contains
       call self%control%residual(self%y, self%r)
       point%omega = request%omega
       point%place = request%place()
-      point%load_scale = self%y(n + 1)
+      ! Where none was found the last trial is no load, and may be negative.
+      point%load_scale = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (report%converged) point%load_scale = self%y(n + 1)
       point%control = request%amplitude
       point%converged = report%converged
       point%residual = report%residual
@@ -287,6 +307,9 @@ contains
          self%served_by = served_by_smaller_steps
          if (allocated(error) .or. ends(report)) return
       end if
+      call search_loads(self, place, amplitude, report, error)
+      self%served_by = served_by_raised_load
+      if (allocated(error) .or. ends(report)) return
       if (.not. self%method%newton%linear%lu_left_out) return
       self%method%newton%linear%lu_follows = .true.
       call from_guesses(self, place, amplitude, report, error)
@@ -397,11 +420,11 @@ contains
    end subroutine multiply_vibration
 
    !> The linear solution under the load of the case, scaled to the amplitude.
-   subroutine scale_linear(self, amplitude, notes_rest, is_there)
+   subroutine scale_linear(self, amplitude, stuck, is_there)
       class(controlled_response), intent(inout) :: self
       real(wp), intent(in) :: amplitude
-      !> Keep its static part as that of the response.
-      logical, intent(in) :: notes_rest
+      !> That with stuck pairs, which comes first: keep its static part as that of the response.
+      logical, intent(in) :: stuck
       !> False where what is observed rests.
       logical, intent(out) :: is_there
       complex(wp), allocatable :: at_rest_motion(:)
@@ -422,11 +445,12 @@ contains
       is_there = vibration > at_rest*others .and. vibration > 0.0_wp .and. &
                  vibration*(self%held_by + self%system%frequency()**2*self%carried) >= &
                  round_off*self%force
-      self%is_node = .not. is_there
+      ! Stuck pairs may hold what moves freely, and pass on a motion to what rests otherwise.
+      self%is_node = .not. is_there .and. (stuck .or. self%is_node)
       if (.not. is_there) return
       ! The largest of the period has the static part on top.
       if (self%control%of /= of_first_harmonic) then
-         if (notes_rest) self%rest = abs(static)
+         if (stuck) self%rest = abs(static)
          if (abs(static) < amplitude) vibration = vibration*amplitude/(amplitude - abs(static))
       end if
       call multiply_vibration(self, amplitude/vibration)
@@ -461,6 +485,8 @@ contains
          report%converged = .false.
       end do
       if (report%converged) call self%method%refuse(self%system, self%y(:n), report)
+      ! What is observed is round-off of what moves elsewhere.
+      if (self%control%size_of_motion() <= at_rest*norm2(self%y(:n))) report%converged = .false.
    end subroutine attempt
 
    !> A load with the other sign is one half a period later: U_n (-1)^n. Paths that start at rest
@@ -538,8 +564,11 @@ contains
       call remark_undetermined(self%method%undetermined_at, self%method%undetermined_again, &
                                summary%remarks)
       if (state%was_stopped .or. state%all_converged()) return
-      message = 'not converged: try smaller steps of frequency or amplitude, or more '// &
-                'harmonics%n_harmonics, for the points above'
+      message = 'not converged: for the reasons above'
+      if (self%n_unexplained > 0) then
+         message = 'not converged: try smaller steps of frequency or amplitude, or more '// &
+                   'harmonics%n_harmonics, for the points above'
+      end if
       if (self%method%rippled) message = message//'; some were solved with friction that is '// &
          "ripple, not slip: take contact%law = 'rigid' where friction acts on mass"
    end subroutine describe

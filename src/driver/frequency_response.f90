@@ -5,7 +5,8 @@ module fw_frequency_response
    use fw_adaptive, only: adaptive_solver
    use fw_branch, only: branch_source
    use fw_bifurcation, only: bifurcation_list
-   use fw_case, only: analysis_frf, analysis_time, case_type
+   use fw_bifurcation_group, only: bifurcation_group
+   use fw_case, only: analyses, case_type
    use fw_control_branch, only: control_branch
    use fw_controlled_response, only: controlled_response
    use fw_error, only: error_type, status_stopped
@@ -13,10 +14,11 @@ module fw_frequency_response
    use fw_observer, only: observer_type
    use fw_one_level, only: one_level
    use fw_peak, only: peak_type
+   use fw_peak_group, only: peak_group
    use fw_peak_cycle, only: cycle_keeper
    use fw_peak_finder, only: peak_finder
-   use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_peaks, remark_range, &
-      remark_stability
+   use fw_remarks, only: is_shaken, is_undamped, remark_condensed, remark_open, remark_peaks, &
+      remark_range, remark_stability
    use fw_result, only: result_writer
    use fw_point, only: point_type
    use fw_run_state, only: run_state
@@ -85,7 +87,7 @@ contains
                call remark_range(case, finder%modes, summary%remarks)
                in_order = finder%in_order
             end if
-            if (case%analysis == analysis_frf .and. case%sweep%stability .and. in_order) then
+            if (analyses(case%analysis)%is_sweep .and. case%sweep%stability .and. in_order) then
                call changes%start(source, strategy, observer)
                call sinks%add(changes)
             end if
@@ -185,10 +187,13 @@ contains
       subroutine keep(list, n_solved, iterations)
          type(bifurcation_list), intent(in) :: list
          integer, intent(in) :: n_solved, iterations
+         type(bifurcation_group) :: group
 
          call summary%describe_bifurcations(list, n_solved, iterations)
-         call writer%add_bifurcations(list, case%harmonics%n_harmonics, case%model%unit_system, &
-                                      error, frequency_of(case))
+         group%list = list
+         group%n_harmonics = case%harmonics%n_harmonics
+         group%omega = frequency_of(case)
+         call writer%add(group, error)
       end subroutine keep
 
    end subroutine keep_bifurcations
@@ -239,7 +244,10 @@ contains
       type(summary_type), intent(inout) :: summary
       type(error_type), allocatable, intent(out) :: error
       type(peak_type), allocatable :: peaks(:)
+      type(peak_group) :: group
       type(point_type) :: highest
+      real(wp) :: open(2)
+      integer :: n_open
 
       if (case%over%is_wanted() .or. case%control%is_wanted()) return
       select type (source)
@@ -257,10 +265,15 @@ contains
          call keeper%solve_at_peak(case, finder, strategy, observer, peaks, error)
          if (allocated(error)) return
          call summary%describe_peaks(peaks, finder%n_solved, finder%iterations)
+         call finder%find_open(open, n_open)
+         call remark_open(open, n_open, summary%remarks)
       end select
       call remark_peaks(peaks, case%model%observe_name, is_undamped(case), summary%remarks)
-      call writer%add_peaks(peaks, case%harmonics%n_harmonics, case%model%unit_system, &
-                            keeper%omega, keeper%cycle, error)
+      call move_alloc(peaks, group%peaks)
+      group%n_harmonics = case%harmonics%n_harmonics
+      group%omega = keeper%omega
+      if (allocated(keeper%cycle)) group%cycle = keeper%cycle
+      call writer%add(group, error)
    end subroutine find_peaks
 
    !> The one frequency of a sweep over another parameter [rad/s]; 0 where there is none.
@@ -276,7 +289,7 @@ contains
       type(case_type), intent(in) :: case
       class(point_strategy), allocatable, intent(out) :: strategy
 
-      if (case%analysis == analysis_time) then
+      if (analyses(case%analysis)%is_integrated) then
          allocate (time_strategy :: strategy)
       else if (case%control%is_wanted()) then
          allocate (controlled_response :: strategy)
@@ -313,7 +326,7 @@ contains
       type is (one_level)
          ! A linear structure leaves no unknowns, and no branch that could turn back; nor does a
          ! structure at rest.
-         along_branch = case%analysis == analysis_frf .and. strategy%level%system%n > 0 .and. &
+         along_branch = analyses(case%analysis)%is_sweep .and. strategy%level%system%n > 0 .and. &
                         case%sweep%continuation == continuation_arclength
          if (along_branch) along_branch = is_shaken(case)
          if (along_branch) then

@@ -2,7 +2,7 @@
 !> is left of the way is a Newton iteration. Slow stick-slip, whose square waves no balance of few
 !> harmonics resembles, dies out to its periodic motion within some periods.
 module fw_integrated_start
-   use fw_case, only: analysis_frf, analysis_point, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, status_stopped
    use fw_kept_modes, only: complete_modes
    use fw_kinds, only: wp
@@ -30,7 +30,7 @@ contains
       type(case_type), intent(in) :: case
       type(level_type), intent(in) :: level
 
-      can_integrate = any(case%analysis == [analysis_frf, analysis_point]) &
+      can_integrate = analyses(case%analysis)%is_response &
                       .and. .not. case%model%cyclic%is_cyclic .and. .not. case%over%is_wanted() &
                       .and. .not. case%control%is_wanted() .and. case%model%n_dof <= most_dofs &
                       .and. level%system%problem%structure%n_relative > 0

@@ -20,6 +20,8 @@ module fw_joint_modes
    type, extends(mode_type) :: joint_mode_type
       !> The state of the joint that it is a mode of.
       integer :: state = state_free
+      !> Harmonic of the loads that it answers.
+      integer :: harmonic = 1
    end type joint_mode_type
 
    !> Stiffness that stands for a rigid hold, in parts of the largest of the structure: modes are
@@ -92,14 +94,14 @@ contains
          found(i)%width = found(i)%width/n
          found(i)%amplitude = [(found(i)%amplitude, j=1, case%model%cyclic%n_solved())]
       end do
-      call join(found, state, modes)
+      call join(found, state, n, modes)
    end subroutine add_modes_of
 
    !> Add the modes of a state. Element by element: gfortran 12 loses allocatable components of an
    !> array constructor in places.
-   subroutine join(found, state, modes)
+   subroutine join(found, state, harmonic, modes)
       type(mode_type), intent(in) :: found(:)
-      integer, intent(in) :: state
+      integer, intent(in) :: state, harmonic
       type(joint_mode_type), allocatable, intent(inout) :: modes(:)
       type(joint_mode_type), allocatable :: longer(:)
       integer :: i, n
@@ -112,6 +114,7 @@ contains
       do i = 1, size(found)
          longer(n + i)%mode_type = found(i)
          longer(n + i)%state = state
+         longer(n + i)%harmonic = harmonic
       end do
       call move_alloc(longer, modes)
    end subroutine join

@@ -60,6 +60,7 @@ module fw_known_tail
       procedure :: correct
       procedure :: next_change
       procedure :: distance_from
+      procedure :: distance_apart
       procedure :: left_above
       procedure :: take
    end type known_tail
@@ -193,6 +194,13 @@ contains
 
       distance = relative_distance(self%coefficients, coefficients)
    end function distance_from
+
+   !> The same, of the last answer of another tail.
+   pure real(wp) function distance_apart(self, other) result(distance)
+      class(known_tail), intent(in) :: self, other
+
+      distance = relative_distance(self%coefficients, other%coefficients)
+   end function distance_apart
 
    !> What the harmonics above a highest one that is given back, and above N, come to, relative to
    !> the vibration: the former are known, the latter are taken for as much as follows where octaves

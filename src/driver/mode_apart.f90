@@ -30,14 +30,15 @@ contains
       type(solver_report), intent(inout) :: report
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: depth(:)
-      real(wp) :: reached
+      real(wp) :: largest, reached
       integer :: k
 
       associate (balance => path%system%balance)
          if (size(balance%depth) == 0) return
          depth = balance%depth
+         largest = path%system%motion_unit*lowest*maxval(abs(path%system%motion(linear)))
          do k = 1, size(gaps)
-            balance%depth = depth + gaps(k)*lowest*maxval(abs(path%system%motion(linear)))
+            balance%depth = depth + gaps(k)*largest
             y = linear
             call path%solve(log(open*gaps(k)*lowest), y, report, error)
             if (allocated(error)) exit

@@ -2,9 +2,10 @@
 !>
 !> What that motion does to a pair only grows with its amplitude. But the position about which a
 !> pair vibrates may move: under a static load it slips in the first turns, not in the cycle, and
-!> shakes down to another one, in proportion to the amplitude while nothing else begins to. So the
-!> onset is looked for between two rows of the curve, of which one is stuck and the next is not,
-!> about positions in a straight line, and confirmed by a solution just below.
+!> shakes down to another one, in one direction in proportion to the amplitude while nothing else
+!> begins to. So no position of before says where the onset is: it lies between two solutions, of
+!> which the lower is stuck and the other, just above, is not. Positions in a straight line through
+!> two stuck ones say where to look, and what is left between the two.
 module fw_mode_onset
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_error, only: error_type
@@ -12,7 +13,9 @@ module fw_mode_onset
    use fw_mode_path, only: mode_path
    use fw_mode_system, only: mode_system
    use fw_newton, only: solver_report
+   use fw_onset_bound, only: find_bound
    use fw_onset_bracket, only: onset_bracket
+   use fw_onset_departure, only: evaluate_motion, onset_departure
    implicit none (type, external)
    private
 
@@ -24,12 +27,16 @@ module fw_mode_onset
       real(wp), private :: low(2) = 0.0_wp, high = huge(1.0_wp)
       real(wp), allocatable, private :: y(:, :)
       integer, private :: n_low = 0
+      !> A solution that is not stuck, its amplitude, and whether there is one.
+      real(wp), allocatable, private :: y_above(:)
+      real(wp), private :: above = huge(1.0_wp)
       logical, private :: departed = .false.
-      !> What departs in rows and solutions above the onset, to begin a search with, and the rows.
-      type(onset_bracket), private :: known
+      !> What departs in solutions above the onset, to begin a search with: shares and sliding.
+      type(onset_bracket), private :: shares, sliding
       integer, private :: n_above = 0
-      !> Shares of stick, slip and separation at rest (3, n_pairs).
-      real(wp), allocatable, private :: rest(:, :)
+      !> Whether the bound is known, so that what does not converge needs no more trials.
+      logical, private :: bounded = .false.
+      type(onset_departure), private :: departure
    contains
       procedure :: begin
       procedure :: is_stuck
@@ -37,41 +44,40 @@ module fw_mode_onset
       procedure :: find
    end type onset_finder
 
-   !> Change of the shares of the period that is no round-off of the march.
-   real(wp), parameter :: share_change = 1.0e-9_wp
    !> Amplitude over the lowest one at which the motion is that near rest.
    real(wp), parameter :: near_rest = 1.0e-6_wp
-   !> Ratios of two amplitudes between which the onset is known well enough: by solutions, to look
-   !> at the position there, about positions in a line that is to be confirmed, about those in one
-   !> that was, and about a position that is known.
-   real(wp), parameter :: rough = 1.0_wp + 4.0e-3_wp, near = 1.0_wp + 1.0e-3_wp, &
-                          coarse = 1.0_wp + 1.0e-4_wp, fine = 1.0_wp + 1.0e-13_wp
+   !> Ratios of two amplitudes between which the onset is known well enough: about positions in a
+   !> line, by solutions, and about a position that is known.
+   real(wp), parameter :: near = 1.0_wp + 1.0e-3_wp, coarse = 1.0_wp + 1.0e-4_wp, &
+                          fine = 1.0_wp + 1.0e-13_wp
+   !> What the bound is known to.
+   real(wp), parameter :: beside = 1.0_wp + 1.0e-5_wp
 
 contains
 
    !> Take the shares at rest; an amplitude to begin with: the lowest one, or where the motion about
    !> the position at rest is stuck.
-   subroutine begin(self, system, y, lowest, amplitude)
+   subroutine begin(self, system, y, lowest, mu, amplitude)
       class(onset_finder), intent(inout) :: self
       type(mode_system), intent(inout) :: system
       real(wp), intent(in) :: y(:)
       real(wp), intent(in) :: lowest
+      !> Friction coefficients (n_pairs).
+      real(wp), intent(in) :: mu(:)
       real(wp), intent(out) :: amplitude
       real(wp), parameter :: apart = 1.02_wp, below = 0.99_wp
       real(wp) :: high, low, middle
 
       amplitude = lowest
-      allocate (self%rest(3, system%balance%problem%n_pairs), source=0.0_wp)
-      allocate (self%y(size(y), 2), source=0.0_wp)
-      if (size(self%rest) == 0) return
       low = near_rest*lowest
-      call evaluate(system, low, y)
-      call system%balance%pair_shares(self%rest)
-      if (departure(self, system, lowest, y) <= 0.0_wp) return
+      allocate (self%y(size(y), 2), source=0.0_wp)
+      call self%departure%begin(system, low, y, mu)
+      if (size(mu) == 0) return
+      if (by_shares(self, system, lowest, y) <= 0.0_wp) return
       high = lowest
       do while (high > apart*low)
          middle = sqrt(low*high)
-         if (departure(self, system, middle, y) > 0.0_wp) then
+         if (by_shares(self, system, middle, y) > 0.0_wp) then
             high = middle
          else
             low = middle
@@ -80,46 +86,44 @@ contains
       amplitude = below*low
    end subroutine begin
 
-   !> Whether all pairs have the shares that they have at rest, where the system stands.
-   logical function is_stuck(self, system)
+   !> Whether no pair slides within the period, or parts, in a motion where the system stands.
+   logical function is_stuck(self, system, y)
       class(onset_finder), intent(in) :: self
-      type(mode_system), intent(in) :: system
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(in) :: y(:)
 
-      is_stuck = departed_by(self, system) <= 0.0_wp
+      is_stuck = self%departure%by_sliding(system, system%amplitude, y) <= 0.0_wp
    end function is_stuck
-
-   !> Largest change of a share from that at rest; none where it is round-off.
-   real(wp) function departed_by(self, system)
-      type(onset_finder), intent(in) :: self
-      type(mode_system), intent(in) :: system
-      real(wp) :: share(3, size(self%rest, 2))
-
-      departed_by = 0.0_wp
-      if (size(share) == 0) return
-      call system%balance%pair_shares(share)
-      departed_by = maxval(abs(share - self%rest))
-      if (departed_by <= share_change) departed_by = 0.0_wp
-   end function departed_by
 
    !> Take a solution of the curve, where the system stands.
    subroutine note(self, system, y)
       class(onset_finder), intent(inout) :: self
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(in) :: y(:)
+      real(wp) :: departed
+
+      if (self%n_above == 2 .or. size(self%departure%rest) == 0) return
+      departed = self%departure%by_sliding(system, system%amplitude, y)
+      if (departed > 0.0_wp .or. self%departed) then
+         if (.not. self%departed) call take_above(self, system, y)
+         self%departed = .true.
+         self%n_above = self%n_above + 1
+         call self%sliding%take_above(system%amplitude, departed)
+         call self%shares%take_above(system%amplitude, self%departure%by_shares(system))
+      else if (system%amplitude > self%low(1)) then
+         call take(self, system%amplitude, y)
+      end if
+   end subroutine note
+
+   subroutine take_above(self, system, y)
+      type(onset_finder), intent(inout) :: self
       type(mode_system), intent(in) :: system
       real(wp), intent(in) :: y(:)
 
-      if (self%n_above == 2 .or. size(self%rest) == 0) return
-      if (self%departed) then
-         call self%known%take_above(system%amplitude, departed_by(self, system))
-         self%n_above = 2
-      else if (is_stuck(self, system)) then
-         if (system%amplitude > self%low(1)) call take(self, system%amplitude, y)
-      else
-         self%departed = .true.
-         self%high = system%amplitude
-         call self%known%take_above(system%amplitude, departed_by(self, system))
-         self%n_above = 1
-      end if
-   end subroutine note
+      self%high = system%amplitude
+      self%above = system%amplitude
+      self%y_above = y
+   end subroutine take_above
 
    subroutine take(self, amplitude, y)
       type(onset_finder), intent(inout) :: self
@@ -143,103 +147,159 @@ contains
       type(mode_path), intent(inout) :: path
       real(wp), intent(out) :: onset
       type(error_type), allocatable, intent(out) :: error
-      type(solver_report) :: report
-      real(wp) :: high, ratio, y(size(self%y, 1))
+      logical :: found, known
+      real(wp) :: bound, y(size(self%y, 1))
 
       onset = ieee_value(1.0_wp, ieee_quiet_nan)
-      if (any(self%rest > share_change .and. self%rest < 1.0_wp - share_change)) then
+      if (self%departure%at_every_amplitude()) then
          onset = 0.0_wp
          return
       end if
       if (.not. self%departed) return
       onset = self%low(1)
       if (self%n_low == 0) return
-      high = self%high
-      call bisect(self, path%system, near, onset, high)
-      y = position(self, onset)
-      call path%solve(log(onset), y, report, error)
+      call find_bound(path%system, self%low(1), self%y(:, 1), self%departure%mu, bound, y, known)
+      if (.not. known) bound = huge(1.0_wp)
+      self%bounded = known
+      if (known) call look_at_bound(self, path, bound, y, found, error)
       if (allocated(error)) return
-      if (report%converged .and. is_stuck(self, path%system)) then
-         if (report%iterations == 0) then
-            ! About the position just below nothing moves any more up to the onset.
-            call bisect(self, path%system, fine, onset, high)
-            return
-         end if
-         call take(self, onset, y)
-         call close_in(self, path, high, ratio, error)
-      else
-         self%high = onset
-         ratio = coarse
-         call come_down(self, path, high, error)
+      if (known .and. found) then
+         onset = bound
+         if (coarse*self%low(1) >= bound) onset = min(bound, between(self, path%system))
+         return
       end if
+      call find_first_slip(self, path, onset, found, error)
+      if (allocated(error) .or. found) return
+      call close_in(self, path, error)
       if (allocated(error)) return
       onset = self%low(1)
-      call bisect(self, path%system, ratio, onset, high)
+      if (self%above > self%low(1) .and. self%above <= coarse*coarse*self%low(1)) then
+         onset = between(self, path%system)
+      end if
+      onset = min(bound, onset)
    end subroutine find
 
-   !> From a solution just below: another one tells how the position moves from there up to `high`,
-   !> where the motion departed about positions in the line before.
-   subroutine close_in(self, path, high, ratio, error)
+   !> Just below the bound of the stuck motion: whether that sticks, or nothing says the contrary.
+   !> Solutions that slip below it, though the bound would allow them to stick, show that the
+   !> assembly does not lead to what it allows.
+   subroutine look_at_bound(self, path, bound, motion, sticks, error)
       type(onset_finder), intent(inout) :: self
       type(mode_path), intent(inout) :: path
-      real(wp), intent(inout) :: high
-      !> What the bracket is worth: all digits where the line down to the row below is one.
-      real(wp), intent(out) :: ratio
+      real(wp), intent(in) :: bound
+      !> The stuck motion there, to begin with.
+      real(wp), intent(in) :: motion(:)
+      logical, intent(out) :: sticks
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_report) :: report
+      real(wp) :: below, y(size(motion))
+
+      below = bound/beside
+      ! What slips above the bound only leaves nothing to ask.
+      sticks = self%high >= bound .or. self%low(1) >= below
+      if (self%low(1) < below) then
+         y = motion
+         call solve_near(path, below, y, report, error)
+         if (allocated(error)) return
+         if (report%converged) then
+            ! What slips below it is another motion then.
+            if (self%departure%by_sliding(path%system, below, y) <= 0.0_wp) sticks = .true.
+            if (sticks) call judge(self, path%system, below, y)
+            sticks = sticks .and. self%low(1) >= below
+         end if
+      end if
+      if (.not. sticks) return
+      self%high = beside*bound
+      self%above = self%high
+   end subroutine look_at_bound
+
+   !> About a position that does not move: the onset to all digits, unless the pair that slips there
+   !> shakes down.
+   subroutine find_first_slip(self, path, onset, found, error)
+      type(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      real(wp), intent(out) :: onset
+      logical, intent(out) :: found
       type(error_type), allocatable, intent(out) :: error
       integer :: before
+      real(wp) :: high
 
-      before = path%iterations
-      call look(self, path, self%low(1)/rough, error)
-      if (allocated(error)) return
-      ratio = merge(fine, coarse, path%iterations == before)
-      if (departure(self, path%system, high, position(self, high)) <= 0.0_wp) high = self%high
-   end subroutine close_in
-
-   !> From a solution just above. The onset is near: what positions in a straight line say is off by
-   !> little. Two solutions below it, apart enough to tell how the position moves, save halvings
-   !> from the row below.
-   subroutine come_down(self, path, high, error)
-      type(onset_finder), intent(inout) :: self
-      type(mode_path), intent(inout) :: path
-      real(wp), intent(out) :: high
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: below
-      integer :: k
-
+      found = .false.
+      onset = self%low(1)
       high = self%high
-      do k = 1, 2
-         below = self%high/rough**k
-         if (below <= self%low(2)) exit
-         call look(self, path, below, error)
-         if (allocated(error)) return
-         if (self%high < high) exit
-      end do
-      call bisect_solutions(self, path, rough, error)
-      if (allocated(error)) return
-      ! One row tells nothing of how the position moves.
-      if (self%n_low < 2) call bisect_solutions(self, path, coarse, error)
-      if (allocated(error)) return
-      call descend(self, path%system, high)
-   end subroutine come_down
+      call bisect(self, path%system, near, onset, high)
+      before = path%iterations
+      call look(self, path, onset, error)
+      if (allocated(error) .or. self%low(1) < onset .or. path%iterations > before) return
+      call bisect(self, path%system, fine, onset, high)
+      if (self%high > coarse*onset) call look(self, path, coarse*onset, error)
+      found = self%high <= coarse*onset*(1.0_wp + epsilon(1.0_wp))
+   end subroutine find_first_slip
 
-   !> By growing steps from a solution above the onset, to where the motion last departs about
-   !> positions in a straight line.
-   subroutine descend(self, system, high)
+   !> Where shares of the period change about positions in a straight line.
+   subroutine bisect(self, system, ratio, low, high)
       type(onset_finder), intent(in) :: self
       type(mode_system), intent(inout) :: system
-      real(wp), intent(out) :: high
-      real(wp) :: trial, ratio
+      real(wp), intent(in) :: ratio
+      real(wp), intent(inout) :: low, high
+      type(onset_bracket) :: bracket
+      real(wp) :: middle
 
-      high = self%high
-      ratio = coarse
-      do
-         trial = high/ratio
-         if (trial <= self%low(1)) return
-         if (departure(self, system, trial, position(self, trial)) <= 0.0_wp) return
-         high = trial
-         ratio = ratio**2
+      bracket = self%shares
+      call bracket%forget_zero()
+      bracket%low = low
+      bracket%high = high
+      do while (bracket%high > ratio*bracket%low)
+         middle = bracket%next()
+         call bracket%narrow(middle, by_shares(self, system, middle, position(self, middle)))
       end do
-   end subroutine descend
+      low = bracket%low
+      high = bracket%high
+   end subroutine bisect
+
+   !> By solutions, to a stuck one and one just above that is not.
+   subroutine close_in(self, path, error)
+      type(onset_finder), intent(inout) :: self
+      type(mode_path), intent(inout) :: path
+      type(error_type), allocatable, intent(out) :: error
+      !> Times that what did not converge is passed over.
+      integer, parameter :: most_blind = 4
+      integer :: blind
+
+      do blind = 1, most_blind
+         call self%sliding%forget_zero()
+         do while (self%high > coarse*self%low(1))
+            self%sliding%low = self%low(1)
+            self%sliding%high = self%high
+            call look(self, path, self%sliding%next(), error)
+            if (allocated(error)) return
+         end do
+         if (self%above <= coarse*self%high) return
+         ! What did not converge is no proof that nothing sticks above it.
+         self%high = self%above
+         call look(self, path, sqrt(self%low(1)*self%above), error)
+         if (allocated(error)) return
+         if (self%high < self%above) return
+      end do
+   end subroutine close_in
+
+   !> Between two solutions that are near to each other: about positions in a straight line.
+   real(wp) function between(self, system) result(onset)
+      type(onset_finder), intent(inout) :: self
+      type(mode_system), intent(inout) :: system
+      type(onset_bracket) :: bracket
+      real(wp) :: middle, y(size(self%y, 1))
+
+      bracket = self%sliding
+      call bracket%forget_zero()
+      bracket%low = self%low(1)
+      bracket%high = min(self%high, coarse*self%low(1))
+      do while (bracket%high > fine*bracket%low)
+         middle = bracket%next()
+         y = position(self, middle)
+         call bracket%narrow(middle, self%departure%by_sliding(system, middle, y))
+      end do
+      onset = bracket%low
+   end function between
 
    !> Unknowns of the stuck motion: positions in a straight line.
    function position(self, amplitude) result(y)
@@ -252,82 +312,80 @@ contains
       y = y + (amplitude - self%low(1))/(self%low(1) - self%low(2))*(y - self%y(:, 2))
    end function position
 
-   !> Where the motion departs about positions in a straight line.
-   subroutine bisect(self, system, ratio, low, high)
-      type(onset_finder), intent(in) :: self
-      type(mode_system), intent(inout) :: system
-      real(wp), intent(in) :: ratio
-      real(wp), intent(inout) :: low, high
-      type(onset_bracket) :: bracket
-      real(wp) :: middle
-
-      bracket = self%known
-      call bracket%forget_zero()
-      bracket%low = low
-      bracket%high = high
-      do while (bracket%high > ratio*bracket%low)
-         middle = bracket%next()
-         call bracket%narrow(middle, departure(self, system, middle, position(self, middle)))
-      end do
-      low = bracket%low
-      high = bracket%high
-   end subroutine bisect
-
-   !> The same by a solution at each amplitude, where positions follow no straight line but very
-   !> near the onset. Towards it two directions settle ever more slowly.
-   subroutine bisect_solutions(self, path, ratio, error)
-      type(onset_finder), intent(inout) :: self
-      type(mode_path), intent(inout) :: path
-      real(wp), intent(in) :: ratio
-      type(error_type), allocatable, intent(out) :: error
-
-      ! By halves: solutions that lie together tell little of how the position moves.
-      do while (self%high > ratio*self%low(1))
-         call look(self, path, sqrt(self%low(1)*self%high), error)
-         if (allocated(error)) return
-      end do
-   end subroutine bisect_solutions
-
-   !> Solve at an amplitude, and note on which side of the onset it is.
+   !> Solve at an amplitude, and note on which side of the onset it is: from positions in a line,
+   !> then in steps, then from above.
    subroutine look(self, path, amplitude, error)
       type(onset_finder), intent(inout) :: self
       type(mode_path), intent(inout) :: path
       real(wp), intent(in) :: amplitude
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
-      real(wp) :: departed, y(size(self%y, 1))
+      real(wp) :: reached, y(size(self%y, 1))
 
       y = position(self, amplitude)
-      call path%solve(log(amplitude), y, report, error)
+      call solve_near(path, amplitude, y, report, error)
       if (allocated(error)) return
-      departed = departed_by(self, path%system)
-      if (report%converged .and. departed <= 0.0_wp) then
-         call take(self, amplitude, y)
+      if (.not. (report%converged .or. self%bounded) .and. amplitude > self%low(1)) then
+         call path%restart(log(self%low(1)), self%y(:, 1))
+         call path%reach(log(amplitude), y, report, reached, error)
+         if (allocated(error)) return
+         if (.not. report%converged .and. exp(reached) > self%low(1)) then
+            call judge(self, path%system, exp(reached), y)
+            if (self%high < amplitude) return
+         end if
+      end if
+      if (.not. report%converged) then
+         y = self%y_above
+         call solve_near(path, amplitude, y, report, error)
+         if (allocated(error)) return
+      end if
+      if (report%converged) then
+         call judge(self, path%system, amplitude, y)
       else if (amplitude > self%low(1)) then
          self%high = amplitude
-         if (report%converged) call self%known%take_above(amplitude, departed)
       end if
    end subroutine look
 
-   !> That of a motion.
-   real(wp) function departure(self, system, amplitude, y)
+   !> A solution that is far from its guess may be one of another curve.
+   subroutine solve_near(path, amplitude, y, report, error)
+      type(mode_path), intent(inout) :: path
+      real(wp), intent(in) :: amplitude
+      real(wp), intent(inout), contiguous :: y(:)
+      type(solver_report), intent(out) :: report
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: guess(size(y))
+
+      guess = y
+      call path%solve(log(amplitude), y, report, error)
+      if (allocated(error)) return
+      report%converged = report%converged .and. norm2(y - guess) <= path%leash*norm2(guess)
+   end subroutine solve_near
+
+   !> On which side a solution is.
+   subroutine judge(self, system, amplitude, y)
+      type(onset_finder), intent(inout) :: self
+      type(mode_system), intent(inout) :: system
+      real(wp), intent(in) :: amplitude, y(:)
+      real(wp) :: departed
+
+      departed = self%departure%by_sliding(system, amplitude, y)
+      if (departed <= 0.0_wp) then
+         call take(self, amplitude, y)
+      else if (amplitude > self%low(1)) then
+         self%high = amplitude
+         call take_above(self, system, y)
+         call self%sliding%take_above(amplitude, departed)
+      end if
+   end subroutine judge
+
+   !> Largest change of a share in a motion.
+   real(wp) function by_shares(self, system, amplitude, y)
       type(onset_finder), intent(in) :: self
       type(mode_system), intent(inout) :: system
       real(wp), intent(in) :: amplitude, y(:)
 
-      call evaluate(system, amplitude, y)
-      departure = departed_by(self, system)
-   end function departure
-
-   subroutine evaluate(system, amplitude, y)
-      type(mode_system), intent(inout) :: system
-      real(wp), intent(in) :: amplitude, y(:)
-      type(error_type), allocatable :: ignored
-      real(wp) :: r(system%n), x(system%n)
-
-      x = y
-      call system%set_parameter(log(amplitude), ignored)
-      call system%residual(x, r)
-   end subroutine evaluate
+      call evaluate_motion(system, amplitude, y)
+      by_shares = self%departure%by_shares(system)
+   end function by_shares
 
 end module fw_mode_onset

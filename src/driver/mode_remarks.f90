@@ -8,7 +8,7 @@ module fw_mode_remarks
    implicit none (type, external)
    private
 
-   public :: remark_internal, remark_jump
+   public :: remark_internal, remark_jump, remark_no_onset
 
    !> Frequencies this near, as a part of them, meet: the tongues of weak couplings are narrow, and
    !> their damping is of this order.
@@ -118,5 +118,17 @@ contains
                        "another curve; take a lower mode%start with mode%continuation = "// &
                        "'arclength' to follow it")
    end subroutine remark_jump
+
+   !> That nothing is known of the onset: the curve ended with its pairs as they are at rest.
+   subroutine remark_no_onset(reached, end, remarks)
+      real(wp), intent(in) :: reached, end
+      type(remark_list), intent(inout) :: remarks
+
+      call remarks%add('onset not reached', 'up to the amplitude '//to_text(reached)//', where '// &
+                       'the curve ended short of '//to_text(end)//', its pairs are as at rest: '// &
+                       'onset_amplitude is NaN, as the onset is not known; follow the curve '// &
+                       "further (mode%continuation = 'arclength', more mode%max_points or "// &
+                       'mode%n_points), or give the structure a stiffness beside its pairs')
+   end subroutine remark_no_onset
 
 end module fw_mode_remarks

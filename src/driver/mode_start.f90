@@ -21,7 +21,7 @@ module fw_mode_start
    implicit none (type, external)
    private
 
-   public :: mode_start
+   public :: mode_start, node
 
    !> Frequencies of linear modes with stuck and with sliding pairs [rad/s].
    type :: joint_frequencies
@@ -52,8 +52,6 @@ module fw_mode_start
       procedure :: build
    end type mode_start
 
-   !> Two frequencies nearer than this part of them are one: the plane of the motion is free.
-   real(wp), parameter :: same_frequency = 1.0e-6_wp
    !> Unknowns of a dense factorization that takes seconds and below 1 GB; both grow fast. Dofs
    !> whose linear modes take as long.
    integer, parameter :: most_unknowns = 6000, most_dofs = 3000
@@ -81,13 +79,15 @@ contains
       if (allocated(error)) return
       if (self%case%model%cyclic%is_cyclic) then
          ! Waves of other nodal diameters that harmonics may meet stay as coordinates.
-         self%case%sweep%start = modes%omega(self%number)
+         self%case%sweep%start = modes%frequency()
          call at_rest(self, x, modes, error)
       else if (any_rigid(self%problem)) then
          ! Their numbers of the method are those of the structure near the frequency of the mode.
-         self%case%sweep%start = modes%omega(self%number)
+         self%case%sweep%start = modes%frequency()
          call scale_anew(self, x, modes, error)
       end if
+      ! Of other modes: the same one.
+      if (.not. allocated(error) .and. modes%choice%number == 0) call choose(self, modes, error)
       if (allocated(error)) return
       call note_frequencies(self, modes)
       call take_mode(self, modes, x, error)
@@ -268,14 +268,14 @@ contains
          end if
          allocate (self%met(h)%stuck(0), self%met(h)%sliding(0))
          if (self%slides) then
-            self%met(h)%sliding = modes%omega
+            call modes%list(self%met(h)%sliding)
             cycle
          end if
          call find_stuck_modes(self%balance, other, done, harmonic=h)
-         if (done) self%met(h)%stuck = other%omega
+         if (done) call other%list(self%met(h)%stuck)
          if (self%problem%n_pairs == 0) cycle
          call find_stuck_modes(self%balance, other, done, slides=.true., harmonic=h)
-         if (done) self%met(h)%sliding = other%omega
+         if (done) call other%list(self%met(h)%sliding)
       end do
    end subroutine note_frequencies
 
@@ -291,39 +291,46 @@ contains
    !> By number or by frequency; double modes are refused.
    subroutine choose(self, modes, error)
       class(mode_start), intent(inout) :: self
-      type(stuck_modes), intent(in) :: modes
+      type(stuck_modes), intent(inout) :: modes
       type(error_type), allocatable, intent(out) :: error
-      integer :: j, n
+      character(:), allocatable :: name
 
-      associate (mode => self%case%mode)
-         n = size(modes%omega)
-         if (n == 0) then
+      call modes%choose(self%case%mode%number, self%case%mode%near)
+      associate (choice => modes%choice)
+         self%number = choice%number
+         name = '&mode number = '//to_text(choice%number)
+         if (.not. choice%done) then
+            call fatal_error(error, "case%analysis = 'mode': the linear modes with closed "// &
+                             'pairs stuck were not found: check mass, stiffness and damping of '// &
+                             'the model for entries that are out of proportion', status_input)
+         else if (choice%n_modes == 0) then
             call fatal_error(error, "case%analysis = 'mode': with its closed pairs stuck the "// &
-                             'structure has no elastic mode (rigid motions do not count): '// &
-                             'check the stiffness', status_input)
-            return
+                             'structure has no elastic mode that oscillates ('// &
+                             to_text(choice%n_overdamped)//' are overdamped): lower the '// &
+                             'damping', status_input)
+         else if (choice%number > choice%n_modes) then
+            call fatal_error(error, name//': the structure with its closed pairs stuck has '// &
+                             to_text(choice%n_modes)//' elastic modes'// &
+                             overdamped(choice%n_overdamped), status_input)
+         else if (choice%twin > 0) then
+            call fatal_error(error, name//': modes '//to_text(min(choice%twin, choice%number))// &
+                             ' and '//to_text(max(choice%twin, choice%number))//' with stuck '// &
+                             'pairs have one frequency ('//to_text(choice%mode%omega)// &
+                             ' rad/s) and one damping, so that the plane of the motion is '// &
+                             'free: detune the structure', status_input)
          end if
-         self%number = mode%number
-         if (mode%near > 0.0_wp) self%number = minloc(abs(modes%omega - mode%near), dim=1)
-         if (self%number > n) then
-            call fatal_error(error, '&mode number = '//to_text(self%number)//': the structure '// &
-                             'with its closed pairs stuck has '//to_text(n)//' elastic modes', &
-                             status_input)
-            return
-         end if
-         do j = max(1, self%number - 1), min(n, self%number + 1)
-            if (j == self%number) cycle
-            if (abs(modes%omega(j) - modes%omega(self%number)) > &
-                same_frequency*modes%omega(j)) cycle
-            call fatal_error(error, '&mode number = '//to_text(self%number)//': modes '// &
-                             to_text(min(j, self%number))//' and '//to_text(max(j, self%number))// &
-                             ' with stuck pairs have one frequency ('// &
-                             to_text(modes%omega(j))//' rad/s), so that the plane of the '// &
-                             'motion is free: detune the structure', status_input)
-            return
-         end do
       end associate
    end subroutine choose
+
+   !> What numbers leave out.
+   pure function overdamped(n) result(text)
+      integer, intent(in) :: n
+      character(:), allocatable :: text
+
+      text = ''
+      if (n > 0) text = ' that oscillate; '//to_text(n)// &
+                        ' with damping ratios of 1 and more do not count'
+   end function overdamped
 
    !> The mode with its damping, and the system of its curve at the lowest amplitude.
    subroutine take_mode(self, modes, x, error)
@@ -331,31 +338,30 @@ contains
       type(stuck_modes), intent(in) :: modes
       real(wp), intent(in) :: x(:)
       type(error_type), allocatable, intent(out) :: error
-      complex(wp), dimension(size(modes%observe, 2)) :: shape, about
+      complex(wp), dimension(size(modes%observe, 2)) :: shape, about, phi
       logical :: done
 
       ! Without phase of its own where the first observed quantity does not move.
       about = modes%observe(1, :)
-      associate (phi => modes%shape(:, self%number))
-         if (abs(sum(about*phi)) <= node*norm2(abs(about))*norm2(abs(phi))) then
-            if (self%case%mode%control == control_observed) then
-               call fatal_error(error, 'output%observe: the first observed quantity is at a '// &
-                                'node of mode '//to_text(self%number)//': name another, or '// &
-                                "take &mode control = 'modal'", status_input)
-               return
-            end if
-            about = conjg(phi)
+      phi = modes%shape_of()
+      if (abs(sum(about*phi)) <= node*norm2(abs(about))*norm2(abs(phi))) then
+         if (self%case%mode%control == control_observed) then
+            call fatal_error(error, 'output%observe: the first observed quantity is at a '// &
+                             'node of mode '//to_text(self%number)//': name another, or '// &
+                             "take &mode control = 'modal'", status_input)
+            return
          end if
-      end associate
-      call modes%refine(self%number, about, self%omega, self%self_excitation, shape, done)
+         about = conjg(phi)
+      end if
+      call modes%refine(about, self%omega, self%self_excitation, shape, done)
       if (.not. done) then
-         call fatal_error(error, '&mode number = '//to_text(self%number)//': the mode with its '// &
-                          'damping was not found (overdamped, or next to another): check the '// &
-                          'damping', status_input)
+         call fatal_error(error, '&mode number = '//to_text(self%number)//': the mode at '// &
+                          to_text(modes%choice%mode%omega)//' rad/s was not found exactly with '// &
+                          'its damping, since another is next to it: detune the structure, or '// &
+                          'check the damping', status_input)
          return
       end if
-      call new_mode_system(self%balance, self%case%mode%control, self%omega, &
-                           self%case%mode%end*maxval(abs(real(shape, wp))), self%system)
+      call new_mode_system(self%balance, self%case%mode%control, self%omega, self%system)
       call scale_mode(self, x, shape)
    end subroutine take_mode
 
@@ -368,22 +374,27 @@ contains
       type(error_type), allocatable :: ignored
       real(wp), allocatable :: q(:)
       complex(wp), allocatable :: amplitude(:, :)
-      real(wp) :: modal
+      real(wp) :: modal, size_of_shape
       integer :: m
 
       m = size(shape)
       associate (fourier => self%problem%fourier, system => self%system)
          system%amplitude = 1.0_wp
          modal = 1.0_wp
-         if (system%control /= control_observed) modal = sqrt(real(dot_product(shape, &
-                                                              matmul(system%mass, shape)), wp))
+         size_of_shape = 1.0_wp
+         if (system%control /= control_observed) then
+            modal = sqrt(real(dot_product(shape, matmul(system%mass, shape)), wp))
+            size_of_shape = norm2(abs(shape))
+         end if
+         system%inertia = self%omega**2*norm2(abs(matmul(system%mass, shape)))/size_of_shape
+         call system%measure_by(size_of_shape/modal, &
+                                self%case%mode%end*maxval(abs(real(shape, wp)))/modal)
          allocate (amplitude(m, fourier%n_retained), source=(0.0_wp, 0.0_wp))
          amplitude(:, system%first) = shape/modal
          allocate (q(size(x)), self%y(system%n))
          call to_real(fourier, m, amplitude, q)
          if (fourier%has_constant()) q(:m) = x(:m)
          call system%from_balance(q, self%omega, self%self_excitation, self%y)
-         system%inertia = self%omega**2*norm2(abs(matmul(system%mass, shape)))/modal
          call system%remember(self%y)
          system%static_load = static_size(self%balance)
          call system%set_parameter(log(self%case%mode%start), ignored)

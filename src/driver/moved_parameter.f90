@@ -16,8 +16,8 @@ module fw_moved_parameter
    use fw_moved_structure, only: move_structure
    use fw_parameter_slopes, only: parameter_entry, parameter_slope, slope_finder
    use fw_parameter_values, only: get_parameter, put_parameter
-   use fw_parameters, only: harmonic_scale, is_of_matrices, is_per_pair, is_per_spring, &
-      static_scale
+   use fw_parameters, only: harmonic_scale, is_of_loads, is_of_matrices, is_per_pair, &
+      is_per_spring, static_scale
    implicit none (type, external)
    private
 
@@ -61,20 +61,14 @@ contains
       self%built = self%base
       if (is_of_matrices(number)) then
          self%case = case
-      else if (.not. is_load(number)) then
-         ! Matrices are large, and stay.
+      else if (.not. is_of_loads(number)) then
+         ! Loads are moved by factors of the state, all else by other laws or matrices. Matrices
+         ! are large, and stay.
          self%case%contact = case%contact
          self%case%springs = case%springs
          self%case%harmonics%filter_harmonics = case%harmonics%filter_harmonics
       end if
    end function new_moved_parameter
-
-   !> Loads are moved by factors of the state, all else by other laws or matrices.
-   pure logical function is_load(number)
-      integer, intent(in) :: number
-
-      is_load = any(number == [harmonic_scale, static_scale])
-   end function is_load
 
    !> What the parameter is at a value or factor, each pair or spring its own.
    pure function values_at(self, value) result(values)
@@ -92,7 +86,7 @@ contains
       real(wp), intent(in) :: value
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. is_load(self%number)) then
+      if (.not. is_of_loads(self%number)) then
          call put_parameter(self%case, self%number, self%values_at(value), error)
          if (allocated(error)) return
       end if
@@ -163,7 +157,7 @@ contains
       type(parameter_slope) :: slope
       real(wp) :: rate
 
-      if (is_load(self%number) .and. .not. present(observed)) then
+      if (is_of_loads(self%number) .and. .not. present(observed)) then
          ! Its value may be 0.
          rate = merge(1.0_wp, 1.0_wp/self%base(1), self%by_factor)
          call state%derivative_by_loads(merge(rate, 0.0_wp, self%number == static_scale), &
@@ -171,7 +165,7 @@ contains
          return
       end if
       call self%find_slope(finder, state, x, value, slope, residual_only= &
-                           .not. (is_of_matrices(self%number) .or. is_load(self%number)))
+                           .not. (is_of_matrices(self%number) .or. is_of_loads(self%number)))
       dr = reshape(slope%residual, [size(dr)])
       if (present(observed)) observed = slope%observed
    end subroutine derive

@@ -6,14 +6,16 @@
 !> lies there and is narrow for the interval. After the sweep a few more solutions find the maxima;
 !> rows do not change by it.
 module fw_peak_finder
-   use fw_case, only: analysis_time, case_type
+   use fw_case, only: analyses, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_hidden_resonance, only: hides_mode, hides_resonance, turns_back
    use fw_joint_modes, only: find_joint_modes, joint_mode_type
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
+   use fw_mixed_bands, only: find_bands, mixed_band
    use fw_peak, only: peak_type
+   use fw_peak_gaps, only: gap_list
    use fw_peak_rules, only: find_edge, find_gap, find_next, find_way_past, highest_of, is_bound, &
       is_maximum, list_peaks, place_of_highest
    use fw_point, only: point_type
@@ -51,12 +53,16 @@ module fw_peak_finder
       class(interrupt_type), pointer :: interrupt => null()
       !> Modes of the joint in the range of the sweep.
       type(joint_mode_type), allocatable :: modes(:)
+      !> Between those of the free joint and of the held one.
+      type(mixed_band), allocatable, private :: bands(:)
       !> Solutions of the search, and their iterations.
       integer :: n_solved = 0, iterations = 0
       !> The points of these solutions, where they are to become rows.
       type(point_list) :: added
       type(sample_list), private :: samples
       type(interval_type), allocatable, private :: suspects(:)
+      !> Where modes that the joint changes may lie below the rows.
+      type(gap_list), private :: gaps
       !> Frequencies at which rows failed [rad/s].
       real(wp), allocatable, private :: failed(:)
       !> Rows taken, and those of them since the last that failed.
@@ -69,6 +75,7 @@ module fw_peak_finder
       procedure :: take
       procedure :: search
       procedure :: peaks
+      procedure :: find_open
       procedure :: go_to
       procedure :: clear
    end type peak_finder
@@ -93,9 +100,30 @@ contains
       self%is_active = .true.
       n = size(omega)
       self%in_order = all(omega(2:) > omega(:n - 1)) .or. all(omega(2:) < omega(:n - 1))
-      call find_joint_modes(case, [minval(omega), maxval(omega)], self%modes)
+      call find_modes(self, case, minval(omega), maxval(omega))
       allocate (self%suspects(0), self%failed(0))
    end subroutine start
+
+   !> Modes of the joint in the range, and where those lie that it changes.
+   subroutine find_modes(self, case, lowest, highest)
+      class(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      !> Of the range [rad/s].
+      real(wp), intent(in) :: lowest, highest
+      type(joint_mode_type), allocatable :: modes(:)
+      integer :: j, n
+
+      call find_joint_modes(case, [0.0_wp, highest], modes)
+      call find_bands(case, modes, self%bands)
+      allocate (self%modes(count(modes%omega >= lowest)))
+      n = 0
+      ! Element by element, as in fw_joint_modes.
+      do j = 1, size(modes)
+         if (modes(j)%omega < lowest) cycle
+         n = n + 1
+         self%modes(n) = modes(j)
+      end do
+   end subroutine find_modes
 
    !> A row of the sweep.
    subroutine take(self, point, error)
@@ -165,6 +193,7 @@ contains
                below%is_needed = .true.
                above%is_needed = .true.
             end if
+            call self%gaps%note(self%bands, below, above)
          end associate
          if (n < 3) return
          ! The row before the last has neighbours on both sides now.
@@ -192,9 +221,55 @@ contains
             if (hides_resonance(self%modes, below, above)) then
                self%suspects = [self%suspects, interval_type(below%omega, above%omega)]
             end if
+            call self%gaps%note(self%bands, below, above)
          end associate
       end do
    end subroutine suspect_all
+
+   !> Solve between rows below which a resonance of a joint that opens may lie, and may be the
+   !> highest: so near to each other that its flank would stand out.
+   subroutine look_between(self, case, budget, error)
+      class(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: budget
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: share
+      integer :: j, k
+
+      if (self%gaps%n == 0) return
+      call self%gaps%plan(self%samples, highest_of_all(self), self%n_rows)
+      do k = 1, self%gaps%n
+         associate (gap => self%gaps%item(k))
+            do j = 1, gap%points
+               share = real(j, wp)/real(gap%points + 1, wp)
+               call solve_at(self, case, gap%below + share*(gap%above - gap%below), budget, error)
+               if (allocated(error)) return
+            end do
+         end associate
+      end do
+   end subroutine look_between
+
+   !> The largest amplitude of every quantity.
+   pure function highest_of_all(self) result(highest)
+      type(peak_finder), intent(in) :: self
+      real(wp), allocatable :: highest(:)
+      integer :: i
+
+      highest = [(highest_of(self%samples, i), i=1, size(self%samples%item(1)%at%amplitude))]
+   end function highest_of_all
+
+   !> The range in which a joint that opens may have a higher maximum than all that were found.
+   pure subroutine find_open(self, range, n_open)
+      class(peak_finder), intent(in) :: self
+      !> [rad/s]
+      real(wp), intent(out) :: range(2)
+      !> Intervals between rows; 0 where none is left.
+      integer, intent(out) :: n_open
+
+      n_open = 0
+      range = 0.0_wp
+      if (self%samples%n > 0) call self%gaps%find_open(highest_of_all(self), range, n_open)
+   end subroutine find_open
 
    !> Look for every maximum that the rows leave open.
    subroutine search(self, case, error)
@@ -206,7 +281,7 @@ contains
 
       if (.not. self%is_active) return
       ! There a point depends on those before, or takes too long.
-      if (case%contact%memory == memory_carried .or. case%analysis == analysis_time) return
+      if (case%contact%memory == memory_carried .or. analyses(case%analysis)%is_integrated) return
       if (.not. self%in_order) call suspect_all(self)
       budget = min(max(least_budget, self%n_rows/budget_share), most_budget)
       ! In the order of what they may find: resonances that no row shows, ends of the range,
@@ -215,7 +290,8 @@ contains
          call look_into(self, case, self%suspects(k), budget, error)
          if (allocated(error)) return
       end do
-      call look_inside(self, case, budget, error)
+      call look_between(self, case, budget, error)
+      if (.not. allocated(error)) call look_inside(self, case, budget, error)
       more = .true.
       do while (more .and. .not. allocated(error))
          call climb(self, case, budget, error)
@@ -223,6 +299,8 @@ contains
          if (.not. allocated(error)) call look_beyond(self, case, budget, more, error)
          if (.not. allocated(error)) call look_past(self, case, budget, more, error)
       end do
+      ! What was solved for widths and branches may tell of corners.
+      if (.not. allocated(error)) call climb(self, case, budget, error)
       ! What becomes a row now is known here already.
       self%is_active = .false.
    end subroutine search

@@ -33,22 +33,51 @@ module fw_peak_rules
 contains
 
    !> Whether sample k is a maximum of quantity i: the first of the highest among neighbours that
-   !> differ by round-off, above what lies next to these.
+   !> differ by round-off, above what lies next to these on both sides.
    pure logical function is_maximum(samples, k, i)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
       real(wp) :: rise
-      integer :: below(2)
 
       is_maximum = .false.
       if (k <= 1 .or. k >= samples%n) return
-      associate (middle => samples%item(k)%at)
-         rise = max(round_off*swing_of(middle, i, middle%mean(i)), &
-                    negligible*maxval(middle%amplitude))
-      end associate
-      below = [place_below(samples, k, i, -1, rise), place_below(samples, k, i, 1, rise)]
-      is_maximum = all(below >= 0) .and. any(below > 0)
+      rise = rise_of(samples, k, i)
+      if (place_below(samples, k, i, -1, rise) < 0) return
+      if (place_below(samples, k, i, 1, rise) < 0) return
+      ! What is level up to an end of the range is highest there.
+      is_maximum = is_lower(samples, k, i, -1, rise) .and. is_lower(samples, k, i, 1, rise)
    end function is_maximum
+
+   !> What two amplitudes next to sample k may differ by without a meaning.
+   pure real(wp) function rise_of(samples, k, i) result(rise)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+
+      associate (at => samples%item(k)%at)
+         rise = max(round_off*swing_of(at, i, at%mean(i)), negligible*maxval(at%amplitude))
+      end associate
+   end function rise_of
+
+   !> Whether the first sample in a direction that differs from sample k by more than the rise is
+   !> lower; false where none differs.
+   pure logical function is_lower(samples, k, i, direction, rise)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i, direction
+      real(wp), intent(in) :: rise
+      real(wp) :: change
+      integer :: j
+
+      is_lower = .false.
+      j = k + direction
+      do while (j >= 1 .and. j <= samples%n)
+         change = samples%item(j)%at%amplitude(i) - samples%item(k)%at%amplitude(i)
+         if (abs(change) > rise) then
+            is_lower = change < 0.0_wp
+            return
+         end if
+         j = j + direction
+      end do
+   end function is_lower
 
    !> The first sample from k on in a direction that is lower by more than the rise: 0 where there
    !> is none, below 0 where a higher one comes first.
@@ -83,10 +112,11 @@ contains
       real(wp), intent(out) :: promise
       logical, intent(out) :: done
       real(wp) :: curvature, vertex, share, mean
-      logical :: left_is_known, right_is_known
+      logical :: left_is_known, right_is_known, is_high
 
       share = near
-      if (samples%item(k)%at%amplitude(i) >= near*highest_of(samples, i)) share = nearest
+      is_high = samples%item(k)%at%amplitude(i) >= near*highest_of(samples, i)
+      if (is_high) share = nearest
       associate (left => samples%item(k - 1)%at, middle => samples%item(k)%at, &
                  right => samples%item(k + 1)%at)
          call vertex_of(left, middle, right, i, vertex, promise, curvature)
@@ -107,7 +137,10 @@ contains
             if (.not. done) return
          end if
          done = left_is_known .and. right_is_known
-         if (done) return
+         if (done) then
+            if (is_high) call find_corner(samples, k, i, mean, omega, promise, done)
+            return
+         end if
          if (right_is_known) then
             omega = beside(left, middle, i, mean, curvature, share)
          else
@@ -116,6 +149,116 @@ contains
          done = abs(omega - middle%omega) <= same_frequency*middle%omega
       end associate
    end subroutine find_next
+
+   !> Where to solve next for a peak that may be a corner, which three samples show as a parabola
+   !> that it is not; `done` where five bear out the parabola, or leave no room for a corner that
+   !> is higher than the tolerance.
+   pure subroutine find_corner(samples, k, i, mean, omega, promise, done)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      !> Position of the three [length].
+      real(wp), intent(in) :: mean
+      real(wp), intent(inout) :: omega, promise
+      logical, intent(out) :: done
+      !> Of the tolerance: a third difference says little of a corner.
+      real(wp), parameter :: borne_out = 0.2_wp
+      real(wp) :: gain, place, most
+      integer :: direction
+
+      most = 0.0_wp
+      do direction = -1, 1, 2
+         call bound_corner(samples, k, i, direction, mean, place, gain)
+         if (gain <= most) cycle
+         most = gain
+         omega = place
+      end do
+      done = most <= small_gain .or. misses_parabola(samples, k, i, mean) <= borne_out*small_gain
+      if (done) return
+      associate (middle => samples%item(k)%at)
+         promise = (1.0_wp + most)*swing_of(middle, i, mean)
+         done = abs(omega - middle%omega) <= same_frequency*middle%omega
+      end associate
+   end subroutine find_corner
+
+   !> How much higher than sample k the response may be on one side: up to where the lines through
+   !> the two samples before and the two behind meet, if it bends down elsewhere.
+   pure subroutine bound_corner(samples, k, i, direction, mean, omega, gain)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i, direction
+      real(wp), intent(in) :: mean
+      !> [rad/s], and relative to the height.
+      real(wp), intent(out) :: omega, gain
+      real(wp) :: rise, fall, way, share
+
+      omega = samples%item(k)%at%omega
+      gain = 0.0_wp
+      associate (before => samples%item(k - direction)%at, middle => samples%item(k)%at, &
+                 behind => samples%item(k + direction)%at)
+         way = abs(behind%omega - middle%omega)
+         if (way <= same_frequency*middle%omega .or. &
+             abs(middle%omega - before%omega) <= same_frequency*middle%omega) return
+         rise = (middle%amplitude(i) - before%amplitude(i))/abs(middle%omega - before%omega)
+         ! Of the part that lies on the line behind, if one is known, and of all else.
+         share = 0.5_wp
+         gain = rise*way*share
+         if (k + 2*direction >= 1 .and. k + 2*direction <= samples%n) then
+            associate (last => samples%item(k + 2*direction)%at)
+               fall = (behind%amplitude(i) - last%amplitude(i))/ &
+                      max(abs(last%omega - behind%omega), tiny(1.0_wp))
+            end associate
+            if (rise + fall > 0.0_wp) share = ((behind%amplitude(i) - middle%amplitude(i))/way &
+                                               + fall)/(rise + fall)
+            share = min(max(share, margin), 1.0_wp - margin)
+            gain = rise*way*share
+         end if
+         omega = middle%omega + direction*share*way
+         gain = gain/swing_of(middle, i, mean)
+      end associate
+   end subroutine bound_corner
+
+   !> How much the parabola through a maximum and its neighbours may miss between them, relative to
+   !> the height: what the samples beyond say of its third difference.
+   pure real(wp) function misses_parabola(samples, k, i, mean) result(missed)
+      type(sample_list), intent(in) :: samples
+      integer, intent(in) :: k, i
+      real(wp), intent(in) :: mean
+      real(wp) :: s(4), g(4), third, swing
+      integer :: direction, j, side
+
+      missed = 0.0_wp
+      swing = swing_of(samples%item(k)%at, i, mean)
+      do direction = -1, 1, 2
+         if (k + 2*direction < 1 .or. k + 2*direction > samples%n) cycle
+         do j = 1, 4
+            associate (at => samples%item(k + direction*(j - 2))%at)
+               s(j) = at%omega**2 - samples%item(k)%at%omega**2
+               g(j) = (swing/swing_of(at, i, mean))**2
+            end associate
+         end do
+         if (abs(s(4) - s(3)) <= same_frequency*samples%item(k)%at%omega**2) cycle
+         third = abs(divided_difference(s, g))
+         do side = 1, 2
+            associate (middle => 0.5_wp*(s(side) + s(side + 1)))
+               missed = max(missed, 0.5_wp*third*abs(product(middle - s(:3))))
+            end associate
+         end do
+      end do
+   end function misses_parabola
+
+   !> Of third order, of four points.
+   pure real(wp) function divided_difference(s, g) result(third)
+      real(wp), intent(in) :: s(4), g(4)
+      real(wp) :: d(4)
+      integer :: order, j
+
+      d = g
+      do order = 1, 3
+         do j = 4, order + 1, -1
+            d(j) = (d(j) - d(j - 1))/(s(j) - s(j - order))
+         end do
+      end do
+      third = d(4)
+   end function divided_difference
 
    !> Whether the response falls behind a neighbour of the peak faster than any resonance does: it
    !> jumps there.
@@ -388,16 +531,15 @@ contains
       end do
    end function highest_of
 
-   !> Whether the amplitude rises towards an end of the range, which this sample stands on.
+   !> Whether the amplitude rises towards an end of the range, which this sample stands on: by more
+   !> than round-off, or it is none that another way to the same solutions comes to.
    pure logical function is_bound(samples, k, i)
       type(sample_list), intent(in) :: samples
       integer, intent(in) :: k, i
-      integer :: inside
 
       is_bound = (k == 1 .or. k == samples%n) .and. samples%item(k)%at%amplitude(i) > 0.0_wp
       if (.not. is_bound .or. samples%n == 1) return
-      inside = merge(2, samples%n - 1, k == 1)
-      is_bound = samples%item(k)%at%amplitude(i) >= samples%item(inside)%at%amplitude(i)
+      is_bound = is_lower(samples, k, i, merge(1, -1, k == 1), rise_of(samples, k, i))
    end function is_bound
 
    !> The maxima of every quantity by ascending frequency, and the ends of the range where the
@@ -460,6 +602,9 @@ contains
          if (.not. done .or. has_gap .or. any(failed > samples%item(k - 1)%at%omega .and. &
                                  failed < samples%item(k + 1)%at%omega)) then
             peak%found_by = found_unresolved
+         else if (at%amplitude(i) >= near*highest_of(samples, i)) then
+            ! Lower ones may hide a corner.
+            peak%tolerance = small_gain
          end if
       end associate
    end function describe

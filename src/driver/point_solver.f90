@@ -114,7 +114,8 @@ contains
       call system_clock(clock, rate)
       self%omega_wanted = request%place()
       self%best_residual = huge(1.0_wp)
-      self%work_limit = most_work*max(case%solver%max_iterations, least_counted)
+      self%work_limit = min(request%most_work, &
+                            most_work*max(case%solver%max_iterations, least_counted))
       self%out_of_work = .false.
       system%interrupt => request%interrupt
       if (allocated(system%moved%mover)) call system%set_frequency(request%omega, error)

@@ -3,8 +3,7 @@ module fw_problem
    use fw_kinds, only: wp
    use fw_balance_problem, only: balance_problem, new_balance_problem, problem_origin
    use fw_balance_state, only: balance_state, new_balance_state
-   use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_point, analysis_resonance, &
-      analysis_wear
+   use fw_case, only: analyses, case_type
    use fw_all_sectors, only: all_sectors, new_all_sectors
    use fw_cyclic_structure, only: cyclic_structure, new_cyclic_structure
    use fw_error, only: error_type, fatal_error, status_input
@@ -145,13 +144,13 @@ contains
       if (present(of_level)) harmonics = of_level
       ! A perturbation moves what no load moves.
       skip_idle = case%solver%skips .and. .not. case%sweep%stability .and. &
-                  case%analysis /= analysis_mode
+                  .not. analyses(case%analysis)%is_free
       ! A gap that closes into an interference does so too.
       if (case%over%number == gap) skip_idle = .false.
       call new_joint(case%model, case%contact, case%springs, skip_idle, joint, error)
       if (allocated(error)) return
       ! No load moves a mode, and none has to.
-      if (case%analysis == analysis_mode) joint%idle = .false.
+      if (analyses(case%analysis)%is_free) joint%idle = .false.
       if (present(forces)) then
          laws = forces
       else
@@ -162,11 +161,11 @@ contains
       if (allocated(error)) return
       if (fft_pays(fourier%n_coefficients)) fourier%fft_rows = 3*case%contact%n_pairs
       range = case%sweep%start
-      if (case%analysis == analysis_frf) range = case%sweep%range()
-      if (case%analysis == analysis_wear .and. case%wear%follow_resonance) then
+      if (analyses(case%analysis)%is_sweep) range = case%sweep%range()
+      if (analyses(case%analysis)%wears .and. case%wear%follow_resonance) then
          range = follow_range*range
       end if
-      if (case%analysis == analysis_resonance) then
+      if (analyses(case%analysis)%is_resonance) then
          ! As far as the resonance may go.
          range = case%sweep%range()
          range = range + 0.5_wp*(range(2) - range(1))*[-1.0_wp, 1.0_wp]
@@ -241,7 +240,7 @@ contains
       end if
       allocate (cyclic)
       call new_cyclic_structure(case%model, joint%cyclic, fourier%harmonic, range, means, cyclic, &
-                                error, of_mode=case%analysis == analysis_mode)
+                                error, of_mode=analyses(case%analysis)%is_free)
       call move_alloc(cyclic, structure)
    end subroutine new_structure
 
@@ -369,13 +368,14 @@ contains
          locates_events = .not. is_planar(joint) .or. case%contact%n_pairs <= few_pairs
          return
       end if
-      if (any(case%analysis == [analysis_mode, analysis_resonance])) then
+      if (analyses(case%analysis)%finds_frequency) then
          ! Instants put corners into curves whose derivatives are followed.
          locates_events = harmonics%n_time == 0
          return
       end if
       locates_events = harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &
-                       any(case%analysis == [analysis_frf, analysis_point, analysis_wear]) .and. &
+                       (analyses(case%analysis)%is_response .or. &
+                        analyses(case%analysis)%wears) .and. &
                        .not. harmonics%adaptive .and. .not. case%output%histories .and. &
                        .not. case%sweep%stability .and. .not. is_planar(joint)
    end function locates_events

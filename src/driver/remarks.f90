@@ -1,7 +1,7 @@
 !> What is allowed and seldom meant: it is said, in the summary and in the result, and never ends a
 !> run.
 module fw_remarks
-   use fw_case, only: analysis_mode, case_type
+   use fw_case, only: analyses, case_type
    use fw_force_law, only: law_facts
    use fw_joint_modes, only: held_stiffness, joint_mode_type, most_dofs, state_sliding
    use fw_kinds, only: pi, wp
@@ -10,13 +10,14 @@ module fw_remarks
    use fw_laws, only: facts_of, law_under_accuracy, law_words, is_of_high_order
    use fw_parameters, only: modal_damping, rayleigh_mass, rayleigh_stiffness
    use fw_peak, only: found_bound, found_unresolved, peak_type
+   use fw_result_group, only: group_writer, result_group
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
    private
 
-   public :: remark_list, remark_input, remark_range, remark_peaks, remark_stability
-   public :: remark_condensed, remark_undetermined, is_shaken, is_undamped
+   public :: remark_list, remark_input, remark_range, remark_peaks, remark_open, remark_stability
+   public :: remark_condensed, remark_undetermined, remark_unused, is_shaken, is_undamped
 
    !> Friction coefficients above it are no dry friction of metals.
    real(wp), parameter :: highest_friction = 2.0_wp
@@ -25,14 +26,25 @@ module fw_remarks
    real(wp), parameter :: round_off = 1.0e-9_wp
 
    !> Names by which programs know remarks, and their texts.
-   type :: remark_list
+   type, extends(result_group) :: remark_list
       type(string_type), allocatable :: name(:), text(:)
    contains
+      procedure :: write => write_remarks
       procedure :: add
       procedure :: count => count_remarks
    end type remark_list
 
 contains
+
+   !> Nothing where there is none.
+   subroutine write_remarks(self, to)
+      class(remark_list), intent(in) :: self
+      type(group_writer), intent(inout) :: to
+
+      if (self%count() == 0) return
+      call to%put('/remarks/name', self%name)
+      call to%put('/remarks/text', self%text)
+   end subroutine write_remarks
 
    !> A name for programs and a text for people.
    subroutine add(self, name, text)
@@ -79,14 +91,52 @@ contains
             trim(law_words(case%contact%law))//"' does not take")
       end if
       ! A mode has none.
-      if (.not. (is_shaken(case) .or. case%analysis == analysis_mode)) then
+      if (.not. (is_shaken(case) .or. analyses(case%analysis)%is_free)) then
          call remarks%add('no load', 'no vibratory load acts: the response is that at rest; '// &
                           'set load%cosine or load%sine (with a model file, load%harmonic_scale)')
       end if
+      call remark_unused(case, remarks)
       call remark_harmonics(case, remarks)
       call remark_law(case, remarks)
       call remark_tail(case, remarks)
    end subroutine remark_input
+
+   !> What was given and has no effect.
+   subroutine remark_unused(case, remarks)
+      type(case_type), intent(in) :: case
+      type(remark_list), intent(inout) :: remarks
+      integer :: n
+
+      if (allocated(case%unread)) then
+         if (size(case%unread) > 0) call remarks%add('not read', 'the model file holds '// &
+            trim(list_of(case%unread))//', which nothing reads; fw_run --parts lists what is read')
+      end if
+      if (case%idle_contact) call remarks%add('no pairs', '&contact is given, but there are no '// &
+         'contact pairs, and it has no effect: contact%n_pairs and side_1 give some')
+      if (case%idle_spring) call remarks%add('no springs', '&spring is given, but there are no '// &
+         'springs, and it has no effect: spring%n_springs and side_1 give some')
+      n = 0
+      associate (c => case%contact)
+         if (c%n_pairs > 0) n = count(abs(c%gap) > 0.0_wp .and. c%side_1(3, :) == 0 .and. &
+                                      c%side_2(3, :) == 0)
+      end associate
+      if (n > 0) call remarks%add('gap not used', 'contact%gap has no effect on '//to_text(n)// &
+         ' pairs, which have no normal dof: contact%normal_load presses them')
+   end subroutine remark_unused
+
+   !> `a, b, c and 7 more`.
+   pure function list_of(names) result(text)
+      type(string_type), intent(in) :: names(:)
+      character(300) :: text
+      integer, parameter :: most = 5
+      integer :: i
+
+      text = names(1)%text
+      do i = 2, min(size(names), most)
+         text = trim(text)//', '//names(i)%text
+      end do
+      if (size(names) > most) text = trim(text)//' and '//to_text(size(names) - most)//' more'
+   end function list_of
 
    !> Whether a vibratory load acts.
    pure logical function is_shaken(case)
@@ -261,6 +311,19 @@ contains
       if (n_open > 0) call remarks%add('peak not resolved', to_text(n_open)// &
          ' of '//to_text(size(peaks))//' maxima are not resolved: '//remedy)
    end subroutine remark_peaks
+
+   !> Of rows that are too far apart for the resonances of a joint that opens.
+   subroutine remark_open(range, n_open, remarks)
+      !> Where they may lie [rad/s], and in how many intervals between rows.
+      real(wp), intent(in) :: range(2)
+      integer, intent(in) :: n_open
+      type(remark_list), intent(inout) :: remarks
+
+      if (n_open > 0) call remarks%add('another peak', 'in '//to_text(n_open)//' intervals '// &
+         'between '//to_text(rounded(range(1)))//' and '//to_text(rounded(range(2)))// &
+         ' rad/s a resonance of the joint, which opens within the period, may lie between the '// &
+         'points and be the highest: take more points there')
+   end subroutine remark_open
 
    !> Of a branch of a small structure that could not be taken whole.
    subroutine remark_condensed(remarks)

@@ -12,7 +12,7 @@ module fw_run
    use fw_observer, only: observer_type
    use fw_outcome, only: outcome_type
    use fw_problem, only: build_system, threads_for
-   use fw_remarks, only: remark_input
+   use fw_remarks, only: remark_input, remark_unused
    use fw_restart_file, only: read_restart, restart_type
    use fw_result, only: result_writer
    use fw_run_mode, only: check_mode_case, run_mode
@@ -22,6 +22,7 @@ module fw_run
    use fw_strategy, only: kept_strategy
    use fw_summary, only: summary_type, new_summary
    use fw_text, only: string_type, to_text
+   use fw_text_list, only: append
    use fw_threads, only: thread_scope
    use fw_wear_response, only: run_wear
    implicit none (type, external)
@@ -77,6 +78,7 @@ contains
       type(string_type), allocatable :: table(:)
       integer(int64) :: clock, clock_end, rate
       real(wp) :: elapsed
+      integer :: i
 
       call system_clock(clock, rate)
       call check_combinations(case, error)
@@ -99,6 +101,7 @@ contains
       summary = new_summary(case)
       if (case%analysis /= analysis_modes) call remark_input(case, summary%remarks)
       if (case%analysis == analysis_modes) then
+         call remark_unused(case, summary%remarks)
          call run_modes(case, writer, table, error)
       else if (case%analysis == analysis_mode) then
          call run_mode(case, observer, writer, summary, state, error)
@@ -115,9 +118,7 @@ contains
       outcome%status = state%status()
       outcome%out_of_time = observer%run_out
       call summary%remark_instants()
-      if (.not. allocated(error) .and. summary%remarks%count() > 0) then
-         call writer%add_remarks(summary%remarks%name, summary%remarks%text, error)
-      end if
+      if (.not. allocated(error)) call writer%add(summary%remarks, error)
       if (allocated(error)) then
          if (state%n_points == 0) then
             ! A result without points is none.
@@ -134,6 +135,9 @@ contains
       call writer%close(trim(state%words()), elapsed, error, summary%skipped, summary%sampling)
       if (present(image)) call move_alloc(writer%image, image)
       if (allocated(table)) then
+         do i = 1, summary%remarks%count()
+            call append(table, 'remark            '//summary%remarks%text(i)%text)
+         end do
          call move_alloc(table, outcome%summary)
       else
          outcome%summary = summary%lines(state, elapsed)

@@ -1,7 +1,7 @@
 !> Analysis 'mode': a nonlinear mode over its amplitude, its limit cycles, and responses near its
 !> resonance that are put together from it.
 module fw_run_mode
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
    use fw_complex_form, only: amplitudes_of, coefficients_of
@@ -15,8 +15,8 @@ module fw_run_mode
    use fw_mode_options, only: control_observed
    use fw_mode_onset, only: onset_finder
    use fw_mode_path, only: mode_path
-   use fw_mode_remarks, only: remark_internal, remark_jump
-   use fw_mode_start, only: mode_start
+   use fw_mode_remarks, only: remark_internal, remark_jump, remark_no_onset
+   use fw_mode_start, only: mode_start, node
    use fw_mode_synthesis, only: synthesize
    use fw_newton, only: solver_report
    use fw_observer, only: observer_type
@@ -120,8 +120,12 @@ contains
       call remark_internal(curve%start, curve%table, summary%remarks)
       call curve%watch%remark(summary%remarks)
       call remark_jump(curve%jumped_at, case%mode%start, summary%remarks)
+      if (state%is_incomplete .and. curve%begins .and. curve%start%problem%n_pairs > 0 .and. &
+          ieee_is_nan(curve%table%onset_amplitude)) then
+         call remark_no_onset(exp(curve%end_p), case%mode%end, summary%remarks)
+      end if
       call synthesize(case%mode%synthesis, curve%table)
-      call writer%add_mode(curve%table, case%model%unit_system, error)
+      call writer%add(curve%table, error)
       call summary%describe_work(curve%start%balance, curve%path%newton%linear, case%solver%kind, &
                                  state%all_converged())
       call curve%sensitivity%describe(derivatives)
@@ -211,9 +215,12 @@ contains
       real(wp), parameter :: smaller = 0.1_wp
       integer, parameter :: most_smaller = 8
       real(wp) :: amplitude
+      real(wp), allocatable :: mu(:)
       integer :: k
 
-      call curve%onset%begin(curve%start%system, curve%start%y, case%mode%start, amplitude)
+      allocate (mu(curve%start%problem%n_pairs), source=1.0_wp)
+      if (case%contact%n_pairs == size(mu)) mu = case%contact%mu
+      call curve%onset%begin(curve%start%system, curve%start%y, case%mode%start, mu, amplitude)
       ! The sliding mode is the limit of high amplitudes.
       if (curve%start%slides) amplitude = case%mode%end
       do k = 1, most_smaller
@@ -222,7 +229,7 @@ contains
          if (allocated(error)) return
          if (report%converged .and. (curve%start%slides .or. curve%start%problem%n_pairs == 0)) exit
          if (report%converged) then
-            if (curve%onset%is_stuck(curve%start%system)) exit
+            if (curve%onset%is_stuck(curve%start%system, y)) exit
          end if
          ! About another position, or springs: nearer to the linear mode.
          amplitude = merge(1.0_wp/smaller, smaller, curve%start%slides)*amplitude
@@ -358,7 +365,9 @@ contains
       m = start%problem%structure%n_coordinates
       associate (f => start%problem%fourier)
          first = sum(start%system%observed*start%system%motion(y))
-         if (.not. abs(first) > 0.0_wp) return
+         ! At a node its phase is round-off.
+         if (.not. abs(first) > node*norm2(abs(start%system%observed))* &
+             norm2(abs(start%system%motion(y)))) return
          first = first/abs(first)
          allocate (amplitude(m, f%n_retained))
          call amplitudes_of(f%harmonic, f%column, m, y, m, amplitude)
@@ -474,7 +483,7 @@ contains
          point%self_excitation = row%self_excitation
          point%modal_amplitude = row%modal_amplitude
          point%first_harmonic = hypot(row%first(1, :), row%first(2, :))
-         row%force = modal_force(curve%start, y)*system%amplitude/row%modal_amplitude
+         row%force = modal_force(curve%start, y)*system%length()/row%modal_amplitude
          if (report%converged) call curve%onset%note(system, y)
          if (report%converged .and. served_by == served_by_newton) then
             call curve%watch%note(system, y)
@@ -494,7 +503,7 @@ contains
       call curve%table%add(row)
    end subroutine add_row
 
-   !> |U_1^H F| for the vibratory load of the case, over the amplitude.
+   !> |U_1^H F| for the vibratory load of the case, over the size of the motion.
    real(wp) function modal_force(start, y) result(force)
       type(mode_start), intent(in) :: start
       real(wp), intent(in) :: y(:)

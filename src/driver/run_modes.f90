@@ -1,7 +1,8 @@
 !> Runs analysis 'modes', and lists the natural frequencies that a sweep covers.
 module fw_run_modes
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-   use fw_case, only: analysis_mode, analysis_modes, case_type
+   use fw_case, only: analyses, case_type
+   use fw_cyclic_group, only: modes_group
    use fw_error, only: error_type
    use fw_kinds, only: pi, wp
    use fw_natural_modes, only: find_natural_modes, natural_modes
@@ -29,14 +30,20 @@ contains
       type(string_type), allocatable, intent(out) :: table(:)
       type(error_type), allocatable, intent(out) :: error
       type(natural_modes) :: modes
+      type(modes_group) :: group
       character(:), allocatable :: text, name
       integer :: j
 
       call find_natural_modes(case, min(case%model%cyclic%n_modes, most_of(case)), modes, error)
       if (allocated(error)) return
-      call writer%add_modes(modes%nodal_diameter, modes%open, modes%closed, &
-                            case%model%unit_system, error, modes%open_damping, &
-                            modes%closed_damping)
+      group%nodal_diameter = modes%nodal_diameter
+      group%open = modes%open
+      group%closed = modes%closed
+      if (allocated(modes%open_damping)) then
+         group%open_damping = modes%open_damping
+         group%closed_damping = modes%closed_damping
+      end if
+      call writer%add(group, error)
       if (allocated(error)) return
       allocate (table(0))
       text = 'natural frequencies ['//trim(unit_words(case%sweep%unit))//']'
@@ -78,13 +85,13 @@ contains
       integer :: j
 
       allocate (lines(0))
-      if (case%analysis == analysis_modes) return
+      if (.not. analyses(case%analysis)%has_points) return
       if (most_of(case) > most_checked) then
          call append(lines, "! natural frequencies: see analysis 'modes' (more than "// &
                      to_text(most_checked)//' dofs)')
          return
       end if
-      if (case%analysis == analysis_mode) then
+      if (analyses(case%analysis)%is_free) then
          range = [0.0_wp, huge(1.0_wp)]
       else
          range = case%sweep%range()
@@ -94,7 +101,7 @@ contains
                               diameters_of(case))
       if (allocated(ignored)) return
       text = ' within the sweep'
-      if (case%analysis == analysis_mode) text = ''
+      if (analyses(case%analysis)%is_free) text = ''
       call append(lines, '! natural frequencies ['//trim(unit_words(case%sweep%unit))//']'// &
                   text//':')
       do j = 1, size(modes%nodal_diameter)

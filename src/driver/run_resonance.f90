@@ -77,7 +77,8 @@ contains
       end if
       call observer%on_end()
       if (allocated(error)) return
-      call writer%add_resonance(run%table, case%resonance, case%model%unit_system, error)
+      run%table%options = case%resonance
+      call writer%add(run%table, error)
       associate (level => run%track%strategy%level)
          call run%track%curve%linear%add_work(level%solver%method%newton%linear)
          call run%track%curve%linear%add_work(run%track%curve%newton%linear)

@@ -12,8 +12,8 @@ module fw_sensitivity_solver
    use fw_mode_sensitivity, only: find_mode_slopes
    use fw_mode_system, only: mode_system
    use fw_parameter_slopes, only: parameter_entry
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-      is_per_pair, is_per_spring, normal_load, normal_stiffness, static_scale, tangential_stiffness
+   use fw_parameter_values, only: get_parameter
+   use fw_parameters, only: is_of_matrices, is_per_pair, is_per_spring
    use fw_point, only: point_sensitivity, point_type
    use fw_remarks, only: remark_list
    use fw_response_rows, only: load_scale, mode_damping_ratio, mode_omega, resonance_omega
@@ -137,17 +137,24 @@ contains
    subroutine start(self, case)
       type(sensitivity_solver), intent(inout) :: self
       type(case_type), intent(in) :: case
+      type(parameter_entry) :: entry
+      real(wp), allocatable :: values(:)
       integer :: i, k
 
       associate (finder => self%finder, options => case%sensitivity)
          finder%quantities = options%quantities
          finder%parameters = [parameter_entry ::]
          do k = 1, size(options%parameters)
-            associate (number => options%parameters(k))
-               do i = 1, max(1, count_elements(case, number))
-                  finder%parameters = [finder%parameters, entry_of(case, number, i)]
-               end do
-            end associate
+            entry = parameter_entry(number=options%parameters(k))
+            if (is_of_matrices(entry%number)) then
+               entry%change = findloc(case%model%changes%parameter, entry%number, dim=1)
+            end if
+            call get_parameter(case, entry%number, values)
+            do i = 1, size(values)
+               entry%value = values(i)
+               if (is_per_pair(entry%number) .or. is_per_spring(entry%number)) entry%element = i
+               finder%parameters = [finder%parameters, entry]
+            end do
          end do
          finder%mu = spread(0.0_wp, 1, case%contact%n_pairs)
          if (case%contact%n_pairs > 0) finder%mu = case%contact%mu
@@ -214,44 +221,6 @@ contains
          point%sensitivity = [point%sensitivity, block]
       end associate
    end subroutine add_one
-
-   !> Values that a parameter has; 0 where it is one.
-   pure integer function count_elements(case, number) result(n)
-      type(case_type), intent(in) :: case
-      integer, intent(in) :: number
-
-      n = 0
-      if (is_per_pair(number)) n = case%contact%n_pairs
-      if (is_per_spring(number)) n = case%springs%n_springs
-   end function count_elements
-
-   pure type(parameter_entry) function entry_of(case, number, element) result(entry)
-      type(case_type), intent(in) :: case
-      integer, intent(in) :: number, element
-      integer :: k
-
-      entry%number = number
-      if (count_elements(case, number) > 0) entry%element = element
-      associate (c => case%contact)
-         select case (number)
-         case (friction_coefficient); entry%value = c%mu(element)
-         case (normal_load); entry%value = c%normal_load(element)
-         case (gap); entry%value = c%gap(element)
-         case (tangential_stiffness); entry%value = c%tangential_stiffness(element)
-         case (normal_stiffness); entry%value = c%normal_stiffness(element)
-         case (harmonic_scale); entry%value = case%model%harmonic_scale
-         case (static_scale); entry%value = case%model%static_scale
-         case default
-            if (is_per_spring(number)) entry%value = case%springs%coefficient(element)
-            if (.not. is_of_matrices(number)) return
-            do k = 1, size(case%model%changes)
-               if (case%model%changes(k)%parameter /= number) cycle
-               entry%change = k
-               entry%value = case%model%changes(k)%value
-            end do
-         end select
-      end associate
-   end function entry_of
 
    !> From the table of derivatives to blocks of the point, one for each quantity and parameter.
    subroutine lay_out(self, case, point)

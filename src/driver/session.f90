@@ -5,7 +5,7 @@
 !> a time.
 module fw_session
    use, intrinsic :: iso_c_binding, only: c_int8_t
-   use fw_case, only: analysis_frf, analysis_point, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_usage
    use fw_harmonics_options, only: harmonics_options
    use fw_kinds, only: wp
@@ -276,7 +276,7 @@ contains
                           status_usage)
          return
       end if
-      if (all(self%case%analysis /= [analysis_frf, analysis_point]) .or. &
+      if (.not. analyses(self%case%analysis)%is_response .or. &
           self%case%sweep%continuation /= continuation_natural .or. &
           self%case%harmonics%adaptive .or. self%case%harmonics%accuracy > 0.0_wp) then
          call fatal_error(error, 'steps go through frequencies of harmonic balance: '// &
@@ -301,7 +301,7 @@ contains
       n = 0
       if (.not. self%is_read .or. self%case%sweep%continuation /= continuation_natural) return
       n = 1
-      if (self%case%analysis == analysis_frf) n = self%case%sweep%n_points
+      if (analyses(self%case%analysis)%is_sweep) n = self%case%sweep%n_points
    end function n_frequencies
 
    !> Frequency k of the sweep, to the bit the one that a run takes [rad/s].

@@ -18,6 +18,7 @@ module fw_solution
    use fw_pseudo_time, only: pseudo_report, pseudo_time_solver
    use fw_recovery, only: carry_solution
    use fw_unbounded, only: is_lost_in_round_off
+   use fw_undetermined, only: damps_all, find_undetermined
    use fw_slip_gap, only: lacks_friction
    use fw_solver_options, only: pseudo_time_options, jacobian_difference, solver_kinsol, &
       solver_powell
@@ -25,6 +26,9 @@ module fw_solution
    private
 
    public :: solution_method, is_lasting
+
+   !> What is known of the damping of a structure.
+   integer, parameter :: unknown = 0, everywhere = 1, in_parts = 2
 
    type :: solution_method
       type(newton_solver) :: newton
@@ -43,6 +47,8 @@ module fw_solution
       !> that was so at other frequencies too; below 0: nowhere.
       real(wp) :: undetermined_at = -1.0_wp
       logical :: undetermined_again = .false.
+      !> Whether all motions are damped by more than contact.
+      integer, private :: damping = unknown
       !> A solution was refused because its friction is ripple.
       logical :: rippled = .false.
       !> The system was evaluated last at the very solution that converged.
@@ -205,9 +211,15 @@ contains
       real(wp), intent(in), contiguous :: x(:)
       type(solver_report), intent(inout) :: report
       logical :: lost, rippled
-      integer :: n_driven, n_idle
+      integer :: n_driven, n_idle, n_held(2)
 
       call system%problem%structure%undetermined(system%structure_state, n_idle, n_driven)
+      if (self%damping == unknown) self%damping = merge(everywhere, in_parts, damps_all(system))
+      if (self%damping == in_parts) then
+         call find_undetermined(system, n_held(1), n_held(2))
+         n_idle = n_idle + n_held(1)
+         n_driven = n_driven + n_held(2)
+      end if
       lost = n_driven > 0 .or. is_lost_in_round_off(system, x)
       self%unbounded = self%unbounded .or. lost
       report%converged = is_lasting(system) .and. .not. lost

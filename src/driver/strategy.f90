@@ -1,7 +1,7 @@
 !> How the point at a frequency is solved: with the harmonics of the case, with as many as it needs,
 !> to a given accuracy, or by integration in time.
 module fw_strategy
-   use fw_case, only: analysis_time, case_type
+   use fw_case, only: analyses, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_interrupt, only: interrupt_type
@@ -41,6 +41,8 @@ module fw_strategy
       real(wp) :: tolerance = 0.0_wp
       !> From one guess, with no more iterations than these (0: as the case has it).
       integer :: most_iterations = 0
+      !> Iterations from which on no other way is begun, if these are fewer than for any point.
+      integer :: most_work = huge(1)
    contains
       procedure :: place
       procedure :: describe => describe_request
@@ -213,7 +215,8 @@ contains
       type(case_type), intent(in) :: case
 
       keeps_cycles = case%output%contact .and. case%contact%n_pairs > 0 .and. &
-                     (case%contact%memory == memory_carried .or. case%analysis == analysis_time)
+                     (case%contact%memory == memory_carried .or. &
+                      analyses(case%analysis)%is_integrated)
    end function keeps_cycles
 
 end module fw_strategy

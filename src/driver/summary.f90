@@ -337,12 +337,13 @@ contains
    end subroutine describe_harmonics
 
    !> What the points took to be accurate.
-   subroutine describe_accuracy(self, worst, accuracy, known)
+   subroutine describe_accuracy(self, worst, accuracy, n_claimed, n_short)
       class(summary_type), intent(inout) :: self
-      !> Largest estimate of the error, and what was asked for.
+      !> Largest estimate of the error among the points with a claim, and what was asked for.
       real(wp), intent(in) :: worst, accuracy
-      !> Whether there is an estimate.
-      logical, intent(in) :: known
+      !> Points with a claim, and converged ones without.
+      integer, intent(in) :: n_claimed, n_short
+      character(:), allocatable :: words
       character(10) :: text(2)
 
       write (text(1), '(es8.1)') worst
@@ -351,21 +352,27 @@ contains
                     to_text(self%harmonics(2)))
       call add_line(self%work, 'instants', to_text(self%instants(1))//' to '// &
                     to_text(self%instants(2)))
-      if (known) then
-         call add_line(self%work, 'error', 'at most '//trim(adjustl(text(1)))//' by estimate, '// &
-                       trim(adjustl(text(2)))//' asked for')
-      else
+      if (n_claimed + n_short == 0) then
          call add_line(self%work, 'error', 'not known: no point converged')
+         return
       end if
+      words = 'nothing is claimed, '
+      if (n_claimed > 0) words = 'at most '//trim(adjustl(text(1)))//' by estimate, '
+      words = words//trim(adjustl(text(2)))//' asked for'
+      if (n_claimed > 0 .and. n_short > 0) words = words//'; nothing is claimed at '// &
+         to_text(n_short)//' of '//to_text(n_claimed + n_short)//' points'
+      call add_line(self%work, 'error', words)
    end subroutine describe_accuracy
 
    !> What became of the wear.
-   subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth)
+   subroutine describe_wear(self, steady_state, n_steps, n_rejected, cycles, depth, otherwise)
       class(summary_type), intent(inout) :: self
       character(*), intent(in) :: steady_state
       integer, intent(in) :: n_steps, n_rejected
       !> Cycles covered, and largest depth at their end [length].
       real(wp), intent(in) :: cycles, depth
+      !> Steps that were left to the implicit scheme, and leaps.
+      integer, intent(in) :: otherwise(2)
       character(40) :: text
 
       write (text, '(es13.6, a, es13.6)') depth, ' after ', cycles
@@ -373,6 +380,10 @@ contains
       call add_line(self%work, 'largest depth', trim(adjustl(text))//' cycles')
       call add_line(self%work, 'wear steps', to_text(n_steps)//', '//to_text(n_rejected)// &
                     ' repeated')
+      if (otherwise(1) > 0) call add_line(self%work, '', to_text(otherwise(1))// &
+                                          ' of them implicit')
+      if (otherwise(2) > 0) call add_line(self%work, '', to_text(otherwise(2))// &
+                                          ' of them over what no other step passes')
    end subroutine describe_wear
 
    !> What a nonlinear mode is, and where it slips and keeps itself alive.

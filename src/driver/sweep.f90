@@ -1,6 +1,6 @@
 !> The one loop over the points of a run: a source gives them one after the other, sinks take them.
 module fw_sweep
-   use fw_case, only: analysis_frf, analysis_time, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, status_stopped
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
@@ -239,8 +239,8 @@ contains
       integer :: k, n_points
 
       n_points = 1
-      if (case%analysis == analysis_frf) n_points = case%sweep%n_points
-      if (case%analysis == analysis_time .and. case%sweep%end > 0.0_wp) then
+      if (analyses(case%analysis)%is_sweep) n_points = case%sweep%n_points
+      if (analyses(case%analysis)%is_integrated .and. case%sweep%end > 0.0_wp) then
          n_points = case%sweep%n_points
       end if
       if (case%over%is_wanted()) then

@@ -4,17 +4,19 @@
 module fw_wear_recorder
    use, intrinsic :: iso_fortran_env, only: int64
    use fw_case, only: case_type
-   use fw_error, only: error_type
+   use fw_error, only: error_type, status_stopped
    use fw_finer_wear, only: finer_wear
    use fw_kinds, only: wp
    use fw_observer, only: observer_type
    use fw_patches, only: patch_volumes
    use fw_point, only: point_type
+   use fw_point_solver, only: point_solver
    use fw_recovery, only: recover_histories, recover_point
    use fw_restart_rows, only: restart_row_set
    use fw_result, only: result_writer
    use fw_solution, only: is_lasting
    use fw_run_state, only: run_state
+   use fw_strategy, only: new_request, point_request
    use fw_summary, only: summary_type
    use fw_wear_march, only: wear_march, wear_observer
    use fw_wear_options, only: wear_energy, wear_pseudo_time
@@ -43,6 +45,7 @@ module fw_wear_recorder
    contains
       procedure :: take
       procedure :: begin_slip
+      procedure :: find
       procedure :: allowed_residual
       procedure :: count_point
    end type wear_recorder
@@ -112,6 +115,39 @@ contains
 
       call self%finer%look(self%case, march, system, state, march%begins)
    end subroutine begin_slip
+
+   !> A vibration at held depths by all ways to a first point.
+   subroutine find(self, system, x, found, iterations, error)
+      class(wear_recorder), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      real(wp), intent(inout), contiguous :: x(:)
+      logical, intent(out) :: found
+      integer, intent(out) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      type(point_solver) :: solver
+      type(point_request) :: request
+      type(point_type) :: point
+
+      found = .false.
+      iterations = 0
+      request = new_request(self%case, system%vibration%frequency(), self%observer)
+      ! Of this point the solution alone is wanted.
+      request%contact = .false.
+      request%histories = .false.
+      request%cycle = .false.
+      call solver%start(self%case, self%case%harmonics, size(x))
+      call self%observer%limit_point(self%case%solver%max_seconds)
+      call solver%solve(self%case, system%vibration, request, point, error)
+      call self%observer%limit_point(0.0_wp)
+      if (allocated(error)) then
+         ! That the run was stopped the march sees itself.
+         if (error%status == status_stopped) deallocate (error)
+         return
+      end if
+      iterations = point%iterations
+      found = point%converged
+      if (found) x = solver%x
+   end subroutine find
 
    !> Residual of a row that counts as converged: steps of pseudo-time are accepted with what their
    !> vibration lags behind the depths, which /residual holds.

@@ -25,7 +25,7 @@ module fw_wear_response
       wear_observer
    use fw_wear_options, only: wear_energy, wear_explicit, wear_pseudo_time
    use fw_wear_recorder, only: friction_energy, wear_recorder
-   use fw_wear_rows, only: start_wear, state_halved, state_outcome
+   use fw_wear_group, only: wear_halved, wear_outcome, wear_patches
    use fw_wear_step, only: new_wear_stepper, wear_state
    use fw_wear_system, only: new_wear_system, wear_system
    implicit none (type, external)
@@ -44,8 +44,11 @@ module fw_wear_response
 
    !> Watches nothing: the march is repeated for its end alone.
    type, extends(wear_observer) :: silent_observer
+      !> Who finds vibrations.
+      type(wear_recorder), pointer :: recorder => null()
    contains
       procedure :: take => pass_by
+      procedure :: find => find_by_recorder
    end type silent_observer
 
    !> Everything between the start of a run and its end.
@@ -134,6 +137,8 @@ contains
       type(summary_type), intent(inout), target :: summary
       type(run_state), intent(inout), target :: state
       type(error_type), allocatable, intent(out) :: error
+      type(wear_patches) :: patches
+      type(wear_outcome) :: outcome
 
       recorder%case => case
       recorder%state => state
@@ -141,9 +146,12 @@ contains
       recorder%writer => writer
       recorder%summary => summary
       call system_clock(recorder%clock)
-      call start_wear(writer%file, case%contact, cycles_units(case), error)
-      if (.not. allocated(error)) call state_outcome(writer%file, &
-         steady_words(steady_not_reached), 'incomplete', error)
+      patches%contact => case%contact
+      patches%cycles_units = cycles_units(case)
+      call writer%add(patches, error)
+      outcome%steady_state = trim(steady_words(steady_not_reached))
+      outcome%ending = 'incomplete'
+      if (.not. allocated(error)) call writer%add(outcome, error)
    end subroutine start_recorder
 
    !> From the vibration of the unworn joint, at its resonance where that is to be followed.
@@ -225,6 +233,7 @@ contains
       type(wear_run), intent(inout) :: run
       type(restart_type), intent(in) :: restart
       type(error_type), allocatable, intent(out) :: error
+      type(wear_outcome) :: outcome
 
       associate (march => run%march, recorder => run%recorder, summary => run%recorder%summary)
          call recorder%observer%on_message('wear: '//march%ending)
@@ -235,7 +244,8 @@ contains
                                     recorder%state%all_converged())
          call summary%describe_wear(trim(steady_words(march%steady)), march%n_steps, &
                                     march%n_rejected, run%state%cycles, &
-                                    depth_of(run%system, run%state))
+                                    depth_of(run%system, run%state), &
+                                    [march%n_implicit, march%n_leaps])
          if (restart%n_rows > 0) call summary%note_restart(restart%n_rows, restart%path)
          if (.not. march%gave_up .and. allocated(run%state%x)) then
             call recorder%finer%look_at_end(recorder%case, march, run%system, run%state)
@@ -243,8 +253,10 @@ contains
          call recorder%finer%remark(recorder%case, summary)
          call remark_steps(recorder%case, march, depth_of(run%system, run%state), summary)
          call recorder%finer%finish()
-         call state_outcome(recorder%writer%file, trim(steady_words(march%steady)), &
-                            march%ending, error)
+         outcome%steady_state = trim(steady_words(march%steady))
+         outcome%ending = march%ending
+         outcome%counts = [march%n_implicit, march%n_leaps, march%n_jumps]
+         call recorder%writer%add(outcome, error)
       end associate
    end subroutine report_end
 
@@ -259,6 +271,11 @@ contains
       !> rule: of w' = 1 - w a single step up to 63 % is 7 % off, five are 1 %.
       real(wp), parameter :: fine = 0.02_wp, coarse = 0.2_wp
 
+      if (march%n_jumps > 0) call summary%remarks%add('vibration jumps', 'the vibration jumps '// &
+         'in '//to_text(march%n_jumps)//' of the steps, first at cycle '// &
+         to_text(march%first_jump)//': the one before it does not exist beyond these depths; '// &
+         'which one the joint goes to was looked for without its motion: compare with '// &
+         "analysis = 'time' there")
       if (march%n_unsettled > 0) call summary%remarks%add('slip begins', 'in '// &
          to_text(march%n_unsettled)//' steps pairs begin to slip that were stuck, and what '// &
          'they wear depends on the step, however short: compare with wear%check_steps and more '// &
@@ -333,7 +350,7 @@ contains
 
    !> The same march with steps of half the size: how far its profile is from that at the end.
    subroutine compare_halved(recorder, system, march, first, first_omega, state, error)
-      type(wear_recorder), intent(inout) :: recorder
+      type(wear_recorder), intent(inout), target :: recorder
       type(wear_system), intent(inout), target :: system
       type(wear_march), intent(in) :: march
       type(wear_state), intent(in) :: first
@@ -344,6 +361,7 @@ contains
       type(wear_march), target :: halved
       type(silent_observer) :: silent
       type(wear_state) :: end_state
+      type(wear_halved) :: profile
       real(wp) :: change
       integer :: n
 
@@ -364,6 +382,7 @@ contains
       call system%set_parameter(first_omega, error)
       if (allocated(error)) return
       call stand_at(system, end_state%x)
+      silent%recorder => recorder
       call halved%run(system, end_state, silent, error)
       if (allocated(error)) return
       if (.not. halved%complete .or. halved%steady /= march%steady) then
@@ -377,8 +396,9 @@ contains
       if (change > large_change) call recorder%summary%remarks%add('profile depends on steps', &
          'steps of half the size move the worn profile by '//to_text(100.0_wp*change)// &
          ' % of its largest depth')
-      call state_halved(recorder%writer%file, end_state%x(n + 1:), change, &
-                        recorder%case%model%unit_system, error)
+      profile%depth = end_state%x(n + 1:)
+      profile%change = change
+      call recorder%writer%add(profile, error)
    end subroutine compare_halved
 
    !> Nothing is kept of the states on the way.
@@ -396,6 +416,18 @@ contains
       end associate
       go_on = .true.
    end subroutine pass_by
+
+   !> As the recorder of the run does.
+   subroutine find_by_recorder(self, system, x, found, iterations, error)
+      class(silent_observer), intent(inout) :: self
+      type(wear_system), intent(inout) :: system
+      real(wp), intent(inout), contiguous :: x(:)
+      logical, intent(out) :: found
+      integer, intent(out) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%recorder%find(system, x, found, iterations, error)
+   end subroutine find_by_recorder
 
    !> Whether nothing in the case tells the size of the steps.
    pure logical function needs_depth_step(case)

@@ -14,8 +14,8 @@ module fw_contact_keys
    implicit none (type, external)
    private
 
-   public :: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, bind_normal_load, &
-             bind_laws, bind_march, bind_worn, bind_n_springs, bind_springs
+   public :: ask_laws, bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
+             bind_normal_load, bind_laws, bind_march, bind_worn, bind_n_springs, bind_springs
 
    !> More pairs or springs are taken for a mistake.
    integer, parameter :: most = 1000000
@@ -99,13 +99,10 @@ contains
                          only='pairs without a normal dof'), contact%normal_load, needed)
    end subroutine bind_normal_load
 
-   !> The keys that belong to one law or some, those of the law of the case first: keys that laws
-   !> share are needed as it says.
-   subroutine bind_laws(keys, contact, slides, closes)
+   !> Which constants the laws have: the visitor is not asked for any.
+   subroutine ask_laws(keys, contact)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
-      !> Whether there are tangential dofs, normal dofs.
-      logical, intent(in) :: slides, closes
       class(pair_law), allocatable :: law
       integer :: k
 
@@ -116,6 +113,19 @@ contains
          call law%bind_keys(keys, contact, .false., .false.)
       end do
       contact%constants%is_asked = .false.
+   end subroutine ask_laws
+
+   !> The keys that belong to one law or some, those of the law of the case first: keys that laws
+   !> share are needed as it says.
+   subroutine bind_laws(keys, contact, slides, closes)
+      class(key_visitor), intent(inout) :: keys
+      type(contact_type), intent(inout) :: contact
+      !> Whether there are tangential dofs, normal dofs.
+      logical, intent(in) :: slides, closes
+      class(pair_law), allocatable :: law
+      integer :: k
+
+      call ask_laws(keys, contact)
       contact%constants%law = contact%law
       contact%constants%is_in_use = .true.
       call new_law(contact%law, law)

@@ -10,8 +10,6 @@ module fw_law_constants
 
    type :: constant_type
       character(24) :: name = ''
-      !> Which laws declare it, as its key says: law = 'one', 'another'.
-      character(60) :: only = ''
       !> Number of the law that declared it.
       integer :: law = 0
       !> One for each pair; not allocated where none was given.
@@ -27,12 +25,15 @@ module fw_law_constants
       logical :: is_asked = .false.
       !> Whether that law is the one of the case, which takes what the model offers.
       logical :: is_in_use = .true.
-      type(constant_type), allocatable, private :: constant(:), named(:)
+      type(constant_type), allocatable, private :: constant(:)
+      !> The keys of all laws that were asked; `only` says which have them: law = 'one', 'another'.
+      type(key_type), allocatable :: named(:)
       !> What the model has, with the number of the law that took it (0: none).
       type(constant_type), allocatable, private :: offered(:)
    contains
       procedure :: bind
       procedure :: offer
+      procedure :: offer_all
       procedure :: first_unused
       procedure :: set
       procedure :: get
@@ -55,13 +56,14 @@ contains
       integer :: k
 
       if (self%is_asked) then
-         call note_law(self, key%name)
+         call note_law(self, key)
          return
       end if
       if (.not. allocated(self%constant)) allocate (self%constant(0))
       if (place_of(self%constant, key%name) > 0) return
       shown = key
-      k = place_of(self%named, key%name)
+      k = 0
+      if (allocated(self%named)) k = findloc(self%named%name, key%name, dim=1)
       if (k > 0) shown%only = self%named(k)%only
       new%name = key%name
       new%law = self%law
@@ -76,37 +78,56 @@ contains
       self%constant = [self%constant, new]
    end subroutine bind
 
-   !> The law that declares now has a constant of this name.
-   subroutine note_law(self, name)
+   !> The law that declares now has this constant.
+   subroutine note_law(self, key)
       class(law_constants), intent(inout) :: self
-      character(*), intent(in) :: name
-      type(constant_type) :: new
+      type(key_type), intent(in) :: key
       integer :: k
 
       if (.not. allocated(self%named)) allocate (self%named(0))
-      k = place_of(self%named, name)
+      k = findloc(self%named%name, key%name, dim=1)
       if (k > 0) then
          self%named(k)%only = trim(self%named(k)%only)//", '"//trim(self%word)//"'"
       else
-         new%name = name
-         new%only = "law = '"//trim(self%word)//"'"
-         self%named = [self%named, new]
+         self%named = [self%named, key]
+         self%named(size(self%named))%only = "law = '"//trim(self%word)//"'"
       end if
    end subroutine note_law
 
-   !> What the model has for a constant (n_pairs), if anything: it holds where the case gives none.
+   !> What the model has for a constant (n_pairs): it holds where the case gives none.
    subroutine offer(self, name, values)
       class(law_constants), intent(inout) :: self
       character(*), intent(in) :: name
-      real(wp), allocatable, intent(in) :: values(:)
+      real(wp), intent(in) :: values(:)
       type(constant_type) :: new
+      integer :: k
 
-      if (.not. allocated(values)) return
       if (.not. allocated(self%offered)) allocate (self%offered(0))
       new%name = name
-      new%values = values
-      self%offered = [self%offered, new]
+      k = place_of(self%offered, name)
+      if (k == 0) then
+         self%offered = [self%offered, new]
+         k = size(self%offered)
+      end if
+      self%offered(k)%values = values
    end subroutine offer
+
+   !> All that another one offers, repeated where it is of the pairs of one sector of some.
+   subroutine offer_all(self, other, n_pairs, n_sectors)
+      class(law_constants), intent(inout) :: self
+      type(law_constants), intent(in) :: other
+      !> Of a sector.
+      integer, intent(in) :: n_pairs, n_sectors
+      integer :: j, k
+
+      if (.not. allocated(other%offered)) return
+      do k = 1, size(other%offered)
+         associate (values => other%offered(k)%values)
+            call self%offer(trim(other%offered(k)%name), &
+                            [(values, j=1, merge(n_sectors, 1, size(values) == n_pairs))])
+         end associate
+      end do
+   end subroutine offer_all
 
    !> A constant of the model that the law of the case has not taken; blank where there is none.
    pure subroutine first_unused(self, name)

@@ -6,7 +6,6 @@ module fw_air_file
    use fw_cyclic_parts, only: add_influence, finish_influence
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hdf5, only: dataset_failure, hdf5_file
-   use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
    use fw_model_file_parts, only: read_matrix
    use fw_text, only: to_text
@@ -15,7 +14,6 @@ module fw_air_file
 
    public :: read_air_file
 
-   character(*), parameter :: by_frequency(*) = [character(15) :: '/aero/frequency', '/aero/matrix']
    character(*), parameter :: by_sector = '/aero/sector', by_diameter = '/aero/nodal_diameter'
 
 contains
@@ -29,20 +27,8 @@ contains
       type(influence_type) :: found
       real(wp), allocatable :: modes(:, :)
       character(:), allocatable :: group, message
-      integer :: i
 
       if (.not. file%exists('/aero')) return
-      do i = 1, size(by_frequency)
-         if (.not. file%exists(trim(by_frequency(i)))) cycle
-         ! Left out, the answer would be that of another air.
-         call dataset_failure(file, trim(by_frequency(i)), 'is there, but forces of the air do '// &
-                              'not depend on frequency here: give those of the frequency that '// &
-                              'matters as /aero/sector/M or /aero/nodal_diameter/K', error)
-         return
-      end do
-      call refuse_strangers(file, '/aero', [character(14) :: 'sector', 'nodal_diameter', 'modes'], &
-                            error)
-      if (allocated(error)) return
       found%by_diameter = file%exists(by_diameter)
       if (found%by_diameter .eqv. file%exists(by_sector)) then
          call fatal_error(error, file%path//': /aero holds '// &
@@ -81,8 +67,6 @@ contains
 
       ! By name: nothing says how many there are, nor in what order.
       allocate (air%number(0))
-      call refuse_strangers(file, group, [character(1) ::], error, [1 - n_sectors, n_sectors - 1])
-      if (allocated(error)) return
       do k = 1 - n_sectors, n_sectors - 1
          name = group//'/'//to_text(k)
          if (.not. file%exists(name)) cycle

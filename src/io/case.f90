@@ -20,15 +20,40 @@ module fw_case
    implicit none (type, external)
    private
 
-   public :: case_type, output_options
+   public :: analyses, case_type, output_options
    public :: analysis_words, analysis_frf, analysis_point, analysis_wear, analysis_time, &
              analysis_modes, analysis_mode, analysis_resonance
 
-   character(*), parameter :: analysis_words(*) = &
-      [character(9) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance']
+   !> What the program knows of an analysis beside its word. A new one is a row of `analyses`, a
+   !> line in fw_run and a file of its own.
+   type :: analysis_facts
+      !> The result has points: natural frequencies are none.
+      logical :: has_points = .true.
+      !> Harmonic balance.
+      logical :: is_balanced = .true.
+      !> Each point is a response that stands by itself, with other ways to it where one fails.
+      logical :: is_response = .false.
+      !> Points one behind the other over a range.
+      logical :: is_sweep = .false.
+      !> The frequency is an unknown; without a load.
+      logical :: finds_frequency = .false., is_free = .false.
+      logical :: wears = .false., is_resonance = .false., is_integrated = .false.
+   end type analysis_facts
+
    integer, parameter :: analysis_frf = 1, analysis_point = 2, analysis_wear = 3, &
                          analysis_time = 4, analysis_modes = 5, analysis_mode = 6, &
                          analysis_resonance = 7
+   !> In the order of the constants.
+   character(*), parameter :: analysis_words(*) = &
+      [character(9) :: 'frf', 'point', 'wear', 'time', 'modes', 'mode', 'resonance']
+   type(analysis_facts), parameter :: analyses(*) = [ &
+      analysis_facts(is_response=.true., is_sweep=.true.), &
+      analysis_facts(is_response=.true.), &
+      analysis_facts(wears=.true.), &
+      analysis_facts(is_integrated=.true., is_balanced=.false.), &
+      analysis_facts(has_points=.false., is_balanced=.false.), &
+      analysis_facts(is_free=.true., finds_frequency=.true.), &
+      analysis_facts(is_resonance=.true., finds_frequency=.true.)]
 
    !> What is written (group &output).
    type :: output_options
@@ -71,6 +96,10 @@ module fw_case
       character(:), allocatable :: namelist
       !> Absolute paths of the files it was read from: no result replaces them.
       type(string_type), allocatable :: inputs(:)
+      !> What stands in the model file and nothing reads.
+      type(string_type), allocatable :: unread(:)
+      !> Groups &contact and &spring that are given where there are no pairs and no springs.
+      logical :: idle_contact = .false., idle_spring = .false.
       !> Result file of a wear run that is to be continued; not allocated to start anew. No key of
       !> the namelist.
       character(:), allocatable :: restart

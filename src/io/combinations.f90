@@ -3,11 +3,11 @@
 !> Ranges of single keys are checked where the keys are declared, and what needs the model where it
 !> is built. The first fault is told: others may follow from it.
 module fw_combinations
-   use fw_case, only: analysis_modes, analysis_wear, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    use fw_memory, only: require_memory
-   use fw_path_checks, only: check_parameter_sweep
+   use fw_parameter_checks, only: check_parameter_sweep
    use fw_rules, only: apply_rules
    use fw_solver_options, only: scheme_implicit_euler
    use fw_text, only: to_text
@@ -42,7 +42,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       associate (highest => case%model%waves%highest())
-         if (highest <= case%harmonics%n_harmonics .or. case%analysis == analysis_modes) return
+         if (.not. analyses(case%analysis)%has_points) return
+         if (highest <= case%harmonics%n_harmonics) return
          call fatal_error(error, 'harmonics%n_harmonics = '// &
                           to_text(case%harmonics%n_harmonics)//', but &load (or /load/harmonic '// &
                           'of the model file) acts in harmonic '//to_text(highest)//': must be '// &
@@ -75,7 +76,7 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
 
-      if (case%analysis /= analysis_wear) return
+      if (.not. analyses(case%analysis)%wears) return
       if (case%wear%scheme == wear_explicit .and. case%wear%order > 2) then
          call fatal_error(error, 'wear%order = '//to_text(case%wear%order)// &
                           ": scheme = 'explicit' has orders 1 and 2, 'implicit' 1 to 4", &

@@ -6,34 +6,37 @@ module fw_cyclic_file
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hdf5, only: dataset_failure, has_attribute, hdf5_file, read_attribute, read_dataset, &
       read_text
-   use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
    use fw_text, only: string_type, to_text
    implicit none (type, external)
    private
 
-   public :: read_complex, read_cyclic_file
+   public :: count_sectors, read_complex, read_cyclic_file
 
    character(*), parameter :: group = '/cyclic'
 
 contains
 
-   !> What the file says of its sectors; nothing where it has no group /cyclic.
-   subroutine read_cyclic_file(file, parts, error)
+   !> Number of sectors; 0 where the file has no group /cyclic.
+   subroutine count_sectors(file, n_sectors, error)
       type(hdf5_file), intent(in) :: file
-      type(cyclic_parts), intent(out) :: parts
+      integer, intent(out) :: n_sectors
       type(error_type), allocatable, intent(out) :: error
 
+      n_sectors = 0
       if (.not. file%exists(group)) return
-      call read_attribute(file, group, 'n_sectors', parts%n_sectors, error)
-      if (allocated(error)) return
-      if (parts%n_sectors < 1) then
-         call fatal_error(error, file%path//': attribute n_sectors of /cyclic is '// &
-                          to_text(parts%n_sectors)//', expected at least 1', status_input)
-         return
-      end if
-      call refuse_strangers(file, group, [character(5) :: 'left', 'right'], error)
-      if (allocated(error)) return
+      call read_attribute(file, group, 'n_sectors', n_sectors, error)
+      if (allocated(error) .or. n_sectors >= 1) return
+      call fatal_error(error, file%path//': attribute n_sectors of /cyclic is '// &
+                       to_text(n_sectors)//', expected at least 1', status_input)
+   end subroutine count_sectors
+
+   !> What the file says of its sectors, once they are counted.
+   subroutine read_cyclic_file(file, parts, error)
+      type(hdf5_file), intent(in) :: file
+      type(cyclic_parts), intent(inout) :: parts
+      type(error_type), allocatable, intent(out) :: error
+
       ! Only matrices of nodal diameters have coordinates beyond displacements.
       if (has_attribute(file, group, 'n_physical')) then
          call read_nodal(file, parts, error)
@@ -51,6 +54,11 @@ contains
       if (file%exists('/nodal_diameter')) then
          call fatal_error(error, file%path//': /nodal_diameter needs attribute n_physical of '// &
                           '/cyclic', status_input)
+         return
+      else if (has_attribute(file, group, 'phase')) then
+         call fatal_error(error, file%path//': attribute phase of /cyclic is that of '// &
+                          'matrices of nodal diameters, and there are none: remove it', &
+                          status_input)
          return
       end if
       ! Sectors that only contact joins have neither.
@@ -70,8 +78,8 @@ contains
       type(hdf5_file), intent(in) :: file
       type(cyclic_parts), intent(inout) :: parts
       type(error_type), allocatable, intent(out) :: error
-      character(*), parameter :: others(*) = [character(13) :: '/mass', '/stiffness', '/damping', &
-         '/cyclic/left', '/cyclic/right']
+      character(*), parameter :: others(*) = [character(19) :: '/mass', '/stiffness', '/damping', &
+         '/stiffness_rotation', '/coriolis', '/cyclic/left', '/cyclic/right']
       character(:), allocatable :: phase
       logical :: turns
       integer :: i, k
@@ -101,10 +109,6 @@ contains
                           '", expected "delay" or "advance"', status_input)
          return
       end if
-      ! Those above N/2 are the conjugates of others: what the file says of them would not count.
-      call refuse_strangers(file, '/nodal_diameter', [character(1) ::], error, &
-                            [0, parts%n_sectors/2])
-      if (allocated(error)) return
       allocate (parts%nodal(parts%n_sectors/2 + 1))
       do k = 0, parts%n_sectors/2
          if (.not. file%exists('/nodal_diameter/'//to_text(k))) cycle
@@ -147,14 +151,6 @@ contains
       character(:), allocatable :: message
       integer :: n
 
-      call refuse_strangers(file, name(:len(name) - 1), &
-                            [character(18) :: 'mass', 'stiffness', 'damping', &
-                             'stiffness_rotation', 'coriolis', 'load', 'observe'], error)
-      if (.not. allocated(error)) call refuse_strangers( &
-         file, name//'load', [character(15) :: 'static', 'cosine', 'sine', 'static_rotation'], &
-         error)
-      if (.not. allocated(error)) call refuse_strangers(file, name//'observe', ['matrix'], error)
-      if (allocated(error)) return
       n = 0
       call read_square('mass', .true., nodal%mass)
       if (allocated(error)) return

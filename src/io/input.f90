@@ -33,6 +33,7 @@ module fw_input
    contains
       procedure :: parse
       procedure :: given
+      procedure :: has_group
       procedure :: place_of
       procedure :: text_of
       procedure :: require_group
@@ -113,20 +114,30 @@ contains
       end associate
    end function text_of
 
-   !> Record a problem where a group is neither in the file nor in an override.
-   subroutine require_group(self, group, purpose)
-      class(input_type), intent(inout) :: self
+   !> Whether a group stands in the file or a key of it in an override.
+   pure logical function has_group(self, group)
+      class(input_type), intent(in) :: self
       character(*), intent(in) :: group
-      !> What it must say, for the message.
-      character(*), intent(in) :: purpose
       integer :: i
 
+      has_group = .true.
       do i = 1, size(self%namelist%groups)
          if (self%namelist%groups(i)%name == group) return
       end do
       do i = 1, self%namelist%n_entries
          if (self%namelist%entries(i)%group == group) return
       end do
+      has_group = .false.
+   end function has_group
+
+   !> Record a problem where a group is neither in the file nor in an override.
+   subroutine require_group(self, group, purpose)
+      class(input_type), intent(inout) :: self
+      character(*), intent(in) :: group
+      !> What it must say, for the message.
+      character(*), intent(in) :: purpose
+
+      if (self%has_group(group)) return
       call self%blame(0, 'group &'//group//' is missing: it gives '//purpose)
    end subroutine require_group
 

@@ -8,8 +8,10 @@ module fw_memory_model
    use fw_error, only: error_type, fatal_error, status_failure, status_input, status_usage
    use fw_kinds, only: i8, wp
    use fw_memory_sectors, only: check_memory_sectors, is_sector_part, put_sector_integers, &
-      put_sector_reals, sector_integers, sector_reals
+      put_sector_reals
    use fw_model_file, only: file_model_type
+   use fw_part_names, only: meant_part
+   use fw_parts, only: is_of_kind, names_to_put, part_to_put, part_type
    use fw_text, only: string_type, to_text
    use fw_text_list, only: append
    implicit none (type, external)
@@ -19,27 +21,6 @@ module fw_memory_model
 
    !> More dofs or pairs are taken for a mistake: the matrices are dense.
    integer, parameter :: most_dofs = 100000, most_pairs = 1000000
-
-   !> Parts of one real kind each: of n_dof**2 values, of n_dof, of n_pairs.
-   character(*), parameter :: matrix_names(*) = &
-      [character(28) :: 'mass', 'stiffness', 'damping', 'stiffness_rotation', &
-       'coriolis']
-   character(*), parameter :: load_names(*) = &
-      [character(28) :: 'load/static', 'load/cosine', 'load/sine', 'load/static_rotation']
-   character(*), parameter :: wave_names(*) = &
-      [character(28) :: 'load/harmonic_cosine', 'load/harmonic_sine']
-   character(*), parameter :: pair_names(*) = &
-      [character(28) :: 'contact/mu', 'contact/gap', 'contact/area', 'contact/normal_load', &
-       'contact/tangential_stiffness', 'contact/normal_stiffness', 'contact/slip_speed', &
-       'contact/position']
-   !> Of as many springs as the first of these parts says.
-   character(*), parameter :: spring_reals(*) = [character(28) :: 'spring/coefficient']
-   character(*), parameter :: spring_integers(*) = &
-      [character(20) :: 'spring/side_1', 'spring/side_2', 'spring/sector_2', 'spring/power']
-   character(*), parameter :: integer_names(*) = &
-      [character(20) :: 'contact/side_1', 'contact/side_2', 'load/harmonic']
-   character(*), parameter :: text_names(*) = &
-      [character(20) :: 'title', 'unit_system', 'contact/patch']
 
    !> A model in the making; `parts` has the shape of one that was read from a file.
    type :: memory_model_type
@@ -87,33 +68,36 @@ contains
       real(wp), intent(in) :: values(:)
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: message
+      type(part_type) :: part
       integer :: rows, columns
 
+      call look_up(name, 'real', part, error)
+      if (allocated(error)) return
       if (is_sector_part(name)) then
          call put_sector_reals(name, values, self%n_dof, self%parts%cyclic, message)
          if (allocated(message)) call fatal_error(error, name//' '//message, status_input)
          return
       end if
-      ! Loads; the other kinds change it.
       rows = self%n_dof
       columns = 1
-      if (any(matrix_names == name)) columns = self%n_dof
-      if (any(pair_names == name)) then
-         rows = 1
-         columns = self%n_pairs
-         if (name == 'contact/position') rows = 3
-      else if (any(wave_names == name)) then
+      select case (part%shape)
+      case ('dof dof')
+         columns = self%n_dof
+      case ('load dof')
          ! As many as there are harmonics, which may be given later.
          columns = size(values)/rows
-      else if (any(spring_reals == name)) then
+      case ('one_or pair')
+         rows = self%n_pairs
+      case ('pair 3')
+         rows = 3
+         columns = self%n_pairs
+      case ('one_or spring')
          ! Of any number: whether it fits the others is known when all are there.
          self%parts%springs%coefficient = values
          return
-      else if (.not. any(matrix_names == name) .and. .not. any(load_names == name)) then
-         call unknown_name(name, [matrix_names, load_names, wave_names, pair_names, &
-                                  spring_reals, sector_reals], 'real', error)
-         return
-      end if
+      case default ! 'dof'
+         continue
+      end select
       ! The product in 64 bits: n_dof**2 passes the range of 32.
       call check_size(name, size(values, kind=i8), rows, columns, error)
       if (allocated(error)) return
@@ -150,14 +134,11 @@ contains
             parts%area = values
          case ('contact/normal_load')
             parts%normal_load = values
-         case ('contact/tangential_stiffness')
-            parts%tangential_stiffness = values
-         case ('contact/normal_stiffness')
-            parts%normal_stiffness = values
-         case ('contact/slip_speed')
-            parts%slip_speed = values
-         case default ! 'contact/position'
+         case ('contact/position')
             parts%position = reshape(values, [3, self%n_pairs])
+         case default
+            ! Of a law.
+            call parts%constants%offer(name(len('contact/') + 1:), values)
          end select
       end associate
    end subroutine put_reals
@@ -170,17 +151,16 @@ contains
       integer, intent(in) :: values(:)
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: message
+      type(part_type) :: part
 
-      if (any(sector_integers == name)) then
+      call look_up(name, 'integer', part, error)
+      if (allocated(error)) return
+      if (is_sector_part(name)) then
          call put_sector_integers(name, values, self%n_pairs, self%parts%cyclic, message)
          if (allocated(message)) call fatal_error(error, name//' '//message, status_input)
          return
-      else if (any(spring_integers == name)) then
+      else if (index(name, 'spring/') == 1) then
          call put_spring_integers(name, values, self%parts%springs)
-         return
-      else if (.not. any(integer_names == name)) then
-         call unknown_name(name, [integer_names, spring_integers, sector_integers], 'integer', &
-                           error)
          return
       end if
       if (name == 'load/harmonic') then
@@ -217,11 +197,10 @@ contains
       character(*), intent(in) :: name
       type(string_type), intent(in) :: texts(:)
       type(error_type), allocatable, intent(out) :: error
+      type(part_type) :: part
 
-      if (.not. any(text_names == name)) then
-         call unknown_name(name, text_names, 'text', error)
-         return
-      end if
+      call look_up(name, 'text', part, error)
+      if (allocated(error)) return
       call check_size(name, size(texts, kind=i8), 1, merge(self%n_pairs, 1, &
                                                            name == 'contact/patch'), error)
       if (allocated(error)) return
@@ -409,20 +388,20 @@ contains
                        status_input)
    end subroutine check_size
 
-   !> Say which names there are.
-   subroutine unknown_name(name, names, kind_of, error)
-      character(*), intent(in) :: name, names(:), kind_of
+   !> The row of the table for a name; an error that says which names there are.
+   subroutine look_up(name, kind, part, error)
+      character(*), intent(in) :: name, kind
+      type(part_type), intent(out) :: part
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: list
-      integer :: i
 
-      list = ''
-      do i = 1, size(names)
-         if (i > 1) list = list//', '
-         list = list//trim(names(i))
-      end do
-      call fatal_error(error, "'"//name//"' is no "//kind_of//' part of a model: must be one '// &
-                       'of '//list, status_usage)
-   end subroutine unknown_name
+      ! Functions of texts serve one thread at a time.
+      !$omp critical (fretwear_io)
+      part = part_to_put(name)
+      if (.not. is_of_kind(part, kind)) then
+         call fatal_error(error, "'"//name//"' is no "//kind//' part of a model: must be one '// &
+                          'of '//names_to_put(kind)//meant_part(name), status_usage)
+      end if
+      !$omp end critical (fretwear_io)
+   end subroutine look_up
 
 end module fw_memory_model

@@ -14,14 +14,7 @@ module fw_memory_sectors
    private
 
    public :: is_sector_part, put_sector_integers, put_sector_reals, check_memory_sectors
-   public :: sector_integers, sector_reals
 
-   !> Names for messages: K and M stand for numbers.
-   character(*), parameter :: sector_integers(*) = &
-      [character(20) :: 'cyclic/n_sectors', 'cyclic/left', 'cyclic/right', 'contact/sector_2']
-   character(*), parameter :: sector_reals(*) = &
-      [character(28) :: 'nodal_diameter/K/mass', 'aero/sector/M', 'aero/nodal_diameter/M', &
-       'aero/modes']
    character(*), parameter :: nodal = 'nodal_diameter/', air_by_sector = 'aero/sector/', &
       air_by_diameter = 'aero/nodal_diameter/'
 
@@ -59,14 +52,12 @@ contains
          parts%left = values
       case ('cyclic/right')
          parts%right = values
-      case ('contact/sector_2')
+      case default ! 'contact/sector_2'
          if (size(values) /= n_pairs) then
             call miscount(size(values), n_pairs, message)
          else
             parts%sector_2 = values
          end if
-      case default
-         message = 'is no integer part of a model'
       end select
    end subroutine put_sector_integers
 
@@ -85,16 +76,9 @@ contains
          return
       end if
       slash = index(name(len(nodal) + 1:), '/')
-      k = -1
-      if (index(name, nodal) == 1 .and. slash > 1) then
-         call take_number(name(len(nodal) + 1:len(nodal) + slash - 1), 0, parts%n_sectors/2, k, &
-                          message)
-         if (allocated(message)) return
-      end if
-      if (k < 0) then
-         message = 'is no real part of a model'
-         return
-      end if
+      call take_number(name(len(nodal) + 1:len(nodal) + slash - 1), 0, parts%n_sectors/2, k, &
+                       message)
+      if (allocated(message)) return
       if (.not. allocated(parts%nodal)) allocate (parts%nodal(parts%n_sectors/2 + 1))
       parts%n_physical = n_dof
       call put_diameter(name(len(nodal) + slash + 1:), values, n_dof, parts%nodal(k + 1), message)
@@ -143,17 +127,13 @@ contains
          call take_load(values, n, parts%load_sine, message)
       case ('load/static_rotation')
          call take_load(values, n, parts%load_static_rotation, message)
-      case ('observe/matrix')
+      case default ! 'observe/matrix'
          if (modulo(size(values), 2*n) /= 0) then
             message = 'has '//to_text(size(values))//' values: must be a multiple of '// &
                       to_text(2*n)//', a row for each observed quantity'
          else
             parts%observe = complex_rows(values, n)
          end if
-      case default
-         message = 'is no part of a nodal diameter: must be mass, stiffness, damping, '// &
-                   'stiffness_rotation, coriolis, load/static, load/cosine, load/sine, '// &
-                   'load/static_rotation or observe/matrix'
       end select
    end subroutine put_diameter
 
@@ -208,11 +188,6 @@ contains
       end if
       by_diameter = index(name, air_by_diameter) == 1
       start = merge(len(air_by_diameter), len(air_by_sector), by_diameter) + 1
-      if (.not. by_diameter .and. index(name, air_by_sector) /= 1) then
-         message = 'is no part of the forces of the air: must be aero/modes, aero/sector/M or '// &
-                   'aero/nodal_diameter/M'
-         return
-      end if
       call take_number(name(start:), 1 - parts%n_sectors, parts%n_sectors - 1, m, message)
       if (allocated(message)) return
       a = nint(sqrt(0.5_wp*real(size(values), wp)))

@@ -1,14 +1,12 @@
 !> Groups /mode and /synthesis of a result file: what a nonlinear mode has beside its points, one
 !> row for each of them, its limit cycles, and responses that are put together from it.
 module fw_mode_group
-   use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
-   use fw_result_labels, only: label_dataset
+   use fw_result_group, only: group_writer, result_group
    implicit none (type, external)
    private
 
-   public :: mode_table, mode_row, write_mode
+   public :: mode_table, mode_row
 
    !> What a point of the curve has beside those of a response.
    type :: mode_row
@@ -26,7 +24,7 @@ module fw_mode_group
       logical :: converged = .true.
    end type mode_row
 
-   type :: mode_table
+   type, extends(result_group) :: mode_table
       !> Number of the mode, its frequency [rad/s] and damping with stuck pairs, and the amplitude
       !> from which on a pair slips or separates; NaN where none does.
       integer :: number = 1
@@ -44,6 +42,7 @@ module fw_mode_group
    contains
       procedure :: add
       procedure :: add_cycle
+      procedure :: write => write_mode
    end type mode_table
 
 contains
@@ -82,37 +81,26 @@ contains
       self%cycle_stable = [self%cycle_stable, merge(1, 0, is_stable)]
    end subroutine add_cycle
 
-   !> Write the groups; nothing where there is no point.
-   subroutine write_mode(file, table, unit_system, error)
-      type(hdf5_file), intent(in) :: file
-      type(mode_table), intent(in) :: table
-      !> Of the model; not allocated where nothing is known of it.
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
+   subroutine write_mode(self, to)
+      class(mode_table), intent(in) :: self
+      type(group_writer), intent(inout) :: to
 
-      if (table%n == 0) return
-      call write_points(file, table, unit_system, error)
-      if (.not. allocated(error)) call write_number(file, table, error)
-      if (.not. allocated(error) .and. allocated(table%cycle_amplitude)) then
-         call write_one(file, '/mode/limit_cycle/amplitude', table%cycle_amplitude, unit_system, &
-                        error)
-         if (.not. allocated(error)) call write_one(file, '/mode/limit_cycle/omega', &
-                                                    table%cycle_omega, unit_system, error)
-         if (.not. allocated(error)) call write_dataset(file, '/mode/limit_cycle/stable', &
-                                                        table%cycle_stable, error)
-         if (.not. allocated(error)) call label_dataset(file, '/mode/limit_cycle/stable', &
-                                                        unit_system, error)
+      if (self%n == 0) return
+      call write_points(self, to)
+      if (allocated(self%cycle_amplitude)) then
+         call to%put('/mode/limit_cycle/amplitude', self%cycle_amplitude, '', 'cycle', &
+                     'amplitude of the limit cycle, as the control has it')
+         call to%put('/mode/limit_cycle/omega', self%cycle_omega, 'rad/s', 'cycle', &
+                     'angular frequency of the limit cycle')
+         call to%put('/mode/limit_cycle/stable', self%cycle_stable, '', 'cycle', &
+                     '1 where damping grows with the amplitude')
       end if
-      if (.not. allocated(error) .and. allocated(table%scale)) then
-         call write_synthesis(file, table, unit_system, error)
-      end if
+      if (allocated(self%scale)) call write_synthesis(self, to)
    end subroutine write_mode
 
-   subroutine write_points(file, table, unit_system, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine write_points(table, to)
       type(mode_table), intent(in) :: table
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
+      type(group_writer), intent(inout) :: to
       real(wp), allocatable :: shape_of(:, :, :)
       integer :: k
 
@@ -121,11 +109,16 @@ contains
       do k = 1, table%n
          shape_of(:, :, k) = table%row(k)%first/table%row(k)%modal_amplitude
       end do
-      call write_dataset(file, '/mode/shape', shape_of, error)
-      if (.not. allocated(error)) call label_dataset(file, '/mode/shape', unit_system, error)
-      if (allocated(error) .or. .not. any(table%row(:table%n)%force > 0.0_wp)) return
-      call write_one(file, '/mode/resonant_scale', &
-                     [(resonant_scale(table%row(k)), k=1, table%n)], unit_system, error)
+      call to%put('/mode/shape', shape_of, '', 'point observed part', &
+                  'first harmonic, cosine and sine, over the modal amplitude')
+      if (any(table%row(:table%n)%force > 0.0_wp)) then
+         call to%put('/mode/resonant_scale', [(resonant_scale(table%row(k)), k=1, table%n)], '1', &
+                     'point', 'factor of the load with which the point is a resonance')
+      end if
+      call to%note('/mode', 'number', table%number)
+      call to%note('/mode', 'stuck_omega', table%stuck_omega)
+      call to%note('/mode', 'stuck_damping_ratio', table%stuck_damping_ratio)
+      call to%note('/mode', 'onset_amplitude', table%onset_amplitude)
    end subroutine write_points
 
    !> The factor of the load with which a point is a resonance: its work balances the damping.
@@ -136,49 +129,20 @@ contains
       if (row%force > 0.0_wp) scale = row%self_excitation*row%omega*row%modal_amplitude/row%force
    end function resonant_scale
 
-   subroutine write_number(file, table, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine write_synthesis(table, to)
       type(mode_table), intent(in) :: table
-      type(error_type), allocatable, intent(out) :: error
-
-      call write_attribute(file, '/mode', 'number', table%number, error)
-      if (.not. allocated(error)) call write_attribute(file, '/mode', 'stuck_omega', &
-                                                       table%stuck_omega, error)
-      if (.not. allocated(error)) call write_attribute(file, '/mode', 'stuck_damping_ratio', &
-                                                       table%stuck_damping_ratio, error)
-      if (.not. allocated(error)) call write_attribute(file, '/mode', 'onset_amplitude', &
-                                                       table%onset_amplitude, error)
-   end subroutine write_number
-
-   subroutine write_synthesis(file, table, unit_system, error)
-      type(hdf5_file), intent(in) :: file
-      type(mode_table), intent(in) :: table
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
+      type(group_writer), intent(inout) :: to
       real(wp) :: first(table%n)
       integer :: k
 
       do k = 1, table%n
          first(k) = hypot(table%row(k)%first(1, 1), table%row(k)%first(2, 1))
       end do
-      call write_one(file, '/synthesis/scale', table%scale, unit_system, error)
-      if (allocated(error)) return
-      call write_dataset(file, '/synthesis/omega', table%response_omega, error)
-      if (.not. allocated(error)) call label_dataset(file, '/synthesis/omega', unit_system, error)
-      if (.not. allocated(error)) call write_one(file, '/synthesis/first_harmonic', first, &
-                                                 unit_system, error)
+      call to%put('/synthesis/scale', table%scale, '1', 'scale', 'factor of the vibratory load')
+      call to%put('/synthesis/omega', table%response_omega, 'rad/s', 'scale point side', &
+                  'frequencies of the response put together, NaN: none')
+      call to%put('/synthesis/first_harmonic', first, '<length>', 'point', &
+                  'amplitude of the first observed quantity')
    end subroutine write_synthesis
-
-   !> A list of numbers with what it is.
-   subroutine write_one(file, name, values, unit_system, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      real(wp), intent(in), contiguous :: values(:)
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
-
-      call write_dataset(file, name, values, error)
-      if (.not. allocated(error)) call label_dataset(file, name, unit_system, error)
-   end subroutine write_one
 
 end module fw_mode_group

@@ -6,21 +6,26 @@
 module fw_model_file
    use fw_air_file, only: read_air_file
    use fw_contact_data, only: spring_type
-   use fw_cyclic_file, only: read_cyclic_file
+   use fw_cyclic_file, only: count_sectors, read_cyclic_file
    use fw_cyclic_parts, only: cyclic_parts
    use fw_error, only: error_type, fatal_error, status_input
-   use fw_hdf5, only: dataset_failure, hdf5_file, has_attribute, read_attribute, read_dataset
+   use fw_hdf5, only: dataset_failure, get_shape, hdf5_file, has_attribute, read_attribute, &
+      read_dataset, shape_text
    use fw_kinds, only: wp
+   use fw_law_constants, only: law_constants
    use fw_laws, only: law_words
    use fw_model_file_parts, only: read_dofs, read_matrix, read_names, read_pair_values, &
       read_positions, read_vector
+   use fw_parts, only: law_constant_names
    use fw_reader_text, only: words_text
    use fw_spring_file, only: read_spring_file
+   use fw_strangers, only: find_strangers
    use fw_text, only: string_type, to_text
+   use hdf5, only: hsize_t
    implicit none (type, external)
    private
 
-   public :: file_model_type, read_model_hdf5
+   public :: file_model_type, list_unread, read_model_hdf5
 
    ! What a file must say of itself in its attributes, so that any other HDF5 file is told apart.
    character(*), parameter :: format_name = 'fretwear-model'
@@ -34,6 +39,8 @@ module fw_model_file
       character(:), allocatable :: title, unit_system
       !> Paths of the files it was read from.
       type(string_type), allocatable :: files(:)
+      !> What stands in the file and nothing reads.
+      type(string_type), allocatable :: unread(:)
       !> Structure (n_dof, n_dof), not checked for symmetry.
       real(wp), allocatable :: mass(:, :), stiffness(:, :), damping(:, :)
       !> Stiffness per square of the rotation speed (n_dof, n_dof) [force/length/(rad/s)**2].
@@ -42,11 +49,11 @@ module fw_model_file
       integer, allocatable :: side_1(:, :), side_2(:, :)
       !> Friction coefficient, gap [length] and area [length**2] of the pairs (n_pairs).
       real(wp), allocatable :: mu(:), gap(:), area(:)
-      !> Constant normal load [force] and stiffnesses [force/length] of the pairs (n_pairs).
-      real(wp), allocatable :: normal_load(:), tangential_stiffness(:), normal_stiffness(:)
-      !> Sliding velocity of smooth friction (n_pairs) [length/s], and the law of the pairs, a
-      !> number in `law_words`; 0: left to the case.
-      real(wp), allocatable :: slip_speed(:)
+      !> Constant normal load of the pairs (n_pairs) [force], and what it offers of the constants
+      !> of laws.
+      real(wp), allocatable :: normal_load(:)
+      type(law_constants) :: constants
+      !> The law of the pairs, a number in `law_words`; 0: left to the case.
       integer :: law = 0
       !> Coordinates of the pairs (3, n_pairs) [length] and the names of their patches (n_pairs).
       real(wp), allocatable :: position(:, :)
@@ -95,6 +102,8 @@ contains
       model%files(1)%text = path
       ! In this order: the mass gives n_dof, the dofs of side 1 the number of pairs.
       call read_header(file, model, error)
+      if (.not. allocated(error)) call read_members(file, model%cyclic%n_sectors, model%unread, &
+                                                    error)
       if (.not. allocated(error)) call read_cyclic_file(file, model%cyclic, error)
       if (.not. allocated(error)) call read_structure(file, model, error)
       if (.not. allocated(error)) call read_air_file(file, model%order(), &
@@ -106,6 +115,39 @@ contains
       if (.not. allocated(error)) call read_observed(file, model, error)
       call file%close(ignored)
    end subroutine read_model_hdf5
+
+   !> What stands in a model file and nothing reads; an error where that is refused.
+   subroutine list_unread(path, unread, error)
+      character(*), intent(in) :: path
+      type(string_type), allocatable, intent(out) :: unread(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: ignored
+      type(hdf5_file) :: file
+      integer :: n_sectors
+
+      ! HDF5 and functions of texts serve one thread at a time.
+      !$omp critical (fretwear_io)
+      call file%open_read(path, error)
+      if (.not. allocated(error)) call read_members(file, n_sectors, unread, error)
+      call file%close(ignored)
+      !$omp end critical (fretwear_io)
+   end subroutine list_unread
+
+   !> The number of sectors, and what nothing reads: first, for a part that is missing may stand
+   !> there under another name.
+   subroutine read_members(file, n_sectors, unread, error)
+      type(hdf5_file), intent(in) :: file
+      integer, intent(out) :: n_sectors
+      type(string_type), allocatable, intent(out) :: unread(:)
+      type(error_type), allocatable, intent(out) :: error
+      !> Takes every number for that of a nodal diameter, where nothing says how many there are.
+      integer, parameter :: many = 1000
+      type(error_type), allocatable :: uncounted
+
+      call count_sectors(file, n_sectors, uncounted)
+      call find_strangers(file, merge(many, n_sectors, allocated(uncounted)), unread, error)
+      if (.not. allocated(error)) call move_alloc(uncounted, error)
+   end subroutine read_members
 
    !> Format and version, which are required, title and system of units, which are not.
    subroutine read_header(file, model, error)
@@ -163,7 +205,9 @@ contains
       type(hdf5_file), intent(in) :: file
       type(file_model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
-      integer :: n
+      character(24), allocatable :: names(:)
+      real(wp), allocatable :: values(:)
+      integer :: k, n
 
       if (.not. file%exists('/contact')) return
       call read_dofs(file, '/contact/side_1', -1, model%side_1, error)
@@ -179,13 +223,13 @@ contains
       if (allocated(error)) return
       call read_pair_values(file, '/contact/normal_load', n, model%normal_load, error)
       if (allocated(error)) return
-      call read_pair_values(file, '/contact/tangential_stiffness', n, &
-                            model%tangential_stiffness, error)
-      if (allocated(error)) return
-      call read_pair_values(file, '/contact/normal_stiffness', n, model%normal_stiffness, error)
-      if (allocated(error)) return
-      call read_pair_values(file, '/contact/slip_speed', n, model%slip_speed, error)
-      if (.not. allocated(error)) call read_law(file, model%law, error)
+      names = law_constant_names()
+      do k = 1, size(names)
+         call read_pair_values(file, '/contact/'//trim(names(k)), n, values, error)
+         if (allocated(error)) return
+         if (allocated(values)) call model%constants%offer(trim(names(k)), values)
+      end do
+      call read_law(file, model%law, error)
       if (allocated(error)) return
       call read_positions(file, '/contact/position', n, model%position, error)
       if (allocated(error)) return
@@ -259,6 +303,12 @@ contains
                               to_text(minval(model%load_harmonic))//', expected 0, 1, ..', error)
          return
       end if
+      if (m > 0 .and. .not. any([(file%exists(trim(wave_names(j))), j=1, size(wave_names))])) then
+         call dataset_failure(file, '/load/harmonic', 'needs their loads, '// &
+                              '/load/harmonic_cosine or /load/harmonic_sine', error)
+         return
+      end if
+      if (m == 0) call refuse_rows(file, error)
       if (m == 0) return
       ! Rows of the file are columns here: `read_matrix` turns them, for it takes matrices.
       call read_rows(trim(wave_names(1)), model%harmonic_cosine)
@@ -277,6 +327,24 @@ contains
       end subroutine read_rows
 
    end subroutine read_harmonic_loads
+
+   !> Loads of no harmonics have no rows.
+   subroutine refuse_rows(file, error)
+      type(hdf5_file), intent(in) :: file
+      type(error_type), allocatable, intent(out) :: error
+      integer(hsize_t), allocatable :: dims(:)
+      integer :: j
+
+      do j = 1, size(wave_names)
+         if (.not. file%exists(trim(wave_names(j)))) cycle
+         call get_shape(file, trim(wave_names(j)), dims, error)
+         if (allocated(error)) return
+         if (product(dims) == 0) cycle
+         call dataset_failure(file, trim(wave_names(j)), 'has shape '//shape_text(dims)// &
+                              ', but /load/harmonic is empty', error)
+         return
+      end do
+   end subroutine refuse_rows
 
    !> Observed quantities: by dof numbers, or by a matrix of factors.
    subroutine read_observed(file, model, error)

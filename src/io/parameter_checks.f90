@@ -1,5 +1,5 @@
-!> Parameters that a case cannot be differentiated by, or changed in, each with the reason: for
-!> every group that takes words of fw_parameters.
+!> Parameters that a case cannot be differentiated by, or changed in, each with the reason, and
+!> values that they cannot take: for every group that takes words of fw_parameters.
 module fw_parameter_checks
    use fw_case, only: case_type
    use fw_contact_data, only: contact_type
@@ -7,13 +7,16 @@ module fw_parameter_checks
    use fw_kinds, only: wp
    use fw_laws, only: is_rigid, law_words
    use fw_model, only: model_type
-   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
-      is_per_pair, is_per_spring, normal_load, normal_stiffness, parameter_key, parameter_words, &
-      rotation_speed, static_scale, tangential_stiffness
+   use fw_parameter_sweep, only: as_factor
+   use fw_parameter_values, only: get_parameter
+   use fw_parameters, only: harmonic_scale, is_of_matrices, is_per_pair, is_per_spring, &
+      normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, parameter_key, &
+      parameter_words, parameters, positive, rotation_speed, static_scale, tangential_stiffness
+   use fw_values, only: number_text
    implicit none (type, external)
    private
 
-   public :: check_parameter
+   public :: check_parameter, check_parameter_sweep, pairs_of
 
 contains
 
@@ -74,36 +77,26 @@ contains
       integer, intent(in) :: number
       !> Not allocated where nothing speaks against it.
       character(:), allocatable, intent(out) :: reason
-      logical :: slides(contact%n_pairs), closes(contact%n_pairs)
       character(24) :: key
 
       if (contact%n_pairs == 0) then
          reason = 'there are no contact pairs: give group &contact'
          return
       end if
-      slides = any(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1)
-      closes = contact%side_1(3, :) /= 0 .or. contact%side_2(3, :) /= 0
-      select case (number)
-      case (friction_coefficient)
-         if (.not. any(slides)) reason = 'no pair has a tangential dof'
-      case (normal_load)
-         if (all(closes)) reason = 'every pair has a normal dof, whose motion presses it'
-      case (gap)
-         if (.not. any(closes)) reason = 'no pair has a normal dof'
-      case (tangential_stiffness, normal_stiffness)
+      if (any(number == [tangential_stiffness, normal_stiffness])) then
          call parameter_key(number, key)
          if (is_rigid(contact%law)) then
             reason = "contact%law = '"//trim(law_words(contact%law))//"' is rigid: its eps is a"// &
                      ' number of the method, on which exact solutions do not depend'
          else if (.not. contact%constants%is_of_law(contact%law, key)) then
             reason = "contact%law = '"//trim(law_words(contact%law))//"' has no "//trim(key)
-         else if (number == tangential_stiffness .and. .not. any(slides)) then
-            reason = 'no pair has a tangential dof'
-         else if (number == normal_stiffness .and. .not. any(closes)) then
-            reason = 'no pair has a normal dof'
          end if
-      case default ! pairs have no other parameter
-         reason = 'it is none of the pairs'
+      end if
+      if (allocated(reason) .or. any(pairs_of(contact, number))) return
+      select case (parameters(number)%pairs)
+      case (of_sliding); reason = 'no pair has a tangential dof'
+      case (of_closing); reason = 'no pair has a normal dof'
+      case default; reason = 'every pair has a normal dof, whose motion presses it'
       end select
    end subroutine check_of_pairs
 
@@ -119,5 +112,76 @@ contains
          reason = 'the model has no stiffness_rotation and no load static_rotation'
       end if
    end subroutine check_of_matrices
+
+   !> Pairs that a parameter says something of.
+   pure function pairs_of(contact, number) result(counts)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: number
+      logical :: counts(contact%n_pairs)
+
+      associate (c => contact)
+         select case (parameters(number)%pairs)
+         case (of_sliding); counts = any(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)
+         case (of_closing); counts = c%side_1(3, :) /= 0 .or. c%side_2(3, :) /= 0
+         case (of_pressed); counts = c%side_1(3, :) == 0 .and. c%side_2(3, :) == 0
+         case default; counts = .false.
+         end select
+      end associate
+   end function pairs_of
+
+   !> A sweep over another parameter than the frequency.
+   subroutine check_parameter_sweep(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. case%over%is_wanted()) return
+      call check_parameter(case, case%over%number, 'sweep%parameter', error)
+      if (.not. allocated(error)) call check_values(case, error)
+   end subroutine check_parameter_sweep
+
+   !> Values that the parameter can take: one for all pairs (springs), in its range.
+   subroutine check_values(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: base(:)
+      real(wp) :: lowest
+
+      associate (over => case%over)
+         call get_parameter(case, over%number, base)
+         if (is_per_pair(over%number)) base = pack(base, pairs_of(case%contact, over%number))
+         lowest = minval(over%ends())
+         if (over%as == as_factor) then
+            if (.not. any(abs(base) > 0.0_wp)) then
+               call fatal_error(error, "sweep%as = 'factor': "// &
+                                trim(parameter_words(over%number))//' is 0 in the case, and a '// &
+                                "factor of it changes nothing; use 'value'", status_input)
+               return
+            end if
+         else if (maxval(base) - minval(base) > 0.0_wp) then
+            call fatal_error(error, 'sweep%parameter = '''// &
+                             trim(parameter_words(over%number))//''': its values differ, from '// &
+                             number_text(minval(base))//' to '//number_text(maxval(base))// &
+                             ", and one value would replace them all; use sweep%as = 'factor'", &
+                             status_input)
+            return
+         end if
+         if (over%as == as_factor .and. is_of_matrices(over%number)) lowest = base(1)*lowest
+         select case (parameters(over%number)%sign)
+         case (not_negative); if (lowest < 0.0_wp) call refuse_lowest('at least 0')
+         case (positive); if (.not. lowest > 0.0_wp) call refuse_lowest('above 0')
+         case default ! any
+         end select
+      end associate
+
+   contains
+
+      subroutine refuse_lowest(what)
+         character(*), intent(in) :: what
+
+         call fatal_error(error, 'sweep goes down to '//number_text(lowest)//' of '// &
+                          trim(parameter_words(case%over%number))//': must be '//what, status_input)
+      end subroutine refuse_lowest
+
+   end subroutine check_values
 
 end module fw_parameter_checks

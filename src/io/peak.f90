@@ -24,6 +24,8 @@ module fw_peak
       !> Between the frequencies on both sides where the amplitude is that over the root of 2
       !> [rad/s]; below 0 where it does not fall so far on both sides.
       real(wp) :: bandwidth = -1.0_wp
+      !> Part of the amplitude to which this is known; below 0 where nothing is said of it.
+      real(wp) :: tolerance = -1.0_wp
       !> Coefficients (0, c1, s1, ...) of the quantity (2H+1).
       real(wp), allocatable :: coefficients(:)
       integer :: found_by = found_row

@@ -1,10 +1,10 @@
 !> Every quantity of a solution point, declared once: what it is called, its unit and dimensions,
-!> when a result holds it (fw_quantity_conditions), and where its numbers are in a point
-!> (fw_quantity_values). The rows of the result file, their labels, what a caller may ask of a point
+!> when a result holds it (fw_quantity_conditions), and where its numbers are in a point. The rows of the result file, their labels, what a caller may ask of a point
 !> and what a continued run copies all follow from here.
 !>
-!> A new quantity is one line in `point_quantities`, naming the procedure that gives its numbers.
+!> A new quantity is one line in `point_quantities` and its case in `values_of`.
 module fw_point_quantities
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use fw_case, only: case_type
    use fw_hdf5, only: growing_integer, growing_logical, growing_real
    use fw_kinds, only: wp
@@ -15,12 +15,6 @@ module fw_point_quantities
    use fw_quantity_conditions, only: always, asks_stability, follows_branch, follows_frequency, &
       follows_parameter, goes_over, has_levels, is_accurate, is_controlled, is_mode, is_response, &
       scales_load, shows_contact, wears
-   use fw_quantity_values, only: amplitude, coefficients, control, converged, cycles, &
-      damping_ratio, depth, dissipation, error_estimate, first_harmonic, fold, force, &
-      force_history, fraction, harmonics, history, instants, iterations, load_scale, &
-      modal_amplitude, multiplier_error, multipliers, nothing, omega, place, residual, seconds, &
-      self_excitation, served_by, slip_history, stable, tangent, tangent_omega, tangent_parameter, &
-      wear_energy, wear_rate, wear_volume
    use fw_response_rows, only: is_of_pairs, value_words
    use fw_sensitivity_options, only: of_itself
    use fw_text, only: string_type
@@ -50,8 +44,7 @@ module fw_point_quantities
       logical :: is_served_by = .false.
       !> Whether an attribute names the parameter that the sweep goes over.
       logical :: names_parameter = .false.
-      !> Its numbers in a point, and whether the result of a case has it at all.
-      procedure(get_values), pointer, nopass :: get => null()
+      !> Whether the result of a case has it at all.
       procedure(is_wanted), pointer, nopass :: exists => null()
       !> Of derivatives: the quantity, and the parameter (0: deviation; `of_itself`: the value of
       !> the other one), which no name tells.
@@ -63,15 +56,6 @@ module fw_point_quantities
    end type quantity_type
 
    abstract interface
-      !> The numbers of a point, laid out as h5py shows them (the last index runs fastest); not
-      !> allocated where they are not known. A flag is 1 or 0.
-      subroutine get_values(point, values)
-         import :: point_type, wp
-         implicit none (type, external)
-         type(point_type), intent(in) :: point
-         real(wp), allocatable, intent(out) :: values(:)
-      end subroutine get_values
-
       !> Whether the result of a case holds the quantity.
       pure logical function is_wanted(case)
          import :: case_type
@@ -92,71 +76,69 @@ contains
 
       allocate (list(room))
       n = 0
-      call add('omega', r, 'rad/s', 'point', 'angular frequency of the excitation', omega, always)
+      call add('omega', r, 'rad/s', 'point', 'angular frequency of the excitation', always)
       call add('parameter', r, '', 'point', 'value of the parameter that the sweep goes over', &
-               place, goes_over)
+               goes_over)
       list(n)%names_parameter = .true.
       call add('load/scale', r, '1', 'point', 'factor of the vibratory loads of the model', &
-               load_scale, scales_load)
+               scales_load)
       call add('control/amplitude', r, '<length>', 'point', &
-               'amplitude for which the load was found', control, is_controlled)
+               'amplitude for which the load was found', is_controlled)
       call add('coefficients', r, '<length>', 'point coefficient observed', &
-               'Fourier coefficients 0, c1, s1, ... of observed quantities', coefficients, always)
-      call add('amplitude', r, '<length>', 'point observed', &
-               'largest magnitude over the period', amplitude, always)
-      call add('converged', l, '', 'point', 'whether the point converged', converged, always)
-      call add('iterations', i, '1', 'point', 'iterations of the solver', iterations, always)
-      call add('residual', r, '1', 'point', 'residual over vibratory load', residual, always)
-      call add('seconds', r, 's', 'point', 'time spent on the point', seconds, always)
+               'Fourier coefficients 0, c1, s1, ... of observed quantities', always)
+      call add('amplitude', r, '<length>', 'point observed', 'largest magnitude over the period', &
+               always)
+      call add('converged', l, '', 'point', 'whether the point converged', always)
+      call add('iterations', i, '1', 'point', 'iterations of the solver', always)
+      call add('residual', r, '1', 'point', 'residual over vibratory load', always)
+      call add('seconds', r, 's', 'point', 'time spent on the point', always)
       call add('served_by', i, '', 'point', 'what gave the solution, an index into names', &
-               served_by, is_response)
+               is_response)
       ! What does not fit a line of the table is set behind it.
       list(n)%is_served_by = .true.
-      call add('fold', l, '', 'point', 'whether the branch turns here', fold, follows_branch)
+      call add('fold', l, '', 'point', 'whether the branch turns here', follows_branch)
       call add('tangent/omega', r, 'rad/s', 'point', 'direction of the branch, frequency', &
-               tangent_omega, follows_frequency)
+               follows_frequency)
       call add('tangent/parameter', r, '', 'point', 'direction of the branch, parameter', &
-               tangent_parameter, follows_parameter)
+               follows_parameter)
       call add('tangent/coefficients', r, '<length>', 'point coefficient observed', &
-               'direction of the branch, coefficients', tangent, follows_branch)
-      call add('harmonics', i, '1', 'point', 'harmonics of the balance', harmonics, has_levels)
-      call add('instants', i, '1', 'point', 'instants of the period', instants, is_accurate)
+               'direction of the branch, coefficients', follows_branch)
+      call add('harmonics', i, '1', 'point', 'harmonics of the balance', has_levels)
+      call add('instants', i, '1', 'point', 'instants of the period', is_accurate)
       call add('error_estimate', r, '1', 'point', 'bound of the relative error of the response', &
-               error_estimate, is_accurate)
+               is_accurate)
       call add('floquet/stable', i, '', 'point', &
-               '1 stable, 0 unstable, -1 undecided or not known', stable, asks_stability)
+               '1 stable, 0 unstable, -1 undecided or not known', asks_stability)
       list(n)%missing = -1
       call add('floquet/multipliers', r, '1', 'point multiplier part', &
-               'Floquet multipliers, real and imaginary part', multipliers, asks_stability)
-      call add('floquet/error', r, '1', 'point multiplier', &
-               'estimated error of each multiplier', multiplier_error, asks_stability)
+               'Floquet multipliers, real and imaginary part', asks_stability)
+      call add('floquet/error', r, '1', 'point multiplier', 'estimated error of each multiplier', &
+               asks_stability)
       call add('contact/force', r, '<force>', 'point coefficient pair direction', &
-               'Fourier coefficients of the contact forces t1, t2, n', force, shows_contact)
+               'Fourier coefficients of the contact forces t1, t2, n', shows_contact)
       call add('contact/fraction', r, '1', 'point pair state', &
-               'share of the period in stick, slip, open', fraction, shows_contact)
-      call add('contact/dissipation', r, '<energy>', 'point pair', &
-               'friction energy per cycle', dissipation, shows_contact)
+               'share of the period in stick, slip, open', shows_contact)
+      call add('contact/dissipation', r, '<energy>', 'point pair', 'friction energy per cycle', &
+               shows_contact)
       call add('history/observed', r, '<length>', 'point instant observed', &
-               'observed quantities over one period', history, always)
+               'observed quantities over one period', always)
       call add('history/force', r, '<force>', 'point instant pair direction', &
-               'contact forces t1, t2, n over one period', force_history, always)
+               'contact forces t1, t2, n over one period', always)
       call add('history/relative_displacement', r, '<length>', 'point instant pair direction', &
-               'relative displacement t1, t2, n over one period', slip_history, always)
+               'relative displacement t1, t2, n over one period', always)
       call add('mode/damping_ratio', r, '1', 'point', 'damping ratio of the mode, xi/(2 omega)', &
-               damping_ratio, is_mode)
+               is_mode)
       call add('mode/self_excitation', r, '1/s', 'point', &
-               'self-excitation xi in proportion to mass', self_excitation, is_mode)
+               'self-excitation xi in proportion to mass', is_mode)
       call add('mode/modal_amplitude', r, '', 'point', &
-               'modal amplitude sqrt(U^H M U) of the first harmonic', modal_amplitude, is_mode)
+               'modal amplitude sqrt(U^H M U) of the first harmonic', is_mode)
       call add('mode/first_harmonic', r, '<length>', 'point observed', &
-               'amplitude of the first harmonic', first_harmonic, is_mode)
-      call add('wear/cycles', r, '1', 'step', 'cycles of vibration', cycles, wears)
-      call add('wear/depth', r, '<length>', 'step pair', 'wear depth', depth, wears)
-      call add('wear/rate', r, '<length>', 'step pair', 'wear depth per cycle', wear_rate, wears)
-      call add('wear/energy', r, '<energy>', 'step pair', 'accumulated friction energy', &
-               wear_energy, wears)
-      call add('wear/volume', r, '<volume>', 'step patch', 'worn volume of the patch', &
-               wear_volume, wears)
+               'amplitude of the first harmonic', is_mode)
+      call add('wear/cycles', r, '1', 'step', 'cycles of vibration', wears)
+      call add('wear/depth', r, '<length>', 'step pair', 'wear depth', wears)
+      call add('wear/rate', r, '<length>', 'step pair', 'wear depth per cycle', wears)
+      call add('wear/energy', r, '<energy>', 'step pair', 'accumulated friction energy', wears)
+      call add('wear/volume', r, '<volume>', 'step patch', 'worn volume of the patch', wears)
       call add_sensitivities()
       list = list(:n)
 
@@ -174,21 +156,21 @@ contains
                call parameter_dataset(p, name)
                call add('sensitivity/'//trim(value_words(q))//'/'//trim(name), r, '', &
                         'point'//trim(of)//trim(elements_of(p)), 'derivative of '// &
-                        trim(value_words(q))//' by '//trim(parameter_words(p)), nothing, always)
+                        trim(value_words(q))//' by '//trim(parameter_words(p)), always)
                list(n)%sensitivity = [q, p]
             end do
             call add('sensitivity/deviation/'//trim(value_words(q)), r, '', &
                      'point'//trim(of), 'standard deviation of '//trim(value_words(q)), &
-                     nothing, always)
+                     always)
             list(n)%sensitivity = [q, 0]
             call add('sensitivity/value/'//trim(value_words(q)), r, '', 'point'//trim(of), &
-                     trim(value_words(q)), nothing, always)
+                     trim(value_words(q)), always)
             list(n)%sensitivity = [q, of_itself]
          end do
          do p = 1, n_parameter_words
             call parameter_dataset(p, name)
             call add('sensitivity/value/'//trim(name), r, '', 'point'//trim(elements_of(p)), &
-                     trim(parameter_words(p)), nothing, always)
+                     trim(parameter_words(p)), always)
             list(n)%sensitivity = [of_itself, p]
          end do
       end subroutine add_sensitivities
@@ -204,10 +186,9 @@ contains
       end function elements_of
 
       !> A line of the table.
-      subroutine add(name, kind_of, unit, dimensions, long_name, get, exists)
+      subroutine add(name, kind_of, unit, dimensions, long_name, exists)
          character(*), intent(in) :: name, unit, dimensions, long_name
          integer, intent(in) :: kind_of
-         procedure(get_values) :: get
          procedure(is_wanted) :: exists
          type(quantity_type) :: quantity
          type(quantity_type), allocatable :: longer(:)
@@ -223,7 +204,6 @@ contains
          quantity%unit = unit
          quantity%dimensions = dimensions
          quantity%long_name = long_name
-         quantity%get => get
          quantity%exists => exists
          list(n) = quantity
       end subroutine add
@@ -289,7 +269,7 @@ contains
       if (any(self%sensitivity /= 0)) then
          call find_sensitivity(point, self%sensitivity, carried)
       else
-         call self%get(point, carried)
+         call values_of(point, self%name, carried)
       end if
       if (.not. allocated(carried)) return
       n = size(carried)
@@ -316,6 +296,118 @@ contains
          is_there = self%exists(case)
       end if
    end function is_there
+
+   !> The numbers of a quantity in a point, laid out as h5py shows them (the last index runs
+   !> fastest); not allocated where they are not known. A flag is 1 or 0.
+   subroutine values_of(point, name, values)
+      type(point_type), intent(in) :: point
+      character(*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: values(:)
+      integer :: k
+
+      ! Matrices are (.., n_observed) in memory, and h5py shows the observed quantity last: turned.
+      ! Blocks by pair have the order of h5py reversed already: as they are.
+      select case (name)
+      case ('omega')
+         values = [point%omega]
+      case ('parameter')
+         values = [point%place]
+      case ('load/scale')
+         values = [point%load_scale]
+      case ('control/amplitude')
+         values = [point%control]
+      case ('coefficients')
+         call by_rows(point%coefficients, values)
+      case ('amplitude')
+         if (allocated(point%amplitude)) values = point%amplitude
+      case ('converged')
+         values = [flag(point%converged)]
+      case ('iterations')
+         values = [real(point%iterations, wp)]
+      case ('residual')
+         values = [point%residual]
+      case ('seconds')
+         values = [point%seconds]
+      case ('served_by')
+         values = [real(point%served_by, wp)]
+      case ('fold')
+         values = [flag(point%fold)]
+      case ('tangent/omega')
+         values = [point%tangent_omega]
+      case ('tangent/parameter')
+         values = [point%tangent_parameter]
+      case ('tangent/coefficients')
+         call by_rows(point%tangent, values)
+      case ('harmonics')
+         values = [real(point%n_harmonics, wp)]
+      case ('instants')
+         values = [real(point%n_time, wp)]
+      case ('error_estimate')
+         if (point%converged .and. point%error_estimate < huge(1.0_wp)) then
+            values = [point%error_estimate]
+         end if
+      case ('floquet/stable')
+         if (allocated(point%multipliers)) values = [real(point%verdict, wp)]
+      case ('floquet/multipliers')
+         if (.not. allocated(point%multipliers)) return
+         values = [(real(point%multipliers(k), wp), aimag(point%multipliers(k)), &
+                    k=1, size(point%multipliers))]
+      case ('floquet/error')
+         if (.not. allocated(point%multiplier_error)) return
+         values = point%multiplier_error
+         where (.not. values < huge(1.0_wp)) values = ieee_value(1.0_wp, ieee_quiet_nan)
+      case ('contact/force')
+         if (allocated(point%force)) values = reshape(point%force, [size(point%force)])
+      case ('contact/fraction')
+         if (allocated(point%fraction)) values = reshape(point%fraction, [size(point%fraction)])
+      case ('contact/dissipation')
+         if (allocated(point%dissipation)) values = point%dissipation
+      case ('history/observed')
+         call by_rows(point%history, values)
+      case ('history/force')
+         if (allocated(point%force_history)) then
+            values = reshape(point%force_history, [size(point%force_history)])
+         end if
+      case ('history/relative_displacement')
+         if (allocated(point%slip_history)) then
+            values = reshape(point%slip_history, [size(point%slip_history)])
+         end if
+      case ('mode/damping_ratio')
+         if (allocated(point%first_harmonic)) values = [0.5_wp*point%self_excitation/point%omega]
+      case ('mode/self_excitation')
+         if (allocated(point%first_harmonic)) values = [point%self_excitation]
+      case ('mode/modal_amplitude')
+         if (allocated(point%first_harmonic)) values = [point%modal_amplitude]
+      case ('mode/first_harmonic')
+         if (allocated(point%first_harmonic)) values = point%first_harmonic
+      case ('wear/cycles')
+         if (allocated(point%depth)) values = [point%cycles]
+      case ('wear/depth')
+         if (allocated(point%depth)) values = point%depth
+      case ('wear/rate')
+         if (allocated(point%wear_rate)) values = point%wear_rate
+      case ('wear/energy')
+         if (allocated(point%wear_energy)) values = point%wear_energy
+      case ('wear/volume')
+         if (allocated(point%wear_volume)) values = point%wear_volume
+      case default ! derivatives, which find_sensitivity knows
+      end select
+   end subroutine values_of
+
+   !> The elements of a matrix with the second index running fastest; nothing of none.
+   pure subroutine by_rows(array, values)
+      real(wp), allocatable, intent(in) :: array(:, :)
+      real(wp), allocatable, intent(out) :: values(:)
+
+      if (allocated(array)) values = reshape(transpose(array), [size(array)])
+   end subroutine by_rows
+
+   !> Truth as a number: rows are reals until they are written.
+   pure real(wp) function flag(is_true)
+      logical, intent(in) :: is_true
+
+      flag = merge(1.0_wp, 0.0_wp, is_true)
+   end function flag
 
    !> The block of a quantity and a parameter, where the point has it.
    pure subroutine find_sensitivity(point, place, values)

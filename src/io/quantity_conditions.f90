@@ -1,6 +1,6 @@
 !> When the result of a case holds a quantity of a point.
 module fw_quantity_conditions
-   use fw_case, only: analysis_frf, analysis_mode, analysis_point, analysis_wear, case_type
+   use fw_case, only: analyses, case_type
    use fw_kinds, only: wp
    use fw_parameters, only: harmonic_scale
    use fw_solver_options, only: continuation_arclength
@@ -25,13 +25,13 @@ contains
    pure logical function is_response(case)
       type(case_type), intent(in) :: case
 
-      is_response = case%analysis == analysis_frf .or. case%analysis == analysis_point
+      is_response = analyses(case%analysis)%is_response
    end function is_response
 
    pure logical function is_mode(case)
       type(case_type), intent(in) :: case
 
-      is_mode = case%analysis == analysis_mode
+      is_mode = analyses(case%analysis)%is_free
    end function is_mode
 
    !> Only a branch turns back.
@@ -103,7 +103,7 @@ contains
    pure logical function wears(case)
       type(case_type), intent(in) :: case
 
-      wears = case%analysis == analysis_wear
+      wears = analyses(case%analysis)%wears
    end function wears
 
 end module fw_quantity_conditions

@@ -1,8 +1,7 @@
 !> From a namelist file to a validated case.
 module fw_read_case
    use fw_combinations, only: check_combinations
-   use fw_case, only: case_type, analysis_frf, analysis_mode, analysis_modes, analysis_point, &
-      analysis_resonance, analysis_wear
+   use fw_case, only: analyses, case_type
    use fw_contact_data, only: memory_carried
    use fw_error, only: error_type
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
@@ -166,7 +165,7 @@ contains
       if (reader%given('harmonics', 'n_harmonics')) return
       if (reader%given('harmonics', 'accuracy')) return
       if (case%sensitivity%is_wanted()) return
-      if (any(case%analysis == [analysis_mode, analysis_resonance]) .or. &
+      if (analyses(case%analysis)%finds_frequency .or. &
           case%control%is_wanted()) then
          case%harmonics%n_harmonics = usual_harmonics
          call reader%amend('harmonics', 'n_harmonics', to_text(usual_harmonics))
@@ -195,7 +194,7 @@ contains
       type(case_type), intent(in) :: case
 
       associate (harmonics => case%harmonics)
-         goes_with_accuracy = any(case%analysis == [analysis_frf, analysis_point]) .and. &
+         goes_with_accuracy = analyses(case%analysis)%is_response .and. &
                               case%sweep%continuation == continuation_natural .and. &
                               harmonics%method == method_hbm .and. harmonics%n_time == 0 .and. &
                               .not. harmonics%adaptive .and. .not. case%output%histories .and. &
@@ -220,13 +219,14 @@ contains
       call read_structure(reader, path, case, raw, error, memory_model)
       if (allocated(error)) return
       call list_inputs(path, raw, case%inputs)
+      if (allocated(raw%unread)) case%unread = raw%unread
       call read_harmonics(reader, case%harmonics)
       call read_sweep(reader, case%analysis, case%sweep, case%over)
       if (.not. reader%failed()) call vary_matrices(case, error)
       if (allocated(error)) return
       call case%solver%bind_keys(reader)
       call case%pseudo_time%bind_keys(reader)
-      call case%wear%bind_keys(reader, case%analysis == analysis_wear)
+      call case%wear%bind_keys(reader, analyses(case%analysis)%wears)
       call case%time%bind_keys(reader)
       call read_mode(reader, case%analysis, case%mode)
       case%output%file = stem_of(path)//'.h5'
@@ -247,7 +247,7 @@ contains
       if (.not. allocated(case%origin)) return
       span = case%over%ends()
       by_factor = case%over%as == as_factor
-      if (case%analysis == analysis_resonance) then
+      if (analyses(case%analysis)%is_resonance) then
          span = [case%resonance%start, case%resonance%end]
          by_factor = case%resonance%as == resonance_as_factor
       else if (is_of_matrices(case%over%number) .and. allocated(case%origin%raw%stiffness)) then
@@ -315,9 +315,9 @@ contains
 
       call read_model(reader, directory_of(path), options, raw, n_dof, error, memory_model)
       if (allocated(error)) return
-      call read_cyclic(reader, raw%cyclic, n_dof, case%analysis /= analysis_modes, &
+      call read_cyclic(reader, raw%cyclic, n_dof, analyses(case%analysis)%has_points, &
                        case%model%cyclic)
-      call read_contact(reader, raw, case%analysis == analysis_wear, &
+      call read_contact(reader, raw, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
       call read_worn(reader, directory_of(path), case%contact, worn, error)
       if (allocated(error)) return
@@ -327,6 +327,11 @@ contains
       end if
       call read_springs(reader, raw%springs, case%model%cyclic%n_solved(), case%springs)
       call check_sectors(reader, case%model%cyclic, case%contact, case%springs)
+      ! A number of 0 was meant.
+      case%idle_contact = case%contact%n_pairs == 0 .and. reader%has_group('contact') .and. &
+                          .not. reader%given('contact', 'n_pairs')
+      case%idle_spring = case%springs%n_springs == 0 .and. reader%has_group('spring') .and. &
+                         .not. reader%given('spring', 'n_springs')
       call read_loads(reader, options, raw, terms)
       wanted = case%sensitivity%parameters
       if (case%varied > 0) then

@@ -55,7 +55,6 @@ contains
       type(file_model_type), intent(in) :: file_model
       integer, intent(in) :: n_sectors
       type(contact_type), intent(inout) :: contact
-      real(wp), allocatable :: values(:)
       integer :: n_file
 
       n_file = 0
@@ -71,12 +70,7 @@ contains
          call repeat_values(file_model%gap, n_file, n_sectors, contact%gap)
          call repeat_values(file_model%area, n_file, n_sectors, contact%area)
          call repeat_values(file_model%normal_load, n_file, n_sectors, contact%normal_load)
-         call repeat_values(file_model%tangential_stiffness, n_file, n_sectors, values)
-         call contact%constants%offer('tangential_stiffness', values)
-         call repeat_values(file_model%normal_stiffness, n_file, n_sectors, values)
-         call contact%constants%offer('normal_stiffness', values)
-         call repeat_values(file_model%slip_speed, n_file, n_sectors, values)
-         call contact%constants%offer('slip_speed', values)
+         call contact%constants%offer_all(file_model%constants, n_file, n_sectors)
          ! Only with the pairs that it was written for: other pairs take the usual law.
          contact%law_is_of_model = file_model%law > 0
          if (contact%law_is_of_model) contact%law = file_model%law

@@ -3,8 +3,7 @@
 !> Single values have passed the range of their key already (fw_key_range). Here are the refusals
 !> that need two keys or the analysis, and what follows from other keys where one is left out.
 module fw_read_options
-   use fw_case, only: analysis_frf, analysis_mode, analysis_modes, analysis_resonance, &
-      analysis_time
+   use fw_case, only: analyses
    use fw_harmonics_options, only: harmonics_options, method_hbm, method_hdhb, sampling_events, &
       instants_per_event_wave, most_for_accuracy
    use fw_kinds, only: wp, pi
@@ -95,17 +94,18 @@ contains
       type(parameter_sweep), intent(inout) :: over
       logical :: has_frequency
 
-      has_frequency = analysis /= analysis_modes .and. analysis /= analysis_mode
+      has_frequency = analyses(analysis)%has_points .and. .not. analyses(analysis)%is_free
       if (has_frequency) then
          call reader%require_group('sweep', &
                                    'the frequency: start (and end and n_points of a sweep)')
       end if
       call reader%open('sweep', 'frequencies, or values of a parameter')
       call over%bind_parameter(reader)
-      call options%bind_keys(reader, any(analysis == [analysis_frf, analysis_resonance]), &
+      call options%bind_keys(reader, &
+                             analyses(analysis)%is_sweep .or. analyses(analysis)%is_resonance, &
                              has_frequency, reader%given('sweep', 'values'), over%is_wanted())
       call over%bind_values(reader)
-      if (analysis == analysis_mode) call refuse_sweep(reader)
+      if (analyses(analysis)%is_free) call refuse_sweep(reader)
       call check_ends(reader, analysis, options)
       call take_values(reader, analysis, options, over)
       if (allocated(options%frequencies)) call take_list(reader, analysis, options)
@@ -140,7 +140,7 @@ contains
       end if
       if (allocated(options%frequencies)) call reader%refuse('sweep', 'frequencies', &
          'does not go with another parameter: give values, and frequency')
-      if (analysis /= analysis_frf) call reader%refuse('sweep', 'parameter', "= '"// &
+      if (.not. analyses(analysis)%is_sweep) call reader%refuse('sweep', 'parameter', "= '"// &
          trim(parameter_words(over%number))//"' goes with analysis = 'frf': leave it out")
       if (allocated(over%values)) then
          call refuse_list(reader, analysis, options, 'values')
@@ -197,9 +197,9 @@ contains
       integer, intent(in) :: analysis
       type(mode_options), intent(inout) :: options
 
-      call options%bind_keys(reader, analysis == analysis_mode)
+      call options%bind_keys(reader, analyses(analysis)%is_free)
       if (options%unit == unit_hertz) options%near = 2.0_wp*pi*options%near
-      if (analysis /= analysis_mode) return
+      if (.not. analyses(analysis)%is_free) return
       if (reader%given('mode', 'near') .and. reader%given('mode', 'number')) then
          call reader%refuse('mode', 'near', 'is given beside number: keep one of the two')
       end if
@@ -300,7 +300,7 @@ contains
          ! None of the three shall stand in the effective input beside the list.
          call reader%amend('sweep', trim(others(i)), '')
       end do
-      if (all(analysis /= [analysis_frf, analysis_time])) then
+      if (.not. (analyses(analysis)%is_sweep .or. analyses(analysis)%is_integrated)) then
          call reader%refuse('sweep', key, "goes with analysis = 'frf' or 'time': "// &
                             'give start, the one frequency, instead')
       else if (options%continuation == continuation_arclength) then
@@ -315,7 +315,8 @@ contains
       integer, intent(in) :: analysis
       type(sweep_options), intent(in) :: options
 
-      if (analysis /= analysis_frf .or. options%continuation /= continuation_arclength) return
+      if (.not. analyses(analysis)%is_sweep) return
+      if (options%continuation /= continuation_arclength) return
       if (.not. (reader%given('sweep', 'start') .and. reader%given('sweep', 'end'))) return
       ! To round-off, since both may come from a computation.
       if (abs(options%end - options%start) > epsilon(1.0_wp)*abs(options%start)) return

@@ -1,12 +1,11 @@
 !> Group &resonance: which parameter a resonance is followed over, and whether the case has it.
 module fw_read_resonance
-   use fw_case, only: analysis_resonance, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
    use fw_parameter_checks, only: check_parameter
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: friction_coefficient, harmonic_scale, modal_damping, normal_load, &
-      normal_stiffness, parameter_words, rotation_speed, static_scale, tangential_stiffness
+   use fw_parameters, only: is_of_loads, not_negative, parameter_words, parameters, positive
    use fw_reader, only: reader_type
    use fw_resonance_options, only: as_factor, condition_phase, resonance_options, spacing_log
    use fw_solver_options, only: continuation_arclength
@@ -28,8 +27,8 @@ contains
       !> The parameter that changes from point to point; left alone where none does.
       integer, intent(inout) :: varied
 
-      call options%bind_keys(reader, analysis == analysis_resonance)
-      if (analysis /= analysis_resonance) return
+      call options%bind_keys(reader, analyses(analysis)%is_resonance)
+      if (.not. analyses(analysis)%is_resonance) return
       varied = options%parameter
       if (.not. reader%given(group, 'parameter')) then
          call reader%refuse(group, 'parameter', "is missing: name what the resonance is "// &
@@ -69,20 +68,21 @@ contains
       end associate
    end subroutine check_ends
 
-   !> Factors and stiffnesses of zero leave nothing to follow.
+   !> Factors of loads and stiffnesses of zero leave nothing to follow.
    pure logical function needs_more(options)
       type(resonance_options), intent(in) :: options
 
-      needs_more = any(options%parameter == [harmonic_scale, static_scale, tangential_stiffness, &
-                                             normal_stiffness])
+      needs_more = is_of_loads(options%parameter)
+      if (options%parameter > 0) needs_more = needs_more .or. &
+         parameters(options%parameter)%sign == positive
    end function needs_more
 
    !> What has no meaning below zero, but may be zero.
    pure logical function is_never_below(options)
       type(resonance_options), intent(in) :: options
 
-      is_never_below = any(options%parameter == [friction_coefficient, normal_load, &
-                                                 modal_damping, rotation_speed])
+      is_never_below = .false.
+      if (options%parameter > 0) is_never_below = parameters(options%parameter)%sign == not_negative
    end function is_never_below
 
    !> Refuse what a resonance over a parameter cannot be made of.
@@ -92,7 +92,7 @@ contains
       real(wp), allocatable :: values(:)
       character(len(parameter_words)) :: name
 
-      if (case%analysis /= analysis_resonance) return
+      if (.not. analyses(case%analysis)%is_resonance) return
       call check_parameter(case, case%resonance%parameter, 'resonance%parameter', error)
       if (allocated(error)) return
       call get_parameter(case, case%resonance%parameter, values)

@@ -1,11 +1,12 @@
 !> Group &sensitivity: which derivatives are wanted, and whether the case has them.
 module fw_read_sensitivity
-   use fw_case, only: analysis_mode, analysis_resonance, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_key, only: key
    use fw_key_range, only: at_least
    use fw_kinds, only: wp
-   use fw_parameter_checks, only: check_parameter
+   use fw_parameter_checks, only: check_parameter, pairs_of
+   use fw_parameter_values, only: get_parameter
    use fw_parameters, only: friction_coefficient, harmonic_scale, normal_load, parameter_words
    use fw_reader, only: reader_type
    use fw_reader_text, only: did_you_mean
@@ -105,9 +106,9 @@ contains
       associate (options => case%sensitivity)
          if (.not. options%is_wanted()) return
          options%has_harmonics = reader%given('harmonics', 'n_harmonics')
-         if (case%analysis == analysis_resonance) options%further = [resonance_omega]
+         if (analyses(case%analysis)%is_resonance) options%further = [resonance_omega]
          if (case%control%is_wanted()) options%further = [load_scale]
-         if (case%analysis == analysis_mode) options%further = [mode_omega, mode_damping_ratio]
+         if (analyses(case%analysis)%is_free) options%further = [mode_omega, mode_damping_ratio]
          if (size(options%quantities) > 0) return
          options%quantities = [first_harmonic, largest]
          if (is_cyclic_mode(case)) options%quantities = [first_harmonic]
@@ -121,7 +122,7 @@ contains
    pure logical function is_cyclic_mode(case)
       type(case_type), intent(in) :: case
 
-      is_cyclic_mode = case%analysis == analysis_mode .and. case%model%cyclic%is_cyclic
+      is_cyclic_mode = analyses(case%analysis)%is_free .and. case%model%cyclic%is_cyclic
    end function is_cyclic_mode
 
    !> Refuse what has no derivative, or none that the program knows.
@@ -134,7 +135,7 @@ contains
       if (.not. case%sensitivity%is_wanted()) return
       do k = 1, size(case%sensitivity%parameters)
          call check_parameter(case, case%sensitivity%parameters(k), asks, error)
-         if (case%analysis == analysis_mode .and. .not. allocated(error) .and. &
+         if (analyses(case%analysis)%is_free .and. .not. allocated(error) .and. &
              case%sensitivity%parameters(k) == harmonic_scale) then
             call fatal_error(error, asks//" = '"//trim(parameter_words(harmonic_scale))// &
                              "': no vibratory load acts on a nonlinear mode; leave it out", &
@@ -161,20 +162,14 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: parameter
       type(error_type), allocatable, intent(out) :: error
-      logical :: slides(case%contact%n_pairs), closes(case%contact%n_pairs)
+      real(wp), allocatable :: values(:)
       logical :: begins(case%contact%n_pairs)
 
       if (all(parameter /= [friction_coefficient, normal_load])) return
-      associate (c => case%contact)
-         ! Pairs without friction of their own do not count.
-         slides = any(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)
-         closes = c%side_1(3, :) /= 0 .or. c%side_2(3, :) /= 0
-         if (parameter == friction_coefficient) then
-            begins = slides .and. .not. c%mu > 0.0_wp
-         else
-            begins = slides .and. .not. closes .and. .not. c%normal_load > 0.0_wp
-         end if
-      end associate
+      ! Pairs without friction of their own do not count.
+      call get_parameter(case, parameter, values)
+      begins = pairs_of(case%contact, friction_coefficient) .and. &
+               pairs_of(case%contact, parameter) .and. .not. values > 0.0_wp
       if (any(begins)) call fatal_error(error, "sensitivity%parameters = '"// &
          trim(parameter_words(parameter))//"': it is 0 at a pair, where friction begins and "// &
          'the derivative is one-sided; leave it out, or give a small value', status_input)

@@ -1,16 +1,14 @@
 !> Groups /parameter and /resonance of a result file: what a resonance over a parameter has beside
 !> its points, one row for each of them.
 module fw_resonance_group
-   use fw_error, only: error_type
-   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset
    use fw_kinds, only: wp
    use fw_parameters, only: parameter_words
    use fw_resonance_options, only: as_words, condition_words, resonance_options, resonance_words
-   use fw_result_labels, only: label_dataset
+   use fw_result_group, only: group_writer, result_group
    implicit none (type, external)
    private
 
-   public :: resonance_table, resonance_row, write_resonance
+   public :: resonance_table, resonance_row
 
    type :: resonance_row
       !> Value, or factor.
@@ -25,11 +23,13 @@ module fw_resonance_group
       logical :: converged = .true.
    end type resonance_row
 
-   type :: resonance_table
+   type, extends(result_group) :: resonance_table
+      type(resonance_options) :: options
       integer :: n = 0
       type(resonance_row), allocatable :: row(:)
    contains
       procedure :: add
+      procedure :: write => write_resonance
    end type resonance_table
 
 contains
@@ -49,44 +49,27 @@ contains
       self%row(self%n) = row
    end subroutine add
 
-   !> Write the groups; nothing where there is no point.
-   subroutine write_resonance(file, table, options, unit_system, error)
-      type(hdf5_file), intent(in) :: file
-      type(resonance_table), intent(in) :: table
-      type(resonance_options), intent(in) :: options
-      !> Of the model; not allocated where nothing is known of it.
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
+   subroutine write_resonance(self, to)
+      class(resonance_table), intent(in) :: self
+      type(group_writer), intent(inout) :: to
 
-      if (table%n == 0) return
-      associate (row => table%row(:table%n))
-         call write_one('/parameter', row%parameter)
-         if (.not. allocated(error)) call write_one('/resonance/value', row%value)
-         if (.not. allocated(error)) call write_one('/resonance/first_harmonic', row%first_harmonic)
-         if (.not. allocated(error)) call write_one('/resonance/phase', row%phase)
-         if (.not. allocated(error)) call write_one('/resonance/curvature', row%curvature)
+      if (self%n == 0) return
+      associate (row => self%row(:self%n), options => self%options)
+         call to%put('/parameter', [row%parameter], '', 'point', &
+                     'value of the parameter, or factor of it')
+         call to%put('/resonance/value', [row%value], '<length>', 'point', &
+                     'what is largest, of the first observed quantity')
+         call to%put('/resonance/first_harmonic', [row%first_harmonic], '<length>', 'point', &
+                     'amplitude of the first observed quantity')
+         call to%put('/resonance/phase', [row%phase], 'rad', 'point', &
+                     'of the first observed quantity behind the load')
+         call to%put('/resonance/curvature', [row%curvature], '', 'point', &
+                     'second derivative of the value by omega')
+         call to%note('/parameter', 'name', trim(parameter_words(options%parameter)))
+         call to%note('/parameter', 'as', trim(as_words(options%as)))
+         call to%note('/resonance', 'condition', trim(condition_words(options%condition)))
+         call to%note('/resonance', 'quantity', trim(resonance_words(options%quantity)))
       end associate
-      if (.not. allocated(error)) call write_attribute(file, '/parameter', 'name', &
-         trim(parameter_words(options%parameter)), error)
-      if (.not. allocated(error)) call write_attribute(file, '/parameter', 'as', &
-         trim(as_words(options%as)), error)
-      if (.not. allocated(error)) call write_attribute(file, '/resonance', 'condition', &
-         trim(condition_words(options%condition)), error)
-      if (.not. allocated(error)) call write_attribute(file, '/resonance', 'quantity', &
-         trim(resonance_words(options%quantity)), error)
-
-   contains
-
-      subroutine write_one(name, values)
-         character(*), intent(in) :: name
-         real(wp), intent(in) :: values(:)
-         real(wp) :: copy(size(values))
-
-         copy = values
-         call write_dataset(file, name, copy, error)
-         if (.not. allocated(error)) call label_dataset(file, name, unit_system, error)
-      end subroutine write_one
-
    end subroutine write_resonance
 
 end module fw_resonance_group

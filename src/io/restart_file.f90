@@ -5,13 +5,14 @@
 !> structure, whose matrices the file does not hold.
 module fw_restart_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use fw_case, only: analysis_wear, analysis_words, case_type
+   use fw_case, only: analyses, analysis_words, case_type
    use fw_case_difference, only: find_difference
    use fw_error, only: error_type, fatal_error, status_input, status_usage
    use fw_hdf5, only: get_shape, hdf5_file, read_attribute, read_dataset
    use fw_kinds, only: wp
    use fw_point, only: point_type
-   use fw_restart_rows, only: c_checked_depth, c_converged, c_largest_rate, c_next_cycles, &
+   use fw_restart_rows, only: c_checked_depth, c_converged, c_first_jump, c_implicit, c_jumps, &
+      c_largest_rate, c_leaps, c_next_cycles, &
       c_provisional, c_rejected, c_spacing, c_steps, c_reach, c_touch, c_unsettled, n_controls, &
       pair_constants, pair_keys
    use fw_result_rows, only: row_names
@@ -73,7 +74,7 @@ contains
       type(hdf5_file) :: file
       type(error_type), allocatable :: ignored
 
-      if (case%analysis /= analysis_wear) then
+      if (.not. analyses(case%analysis)%wears) then
          call fatal_error(error, "--restart continues a run of analysis = 'wear', but this "// &
                           "case has analysis = '"//trim(analysis_words(case%analysis))//"'", &
                           status_usage)
@@ -281,6 +282,10 @@ contains
       march%n_steps = nint(self%control(c_steps))
       march%n_rejected = nint(self%control(c_rejected))
       march%n_unsettled = nint(self%control(c_unsettled))
+      march%n_implicit = nint(self%control(c_implicit))
+      march%n_leaps = nint(self%control(c_leaps))
+      march%n_jumps = nint(self%control(c_jumps))
+      march%first_jump = self%control(c_first_jump)
       march%touch%reach = self%control(c_reach)
       march%touch%in_cycles = self%control(c_touch)
       if (allocated(self%checked_rate)) march%checked_rate = self%checked_rate

@@ -21,18 +21,21 @@ module fw_restart_rows
    public :: restart_row_set, pair_constants
    public :: pair_keys, n_controls, n_notes
    public :: c_next_cycles, c_largest_rate, c_checked_depth, c_spacing, c_steps, c_rejected, &
-             c_converged, c_unsettled, c_reach, c_touch, c_provisional, c_noted
+             c_converged, c_unsettled, c_reach, c_touch, c_provisional, c_implicit, c_leaps, &
+             c_jumps, c_first_jump, c_noted
 
    !> Columns of /restart/control.
    integer, parameter :: c_next_cycles = 1, c_largest_rate = 2, c_checked_depth = 3, &
                          c_spacing = 4, c_steps = 5, c_rejected = 6, c_converged = 7, &
                          c_unsettled = 8, c_reach = 9, c_touch = 10, c_provisional = 11, &
-                         c_noted = 12
+                         c_implicit = 12, c_leaps = 13, c_jumps = 14, c_first_jump = 15, &
+                         c_noted = 16
    !> From c_noted on what the observer of the march has noted.
    integer, parameter :: n_notes = 4, n_controls = c_noted - 1 + n_notes
    character(*), parameter :: control_words(n_controls) = [character(17) :: 'next_cycles', &
       'largest_rate', 'checked_depth', 'frequency_spacing', 'n_steps', 'n_rejected', 'converged', &
-      'n_unsettled', 'touch_reach', 'touch_cycles', 'provisional', 'n_finer', 'n_coarse', &
+      'n_unsettled', 'touch_reach', 'touch_cycles', 'provisional', &
+      'n_implicit', 'n_leaps', 'n_jumps', 'first_jump', 'n_finer', 'n_coarse', &
       'coarse_pair', 'coarse_cycle']
    !> Columns of /restart/pairs: keys of &contact, and the depth of `worn`.
    character(*), parameter :: pair_keys(*) = [character(20) :: 'mu', 'gap', 'area', &
@@ -133,6 +136,10 @@ contains
       control(c_reach) = march%touch%reach
       control(c_touch) = march%touch%in_cycles
       control(c_provisional) = merge(1.0_wp, 0.0_wp, march%is_provisional)
+      control(c_implicit) = real(march%n_implicit, wp)
+      control(c_leaps) = real(march%n_leaps, wp)
+      control(c_jumps) = real(march%n_jumps, wp)
+      control(c_first_jump) = march%first_jump
       control(c_noted:) = notes
       !$omp critical (fretwear_io)
       call self%list(d_vibration)%append(file, vibration, error)

@@ -7,22 +7,15 @@
 module fw_result
    use, intrinsic :: iso_c_binding, only: c_int8_t
    use, intrinsic :: iso_fortran_env, only: int64
-   use fw_bifurcation, only: bifurcation_list
-   use fw_bifurcation_group, only: write_bifurcations
-   use fw_case, only: analysis_modes, case_type
-   use fw_cyclic_group, only: write_cyclic, write_modes
+   use fw_case, only: analyses, case_type
+   use fw_contact_data, only: contact_type
+   use fw_cyclic_group, only: write_cyclic
    use fw_error, only: error_type, fatal_error, status_input
    use fw_harmonics_options, only: sampling_words
-   use fw_hdf5, only: hdf5_file, write_attribute, write_dataset, write_text
+   use fw_hdf5, only: hdf5_file, write_attribute
    use fw_kinds, only: wp
-   use fw_mode_group, only: mode_table, write_mode
-   use fw_peak, only: peak_type
-   use fw_pair_cycle, only: pair_cycle
-   use fw_peak_group, only: write_peak_cycle, write_peaks
    use fw_point, only: point_type
-   use fw_resonance_group, only: resonance_table, write_resonance
-   use fw_resonance_options, only: resonance_options
-   use fw_result_labels, only: label_dataset
+   use fw_result_group, only: group_writer, result_group
    use fw_result_part, only: at_work, create_part, delete_part, publish_part
    use fw_result_target, only: result_format
    use fw_result_rows, only: row_set
@@ -42,8 +35,10 @@ module fw_result
    !> open. HDF5 and the handling of texts serve one thread at a time: every procedure waits for
    !> its turn.
    type :: result_writer
-      !> The open file, for analyses that add groups of their own.
+      !> The open file, for rows that an analysis adds by itself.
       type(hdf5_file) :: file
+      !> Of the model; not allocated where nothing is known of it.
+      character(:), allocatable, private :: unit_system
       !> The name that the file takes at the end.
       character(:), allocatable, private :: path
       type(row_set), private :: rows
@@ -56,12 +51,7 @@ module fw_result
       procedure :: open
       procedure :: add_point
       procedure :: copy_points
-      procedure :: add_peaks
-      procedure :: add_bifurcations
-      procedure :: add_remarks
-      procedure :: add_modes
-      procedure :: add_mode
-      procedure :: add_resonance
+      procedure :: add
       procedure :: sort_points
       procedure :: flush
       procedure :: close
@@ -103,11 +93,10 @@ contains
          call create_part(case%output%file, self%path, self%file, error)
       end if
       if (allocated(error)) return
-      call write_header(self%file, case, error)
-      if (.not. allocated(error)) call write_pairs(self%file, case, error)
-      if (.not. allocated(error)) call write_cyclic(self%file, case, error)
+      if (allocated(case%model%unit_system)) self%unit_system = case%model%unit_system
+      call write_head(self, case, error)
       ! Natural frequencies are no points.
-      if (.not. allocated(error) .and. case%analysis /= analysis_modes) then
+      if (.not. allocated(error) .and. analyses(case%analysis)%has_points) then
          call self%rows%create(self%file, case, error)
       end if
       if (.not. allocated(error)) call flush_file(self, error)
@@ -140,95 +129,29 @@ contains
       !$omp end critical (fretwear_io)
    end subroutine copy_points
 
-   !> What is known of the maxima of the response.
-   subroutine add_peaks(self, peaks, n_harmonics, unit_system, omega, cycle, error)
+   !> A group beside the rows of the points.
+   subroutine add(self, group, error)
       class(result_writer), intent(inout) :: self
-      type(peak_type), intent(in) :: peaks(:)
-      !> Of the case.
-      integer, intent(in) :: n_harmonics
-      !> Of the model; not allocated where nothing is known of it.
-      character(:), allocatable, intent(in) :: unit_system
-      !> One period of the pairs at the highest of them, where it is known, and its frequency
-      !> [rad/s].
-      real(wp), intent(in) :: omega
-      type(pair_cycle), allocatable, intent(in) :: cycle
+      class(result_group), intent(in) :: group
       type(error_type), allocatable, intent(out) :: error
 
       if (self%file%id < 0) return
       !$omp critical (fretwear_io)
-      call write_peaks(self%file, peaks, n_harmonics, unit_system, error)
-      if (allocated(cycle) .and. .not. allocated(error)) then
-         call write_peak_cycle(self%file, omega, cycle, unit_system, error)
-      end if
+      call write_group(self, group, error)
       !$omp end critical (fretwear_io)
-   end subroutine add_peaks
+   end subroutine add
 
-   !> Where the response turns or its stability changes.
-   subroutine add_bifurcations(self, list, n_harmonics, unit_system, error, frequency)
-      class(result_writer), intent(inout) :: self
-      type(bifurcation_list), intent(in) :: list
-      !> Of the case.
-      integer, intent(in) :: n_harmonics
-      !> Of the model; not allocated where nothing is known of it.
-      character(:), allocatable, intent(in) :: unit_system
+   subroutine write_group(self, group, error)
+      class(result_writer), intent(in) :: self
+      class(result_group), intent(in) :: group
       type(error_type), allocatable, intent(out) :: error
-      !> That of a sweep over another parameter [rad/s]; 0 where it is the frequency that changes.
-      real(wp), intent(in) :: frequency
+      type(group_writer) :: to
 
-      if (self%file%id < 0) return
-      !$omp critical (fretwear_io)
-      call write_bifurcations(self%file, list, n_harmonics, unit_system, frequency, error)
-      !$omp end critical (fretwear_io)
-   end subroutine add_bifurcations
-
-   !> Natural frequencies of the nodal diameters.
-   subroutine add_modes(self, nodal_diameter, open, closed, unit_system, error, open_damping, &
-                        closed_damping)
-      class(result_writer), intent(inout) :: self
-      integer, intent(in), contiguous :: nodal_diameter(:)
-      !> (n_modes, n_diameters) [rad/s].
-      real(wp), intent(in), contiguous :: open(:, :), closed(:, :)
-      !> Of the model; not allocated where nothing is known of it.
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
-      !> Fractions of critical damping, only where waves in both directions differ.
-      real(wp), allocatable, intent(in) :: open_damping(:, :), closed_damping(:, :)
-
-      if (self%file%id < 0) return
-      !$omp critical (fretwear_io)
-      call write_modes(self%file, nodal_diameter, open, closed, unit_system, error, open_damping, &
-                       closed_damping)
-      !$omp end critical (fretwear_io)
-   end subroutine add_modes
-
-   !> A nonlinear mode, beside its points.
-   subroutine add_mode(self, table, unit_system, error)
-      class(result_writer), intent(inout) :: self
-      type(mode_table), intent(in) :: table
-      !> Of the model; not allocated where nothing is known of it.
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
-
-      if (self%file%id < 0) return
-      !$omp critical (fretwear_io)
-      call write_mode(self%file, table, unit_system, error)
-      !$omp end critical (fretwear_io)
-   end subroutine add_mode
-
-   !> A resonance over a parameter, beside its points.
-   subroutine add_resonance(self, table, options, unit_system, error)
-      class(result_writer), intent(inout) :: self
-      type(resonance_table), intent(in) :: table
-      type(resonance_options), intent(in) :: options
-      !> Of the model; not allocated where nothing is known of it.
-      character(:), allocatable, intent(in) :: unit_system
-      type(error_type), allocatable, intent(out) :: error
-
-      if (self%file%id < 0) return
-      !$omp critical (fretwear_io)
-      call write_resonance(self%file, table, options, unit_system, error)
-      !$omp end critical (fretwear_io)
-   end subroutine add_resonance
+      to%file = self%file
+      if (allocated(self%unit_system)) to%unit_system = self%unit_system
+      call group%write(to)
+      call move_alloc(to%error, error)
+   end subroutine write_group
 
    !> Bring the rows into the order of their frequencies.
    subroutine sort_points(self, descending, error)
@@ -241,20 +164,6 @@ contains
       call self%rows%sort(self%file, descending, error)
       !$omp end critical (fretwear_io)
    end subroutine sort_points
-
-   !> What is allowed in the case and seldom meant.
-   subroutine add_remarks(self, name, text, error)
-      class(result_writer), intent(inout) :: self
-      !> Names by which programs know them, and the words (n_remarks).
-      type(string_type), intent(in) :: name(:), text(:)
-      type(error_type), allocatable, intent(out) :: error
-
-      if (self%file%id < 0) return
-      !$omp critical (fretwear_io)
-      call write_text(self%file, '/remarks/name', name, error)
-      if (.not. allocated(error)) call write_text(self%file, '/remarks/text', text, error)
-      !$omp end critical (fretwear_io)
-   end subroutine add_remarks
 
    !> One more entry in every dataset, flushed where that takes a small part of the time since then.
    subroutine append_point(self, point, error)
@@ -368,77 +277,70 @@ contains
       if (.not. self%in_memory) call delete_part(self%file%path)
    end subroutine discard_file
 
-   !> What holds for all points: formats, versions, the case as it was read.
-   subroutine write_header(file, case, error)
-      type(hdf5_file), intent(in) :: file
+   !> What holds for all points.
+   subroutine write_head(self, case, error)
+      class(result_writer), intent(in) :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
+      type(group_writer) :: to
 
-      call write_attribute(file, '/', 'format', result_format, error)
-      if (allocated(error)) return
-      call write_attribute(file, '/', 'format_version', result_format_version, error)
-      if (allocated(error)) return
-      call write_attribute(file, '/', 'fretwear_version', version, error)
-      if (allocated(error)) return
+      to%file = self%file
+      if (allocated(self%unit_system)) to%unit_system = self%unit_system
+      call write_header(case, to)
+      if (case%contact%n_pairs > 0) call write_pairs(case%contact, to)
+      call write_cyclic(case, to)
+      call move_alloc(to%error, error)
+   end subroutine write_head
+
+   !> Formats, versions, the case as it was read.
+   subroutine write_header(case, to)
+      type(case_type), intent(in) :: case
+      type(group_writer), intent(inout) :: to
+
+      call to%note('/', 'format', result_format)
+      call to%note('/', 'format_version', result_format_version)
+      call to%note('/', 'fretwear_version', version)
       ! Until the run is over; a file that is cut short keeps it.
-      call write_attribute(file, '/', 'status', at_work, error)
-      if (allocated(error)) return
-      call write_attribute(file, '/', 'elapsed', 0.0_wp, error)
-      if (allocated(error)) return
-      call write_optional(file, 'title', case%title, error)
-      if (allocated(error)) return
-      call write_optional(file, 'namelist', case%namelist, error)
-      if (allocated(error)) return
-      if (allocated(case%model%unit_system)) then
-         call write_attribute(file, '/', 'unit_system', case%model%unit_system, error)
-      end if
-      if (allocated(error) .or. .not. allocated(case%model%observe_name)) return
-      call write_text(file, '/observed/name', case%model%observe_name, error)
-      if (.not. allocated(error)) then
-         call label_dataset(file, '/observed/name', case%model%unit_system, error)
-      end if
+      call to%note('/', 'status', at_work)
+      call to%note('/', 'elapsed', 0.0_wp)
+      call note_optional('title', case%title)
+      call note_optional('namelist', case%namelist)
+      if (allocated(to%unit_system)) call to%note('/', 'unit_system', to%unit_system)
+      if (.not. allocated(case%model%observe_name)) return
+      call to%put('/observed/name', case%model%observe_name, '', 'observed', &
+                  'names of the observed quantities')
+
+   contains
+
+      !> Blank where there is no text.
+      subroutine note_optional(name, text)
+         character(*), intent(in) :: name
+         character(:), allocatable, intent(in) :: text
+
+         if (allocated(text)) then
+            call to%note('/', name, text)
+         else
+            call to%note('/', name, '')
+         end if
+      end subroutine note_optional
+
    end subroutine write_header
 
    !> Where the pairs are, for pictures: what the case knows of it.
-   subroutine write_pairs(file, case, error)
-      type(hdf5_file), intent(in) :: file
-      type(case_type), intent(in) :: case
-      type(error_type), allocatable, intent(out) :: error
+   subroutine write_pairs(contact, to)
+      type(contact_type), intent(in) :: contact
+      type(group_writer), intent(inout) :: to
 
-      if (case%contact%n_pairs == 0) return
-      if (allocated(case%contact%position)) then
-         call write_dataset(file, '/contact/position', case%contact%position, error)
-         if (.not. allocated(error)) then
-            call label_dataset(file, '/contact/position', case%model%unit_system, error)
-         end if
-         if (allocated(error)) return
+      if (allocated(contact%position)) then
+         call to%put('/contact/position', contact%position, '<length>', 'pair axis', &
+                     'centre of the pair x, y, z')
       end if
-      if (allocated(case%contact%area)) then
-         call write_dataset(file, '/contact/area', case%contact%area, error)
-         if (.not. allocated(error)) then
-            call label_dataset(file, '/contact/area', case%model%unit_system, error)
-         end if
-         if (allocated(error)) return
+      if (allocated(contact%area)) then
+         call to%put('/contact/area', contact%area, '<area>', 'pair', 'area of the pair')
       end if
-      if (.not. allocated(case%contact%patch)) return
-      call write_text(file, '/contact/patch', case%contact%patch, error)
-      if (.not. allocated(error)) then
-         call label_dataset(file, '/contact/patch', case%model%unit_system, error)
+      if (allocated(contact%patch)) then
+         call to%put('/contact/patch', contact%patch, '', 'pair', 'patch that the pair belongs to')
       end if
    end subroutine write_pairs
-
-   !> Nothing where there is no text.
-   subroutine write_optional(file, name, text, error)
-      type(hdf5_file), intent(in) :: file
-      character(*), intent(in) :: name
-      character(:), allocatable, intent(in) :: text
-      type(error_type), allocatable, intent(out) :: error
-
-      if (allocated(text)) then
-         call write_attribute(file, '/', name, text, error)
-      else
-         call write_attribute(file, '/', name, '', error)
-      end if
-   end subroutine write_optional
 
 end module fw_result

@@ -1,7 +1,7 @@
 !> The datasets of a result file with one row per solution point, as the table of quantities
 !> declares them.
 module fw_result_rows
-   use fw_case, only: analysis_frf, analysis_mode, analysis_resonance, analysis_wear, case_type
+   use fw_case, only: analyses, case_type
    use fw_error, only: error_type
    use fw_hdf5, only: get_shape, growing_dataset, growing_integer, growing_logical, hdf5_file, &
       read_dataset, write_attribute
@@ -9,7 +9,7 @@ module fw_result_rows
    use fw_parameters, only: parameter_words
    use fw_point, only: point_type, served_words
    use fw_point_quantities, only: point_quantities, quantity_type, unknown_size
-   use fw_result_labels, only: label_quantity
+   use fw_result_group, only: label_dataset
    use fw_solver_options, only: continuation_arclength
    use fw_text, only: string_type
    use hdf5, only: hsize_t
@@ -99,14 +99,14 @@ contains
       type(case_type), intent(in) :: case
 
       expected_rows = 1
-      if (case%analysis == analysis_wear) then
+      if (analyses(case%analysis)%wears) then
          ! The state before any wear is a row of its own.
          expected_rows = min(usual_rows - 1, case%wear%max_steps) + 1
-      else if (case%analysis == analysis_mode) then
+      else if (analyses(case%analysis)%is_free) then
          expected_rows = case%mode%n_points
-      else if (case%analysis == analysis_resonance) then
+      else if (analyses(case%analysis)%is_resonance) then
          expected_rows = case%resonance%n_points
-      else if (case%analysis == analysis_frf) then
+      else if (analyses(case%analysis)%is_sweep) then
          expected_rows = max(1, case%sweep%n_points)
          if (case%control%is_wanted()) expected_rows = expected_rows*size(case%control%amplitude)
          if (case%sweep%continuation == continuation_arclength) then
@@ -244,7 +244,8 @@ contains
       if (allocated(error)) return
       self%dataset%waits = .true.
       place = self%dataset%place(file)
-      call label_quantity(place, self%quantity, case%model%unit_system, error)
+      call label_dataset(place, '.', trim(self%quantity%unit), self%quantity%dimensions, &
+                         trim(self%quantity%long_name), case%model%unit_system, error)
       if (allocated(error)) return
       if (self%quantity%names_parameter) then
          call write_attribute(place, '.', 'name', trim(parameter_words(case%over%number)), error)

@@ -4,7 +4,6 @@ module fw_spring_file
    use fw_contact_data, only: spring_type
    use fw_error, only: error_type
    use fw_hdf5, only: dataset_failure, get_shape, hdf5_file, read_dataset
-   use fw_hdf5_members, only: refuse_strangers
    use fw_kinds, only: wp
    use fw_model_file_parts, only: read_pair_values
    use fw_text, only: to_text
@@ -13,9 +12,6 @@ module fw_spring_file
    private
 
    public :: read_spring_file
-
-   character(*), parameter :: known(*) = &
-      [character(11) :: 'side_1', 'side_2', 'sector_2', 'coefficient', 'power']
 
 contains
 
@@ -27,9 +23,6 @@ contains
       integer :: n
 
       if (.not. file%exists('/spring')) return
-      ! A force law of another program would be left out without a word.
-      call refuse_strangers(file, '/spring', known, error)
-      if (allocated(error)) return
       call read_dataset(file, '/spring/side_1', springs%side_1, error)
       if (allocated(error)) return
       ! The other parts are of as many springs.

@@ -2,8 +2,7 @@
 !> masses and on nodes without mass, where the rest of the case goes with it; else rigid friction
 !> at the instants.
 module fw_usual_law
-   use fw_case, only: analysis_frf, analysis_mode, analysis_point, analysis_resonance, &
-      analysis_time, analysis_wear, case_type
+   use fw_case, only: analyses, case_type
    use fw_harmonics_options, only: method_hbm, sampling_uniform
    use fw_kinds, only: wp
    use fw_laws, only: law_words, usual_law
@@ -27,7 +26,7 @@ contains
       associate (contact => case%contact)
          contact%law = usual_law(goes_with_events(case))
          ! Integrated in time, the rigid laws are one, and nothing was chosen.
-         contact%law_is_chosen = case%analysis /= analysis_time
+         contact%law_is_chosen = .not. analyses(case%analysis)%is_integrated
          call reader%amend('contact', 'law', quoted_text(trim(law_words(contact%law))))
       end associate
    end subroutine choose_law
@@ -39,8 +38,7 @@ contains
       type(case_type), intent(in) :: case
 
       associate (h => case%harmonics, c => case%contact)
-         goes = any(case%analysis == [analysis_frf, analysis_mode, analysis_point, &
-                                      analysis_resonance, analysis_wear]) .and. &
+         goes = analyses(case%analysis)%is_balanced .and. &
                 h%method == method_hbm .and. h%sampling /= sampling_uniform .and. &
                 h%n_time == 0 .and. .not. h%adaptive .and. .not. case%output%histories .and. &
                 .not. any(all(c%side_1(1:2, :) /= 0 .or. c%side_2(1:2, :) /= 0, dim=1)) .and. &

@@ -11,7 +11,7 @@ module fw_lapack
    public :: dgemm, dgemv, zgemm, zgemv, dgetrf, dgetrs, zgetrf, zgetrs, dsyevd, dsygvd
    public :: dgeev, dpotrf, ztrsv, cgemm, cgetrf, claswp, ctrsm, ctrsv, zhegvd, zpotrf, zpotrs
    public :: zggev, sgetrf, strsm, dlaswp, dtrsm, dtrmm, dsyrk, dpocon, dsygst
-   public :: dsyevr
+   public :: dsyevr, zgeev
 
    interface
       !> c = alpha op(a) op(b) + beta c, with op the matrix itself ('N') or its transpose ('T').
@@ -301,6 +301,18 @@ module fw_lapack
          real(wp), intent(inout) :: rwork(*)
          integer, intent(out) :: info
       end subroutine zggev
+
+      !> Eigenpairs of a complex matrix a x = w x; vectors of unit length.
+      subroutine zgeev(jobvl, jobvr, n, a, lda, w, vl, ldvl, vr, ldvr, work, lwork, rwork, info)
+         import :: wp
+         character, intent(in) :: jobvl, jobvr
+         integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+         complex(wp), intent(inout) :: a(lda, *), vl(ldvl, *), vr(ldvr, *)
+         complex(wp), intent(out) :: w(*)
+         complex(wp), intent(inout) :: work(*)
+         real(wp), intent(inout) :: rwork(*)
+         integer, intent(out) :: info
+      end subroutine zgeev
 
       !> As dpotrf for a Hermitian matrix.
       subroutine zpotrf(uplo, n, a, lda, info)

@@ -5,25 +5,53 @@ module fw_parameters
    implicit none (type, external)
    private
 
-   public :: parameter_words, n_parameter_words, parameter_number, parameter_group, parameter_key, &
-             parameter_dataset, is_per_pair, is_per_spring, is_of_matrices
+   public :: parameter_type, parameters, parameter_words, n_parameter_words, parameter_number, &
+             parameter_group, parameter_key, parameter_dataset
+   public :: is_of_loads, is_of_matrices, is_per_pair, is_per_spring
    public :: harmonic_scale, static_scale, friction_coefficient, normal_load, gap, &
              tangential_stiffness, normal_stiffness, spring_coefficient, modal_damping, &
              rotation_speed, rayleigh_mass, rayleigh_stiffness
+   public :: of_sliding, of_closing, of_pressed, not_negative, positive
 
    integer, parameter :: harmonic_scale = 1, static_scale = 2, friction_coefficient = 3, &
                          normal_load = 4, gap = 5, tangential_stiffness = 6, &
                          normal_stiffness = 7, spring_coefficient = 8, modal_damping = 9, &
                          rotation_speed = 10, rayleigh_mass = 11, rayleigh_stiffness = 12
 
-   integer, parameter :: n_parameter_words = 12
+   !> Where its values are: one of the loads, one for each pair or spring, one of the matrices.
+   integer, parameter :: of_loads = 1, of_pairs = 2, of_springs = 3, of_matrices = 4
+   !> Pairs that it says something of: those with tangential dofs, with a normal dof, or those that
+   !> a constant load presses, as they have no normal dof.
+   integer, parameter :: of_sliding = 1, of_closing = 2, of_pressed = 3
+   !> What a value may be.
+   integer, parameter :: any_sign = 0, not_negative = 1, positive = 2
 
-   !> In the order of the constants.
-   character(*), parameter :: parameter_words(n_parameter_words) = &
-      [character(28) :: 'load%harmonic_scale', 'load%static_scale', 'contact%mu', &
-       'contact%normal_load', 'contact%gap', 'contact%tangential_stiffness', &
-       'contact%normal_stiffness', 'spring%coefficient', 'model%modal_damping', &
-       'model%rotation_speed', 'model%rayleigh_mass', 'model%rayleigh_stiffness']
+   type :: parameter_type
+      !> `group%key` of the key that holds the value.
+      character(28) :: word
+      integer :: of
+      integer :: sign = any_sign
+      integer :: pairs = 0
+   end type parameter_type
+
+   !> In the order of the constants. A new parameter is a row; its value in a case is in
+   !> fw_parameter_values, its derivative in fw_parameter_slopes.
+   type(parameter_type), parameter :: parameters(*) = [ &
+      parameter_type('load%harmonic_scale', of_loads), &
+      parameter_type('load%static_scale', of_loads), &
+      parameter_type('contact%mu', of_pairs, not_negative, of_sliding), &
+      parameter_type('contact%normal_load', of_pairs, not_negative, of_pressed), &
+      parameter_type('contact%gap', of_pairs, any_sign, of_closing), &
+      parameter_type('contact%tangential_stiffness', of_pairs, positive, of_sliding), &
+      parameter_type('contact%normal_stiffness', of_pairs, positive, of_closing), &
+      parameter_type('spring%coefficient', of_springs), &
+      parameter_type('model%modal_damping', of_matrices, not_negative), &
+      parameter_type('model%rotation_speed', of_matrices, not_negative), &
+      parameter_type('model%rayleigh_mass', of_matrices, not_negative), &
+      parameter_type('model%rayleigh_stiffness', of_matrices, not_negative)]
+
+   integer, parameter :: n_parameter_words = size(parameters)
+   character(*), parameter :: parameter_words(*) = parameters%word
 
 contains
 
@@ -64,27 +92,40 @@ contains
       name(at:at) = '_'
    end subroutine parameter_dataset
 
+   !> Whether it is a factor of loads.
+   elemental logical function is_of_loads(number)
+      integer, intent(in) :: number
+
+      is_of_loads = is_of(number, of_loads)
+   end function is_of_loads
+
    !> Whether each pair has a value of its own.
    elemental logical function is_per_pair(number)
       integer, intent(in) :: number
 
-      is_per_pair = any(number == [friction_coefficient, normal_load, gap, tangential_stiffness, &
-                                   normal_stiffness])
+      is_per_pair = is_of(number, of_pairs)
    end function is_per_pair
 
    !> Whether each spring has a value of its own.
    elemental logical function is_per_spring(number)
       integer, intent(in) :: number
 
-      is_per_spring = number == spring_coefficient
+      is_per_spring = is_of(number, of_springs)
    end function is_per_spring
 
    !> Whether it changes matrices of the structure.
    elemental logical function is_of_matrices(number)
       integer, intent(in) :: number
 
-      is_of_matrices = any(number == [modal_damping, rotation_speed, rayleigh_mass, &
-                                      rayleigh_stiffness])
+      is_of_matrices = is_of(number, of_matrices)
    end function is_of_matrices
+
+   !> 0 stands for no parameter.
+   elemental logical function is_of(number, of)
+      integer, intent(in) :: number, of
+
+      is_of = .false.
+      if (number > 0) is_of = parameters(number)%of == of
+   end function is_of
 
 end module fw_parameters

@@ -53,6 +53,8 @@ module fw_continuation
    real(wp), parameter :: shortest = 1.0e-7_wp
    !> Points without a part in p: a fold has one, a branch that has so many in a row runs away.
    integer, parameter :: max_constant = 8
+   !> Part of the interval from its end that is none.
+   real(wp), parameter :: round_off = 1.0e-13_wp
    !> Two points of a branch that closes are the same to this part of their size.
    real(wp), parameter :: same = 1.0e-4_wp
 
@@ -213,6 +215,10 @@ contains
          call land(self%corrector, system, before, ahead, bound, point, error)
          if (.not. allocated(error)) call end_at_bound(self, point, bound)
          self%waiting = point
+      else if (abs(ahead%p - self%finish) <= round_off*abs(self%finish - self%start)) then
+         ! Another step, of nothing, would lead to a second point there.
+         self%waiting = ahead
+         call end_at_bound(self, ahead, self%finish)
       else
          call self%plan(system, ahead)
          call self%way%add(self%here)

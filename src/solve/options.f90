@@ -2,7 +2,7 @@
 !> of the namelist, in the order of the constants.
 module fw_solver_options
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: above, at_least, below, operator(.and.), range_type
+   use fw_key_range, only: above, at_least, below, from_to, operator(.and.), range_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -15,7 +15,7 @@ module fw_solver_options
    public :: scheme_words, scheme_implicit_euler, scheme_bdf, scheme_rosenbrock, &
              scheme_runge_kutta
    public :: unit_words, unit_rad_per_second, unit_hertz
-   public :: continuation_words, continuation_natural, continuation_arclength
+   public :: continuation_words, continuation_natural, continuation_arclength, most_points
 
    character(*), parameter :: solver_words(*) = &
       [character(11) :: 'newton', 'powell', 'kinsol', 'pseudo_time']
@@ -42,6 +42,8 @@ module fw_solver_options
 
    character(*), parameter :: continuation_words(*) = [character(9) :: 'natural', 'arclength']
    integer, parameter :: continuation_natural = 1, continuation_arclength = 2
+   !> Points of a sweep at most: a number that is larger was not meant, and its rows fill a disk.
+   integer, parameter :: most_points = 10000000
 
    !> Options of a nonlinear solution (group &solver).
    type :: solver_options
@@ -195,8 +197,8 @@ contains
       call keys%bind_word(key('continuation', 'points at given frequencies, or a branch '// &
                               'through folds'), self%continuation, continuation_words)
       call keys%bind(key('n_points', 'points, evenly spaced, both ends included; of a branch: '// &
-                         'sets the first step', at_least(1), absent='required for a natural '// &
-                         'frf'), self%n_points, &
+                         'sets the first step', from_to(1, most_points), &
+                         absent='required for a natural frf'), self%n_points, &
                      needed=is_range .and. self%continuation == continuation_natural)
       call keys%bind(key('max_points', 'points of a branch at most', at_least(1), &
                          only="continuation = 'arclength'"), self%max_points)

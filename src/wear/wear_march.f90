@@ -9,6 +9,10 @@
 !> two halves, and taken only where they give that pair the same depth; else the first half is the
 !> next one to be judged. Where it stays, the observer is told.
 !>
+!> Where steps would have to become all but nothing, a leap (fw_wear_leap) takes the march over the
+!> place: the vibration there has a fold, and jumps, or the rates have a kink. Steps of 'bdf' that
+!> its integrator does not get done are first tried by the implicit scheme.
+!>
 !> A joint is steady when the largest rate has fallen to steady_tolerance of the largest so far:
 !> no pair both slips and bears. There need not be such a state. The whole joint is in gross slip
 !> when every pair that bears also wears, by rates that no longer change although the depth has
@@ -20,8 +24,9 @@ module fw_wear_march
    use fw_solver_options, only: scheme_bdf
    use fw_text, only: to_text
    use fw_wear_bdf, only: bdf_integrator
+   use fw_wear_leap, only: leap_over, leap_type, vibration_finder
    use fw_wear_options, only: wear_explicit, wear_options, wear_pseudo_time
-   use fw_wear_step, only: wear_state, wear_step_report, wear_stepper
+   use fw_wear_step, only: is_another, wear_state, wear_step_report, wear_stepper
    use fw_wear_system, only: wear_system
    use fw_wear_touch, only: touch_guard
    use fw_newton, only: solver_report
@@ -50,11 +55,17 @@ module fw_wear_march
    integer, parameter :: max_onset_halvings = 12
    !> Wear that the integrator of 'bdf' may take back, as a part of its tolerance.
    real(wp), parameter :: trifle = 1.0e-2_wp
+   !> Growth of a step, as a part of the error that it may have, below which it counts as nothing,
+   !> and that of a leap.
+   real(wp), parameter :: nothing = 1.0e-3_wp, leap_growth = 0.5_wp
+   !> An error of depths that the round-off of vibrations hides, as a part of the largest.
+   real(wp), parameter :: tightest = 1.0e-10_wp
    !> Change of the rates, as a part of the largest, that counts as none; a pair bears and wears
    !> above these parts of the largest pressure and rate.
    real(wp), parameter :: unchanged = 1.0e-2_wp, bears = 1.0e-6_wp, wears = 1.0e-3_wp
 
-   type, abstract :: wear_observer
+   !> As a finder of vibrations it finds none, unless it knows better.
+   type, abstract, extends(vibration_finder) :: wear_observer
    contains
       !> A state of the march, the first included.
       procedure(state_callback), deferred :: take
@@ -89,6 +100,10 @@ module fw_wear_march
       !> steps in which what they wear depends on the step, however short.
       logical, allocatable :: begins(:)
       integer :: n_unsettled = 0
+      !> Steps that the integrator of 'bdf' left to the implicit scheme, and leaps, with those over
+      !> which the vibration jumped and the cycle at the first of these.
+      integer :: n_implicit = 0, n_leaps = 0, n_jumps = 0
+      real(wp) :: first_jump = 0.0_wp
       !> The last step is not the one of a longer march, or what it leaves is not all that the next
       !> one needs: who goes on takes it once more.
       logical :: is_provisional = .false.
@@ -163,10 +178,11 @@ contains
          self%is_provisional = .false.
          if (self%options%scheme == wear_pseudo_time .and. &
              self%stepper%pseudo_scheme == scheme_bdf) then
-            call one_bdf_step(self, system, state, after, iterations)
+            call one_bdf_step(self, observer, system, state, after, iterations, error)
          else
-            call one_step(self, system, state, after, iterations)
+            call one_step(self, observer, system, state, after, iterations, error)
          end if
+         if (allocated(error)) exit
          if (any(self%begins) .and. .not. allocated(self%ending)) then
             call observer%begin_slip(self, system, after, error)
             if (allocated(error)) exit
@@ -250,20 +266,24 @@ contains
    end function in_gross_slip
 
    !> One accepted step, or an ending.
-   subroutine one_step(self, system, state, after, iterations)
+   subroutine one_step(self, observer, system, state, after, iterations, failure)
       type(wear_march), intent(inout) :: self
+      class(wear_observer), intent(inout) :: observer
       type(wear_system), intent(inout) :: system
       type(wear_state), intent(in) :: state
       type(wear_state), intent(out) :: after
       integer, intent(out) :: iterations
+      type(error_type), allocatable, intent(out) :: failure
       type(wear_step_report) :: report
-      real(wp) :: cycles, error, missed(2)
+      real(wp) :: cycles, error, missed(2), allowed, least
       type(wear_state) :: before
       integer :: halvings, n_inaccurate
       logical :: held(size(state%rate)), refined
 
       held = is_held(self, system, state)
       call self%touch%look(system)
+      allowed = allowed_error(self, system, state)
+      least = nothing*allowed/maxval(state%rate)
       before = state
       iterations = 0
       halvings = 0
@@ -281,10 +301,9 @@ contains
          if (system%is_interrupted()) return
          if (.not. report%converged) then
             halvings = halvings + 1
-            self%gave_up = halvings > max_halvings
-            if (self%gave_up) then
-               self%ending = 'no step from cycle '//to_text(state%cycles)// &
-                             ' on converges, down to '//to_text(cycles)//' cycles'
+            if (halvings > max_halvings .or. 0.5_wp*cycles <= least) then
+               call leap(self, observer, system, state, allowed, held, after, &
+                         iterations, failure)
                return
             end if
             if (halvings == 1) call catch_up(self, system, before, iterations)
@@ -318,9 +337,12 @@ contains
          n_inaccurate = n_inaccurate + 1
          self%gave_up = n_inaccurate > max_inaccurate
          if (self%gave_up) then
-            self%ending = 'no step from cycle '//to_text(state%cycles)//' on is as accurate as '// &
-                          'wear%error_tolerance = '//to_text(self%options%tolerance())// &
-                          ', down to '//to_text(cycles)//' cycles: raise it'
+            call end_inaccurate(self, state, cycles)
+            return
+         end if
+         if (self%next_cycles <= least) then
+            call leap(self, observer, system, state, allowed, held, after, &
+                         iterations, failure)
             return
          end if
          self%n_rejected = self%n_rejected + 1
@@ -332,6 +354,70 @@ contains
       if (refined) self%next_cycles = 2.0_wp*cycles
       self%n_steps = self%n_steps + 1
    end subroutine one_step
+
+   !> Error that the depths of a step from a state may have [length], where the system stands there.
+   real(wp) function allowed_error(self, system, state) result(allowed)
+      type(wear_march), intent(in) :: self
+      type(wear_system), intent(in) :: system
+      type(wear_state), intent(in) :: state
+
+      allowed = self%options%tolerance()*max(maxval(state%x(system%n_vibration() + 1:)), &
+                                             first_growth*system%depth_scale())
+   end function allowed_error
+
+   !> No step is accurate enough, down to so many cycles.
+   subroutine end_inaccurate(self, state, cycles)
+      type(wear_march), intent(inout) :: self
+      type(wear_state), intent(in) :: state
+      real(wp), intent(in) :: cycles
+
+      self%ending = 'no step from cycle '//to_text(state%cycles)//' on is as accurate as '// &
+                    'wear%error_tolerance = '//to_text(self%options%tolerance())//', down to '// &
+                    to_text(cycles)//' cycles: raise it'
+   end subroutine end_inaccurate
+
+   !> From a state over the place that no step passes, or an ending that says so.
+   subroutine leap(self, observer, system, before, allowed, held, after, iterations, error)
+      type(wear_march), intent(inout) :: self
+      class(wear_observer), intent(inout) :: observer
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: before
+      !> Error that its depths may have [length].
+      real(wp), intent(in) :: allowed
+      !> Pairs that are stuck at the start of the step.
+      logical, intent(in) :: held(:)
+      type(wear_state), intent(out) :: after
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      type(leap_type) :: asked
+      real(wp) :: growth
+
+      asked%allowed = allowed
+      growth = leap_growth*asked%allowed
+      if (self%options%max_depth_step > 0.0_wp) growth = min(growth, self%options%max_depth_step)
+      asked%longest = min(growth/maxval(before%rate), self%options%n_cycles - before%cycles)
+      call leap_over(observer, self%stepper, system, before, asked, after, error)
+      iterations = iterations + asked%iterations
+      if (allocated(error) .or. system%is_interrupted()) return
+      self%gave_up = .not. asked%found
+      if (self%gave_up .and. asked%exists) then
+         call end_inaccurate(self, before, asked%longest)
+      else if (self%gave_up) then
+         self%ending = 'no step from cycle '//to_text(before%cycles)//' on converges, and no '// &
+                       'other vibration was found to which the joint might jump, up to '// &
+                       to_text(asked%longest)//' cycles ahead'
+      end if
+      if (self%gave_up) return
+      self%begins = held .and. wears_at(self, after)
+      self%n_leaps = self%n_leaps + 1
+      if (asked%jumped) then
+         self%n_jumps = self%n_jumps + 1
+         if (self%n_jumps == 1) self%first_jump = after%cycles
+      end if
+      self%next_cycles = after%cycles - before%cycles
+      self%touch%in_cycles = huge(1.0_wp)
+      self%n_steps = self%n_steps + 1
+   end subroutine leap
 
    !> Pairs that bear at a state and do not wear.
    pure function is_held(self, system, state) result(held)
@@ -422,12 +508,14 @@ contains
    end function is_same
 
    !> One step of the differential-algebraic system: its integrator chooses length and order.
-   subroutine one_bdf_step(self, system, state, after, iterations)
+   subroutine one_bdf_step(self, observer, system, state, after, iterations, error)
       type(wear_march), intent(inout), target :: self
+      class(wear_observer), intent(inout) :: observer
       type(wear_system), intent(inout), target :: system
       type(wear_state), intent(in) :: state
       type(wear_state), intent(out) :: after
       integer, intent(out) :: iterations
+      type(error_type), allocatable, intent(out) :: error
       type(wear_step_report) :: report
       type(solver_report) :: solution
       real(wp) :: scale, largest, taken_back
@@ -469,12 +557,44 @@ contains
          ! What the integrator knows of earlier steps is nowhere else.
          if (self%bdf%is_started()) self%is_provisional = .true.
       end if
-      self%gave_up = .not. report%converged
-      if (self%gave_up) self%ending = 'no step from cycle '//to_text(state%cycles)// &
-                                      ' on converges with wear%error_tolerance = '// &
-                                      to_text(self%options%tolerance())//': try another'
-      self%n_steps = self%n_steps + 1
+      if (report%converged) then
+         ! The length that a step of another scheme would begin with.
+         self%next_cycles = after%cycles - state%cycles
+         self%n_steps = self%n_steps + 1
+      else if (.not. system%is_interrupted()) then
+         call step_implicitly(self, observer, system, state, after, iterations, error)
+      end if
    end subroutine one_bdf_step
+
+   !> A step that the integrator did not get done; it begins anew after it.
+   subroutine step_implicitly(self, observer, system, state, after, iterations, error)
+      type(wear_march), intent(inout), target :: self
+      class(wear_observer), intent(inout) :: observer
+      type(wear_system), intent(inout) :: system
+      type(wear_state), intent(in) :: state
+      type(wear_state), intent(out) :: after
+      integer, intent(inout) :: iterations
+      type(error_type), allocatable, intent(out) :: error
+      type(wear_state) :: before
+      integer :: more, n_leaps
+
+      call self%bdf%finish()
+      self%is_provisional = .false.
+      self%gave_up = self%options%tolerance() < tightest
+      if (self%gave_up) then
+         call end_inaccurate(self, state, 0.0_wp)
+         return
+      end if
+      n_leaps = self%n_leaps
+      before = state
+      call catch_up(self, system, before, iterations)
+      call self%stepper%fall_back(.true.)
+      call one_step(self, observer, system, before, after, more, error)
+      call self%stepper%fall_back(.false.)
+      iterations = iterations + more
+      if (allocated(error) .or. self%gave_up .or. self%n_leaps > n_leaps) return
+      self%n_implicit = self%n_implicit + 1
+   end subroutine step_implicitly
 
    !> Pseudo-time steps leave a residual: a state that looks like the last has to be in equilibrium.
    subroutine confirm(self, system, after, report, iterations)
@@ -512,7 +632,9 @@ contains
       settled = state
       call self%stepper%settle(system, settled, solution)
       iterations = iterations + solution%iterations
-      if (solution%converged) state = settled
+      if (.not. solution%converged) return
+      ! To where the joint would have to jump it does not catch up.
+      if (.not. is_another(system, state%x, settled%x)) state = settled
    end subroutine catch_up
 
    !> Cycles of the next step.

@@ -13,6 +13,7 @@ module fw_wear_step
    private
 
    public :: wear_state, wear_step_report, wear_stepper, new_wear_stepper, largest_lag
+   public :: is_another
 
    !> Where a wear run stands.
    type :: wear_state
@@ -44,8 +45,10 @@ module fw_wear_step
       type(newton_solver) :: newton
       !> Largest depth that a step may add, which pseudo-time enforces [length].
       real(wp) :: max_depth_step = huge(1.0_wp)
-      !> Stages of the implicit scheme.
-      type(tableau_type), private :: tableau
+      !> Stages of the implicit scheme, and those of steps that are left to it.
+      type(tableau_type), private :: tableau, other_tableau
+      !> The next steps are left to the implicit scheme.
+      logical, private :: falls_back = .false.
       !> Estimate the error; the explicit scheme then advances with the corrected depths.
       logical, private :: controls_error = .false.
       !> Error of a step over the largest depth.
@@ -55,6 +58,7 @@ module fw_wear_step
       procedure :: advance
       procedure :: evaluate
       procedure :: settle
+      procedure :: fall_back
    end type wear_stepper
 
    !> Relative residual of the linear solution of a pseudo-time step, and the growth of the
@@ -69,6 +73,8 @@ module fw_wear_step
    real(wp), parameter :: noise = 0.3_wp
    !> Residual at which a step that lags too far has caught up: well within what others may lag.
    real(wp), parameter :: settled = 1.0e-1_wp*largest_lag
+   !> Change of a vibration, as a part of it, at which another one was found.
+   real(wp), parameter :: other_vibration = 5.0e-2_wp
    integer, parameter :: max_corrections = 5
    !> A pseudo-time step may exceed the growth of the depth that was aimed at by this factor.
    real(wp), parameter :: depth_allowance = 1.5_wp
@@ -126,6 +132,11 @@ contains
       may_refuse = .false.
       if (present(refuses)) may_refuse = refuses
       allocate (report%error(size(before%rate)), source=0.0_wp)
+      if (self%falls_back) then
+         call implicit_step(self, system, before, cycles, after, report)
+         after%cycles = before%cycles + cycles
+         return
+      end if
       select case (self%scheme)
       case (wear_explicit)
          call explicit_step(self, system, before, cycles, after, report)
@@ -158,6 +169,21 @@ contains
       call implicit_step(self, system, before, cycles, implicit_after, report)
       after = implicit_after
    end subroutine try_implicitly
+
+   !> Leave the steps to come to the implicit scheme of its usual order, or no longer.
+   subroutine fall_back(self, is_wanted)
+      class(wear_stepper), intent(inout) :: self
+      logical, intent(in) :: is_wanted
+      type(tableau_type) :: tableau
+
+      if (is_wanted .eqv. self%falls_back) return
+      if (is_wanted) self%other_tableau = new_tableau(merge(3, 1, self%controls_error))
+      tableau = self%tableau
+      self%tableau = self%other_tableau
+      self%other_tableau = tableau
+      self%order = self%tableau%order
+      self%falls_back = is_wanted
+   end subroutine fall_back
 
    !> The vibration at given depths, from the guess in state%x; its rates.
    subroutine settle(self, system, state, report, tolerance)
@@ -317,7 +343,7 @@ contains
       type(wear_state), intent(out) :: after
       type(wear_step_report), intent(inout) :: report
       type(solver_report) :: solution
-      real(wp) :: grown, tolerance
+      real(wp) :: grown, tolerance, lagging(size(before%x))
       integer :: n
       logical :: done
 
@@ -335,14 +361,33 @@ contains
          ! What its error refuses need not come to equilibrium first.
          report%is_refused = maxval(abs(report%error)) > self%tolerance*maxval(after%x(n + 1:))
       end if
-      report%converged = after%residual <= largest_lag .or. report%is_refused
+      ! Beyond a fold of the vibration there is no equilibrium to lag behind.
+      report%converged = after%residual <= settled .or. report%is_refused
       if (report%converged .or. .not. after%residual <= farthest_lag) return
       ! Its depths are as good as its estimate says: back to the equilibrium at these, which keeps
       ! the order and is far cheaper than the stages of an implicit step.
+      lagging = after%x
       call self%settle(system, after, solution, tolerance=settled)
       report%iterations = report%iterations + solution%iterations
       report%converged = solution%converged
+      if (report%converged) report%converged = .not. is_another(system, lagging, after%x)
    end subroutine high_order_step
+
+   !> Whether a vibration, without its mean, is another one than that which it should be near to.
+   pure logical function is_another(system, near, x)
+      type(wear_system), intent(in) :: system
+      !> Unknowns of the coupled system.
+      real(wp), intent(in) :: near(:), x(:)
+      integer :: first, last
+
+      first = 1
+      last = system%n_vibration()
+      associate (problem => system%vibration%problem)
+         if (problem%fourier%has_constant()) first = problem%structure%n_coordinates + 1
+      end associate
+      is_another = norm2(x(first:last) - near(first:last)) > &
+                   other_vibration*norm2(near(first:last))
+   end function is_another
 
    !> Rates and residual of the vibration at a state.
    subroutine evaluate(self, system, state)

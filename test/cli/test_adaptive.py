@@ -147,3 +147,27 @@ def test_refused_with_a_branch(fw_run):
     fw_run.write(STOP.format(most=3, adaptive=".true.", tolerance=1e-2))
     message = fw_run.refused("--set", "sweep%continuation='arclength'", "case.nml")
     assert "harmonics%adaptive" in message
+
+
+def test_summary_counts_the_points_without_a_claim(fw_run):
+    """Few harmonics are enough where the mass does not reach the stop, and too few where it does;
+    points between the rows are among those that are counted."""
+    fw_run.write(STOP.replace("n_time = 1024 adaptive = {adaptive} "
+                              "adaptive_tolerance = {tolerance}", "accuracy = 1e-4").format(most=5))
+    done = fw_run("case.nml")
+    with h5py.File(fw_run.directory / "case.h5") as file:
+        found = {"error_estimate": file["error_estimate"][()]}
+    claimed = found["error_estimate"] <= 1e-4
+    told = re.search(r"at most (\S+) by estimate, 1.0E-04 asked for; nothing is claimed at (\d+) of "
+                     r"(\d+) points", done.stdout)
+    assert 0 < claimed.sum() < len(claimed)
+    assert float(told[1]) <= 1e-4
+    assert int(told[2]) >= (~claimed).sum()
+    assert int(told[3]) - int(told[2]) >= claimed.sum()
+
+
+def test_a_number_of_points_that_was_not_meant_is_refused(fw_run):
+    fw_run.write(FRICTION.format(most=3, adaptive=".false.", tolerance=1e-3)
+                 .replace("n_points = 27", "n_points = 1000000000"))
+    done = fw_run("--check", "case.nml")
+    assert done.returncode == 3 and "n_points = 1000000000: must be" in done.stderr

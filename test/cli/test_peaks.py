@@ -102,6 +102,44 @@ def test_the_mode_of_a_free_joint_is_looked_for_between_rows_that_half_slip(tmp_
     assert highest[0] == pytest.approx(highest[1], rel=peak_family.RIGHT)
 
 
+#: Closed by interference, and opened and closed by its resonance, which lies at 0.741 between the
+#: free frequency of 0.606 and the closed one of 1.30.
+LIFTING = {"model": {"n_dof": 3, "mass": np.diag([0.5347588663713378, 1.075383875998595,
+                                                 1.003718112899173]).ravel().tolist(),
+                     "stiffness": [4.297789494168742, -2.337477129314179, 0.0, -2.337477129314179,
+                                   3.2711742735280267, -0.9336971442138475, 0.0,
+                                   -0.9336971442138475, 0.9336971442138475],
+                     "damping": [0.010262351442032459, -0.0038737743831774897,
+                                 -0.00041147216809840224, -0.0038737743831774897,
+                                 0.011559201736420457, -0.0028926704202611965,
+                                 -0.00041147216809840224, -0.0028926704202611965,
+                                 0.006156013438880006]},
+           "contact": {"n_pairs": 1, "law": "penalty", "side_1": [3, 0, 1],
+                       "mu": 0.7639307080880463, "gap": -0.054173792978745555,
+                       "tangential_stiffness": 2.559687975278523,
+                       "normal_stiffness": 2.2412555070596882},
+           "load": {"cosine": [1.1692588203710945, -2.1288837686011512, 0.0]},
+           "harmonics": {"accuracy": 0.01}, "output": {"observe": [3]},
+           "sweep": {"start": 0.571821083864488, "end": 2.8591054193224403, "n_points": 61}}
+
+
+def test_a_resonance_between_free_and_closed_joint_is_found(tmp_path):
+    """No mode of the joint stands there, and the rows beside it are ten times lower."""
+    run(tmp_path, LIFTING)
+    peak, remark = peak_family.reported(tmp_path / "case.h5")
+    # Shooting in time and a march from near rest, whose motion has all harmonics.
+    assert not remark and peak == pytest.approx(111.86, rel=2e-3)
+
+
+def test_rows_too_far_apart_for_the_resonances_of_a_lifting_joint_are_said(tmp_path):
+    few = merged(LIFTING, {"harmonics": {"accuracy": None, "n_harmonics": 3}})
+    found = []
+    for n_points in (6, 121):
+        run(tmp_path, merged(few, {"sweep": {"n_points": n_points}}))
+        found.append("another peak" in remarks(tmp_path / "case.h5"))
+    assert found == [True, False]
+
+
 def test_rows_stay_those_that_were_asked_for(tmp_path):
     groups, _ = peak_family.linear(1)
     sweep = groups["sweep"]

@@ -32,6 +32,24 @@ METHODS = {
 GAPS = {"closed": 0.0, "mixed": [0.0, 0.3, -0.2]}
 
 
+#: At the end of the joint `folded`, by implicit steps of a tolerance of 1e-5.
+FOLDED_DEPTH = 0.71119
+
+
+def folded():
+    """A mass that presses and rubs near resonance, of which less and less is held as it wears."""
+    return {
+        "case": {"analysis": "wear", "threads": 1},
+        "model": {"n_dof": 2, "mass": [[1.138, 0.0], [0.0, 1.012]],
+                  "stiffness": [[1.705, -0.112], [-0.112, 1.474]],
+                  "damping": [[0.0264, -0.001], [-0.001, 0.0231]]},
+        "contact": {"law": "penalty", "n_pairs": 1, "side_1": [1, 0, 2], "mu": 0.661,
+                    "tangential_stiffness": 0.875, "normal_stiffness": 2.09, "area": 0.101},
+        "load": {"static": [0.0, -0.767], "cosine": [-0.0771, -0.186], "sine": [0.0544, 0.0]},
+        "harmonics": {"n_harmonics": 9}, "sweep": {"start": 1.55},
+        "wear": {"coefficient": 4.56e-6}}
+
+
 def planar_joint(changes, contact=None, seed=5, **load):
     """Three pairs in two tangential directions; one of them may be open at first."""
     random = np.random.default_rng(seed)
@@ -163,6 +181,19 @@ def test_what_cannot_come_to_an_end_says_so(tmp_path, wear, words):
     assert found["wear"]["steady_state"] == "not reached"
     for word in words:
         assert word in found["wear"]["ending"]
+
+
+@pytest.mark.parametrize("scheme", ["rosenbrock", "bdf", "implicit"])
+def test_the_vibration_jumps_as_the_joint_wears(tmp_path, scheme):
+    """At a depth of 0.2035 it has a fold: every scheme passes it and comes to one steady state."""
+    found = result(tmp_path, merged(folded(), SCHEMES[scheme]))
+    assert found["wear"]["steady_state"] == "reached"
+    assert found["wear"]["n_jumps"] == 1
+    assert b"vibration jumps" in list(found["remarks/name"])
+    # The tolerance of the steps, ten times.
+    assert found["wear/depth"][-1, 0] == pytest.approx(FOLDED_DEPTH, rel=1e-2)
+    # Nothing was worn beyond the fold by a vibration that is not there.
+    assert found["converged"].all()
 
 
 @pytest.mark.parametrize(("changes", "words"), [

@@ -225,7 +225,7 @@ REFUSED = {
     "nodal_diameter/1/stiffness": (np.zeros(8), "put that first"),
     "nodal_diameter/9/mass": (np.zeros(8), "from 0 to 3"),
     "nodal_diameter/0/mass": (np.zeros(7), "2 n"),
-    "nodal_diameter/0/speed": (np.zeros(8), "before the mass"),
+    "nodal_diameter/0/speed": (np.zeros(8), "nodal_diameter/K/mass, "),
     "aero/sector/6": (np.zeros(2), "from -5 to 5"),
     "aero/sectors/1": (np.zeros(2), "aero/modes"),
     "aero/modes": (np.zeros(3), "multiple of 2"),

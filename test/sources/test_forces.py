@@ -107,7 +107,7 @@ def test_multipliers_and_integration_in_time_are_promised_for_coulomb_alone() ->
     # have: any other that promised these facts would get the numbers of that one, without a word.
     # The springs of polynomial_law.f90 have ways of their own through both.
     promising = {
-        path.name for path in SRC.rglob("*.f90")
+        path.name for path in (SRC / "force").rglob("*.f90")
         if re.search(r"\b(has_multipliers|is_integrated)\s*=\s*\.true\.", path.read_text())
     }
     assert promising == {"friction.f90", "rigid_law.f90", "polynomial_law.f90"}

@@ -270,20 +270,26 @@ contains
       logical, intent(out) :: regular
       !> Part of a column below which its pivot is round-off.
       real(wp), parameter :: vanishing = 1.0e-10_wp
-      real(wp) :: factor(n_points), row
+      real(wp) :: factor(n_points), largest(n_stages), pivot, row
       integer :: c, i, j
 
+      ! As the columns are given: rows of pivots that were taken are divided by them.
       do j = 1, n_stages
-         regular = abs(a(j + 1, j)) > vanishing*maxval(abs(a(2:n_stages + 1, j)))
+         largest(j) = maxval(abs(a(2:n_stages + 1, j)))
+      end do
+      do j = 1, n_stages
+         regular = abs(a(j + 1, j)) > vanishing*largest(j)
          if (.not. regular) return
-         factor = a(:, j)/a(j + 1, j)
-         ! Which leaves the row of the pivot divided by it: all rows have one formula.
-         factor(j + 1) = 1.0_wp - 1.0_wp/a(j + 1, j)
+         pivot = a(j + 1, j)
+         factor = a(:, j)/pivot
+         ! All rows have one formula; that of the pivot is divided by it, whatever its size.
+         factor(j + 1) = 0.0_wp
          do c = j + 1, n
             row = a(j + 1, c)
             do i = 1, n_points
                a(i, c) = a(i, c) - factor(i)*row
             end do
+            a(j + 1, c) = row/pivot
          end do
       end do
    end subroutine eliminate

@@ -1,0 +1,142 @@
+"""Model files beside the table of their parts: what is written is known, what is known is read."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import warnings
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from project import EXAMPLE, PROGRAM
+
+import fretwear as fw
+from fretwear._native import Session, unread_parts
+from fretwear.model import _CONTACT, _IN_NAMELIST, _LOADS, _SPRING
+from fretwear.sectors import _LOADS as OF_DIAMETERS
+from fretwear.sectors import _MATRICES
+
+PAIRS = fw.ContactPairs(
+    [[1, 2, 3]], [[4, 5, 6]], mu=0.3, gap=0.0, area=1.0, normal_load=0.0, position=[[0, 0, 0]],
+    tangential_stiffness=1.0, normal_stiffness=1.0, slip_speed=1.0, patch=["a"], sector_2=[0],
+    law="penalty")
+EYE = np.eye(6)
+
+
+def whole(**more: Any) -> fw.Model:
+    """A model with every part that one of its kind can have."""
+    return fw.Model(EYE, 0.1 * EYE, 2.0 * EYE, contact=PAIRS, springs=[fw.Spring(1, 2, 0.5)],
+                    static=EYE[0], cosine=EYE[1], sine=EYE[2], static_rotation=EYE[3],
+                    stiffness_rotation=EYE, coriolis=0.0 * EYE, harmonic={2: (EYE[0], EYE[1])},
+                    observe={"tip": 1}, title="all", unit_system="mm-tonne-s-N", **more)
+
+
+def nodal() -> fw.Model:
+    one = fw.NodalDiameter(EYE, EYE, EYE, EYE, 0.0 * EYE, EYE[0], EYE[0], EYE[0], EYE[0],
+                           observe={"tip": EYE[0]})
+    return fw.Model(None, None, None, contact=PAIRS,
+                    sectors=fw.Sectors(3, diameters={0: one, 1: one}, n_physical=6,
+                                       air=fw.Air(by_diameter={0: EYE})))
+
+
+MODELS = {
+    "plain": whole,
+    "sector": lambda: whole(sectors=fw.Sectors(3, [1], [-4], air=fw.Air({0: np.eye(2)},
+                                                                        modes=EYE[:2]))),
+    "nodal": nodal}
+
+
+def table() -> dict[str, str]:
+    """Names of all parts, with their shapes."""
+    shown = subprocess.run([PROGRAM, "--parts"], check=True, capture_output=True, text=True)
+    found = {}
+    for line in shown.stdout.splitlines()[2:]:
+        name, _, shape, *_ = line[2:].split(" | ")
+        words = re.findall("`/?([^`]*)`", name)
+        found["@".join(words)] = shape
+    return found
+
+
+def names_in(path: Path) -> set[str]:
+    found: set[str] = set()
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: found.add(name) if isinstance(item, h5py.Dataset)
+                        else None)
+        for group in ("", "contact", "cyclic"):
+            if group in file or not group:
+                found |= {f"{group}@{name}" for name in file[group or "/"].attrs}
+    found = {re.sub(r"^nodal_diameter/\d+", "nodal_diameter/K", name) for name in found}
+    return {re.sub(r"^(aero/\w+)/-?\d+", r"\1/M", name) for name in found}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_saved_model_is_read_in_whole(name: str, tmp_path: Path) -> None:
+    MODELS[name]().save(tmp_path / "model.h5")
+    assert unread_parts(str(tmp_path / "model.h5")) == []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = fw.Model.from_hdf5(tmp_path / "model.h5")
+    again.save(tmp_path / "again.h5")
+    assert names_in(tmp_path / "again.h5") == names_in(tmp_path / "model.h5")
+
+
+def test_the_package_knows_every_part(tmp_path: Path) -> None:
+    parts = table()
+    written: set[str] = set()
+    for number, make in enumerate(MODELS.values()):
+        make().save(tmp_path / f"{number}.h5")
+        written |= names_in(tmp_path / f"{number}.h5")
+    assert written <= set(parts)
+    # By other programs: dof numbers for rows, the other sign, what generators and meshes say.
+    others = {"observe/dof", "cyclic@phase", "@parameters", "@disk_parameters"}
+    assert {name for name in parts if not name.startswith("mesh/")} - written == others
+    given = {f"contact/{name}" for name in _IN_NAMELIST} | {*_CONTACT, *_LOADS}
+    given |= {f"spring/{name}" for name in _SPRING}
+    given |= {f"nodal_diameter/K/{name}" for name in {**_MATRICES, **OF_DIAMETERS}.values()}
+    assert given <= set(parts)
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLE.glob("*/*.h5")), ids=lambda path: path.stem)
+def test_model_files_of_the_examples_hold_parts_only(path: Path) -> None:
+    with h5py.File(path) as file:
+        if file.attrs["format"] != b"fretwear-model":
+            pytest.skip("no model file")
+    assert unread_parts(str(path)) == []
+
+
+def test_strangers_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "model.h5"
+    whole().save(path)
+    with h5py.File(path, "r+") as file:
+        file["notes"] = 1.0
+    with pytest.warns(UserWarning, match="holds /notes, which nothing reads"):
+        fw.Model.from_hdf5(path)
+    with h5py.File(path, "r+") as file:
+        file.move("damping", "dampping")
+    with pytest.raises(fw.InputError, match=r"/dampping is nothing that is read \(did you mean "
+                                            r"/damping\?\)"):
+        fw.Model.from_hdf5(path)
+
+
+@pytest.mark.parametrize(("name", "values", "told"), [
+    ("dampping", [1.0], r"no real part .*\(did you mean damping\?\)"),
+    ("mu", [1.0], r"\(did you mean contact/mu\?\)"),
+    ("cyclic/lefts", [1.0], "'cyclic/lefts' is no real part of a model: must be one of mass"),
+    ("aero/mode", [1.0], r"\(did you mean aero/modes\?\)"),
+    ("nodal_diameter/0/masses", [1.0], "no real part"),
+    ("observe/matrix", [1.0], "no real part"), ("mesh/points", [1.0], "no real part"),
+    ("contact/side_3", [1], r"no integer part .*did you mean contact/side_1"),
+    ("observe/dof", [1], "no integer part"), ("cyclic/sectors", [3], "no integer part"),
+    ("cyclic/n_physical", [3], "no integer part"), ("spring/coefficient", [3], "no integer part")])
+def test_unknown_parts_of_a_model_in_memory_are_refused(name: str, values: list[Any],
+                                                        told: str) -> None:
+    kind = np.int32 if isinstance(values[0], int) else np.float64
+    with Session() as session:
+        session.new_model(1, 1)
+        with pytest.raises(fw.InputError, match=told):
+            session.put(name, np.array(values, dtype=kind))
+        with pytest.raises(fw.InputError, match=r"'titel' is no text part .*did you mean title"):
+            session.put_texts("titel", ["x"])

@@ -1,0 +1,215 @@
+"""What a new law, quantity, rule and analysis cost: each is added to a copy of the tree, compiled,
+run, and the old files that it touched are counted.
+
+A file of its own is free; a limit may only fall.
+"""
+import re
+import shutil
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+from project import ROOT
+
+#: Old files that each may touch.
+LIMITS = {"law": 1, "quantity": 1, "rule": 1, "analysis": 2}
+
+
+class Toy:
+    """Changes of the copy, with the old files that they touch."""
+
+    def __init__(self, tree):
+        self.tree, self.touched = tree, set()
+
+    def new(self, path, text):
+        assert not (self.tree / path).exists()
+        (self.tree / path).write_text(text)
+
+    def change(self, path, *pairs):
+        """Replace in an old file; every text must be there once."""
+        text = (self.tree / path).read_text()
+        for old, new in pairs:
+            assert text.count(old) == 1, f"{path}: {old!r} stands there {text.count(old)} times"
+            text = text.replace(old, new)
+        (self.tree / path).write_text(text)
+        self.touched.add(path)
+
+
+def add_law(toy):
+    """'toy': the regularised law under another name."""
+    text = (toy.tree / "src/force/regularised.f90").read_text()
+    for old, new in (("regularised_friction", "toy_friction"), ("regularised_law", "toy_law"),
+                     ("fw_regularised", "fw_toy_law")):
+        text = text.replace(old, new)
+    toy.new("src/force/toy_law.f90", text)
+    toy.change("src/force/laws.f90",
+               ("'rigid', 'regularised']", "'rigid', 'regularised', 'toy']"),
+               ("smooth in the velocity'", "smooth in the velocity, or a toy'"),
+               ("   use fw_rigid_law,",
+                "   use fw_toy_law, only: toy_friction\n   use fw_rigid_law,"),
+               ("      case ('rigid');",
+                "      case ('toy'); allocate (law, source=toy_friction())\n"
+                "      case ('rigid');"))
+
+
+def add_quantity(toy):
+    """'toy/largest_force' of a point: from what the point holds already."""
+    toy.change("src/io/point_quantities.f90",
+               ("      call add_sensitivities()\n      list",
+                "      call add('toy/largest_force', r, '<force>', 'point', "
+                "'largest coefficient', &\n               shows_contact)\n"
+                "      call add_sensitivities()\n      list"),
+               ("      case ('omega')\n",
+                "      case ('toy/largest_force')\n"
+                "         if (allocated(point%force)) values = [maxval(abs(point%force))]\n"
+                "      case ('omega')\n"))
+
+
+def add_rule(toy):
+    """Histories and a phase do not go together."""
+    toy.change("src/io/rules.f90",
+               ("   type(rule_type), parameter :: of_sweeps(*) = [ &\n",
+                "   type(rule_type), parameter :: of_sweeps(*) = [ &\n"
+                "      rule_type('output%histories', 'output%tail', 'toys refuse it'), &\n"))
+
+
+def add_analysis(toy):
+    """'toy': tells the number of pairs as a group of the result."""
+    toy.new("src/driver/run_toy.f90", """\
+!> Runs analysis 'toy'.
+module fw_run_toy
+   use fw_case, only: case_type
+   use fw_error, only: error_type
+   use fw_result, only: result_writer
+   use fw_result_group, only: group_writer, result_group
+   implicit none (type, external)
+   private
+
+   public :: run_toy
+
+   type, extends(result_group) :: toy_group
+      integer :: n_pairs = 0
+   contains
+      procedure :: write => write_toy
+   end type toy_group
+
+contains
+
+   subroutine run_toy(case, writer, error)
+      type(case_type), intent(in) :: case
+      type(result_writer), intent(inout) :: writer
+      type(error_type), allocatable, intent(out) :: error
+      type(toy_group) :: group
+
+      group%n_pairs = case%contact%n_pairs
+      call writer%add(group, error)
+   end subroutine run_toy
+
+   subroutine write_toy(self, to)
+      class(toy_group), intent(in) :: self
+      type(group_writer), intent(inout) :: to
+
+      call to%put('/toy/pairs', [self%n_pairs], '', 'one', 'number of pairs')
+   end subroutine write_toy
+
+end module fw_run_toy
+""")
+    toy.change("src/io/case.f90",
+               ("'mode', 'resonance']\n   type", "'mode', 'resonance', 'toy']\n   type"),
+               ("             analysis_modes, analysis_mode, analysis_resonance\n",
+                "             analysis_modes, analysis_mode, analysis_resonance, analysis_toy\n"),
+               ("                         analysis_resonance = 7\n",
+                "                         analysis_resonance = 7, analysis_toy = 8\n"),
+               ("      analysis_facts(is_resonance=.true., finds_frequency=.true.)]",
+                "      analysis_facts(is_resonance=.true., finds_frequency=.true.), &\n"
+                "      analysis_facts(has_points=.false., is_balanced=.false.)]"))
+    toy.change("src/driver/run.f90",
+               ("   use fw_run_state,", "   use fw_run_toy, only: run_toy\n   use fw_run_state,"),
+               ("analysis_resonance, analysis_wear, case_type",
+                "analysis_resonance, analysis_toy, &\n      analysis_wear, case_type"),
+               ("      else if (case%analysis == analysis_mode) then\n         call run_mode(",
+                "      else if (case%analysis == analysis_toy) then\n"
+                "         call run_toy(case, writer, error)\n"
+                "      else if (case%analysis == analysis_mode) then\n         call run_mode("))
+
+
+TOYS = {"law": add_law, "quantity": add_quantity, "rule": add_rule, "analysis": add_analysis}
+
+
+@pytest.fixture(scope="module", name="built")
+def build_toys(tmp_path_factory):
+    """(program, {toy: files touched}) of a copy of the tree with all toys."""
+    tree = tmp_path_factory.mktemp("toys")
+    for name in ("src", "app", "cmake", "include", "CMakeLists.txt"):
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tree / name)
+    touched = {}
+    for name, add in TOYS.items():
+        toy = Toy(tree)
+        add(toy)
+        touched[name] = toy.touched
+    options = ["-DCMAKE_Fortran_FLAGS_RELEASE=-O0", "-DFRETWEAR_TESTS=OFF", "-DFRETWEAR_PYTHON=OFF",
+               "-DFRETWEAR_SHARED=OFF"]
+    for command in (["cmake", "-S", tree, "-B", tree / "build", "-G", "Ninja", *options],
+                    ["cmake", "--build", tree / "build", "--target", "fw_run"]):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    return tree / "build" / "fw_run", touched
+
+
+def run(program, folder, name, text):
+    (folder / f"{name}.nml").write_text(text)
+    return subprocess.run([program, f"{name}.nml"], cwd=folder, capture_output=True, text=True,
+                          check=False)
+
+
+RUBBING = """
+&case analysis = 'frf' /
+&model n_dof = 1, mass = 1.0, stiffness = 1.0, damping = 0.04 /
+&contact n_pairs = 1, law = '{law}', side_1 = 1, 0, 0, mu = 1.0, normal_load = 0.5,
+         slip_speed = 0.1 /
+&load cosine = 1.0 /
+&harmonics n_harmonics = 3, n_time = 256 /
+&sweep start = 0.8, end = 1.2, n_points = 5 /
+{more}
+"""
+
+
+@pytest.mark.parametrize("name", TOYS)
+def test_files_touched(built, name):
+    assert len(built[1][name]) <= LIMITS[name], sorted(built[1][name])
+
+
+def test_law_runs(built, tmp_path):
+    results = []
+    for law in ("toy", "regularised"):
+        done = run(built[0], tmp_path, law, RUBBING.format(law=law, more=""))
+        assert done.returncode == 0, done.stderr
+        with h5py.File(tmp_path / f"{law}.h5") as file:
+            results.append(file["coefficients"][:])
+    assert np.array_equal(*results)
+
+
+def test_quantity_is_written(built, tmp_path):
+    done = run(built[0], tmp_path, "quantity", RUBBING.format(law="regularised", more=""))
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "quantity.h5") as file:
+        force = file["contact/force"][:]
+        assert np.array_equal(file["toy/largest_force"][:], abs(force).reshape(5, -1).max(axis=1))
+
+
+def test_rule_refuses(built, tmp_path):
+    more = "&output histories = .true., tail = 9 /"
+    done = run(built[0], tmp_path, "rule", RUBBING.format(law="regularised", more=more))
+    assert done.returncode == 3
+    assert re.search(r"output%histories does not go with output%tail: toys refuse it", done.stderr)
+
+
+def test_analysis_runs(built, tmp_path):
+    text = RUBBING.format(law="regularised", more="").replace("'frf'", "'toy'")
+    text = re.sub(r"&sweep.*?/\n", "", text)
+    done = run(built[0], tmp_path, "analysis", text)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "analysis.h5") as file:
+        assert list(file["toy/pairs"]) == [1]
