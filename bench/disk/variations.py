@@ -1,4 +1,4 @@
-"""What the drawing of the shrouded disk leaves open, varied with one harmonic.
+"""What changes the damping curve of the shrouded disk, varied with one harmonic.
 
     python -m bench.disk.variations [--build build/release] [-o docs/shrouded_disk.md]
 """

@@ -86,9 +86,9 @@ def _say_what_it_takes(n_dof: int, n_contact: int) -> None:
     seconds, memory = needs(n_dof, n_contact)
     if seconds > _LONG or memory > _MUCH:
         print(f"fretwear.sector: {n_dof} degrees of freedom and {n_contact} contact coordinates "
-              f"take some {max(1, round(seconds / 60.0))} min and {memory / 1e9:.0f} GB, or up to "
-              "twice that (a coarser mesh takes less: --airfoil-rows, --blade-columns, "
-              "--disk-rows)", file=sys.stderr, flush=True)
+              f"take roughly {max(1, round(seconds / 60.0))} min and {memory / 1e9:.0f} GB, "
+              "an estimate fitted to two small meshes (a coarser mesh takes less: "
+              "--airfoil-rows, --blade-columns, --disk-rows)", file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:

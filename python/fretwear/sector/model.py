@@ -136,7 +136,7 @@ class ReducedModel:
 
 
 def needs(n_dof: int, n_contact: int) -> tuple[float, float]:
-    """About what a sector takes, from two that were measured on two processors.
+    """About what a sector takes: an estimate, fitted to two small meshes.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def needs(n_dof: int, n_contact: int) -> tuple[float, float]:
     Returns
     -------
     seconds, bytes
-        Right within a factor of two or so.
+        Rough: a large sector is far from both meshes and may take several times as long.
     """
     entries = _FACTORS * (n_dof / _ORDER)**_GROWTH
     seconds = _SECONDS * (n_dof / _ORDER)**_SLOWER + 2.0 * entries * n_contact / _RATE
