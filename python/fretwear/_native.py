@@ -90,6 +90,11 @@ def namelist_values(text: str) -> dict[str, list[str]]:
     return found
 
 
+def tolerance_of(values: dict[str, list[str]]) -> float:
+    """`solver%tolerance` of the values of a namelist, which may have Fortran's exponent `d`."""
+    return float(values.get("solver%tolerance", ["1e-8"])[0].lower().replace("d", "e"))
+
+
 def unread_parts(path: str) -> list[str]:
     """What stands in a model file and nothing reads; raises InputError as a run does."""
     return _words(routines().unread_parts, path)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._native import namelist_values
+from ._native import namelist_values, tolerance_of
 from ._progress import CONTROL
 from .errors import AbsentError, FretwearError
 from .steps import Point, Steps
@@ -119,7 +119,7 @@ def _again(result: Result, point: int) -> Point:
     if values.get("case%analysis") == ["mode"]:
         raise AbsentError(f"{result.name}: a nonlinear mode keeps no histories, and as a response "
                           "to a load it would be another motion")
-    tolerance = float(values.get("solver%tolerance", ["1e-8"])[0])
+    tolerance = tolerance_of(values)
     settings = _settings(result, point)
     if "contact%law" in values:
         # Left to the program, histories would ask for another one.
@@ -177,7 +177,7 @@ def run_again(result: Result) -> Result:
     with case.open() as session:
         session.run(np.zeros(CONTROL, dtype=np.int64), in_memory=True)
         known = type(result).of_run(case, session.text("output"), session.image())
-    tolerance = float(values.get("solver%tolerance", ["1e-8"])[0])
+    tolerance = tolerance_of(values)
     limit = max(_SAME, _SAME_OF_SOLVER * tolerance) * np.abs(result.amplitude).max()
     if known.amplitude.shape != result.amplitude.shape or (
             np.abs(known.amplitude - result.amplitude)[result.converged].max(initial=0.0) > limit):

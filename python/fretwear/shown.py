@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ._native import namelist_values
+from ._native import namelist_values, tolerance_of
 from .errors import AbsentError, NotBuiltError
 
 if TYPE_CHECKING:
@@ -42,7 +42,6 @@ _ROUND_OFF = 1e-9
 #: take little of that, and those that stick are told by their states.
 _NO_WORK = 1e-13
 #: Tolerance of the solver where the file does not tell it.
-_USUAL_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -188,9 +187,9 @@ def _hides_more(heights: Floats, top: float) -> bool:
 
 def known_to(result: Result) -> float:
     """What is below this part of the largest displacement of a point is not known to be motion."""
-    tolerance = _USUAL_TOLERANCE
+    tolerance = tolerance_of({})
     with contextlib.suppress(NotBuiltError, AbsentError):
-        tolerance = float(namelist_values(result.namelist).get("solver%tolerance", ["1e-8"])[0])
+        tolerance = tolerance_of(namelist_values(result.namelist))
     return max(tolerance, _ROUND_OFF)
 
 

@@ -20,7 +20,7 @@ module fw_stuck_modes
    implicit none (type, external)
    private
 
-   public :: stuck_modes, find_stuck_modes, add_slopes
+   public :: stuck_modes, find_stuck_modes
 
    type :: stuck_modes
       !> Of the elastic modes without damping in ascending order: frequencies [rad/s] (n_modes).

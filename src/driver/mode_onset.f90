@@ -91,8 +91,11 @@ contains
       class(onset_finder), intent(in) :: self
       type(mode_system), intent(inout) :: system
       real(wp), intent(in) :: y(:)
+      real(wp) :: amplitude
 
-      is_stuck = self%departure%by_sliding(system, system%amplitude, y) <= 0.0_wp
+      ! A copy: the system is brought to this amplitude once more.
+      amplitude = system%amplitude
+      is_stuck = self%departure%by_sliding(system, amplitude, y) <= 0.0_wp
    end function is_stuck
 
    !> Take a solution of the curve, where the system stands.
@@ -100,10 +103,11 @@ contains
       class(onset_finder), intent(inout) :: self
       type(mode_system), intent(inout) :: system
       real(wp), intent(in) :: y(:)
-      real(wp) :: departed
+      real(wp) :: amplitude, departed
 
       if (self%n_above == 2 .or. size(self%departure%rest) == 0) return
-      departed = self%departure%by_sliding(system, system%amplitude, y)
+      amplitude = system%amplitude
+      departed = self%departure%by_sliding(system, amplitude, y)
       if (departed > 0.0_wp .or. self%departed) then
          if (.not. self%departed) call take_above(self, system, y)
          self%departed = .true.
@@ -366,7 +370,7 @@ contains
       type(onset_finder), intent(inout) :: self
       type(mode_system), intent(inout) :: system
       real(wp), intent(in) :: amplitude, y(:)
-      real(wp) :: departed
+      real(wp) :: amplitude, departed
 
       departed = self%departure%by_sliding(system, amplitude, y)
       if (departed <= 0.0_wp) then

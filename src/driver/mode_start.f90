@@ -307,6 +307,10 @@ contains
             call fatal_error(error, "case%analysis = 'mode': the linear modes with closed "// &
                              'pairs stuck were not found: check mass, stiffness and damping of '// &
                              'the model for entries that are out of proportion', status_input)
+         else if (choice%n_modes + choice%n_overdamped == 0) then
+            call fatal_error(error, "case%analysis = 'mode': with its closed pairs stuck the "// &
+                             'structure has no elastic mode (rigid motions do not count): '// &
+                             'check the stiffness', status_input)
          else if (choice%n_modes == 0) then
             call fatal_error(error, "case%analysis = 'mode': with its closed pairs stuck the "// &
                              'structure has no elastic mode that oscillates ('// &

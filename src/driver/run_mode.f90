@@ -218,8 +218,8 @@ contains
       real(wp), allocatable :: mu(:)
       integer :: k
 
-      allocate (mu(curve%start%problem%n_pairs), source=1.0_wp)
-      if (case%contact%n_pairs == size(mu)) mu = case%contact%mu
+      mu = spread(0.0_wp, 1, case%contact%n_pairs)
+      if (case%contact%n_pairs > 0) mu = case%contact%mu
       call curve%onset%begin(curve%start%system, curve%start%y, case%mode%start, mu, amplitude)
       ! The sliding mode is the limit of high amplitudes.
       if (curve%start%slides) amplitude = case%mode%end

@@ -48,6 +48,7 @@ contains
       integer, parameter :: most_steps = 25
       real(wp) :: weight, rows
       integer :: k, n_time
+      logical :: failed
 
       n_time = instants(self)
       rows = 2.0_wp*n_time*self%n_pairs
@@ -55,11 +56,12 @@ contains
       done = allowed(self, n_time, x)
       do while (done)
          do k = 1, most_steps
-            call improve(self, n_time, weight, x, done)
-            if (done) exit
+            call improve(self, n_time, weight, x, done, failed)
+            if (done .or. failed) exit
          end do
-         ! What bears any amplitude has no bound.
-         done = x(self%n) < 1.0e6_wp
+         ! What bears any amplitude has no bound, and what ends on the way is none.
+         done = x(self%n) < 1.0e6_wp .and. .not. failed
+         if (.not. done) exit
          if (rows < small*weight*x(self%n)) exit
          weight = growth*weight
       end do
@@ -126,12 +128,14 @@ contains
    end function wave_at
 
    !> A step of Newton's method, shortened to stay inside; done where it changes nothing.
-   subroutine improve(self, n_time, weight, x, done)
+   subroutine improve(self, n_time, weight, x, done, failed)
       type(shakedown_type), intent(in) :: self
       integer, intent(in) :: n_time
       real(wp), intent(in) :: weight
       real(wp), intent(inout) :: x(:)
       logical, intent(out) :: done
+      !> No step was found.
+      logical, intent(out) :: failed
       real(wp), parameter :: no_change = 1.0e-6_wp
       real(wp) :: gradient(size(x)), step(size(x)), length, decrement
       type(lu_type) :: lu
@@ -142,7 +146,8 @@ contains
       call slopes(self, n_time, x, gradient, lu%matrix(:self%n, :self%n))
       gradient(self%n) = gradient(self%n) - weight
       call lu%factor(singular)
-      done = singular
+      done = .false.
+      failed = singular
       if (singular) return
       step = -gradient
       call lu%solve(step)

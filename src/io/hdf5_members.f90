@@ -48,7 +48,11 @@ contains
 
       n = 0
       call h5oopen_f(file%id, object, id, status)
-      if (status >= 0) call h5aget_num_attrs_f(id, n, status)
+      if (status < 0) then
+         allocate (names(0))
+         return
+      end if
+      call h5aget_num_attrs_f(id, n, status)
       if (status < 0) n = 0
       allocate (names(n))
       do i = 1, n

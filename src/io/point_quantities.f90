@@ -1,6 +1,7 @@
 !> Every quantity of a solution point, declared once: what it is called, its unit and dimensions,
-!> when a result holds it (fw_quantity_conditions), and where its numbers are in a point. The rows of the result file, their labels, what a caller may ask of a point
-!> and what a continued run copies all follow from here.
+!> when a result holds it (fw_quantity_conditions), and where its numbers are in a point. The rows
+!> of the result file, their labels, what a caller may ask of a point and what a continued run
+!> copies all follow from here.
 !>
 !> A new quantity is one line in `point_quantities` and its case in `values_of`.
 module fw_point_quantities

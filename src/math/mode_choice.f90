@@ -61,6 +61,10 @@ contains
       complex(wp), allocatable :: basis(:, :), u(:)
       integer :: j
 
+      choice%number = number
+      ! Rigid motions alone are no modes.
+      choice%done = size(rest%omega) == 0
+      if (choice%done) return
       search%number = number
       search%near = near
       if (is_proportional(pencil, rest, n_looked_at(rest, search))) then
@@ -71,7 +75,6 @@ contains
       choice%done = search%works
       choice%n_modes = search%n_found
       choice%n_overdamped = search%n_overdamped
-      choice%number = number
       if (near > 0.0_wp .and. search%n_found > 0) choice%number = search%nearest_to(near)
       if (.not. choice%done .or. choice%number > search%n_found) return
       choice%mode = search%found(choice%number)

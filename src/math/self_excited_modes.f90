@@ -186,11 +186,12 @@ contains
       if (n == 1 .and. .not. done) call self%take_within(low, high, high, done)
       if (done) return
       call self%sample_at(0.5_wp*(low%omega + high%omega), middle)
+      if (.not. self%works) return
       if (high%omega - low%omega <= one_frequency*high%omega) then
          call self%take_together(middle, n)
          return
       end if
-      if (self%works) call self%search_between(low, middle)
+      call self%search_between(low, middle)
       if (self%works) call self%search_between(middle, high)
    end subroutine search_between
 

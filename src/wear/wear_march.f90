@@ -95,7 +95,6 @@ module fw_wear_march
       real(wp) :: largest_rate = 0.0_wp
       real(wp) :: checked_depth = 0.0_wp
       real(wp), allocatable :: checked_rate(:)
-      !> Steps of the scheme 'bdf', each of which builds on those before.
       !> Pairs that begin to slip in the last step, though its start held them stuck (n_pairs);
       !> steps in which what they wear depends on the step, however short.
       logical, allocatable :: begins(:)
@@ -582,7 +581,9 @@ contains
       self%is_provisional = .false.
       self%gave_up = self%options%tolerance() < tightest
       if (self%gave_up) then
-         call end_inaccurate(self, state, 0.0_wp)
+         self%ending = 'wear%error_tolerance = '//to_text(self%options%tolerance())// &
+                       ' is below '//to_text(tightest)//', what round-off of the vibration '// &
+                       'leaves: raise it'
          return
       end if
       n_leaps = self%n_leaps

@@ -110,6 +110,14 @@ def table(family, now, before=None):
     return lines
 
 
+def command_of(options, family):
+    """What runs the same seeds again."""
+    if options.first == 0 and options.count in (None, family.COUNT):
+        return f"make family NAME={options.name}"
+    return (f"python test/families/runner.py {options.name} --first {options.first} "
+            f"--count {options.count or family.COUNT} --page")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -139,7 +147,7 @@ def main():
                 + ("; before -> now." if before else "."))
         page = ROOT / "docs" / "robustness" / f"{options.name.replace('_', '-')}.md"
         page.write_text("\n".join([f"# {family.TITLE}", "", family.TEXT.strip(), "",
-                                   f"Made by `make family NAME={options.name}`.", "",
+                                   f"Made by `{command_of(options, family)}`.", "",
                                    told, "", *lines, ""]), encoding="utf-8")
     return int(any(counts[key] for counts in now.values() for key in family.ZERO))
 

@@ -22,5 +22,6 @@ def test_family(name):
     wrong = {seed: counts for seed, counts in found.items()
              if any(counts.get(key) for key in family.ZERO)}
     assert not wrong
-    # A judge that reached nothing proves nothing.
-    assert added_up(found)
+    # A judge that reached nothing proves nothing: the first column counts what was reached.
+    reached = next(iter(family.COLUMNS))
+    assert sum(counts[reached] for counts in added_up(found).values()) > 0
