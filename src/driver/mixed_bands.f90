@@ -8,10 +8,11 @@
 !> modal mass. Two rows hide a resonance between them only where they stand above its flank.
 module fw_mixed_bands
    use fw_case, only: case_type
-   use fw_joint_modes, only: held_stiffness, joint_mode_type, state_free, &
-      state_sliding, state_stuck
+   use fw_joint_modes, only: held_stiffness, joint_mode_type, state_free, state_sliding, &
+      state_stuck
    use fw_kinds, only: wp
    use fw_linalg, only: has_pivots
+   use fw_modes, only: least_width
    use fw_samples, only: sample_type
    implicit none (type, external)
    private
@@ -110,7 +111,9 @@ contains
       band%width = max(band%width, mode%width)
       do i = 1, size(mode%amplitude)
          band%height(i) = max(band%height(i), mode%amplitude(i))
-         band%flank(i) = max(band%flank(i), 0.5_wp*mode%width*mode%amplitude(i))
+         ! With the width that the amplitude was had with: a flank stands without damping too.
+         band%flank(i) = max(band%flank(i), 0.5_wp*max(mode%width, least_width*mode%omega)* &
+                             mode%amplitude(i))
       end do
    end subroutine take
 

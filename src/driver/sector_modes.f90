@@ -7,7 +7,7 @@ module fw_sector_modes
    use fw_hermitian, only: is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
    use fw_laws, only: new_law
-   use fw_modes, only: mode_type
+   use fw_modes, only: least_width, mode_type
    use fw_pair_law, only: pair_law
    use fw_sector, only: add_sector_spring, sector_at, sector_rows
    use fw_whirl_modes, only: find_whirl, most_whirling, wave_matrices, wave_of
@@ -17,7 +17,7 @@ module fw_sector_modes
    public :: find_sector_modes
 
    !> As of fw_modes and fw_joint_modes, with the same reasons.
-   real(wp), parameter :: least_width = 1.0e-6_wp, massless = 1.0e-13_wp, hold = 1.0e6_wp
+   real(wp), parameter :: massless = 1.0e-13_wp, hold = 1.0e6_wp
    real(wp), parameter :: shift_trials(*) = [0.0_wp, 1.0e-3_wp, 1.0_wp]
 
 contains

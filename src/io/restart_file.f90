@@ -12,9 +12,8 @@ module fw_restart_file
    use fw_kinds, only: wp
    use fw_point, only: point_type
    use fw_restart_rows, only: c_checked_depth, c_converged, c_first_jump, c_implicit, c_jumps, &
-      c_largest_rate, c_leaps, c_next_cycles, &
-      c_provisional, c_rejected, c_spacing, c_steps, c_reach, c_touch, c_unsettled, n_controls, &
-      pair_constants, pair_keys
+      c_largest_rate, c_leaps, c_next_cycles, c_provisional, c_rejected, c_spacing, c_steps, &
+      c_reach, c_touch, c_unsettled, n_controls, pair_constants, pair_keys
    use fw_result_rows, only: row_names
    use fw_result_target, only: is_result
    use fw_text, only: string_type, to_text

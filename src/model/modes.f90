@@ -6,7 +6,7 @@ module fw_modes
    implicit none (type, external)
    private
 
-   public :: mode_type, find_modes
+   public :: mode_type, find_modes, least_width
 
    type :: mode_type
       !> Natural frequency [rad/s].
