@@ -13,7 +13,7 @@ module fw_peak_finder
    use fw_joint_modes, only: find_joint_modes, joint_mode_type
    use fw_interrupt, only: interrupt_type
    use fw_kinds, only: wp
-   use fw_mixed_bands, only: find_bands, mixed_band
+   use fw_mixed_bands, only: find_bands, mixed_band, opens
    use fw_peak, only: peak_type
    use fw_peak_gaps, only: gap_list
    use fw_peak_rules, only: find_edge, find_gap, find_next, find_way_past, highest_of, is_bound, &
@@ -234,7 +234,7 @@ contains
       integer, intent(in) :: budget
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: share
-      integer :: j, k
+      integer :: j, k, known
 
       if (self%gaps%n == 0) return
       call self%gaps%plan(self%samples, highest_of_all(self), self%n_rows)
@@ -242,12 +242,76 @@ contains
          associate (gap => self%gaps%item(k))
             do j = 1, gap%points
                share = real(j, wp)/real(gap%points + 1, wp)
-               call solve_at(self, case, gap%below + share*(gap%above - gap%below), budget, error)
+               known = self%samples%n
+               call solve_at(self, case, gap%below + share*(gap%above - gap%below), budget, error, &
+                             fallback=.true.)
                if (allocated(error)) return
+               if (self%samples%n > known) gap%solved = gap%solved + 1
             end do
          end associate
       end do
    end subroutine look_between
+
+   !> A flank is hollow towards its resonance. A sample that stands above the line between its
+   !> neighbours, and is no maximum, is on the flank of another one that lies beside it.
+   subroutine look_at_bulges(self, case, budget, error)
+      type(peak_finder), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: budget
+      type(error_type), allocatable, intent(out) :: error
+      !> Of the way to the neighbours: nearer to the sample, from whose solution they go on.
+      real(wp), parameter :: part = 0.45_wp
+      real(wp), allocatable :: highest(:)
+      real(wp) :: omega(2*self%samples%n)
+      integer :: k, n
+
+      if (size(self%bands) == 0 .or. self%samples%n < 3) return
+      highest = highest_of_all(self)
+      n = 0
+      do k = 2, self%samples%n - 1
+         if (.not. is_bulge(self, k, highest)) cycle
+         associate (item => self%samples%item)
+            omega(n + 1) = item(k)%at%omega - part*(item(k)%at%omega - item(k - 1)%at%omega)
+            omega(n + 2) = item(k)%at%omega + part*(item(k + 1)%at%omega - item(k)%at%omega)
+         end associate
+         n = n + 2
+      end do
+      do k = 1, n
+         call solve_at(self, case, omega(k), budget, error, fallback=.true.)
+         if (allocated(error)) return
+      end do
+   end subroutine look_at_bulges
+
+   !> Whether a sample of a joint that opens is one, where a resonance may be the highest.
+   pure logical function is_bulge(self, k, highest)
+      type(peak_finder), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(in) :: highest(:)
+      !> How far above the line, relative.
+      real(wp), parameter :: least = 0.03_wp
+      real(wp) :: line(size(highest)), share
+      integer :: i, j
+      logical :: is_near
+
+      is_bulge = .false.
+      associate (below => self%samples%item(k - 1)%at, at => self%samples%item(k)%at, &
+                 above => self%samples%item(k + 1)%at)
+         if (.not. (opens(below) .or. opens(at) .or. opens(above))) return
+         is_near = .false.
+         do j = 1, size(self%bands)
+            is_near = is_near .or. (above%omega > self%bands(j)%free .and. &
+                                    below%omega < self%bands(j)%held .and. &
+                                    any(self%bands(j)%height > highest))
+         end do
+         if (.not. is_near) return
+         if (above%omega - below%omega <= same_frequency*above%omega) return
+         if (any([(is_maximum(self%samples, k - 1, i) .or. is_maximum(self%samples, k, i) .or. &
+                   is_maximum(self%samples, k + 1, i), i=1, size(highest))])) return
+         share = (at%omega - below%omega)/(above%omega - below%omega)
+         line = below%amplitude + share*(above%amplitude - below%amplitude)
+         is_bulge = any(at%amplitude > (1.0_wp + least)*line)
+      end associate
+   end function is_bulge
 
    !> The largest amplitude of every quantity.
    pure function highest_of_all(self) result(highest)
@@ -291,6 +355,7 @@ contains
          if (allocated(error)) return
       end do
       call look_between(self, case, budget, error)
+      if (.not. allocated(error)) call look_at_bulges(self, case, budget, error)
       if (.not. allocated(error)) call look_inside(self, case, budget, error)
       more = .true.
       do while (more .and. .not. allocated(error))
@@ -585,13 +650,15 @@ contains
    end subroutine find_summit
 
    !> One more solution, started from the sample given, else from the nearest that can be.
-   subroutine solve_at(self, case, omega, budget, error, from)
+   subroutine solve_at(self, case, omega, budget, error, from, fallback)
       type(peak_finder), intent(inout) :: self
       type(case_type), intent(in) :: case
       real(wp), intent(in) :: omega
       integer, intent(in) :: budget
       type(error_type), allocatable, intent(out) :: error
       integer, intent(in), optional :: from
+      !> Whether the methods that a row falls back to are tried as well.
+      logical, intent(in), optional :: fallback
       type(sample_type) :: sample
       type(point_request) :: request
       type(point_type) :: point
@@ -607,6 +674,7 @@ contains
       request = point_request(omega=omega, by_newton=.true.)
       if (case%sweep%refine) request = new_request(case, omega)
       request%fallback = .false.
+      if (present(fallback)) request%fallback = fallback
       request%interrupt => self%interrupt
       call self%strategy%solve_in_time(case, request, point, error)
       if (allocated(error)) return

@@ -24,8 +24,8 @@ module fw_peak_gaps
       real(wp), allocatable :: height(:)
       !> Whether the joint opens and closes at one of the rows: else only at the resonance.
       logical :: opens = .false.
-      !> To be solved in it.
-      integer :: points = 0
+      !> To be solved in it, and those that were: some fail, or are above the budget of the search.
+      integer :: points = 0, solved = 0
    end type gap_type
 
    type :: gap_list
@@ -135,7 +135,9 @@ contains
       do k = 1, self%n
          associate (gap => self%item(k))
             if (.not. gap%opens) cycle
-            if (gap%length <= real(gap%points + 1, wp) .or. all(gap%height <= highest)) cycle
+            if (all(gap%height <= highest)) cycle
+            ! Where no solution is found beside known ones, another branch may be near.
+            if (gap%solved == gap%points .and. gap%length <= real(gap%points + 1, wp)) cycle
             if (n_open == 0) range = [gap%below, gap%above]
             range = [min(range(1), gap%below), max(range(2), gap%above)]
             n_open = n_open + 1

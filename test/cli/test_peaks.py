@@ -131,6 +131,16 @@ def test_a_resonance_between_free_and_closed_joint_is_found(tmp_path):
     assert not remark and peak == pytest.approx(111.86, rel=2e-3)
 
 
+@pytest.mark.parametrize("n_points", [21, 31])
+def test_it_is_found_beside_a_lower_solution_where_few_points_are_asked_for(tmp_path, n_points):
+    """Newton's method fails from the rows (21), or a row beside it stands on its flank (31)."""
+    few = {"harmonics": {"accuracy": None, "n_harmonics": 3}, "sweep": {"n_points": n_points}}
+    run(tmp_path, merged(LIFTING, few))
+    peak, remark = peak_family.reported(tmp_path / "case.h5")
+    # That of 81 and of 161 rows with the same harmonics.
+    assert not remark and peak == pytest.approx(118.266, rel=2e-3)
+
+
 def test_rows_too_far_apart_for_the_resonances_of_a_lifting_joint_are_said(tmp_path):
     few = merged(LIFTING, {"harmonics": {"accuracy": None, "n_harmonics": 3}})
     found = []
