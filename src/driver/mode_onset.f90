@@ -370,7 +370,7 @@ contains
       type(onset_finder), intent(inout) :: self
       type(mode_system), intent(inout) :: system
       real(wp), intent(in) :: amplitude, y(:)
-      real(wp) :: amplitude, departed
+      real(wp) :: departed
 
       departed = self%departure%by_sliding(system, amplitude, y)
       if (departed <= 0.0_wp) then

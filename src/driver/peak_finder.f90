@@ -237,7 +237,9 @@ contains
       integer :: j, k, known
 
       if (self%gaps%n == 0) return
-      call self%gaps%plan(self%samples, highest_of_all(self), self%n_rows)
+      ! Half of what may be spent: the maxima that are found have to be climbed.
+      call self%gaps%plan(self%samples, highest_of_all(self), self%n_rows, &
+                          (budget - self%n_solved)/2)
       do k = 1, self%gaps%n
          associate (gap => self%gaps%item(k))
             do j = 1, gap%points

@@ -72,17 +72,17 @@ contains
 
    !> Share points among those intervals that may hold the highest maximum of a quantity: first
    !> where the joint opens, and then elsewhere, if it opens at all.
-   subroutine plan(self, samples, highest, n_rows)
+   subroutine plan(self, samples, highest, n_rows, n_most)
       class(gap_list), intent(inout) :: self
       !> All that are known.
       type(sample_list), intent(in) :: samples
       !> Known so far (n_observed).
       real(wp), intent(in) :: highest(:)
-      !> Of the sweep.
-      integer, intent(in) :: n_rows
+      !> Rows of the sweep, and points that may be solved.
+      integer, intent(in) :: n_rows, n_most
       integer :: k, left
 
-      left = max(least_points, n_rows/rows_per_point)
+      left = max(0, min(max(least_points, n_rows/rows_per_point), n_most))
       call share(self, highest, .true., left)
       do k = 1, samples%n
          if (.not. opens(samples%item(k)%at)) cycle
@@ -97,7 +97,6 @@ contains
       real(wp), intent(in) :: highest(:)
       logical, intent(in) :: opens
       integer, intent(inout) :: left
-      real(wp), parameter :: many = 1.0e6_wp
       real(wp) :: wanted
       integer :: k, total
 
@@ -109,7 +108,8 @@ contains
                if (gap%opens .neqv. opens) cycle
                gap%points = 0
                if (any(gap%height > highest)) then
-                  gap%points = max(ceiling(min(wanted*gap%length, many)) - 1, 0)
+                  ! More than are left are too many, however many.
+                  gap%points = max(ceiling(min(wanted*gap%length, real(left + 2, wp))) - 1, 0)
                end if
                total = total + gap%points
             end associate
