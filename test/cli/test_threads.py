@@ -13,7 +13,9 @@ from wear_cases import result
 resource = pytest.importorskip("resource")
 
 N_PAIRS = 72
-MOST_WAITS = 600
+#: Of 48 points: some 20,000 where all regions are shared, some 1,000 in the looks at whether that
+#: would help, on a machine at rest; fewer beside others.
+MOST_WAITS = 4000
 
 
 @pytest.fixture
@@ -66,9 +68,10 @@ def test_threads_without_processors_do_not_wait_for_each_other(chain):
     for threads in (1, 2):
         groups = {"case": {"analysis": "frf", "threads": threads},
                   "model": {"source": "hdf5", "file": "chain.h5"},
-                  "contact": {"mu": 0.4, "gap": 0.0, "area": 1.0},
+                  # Carried: no maxima are looked for, so that the work is that of the rows.
+                  "contact": {"mu": 0.4, "gap": 0.0, "area": 1.0, "memory": "carried"},
                   "harmonics": {"n_harmonics": 5, "n_time": 64},
-                  "sweep": {"start": 1.2, "end": 1.8, "n_points": 12}}
+                  "sweep": {"start": 1.2, "end": 1.8, "n_points": 48}}
         write_namelist(chain / "busy.nml", groups)
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_nvcsw
         subprocess.run(["taskset", "-c", str(chosen), PROGRAM, "-q", "busy.nml"], cwd=chain,
@@ -76,5 +79,4 @@ def test_threads_without_processors_do_not_wait_for_each_other(chain):
         waits.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_nvcsw - before)
         shared.append(read(chain / "busy.h5")["coefficients"].tobytes())
     assert shared[0] == shared[1]
-    # Some 6,000 where all regions are shared; some tens in the looks at whether that would help.
     assert waits[1] < waits[0] + MOST_WAITS, waits
