@@ -180,6 +180,7 @@ def sector_file(pairs: int, folder: Path, coarse: Mapping[str, int] | None = Non
     path = model_file(pairs, folder, coarse)
     if not path.exists():
         options = [f"--{key}={value}" for key, value in (coarse or {}).items()]
+        path.parent.mkdir(parents=True, exist_ok=True)
         subprocess.run([sys.executable, "-m", "fretwear.sector", "--pairs", str(pairs), "-q",
                         *options, "-o", path], check=True,
                        env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
