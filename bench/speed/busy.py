@@ -23,6 +23,7 @@ from pathlib import Path
 
 from bench.common.layout import table, wrapped
 from bench.common.measure import ROOT, Groups, write_namelist
+from bench.common.pages import write_overview
 from bench.common.sector import COARSE, case, sector_file
 
 PAGE = ROOT / "docs" / "benchmarks" / "busy.md"
@@ -146,6 +147,8 @@ def main() -> None:
     text = TEXT.format(processors=len(processors), loops=options.loops, turns=options.turns,
                        wanted=WANTED)
     options.page.write_text(wrapped("\n".join([text, *lines])) + "\n", encoding="utf-8")
+    if options.page == PAGE:
+        write_overview(PAGE.parent.parent)
 
 
 if __name__ == "__main__":
