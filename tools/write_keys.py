@@ -102,7 +102,8 @@ def range_text(key: dict[str, Any]) -> str:
 def accepts(key: dict[str, Any]) -> str:
     kind = key["type"]
     if kind == "word":
-        return ", ".join(f"`'{word}'`" for word in key["words"])
+        words = ", ".join(f"`'{word}'`" for word in key["words"])
+        return f"{words}; one or {key['shape']}" if "shape" in key else words
     if kind in ("text", "list"):
         return "text" if kind == "text" else key["accepts"]
     if kind == "logical":
@@ -170,11 +171,12 @@ def put(text: str, name: str, last: str, lines: str) -> str:
 
 
 def annotation(name: str, key: dict[str, Any]) -> str:
-    if "shape" in key:
+    if "shape" in key and key["type"] != "word":
         return "ArrayLike"
     if key["type"] == "word":
         words = [word for word in key["words"] if word not in OWN_WORDS.get(name, [])]
-        return "Literal[" + ", ".join(f'"{word}"' for word in words) + "]"
+        one = "Literal[" + ", ".join(f'"{word}"' for word in words) + "]"
+        return f"{one} | Sequence[str]" if "shape" in key else one
     return {"real": "float", "integer": "int", "logical": "bool", "text": "str",
             "list": "str | int | Sequence[str | int]"}[key["type"]]
 

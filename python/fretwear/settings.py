@@ -174,7 +174,7 @@ class Contact(TypedDict, total=False):
     n_pairs: int
     #: rigid, rigid at velocity level, elastic, rigid of high order (friction on dofs with mass), or
     #: smooth in the velocity (default: 'rigid' where it goes, else 'dlft')
-    law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised"]
+    law: Literal["dlft", "dlft_velocity", "penalty", "rigid", "regularised"] | Sequence[str]
     #: dofs of t1, t2, n on one side; 0: none, negative: with its sign turned (default: of the file,
     #: else required)
     side_1: ArrayLike

@@ -5,9 +5,10 @@ module fw_active_set
 
    public :: active_set, element_list
 
-   !> Numbers of elements of a law (the first n of `number`).
+   !> Numbers of elements of a law (the first n of `number`), those whose inputs are without the
+   !> balance before those that take it.
    type :: element_list
-      integer :: n = 0
+      integer :: n = 0, n_free = 0
       integer, allocatable :: number(:)
    end type element_list
 

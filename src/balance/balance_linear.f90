@@ -109,30 +109,41 @@ contains
    !> The elements of a law whose forces reach the linear problem: of those that are held throughout
    !> nothing does. Inputs and outputs of the others are not set by products; wear reads those of
    !> mixed pairs, which are always among these.
-   pure subroutine list_acting(self, entry, work, acting)
+   subroutine list_acting(self, entry, work, acting)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
       type(force_workspace), intent(in) :: work
       type(element_list), intent(inout) :: acting
-      integer :: c, i, n_rows
-      logical :: reaches
 
       if (.not. allocated(acting%number)) allocate (acting%number(size(work%state)))
       acting%n = 0
       ! Forces that do not take the balance count in rows that the others take as well.
-      n_rows = self%active%n_used
-      if (entry%law%prediction%takes_balance) n_rows = self%active%n_active
-      do i = 1, size(work%state)
-         if (work%linear_state(i) == pair_open) cycle
-         reaches = .false.
-         do c = 1, size(entry%row, 1)
-            if (entry%row(c, i) == 0 .or. reaches) cycle
-            reaches = self%problem%incidence%reaches(entry%row(c, i), self%active%place, n_rows)
+      if (entry%law%prediction%some_are_free()) call append(.false., self%active%n_used)
+      acting%n_free = acting%n
+      if (entry%law%prediction%takes_balance) call append(.true., self%active%n_active)
+
+   contains
+
+      subroutine append(takes, n_rows)
+         logical, intent(in) :: takes
+         integer, intent(in) :: n_rows
+         integer :: c, i
+         logical :: reaches
+
+         do i = 1, size(work%state)
+            if (work%linear_state(i) == pair_open) cycle
+            if (entry%law%prediction%takes(i) .neqv. takes) cycle
+            reaches = .false.
+            do c = 1, size(entry%row, 1)
+               if (entry%row(c, i) == 0 .or. reaches) cycle
+               reaches = self%problem%incidence%reaches(entry%row(c, i), self%active%place, n_rows)
+            end do
+            if (.not. reaches) cycle
+            acting%n = acting%n + 1
+            acting%number(acting%n) = i
          end do
-         if (.not. reaches) cycle
-         acting%n = acting%n + 1
-         acting%number(acting%n) = i
-      end do
+      end subroutine append
+
    end subroutine list_acting
 
    !> Coordinates whose rows elements hold, and those of them whose rows of A are needed still.
@@ -147,8 +158,9 @@ contains
       do i = 1, size(entry%row, 2)
          do c = 1, last
             if (entry%row(c, i) == 0 .or. work%linear_state(i) == pair_open) cycle
+            if (.not. entry%law%prediction%takes(i)) cycle
             ! At velocity level a row that sticks reads eps dv/dtau = -r: not solved at once.
-            if (entry%law%prediction%order(c) > 0) cycle
+            if (entry%law%prediction%order_of(i, c) > 0) cycle
             j = self%problem%incidence%coordinate_of(entry%row(c, i))
             ! A pair that bears throughout has G = 1 in the normal direction even while it slips,
             ! and its row reads eps v = -r. Its friction depends on the pressure all the same, of
@@ -187,6 +199,7 @@ contains
                     row => self%problem%forces%entry(k)%row)
             if (.not. p%takes_balance) cycle
             do i = 1, size(row, 2)
+               if (.not. p%takes(i)) cycle
                do c = 1, size(row, 1)
                   if (row(c, i) == 0) cycle
                   j = self%problem%incidence%coordinate_of(row(c, i))
@@ -363,22 +376,24 @@ contains
       integer :: k
 
       if (.not. roughly) call self%form_jacobians()
-      ! Two passes: outputs of the laws without the balance are in active_out before the others
-      ! take their inputs from it.
+      ! Outputs of elements without the balance are in active_out before the others take their
+      ! inputs from it.
       do k = 1, self%problem%forces%n_laws
-         associate (entry => self%problem%forces%entry(k), work => self%work(k))
-            call multiply_elements(self, k, self%acting(k)%number(:self%acting(k)%n), map, &
-                                   n_mapped, vector, roughly, work)
-            if (entry%law%prediction%takes_balance) cycle
-            call add_outputs(self, entry, work, self%acting(k)%number(:self%acting(k)%n), &
-                             self%active%place, self%active%n_used, self%scratch%active_out)
+         associate (entry => self%problem%forces%entry(k), work => self%work(k), &
+                    free => self%acting(k)%number(:self%acting(k)%n_free))
+            if (.not. entry%law%prediction%some_are_free()) cycle
+            call multiply_elements(self, k, free, map, n_mapped, vector, roughly, work)
+            call add_outputs(self, entry, work, free, self%active%place, self%active%n_used, &
+                             self%scratch%active_out)
          end associate
       end do
       do k = 1, self%problem%forces%n_laws
-         associate (entry => self%problem%forces%entry(k), work => self%work(k))
+         associate (entry => self%problem%forces%entry(k), work => self%work(k), &
+                    rigid => self%acting(k)%number(self%acting(k)%n_free + 1:self%acting(k)%n))
             if (.not. entry%law%prediction%takes_balance) cycle
-            call add_outputs(self, entry, work, self%acting(k)%number(:self%acting(k)%n), &
-                             self%active%place, self%active%n_active, self%scratch%active_out)
+            call multiply_elements(self, k, rigid, map, n_mapped, vector, roughly, work)
+            call add_outputs(self, entry, work, rigid, self%active%place, self%active%n_active, &
+                             self%scratch%active_out)
          end associate
       end do
    end subroutine add_forces
@@ -466,7 +481,8 @@ contains
       type(force_entry), intent(in) :: entry
 
       pins_last = entry%law%prediction%takes_balance .and. &
-                  entry%law%prediction%order(size(entry%row, 1)) == 0
+                  entry%law%prediction%order(size(entry%row, 1)) == 0 .and. &
+                  .not. entry%law%prediction%some_are_free()
    end function pins_last
 
    !> Outputs of all elements of a law from their inputs.
@@ -539,11 +555,12 @@ contains
             call self%problem%incidence%gather_row(row, map, n_mapped, p%stiffness(element, c), &
                                                    vector, &
                                            inputs(:, c))
-            if (p%order(c) > 0) call take_rate(self%problem%fourier, rests, self%rate_unit(p), &
-                                               inputs(:, c))
+            if (p%order_of(element, c) > 0) call take_rate(self%problem%fourier, rests, &
+                                                           self%rate_unit(p, element), &
+                                                           inputs(:, c))
             if (p%has_inertia) call turn_row(self%problem%fourier, self%frequency(), p, element, &
                                              c, .false., inputs(:, c))
-            if (.not. p%takes_balance) cycle
+            if (.not. p%takes(element)) cycle
             place = self%active%place(self%problem%incidence%coordinate_of(row))
             if (place > 0) inputs(:, c) = inputs(:, c) - balance(place, :)
          end do

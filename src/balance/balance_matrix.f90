@@ -234,7 +234,7 @@ contains
             room%outputs(:n, :n_columns) = room%inputs(:n, :n_columns)
          end if
          do j = 1, n_columns
-            if (entry%law%prediction%takes_balance) then
+            if (entry%law%prediction%takes(i)) then
                call add_rows_of(self, entry, i, room%outputs(:n, j), na, na, &
                                 matrix(:, first + j))
             else

@@ -140,6 +140,7 @@ contains
                     row => self%problem%forces%entry(k)%row)
             if (.not. p%takes_balance) cycle
             do i = 1, size(row, 2)
+               if (.not. p%takes(i)) cycle
                do c = 1, size(row, 1)
                   if (row(c, i) == 0) cycle
                   place = self%active%place(self%problem%incidence%coordinate_of(row(c, i)))
@@ -229,13 +230,15 @@ contains
          ! d/dtau is a factor i n of the complex coefficient uc - i us.
          n = self%problem%fourier%harmonic(h)
          factor = one
-         if (p%order(c_in) > 0) factor = cmplx(0.0_wp, self%rate_unit(p)*n, wp)
+         if (p%order_of(element, c_in) > 0) then
+            factor = cmplx(0.0_wp, self%rate_unit(p, element)*n, wp)
+         end if
          ! A pair at rest takes its mean position, not the rate of it, which is zero.
          if (n == 0 .and. rests) factor = one
          if (p%has_inertia) then
             factor = factor*p%impedance_ratio(element, c_in, n, self%frequency())
          end if
-         if (p%takes_balance) then
+         if (p%takes(element)) then
             p_out = self%active%place(self%problem%incidence%coordinate_of(row(c_out)))
             p_in = self%active%place(self%problem%incidence%coordinate_of(row(c_in)))
             if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then

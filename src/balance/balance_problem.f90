@@ -107,6 +107,7 @@ contains
          associate (law => self%forces%entry(k)%law)
             if (.not. law%prediction%takes_balance) cycle
             call set_stiffness(self, stand, highest, law%prediction)
+            call law%take_prediction()
          end associate
       end do
    end subroutine scale_forces
@@ -125,6 +126,7 @@ contains
       integer :: i, c
 
       do i = 1, self%n_pairs
+         if (.not. prediction%takes(i)) cycle
          stiffness = 0.0_wp
          do c = 1, 3
             if (self%joint%row(c, i) == 0) cycle
@@ -157,6 +159,9 @@ contains
       prediction%damping = 0.0_wp
       n = maxval(self%fourier%harmonic)
       do i = 1, self%n_pairs
+         if (allocated(prediction%own)) then
+            if (.not. prediction%own(i)%has_inertia) cycle
+         end if
          counts = self%joint%row(:, i) > 0 .and. .not. self%joint%idle(:, i)
          k = 0.0_wp
          do j = 1, 3

@@ -57,28 +57,39 @@ contains
 
       call self%form_jacobians()
       do k = 1, self%problem%forces%n_laws
-         associate (p => self%problem%forces%entry(k)%law%prediction)
-            ! Inputs of any other law depend on q alone, and q is held.
-            if (.not. (p%takes_balance .or. (p%by_time .and. in_time))) cycle
-            call inputs_by_point(self, self%problem%forces%entry(k), in_time, m, nc, q, dr, &
-                                 self%work(k)%input)
+         associate (entry => self%problem%forces%entry(k), work => self%work(k), &
+                    p => self%problem%forces%entry(k)%law%prediction)
+            ! Inputs of any other law depend on q alone, and q is held. Elements that take the
+            ! balance come last: what the others add is a part of it.
+            if (p%some_are_free() .and. p%by_time .and. in_time) then
+               call inputs_by_point(self, entry, in_time, m, nc, q, dr, work%input)
+               call multiply_derivative(entry%row, work)
+               call add_outputs(self, entry, work, not_open(p, work, .false.), &
+                                self%problem%incidence%identity, m, dr)
+            end if
+            if (.not. p%takes_balance) cycle
+            call inputs_by_point(self, entry, in_time, m, nc, q, dr, work%input)
+            call multiply_derivative(entry%row, work)
+            call add_outputs(self, entry, work, not_open(p, work, .true.), &
+                             self%problem%incidence%identity, m, dr)
+            if (p%has_inertia .and. in_time) then
+               call add_law_by_frequency(self, entry, work, m, nc, dr)
+            end if
          end associate
-         call multiply_derivative(self%problem%forces%entry(k)%row, self%work(k))
-         call add_outputs(self, self%problem%forces%entry(k), self%work(k), &
-                          not_open(self%work(k)), self%problem%incidence%identity, m, dr)
-         if (self%problem%forces%entry(k)%law%prediction%has_inertia .and. in_time) then
-            call add_law_by_frequency(self, self%problem%forces%entry(k), self%work(k), m, nc, dr)
-         end if
       end do
    end subroutine derivative_with_forces
 
-   !> The elements that have forces.
-   pure function not_open(work) result(elements)
+   !> The elements that have forces, of those that take the balance or of those that do not.
+   pure function not_open(prediction, work, takes) result(elements)
+      type(prediction_type), intent(in) :: prediction
       type(force_workspace), intent(in) :: work
+      logical, intent(in) :: takes
       integer, allocatable :: elements(:)
       integer :: i
 
-      elements = pack([(i, i=1, size(work%linear_state))], work%linear_state /= pair_open)
+      elements = pack([(i, i=1, size(work%linear_state))], &
+                      work%linear_state /= pair_open .and. &
+                      [(prediction%takes(i) .eqv. takes, i=1, size(work%linear_state))])
    end function not_open
 
    !> A law with inertia in units of time depends on the frequency by itself: a central difference,
@@ -123,7 +134,7 @@ contains
                if (row(c, i) == 0) cycle
                associate (y => input((c - 1)*nc + 1:c*nc, i))
                   ! y = k omega B dq/dtau, so that dy/d omega = k B dq/dtau.
-                  if (p%by_time .and. p%order(c) > 0 .and. in_time) then
+                  if (p%in_time(i) .and. p%order_of(i, c) > 0 .and. in_time) then
                      call self%problem%incidence%gather_row(row(c, i), &
                                                             self%problem%incidence%identity, m, &
                                                     p%stiffness(i, c), q, y)
@@ -134,7 +145,7 @@ contains
                   end if
                   ! The balance in y is minus what the residual is without this law, and its slope
                   ! is -dr.
-                  if (p%takes_balance) y = y - &
+                  if (p%takes(i)) y = y - &
                      dr(self%problem%incidence%coordinate_of(row(c, i)), :)
                end associate
             end do

@@ -177,7 +177,7 @@ contains
 
       associate (p => entry%law%prediction, row => entry%row(:, element), &
                  na => self%active%n_active)
-         if (p%takes_balance) then
+         if (p%takes(element)) then
             p_out = self%active%place(self%problem%incidence%coordinate_of(row(c_out)))
             p_in = self%active%place(self%problem%incidence%coordinate_of(row(c_in)))
             if (p_in > 0 .and. p_out > 0 .and. p_out <= na) then

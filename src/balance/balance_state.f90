@@ -464,11 +464,9 @@ contains
          associate (own => self%problem%forces%entry(k)%law%prediction, &
                     given => other%forces%entry(k)%law%prediction)
             if (.not. given%takes_balance) cycle
-            own%stiffness = given%stiffness
-            if (.not. allocated(given%inertia)) cycle
-            own%inertia = given%inertia
-            own%damping = given%damping
+            call own%take_eps(given)
          end associate
+         call self%problem%forces%entry(k)%law%take_prediction()
       end do
       call self%renew_workspaces()
    end subroutine take_stiffness
@@ -689,13 +687,17 @@ contains
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k), work => self%work(k))
             work%rate = self%frequency()
-            ! Laws without the balance come before those with it, which take what is left.
             call predict(self, entry, m, nc, x, work)
             if (k == self%problem%forces%pairs) call entry%law%set_offset(self%depth, work)
-            call entry%law%evaluate(self%problem%fourier, work)
-            if (.not. entry%law%prediction%takes_balance) then
-               call self%problem%incidence%scatter(entry%rows, m, nc, -1.0_wp, work%force, &
+            ! Forces without the balance come before those with it, which take what is left.
+            if (entry%law%prediction%some_are_free()) then
+               call entry%law%evaluate_free(self%problem%fourier, work)
+               call self%problem%incidence%scatter(entry%free_rows, m, nc, -1.0_wp, work%force, &
                                                    self%balance)
+            end if
+            if (entry%law%prediction%takes_balance) then
+               call add_balance(self, entry, work%prediction)
+               call entry%law%evaluate_rigid(self%problem%fourier, work)
             end if
          end associate
       end do
@@ -712,7 +714,7 @@ contains
       self%balance = self%load - self%balance
    end subroutine multiply_stiffness
 
-   !> Predicted inputs of a law.
+   !> Predicted inputs of a law, without the balance.
    subroutine predict(self, entry, m, nc, q, work)
       type(balance_state), intent(in) :: self
       type(force_entry), intent(in) :: entry
@@ -726,34 +728,35 @@ contains
          do j = 1, nc
             y(:, :, j) = p%stiffness*y(:, :, j)
          end do
-         if (any(p%order > 0)) call take_means(self%problem%fourier, p%order, y, work%mean)
-         if (any(p%order > 0)) call take_rates(self%problem%fourier, self%rate_unit(p), p%order, y)
+         if (any(p%order > 0)) call take_means(self%problem%fourier, p, y, work%mean)
+         if (any(p%order > 0)) call take_rates(self%problem%fourier, self%frequency(), p, y)
          if (p%has_inertia) call take_inertias(self%problem%fourier, self%frequency(), p, y)
-         if (p%takes_balance) call add_balance(self, entry%row, y)
       end associate
    end subroutine predict
 
    !> What makes a derivative by tau one by what a law takes: omega where that is the time.
-   pure real(wp) function rate_unit(self, prediction)
+   pure real(wp) function rate_unit(self, prediction, element)
       class(balance_state), intent(in) :: self
       type(prediction_type), intent(in) :: prediction
+      integer, intent(in) :: element
 
-      rate_unit = merge(self%frequency(), 1.0_wp, prediction%by_time)
+      rate_unit = merge(self%frequency(), 1.0_wp, prediction%in_time(element))
    end function rate_unit
 
    !> What elements must transmit for equilibrium.
-   subroutine add_balance(self, row, y)
+   subroutine add_balance(self, entry, y)
       type(balance_state), intent(in) :: self
-      integer, intent(in) :: row(:, :)
+      type(force_entry), intent(in) :: entry
       real(wp), intent(inout) :: y(:, :, :)
       integer :: i, c, j
 
       do j = 1, size(y, 3)
          do c = 1, size(y, 2)
             do i = 1, size(y, 1)
-               if (row(c, i) == 0) cycle
+               if (entry%row(c, i) == 0) cycle
+               if (.not. entry%law%prediction%takes(i)) cycle
                y(i, c, j) = y(i, c, j) + &
-                  self%balance(self%problem%incidence%coordinate_of(row(c, i)), j)
+                  self%balance(self%problem%incidence%coordinate_of(entry%row(c, i)), j)
             end do
          end do
       end do
@@ -770,7 +773,8 @@ contains
       do k = 1, self%problem%forces%n_laws
          associate (entry => self%problem%forces%entry(k))
             if (.not. entry%law%prediction%takes_balance) cycle
-            call self%problem%incidence%scatter(entry%rows, m, nc, 1.0_wp, self%work(k)%force, r)
+            call self%problem%incidence%scatter(entry%rigid_rows, m, nc, 1.0_wp, &
+                                                self%work(k)%force, r)
          end associate
       end do
    end subroutine collect

@@ -95,6 +95,7 @@ contains
                        p => self%problem%forces%entry(k)%law%prediction)
                if (.not. p%takes_balance) cycle
                do i = 1, size(row, 2)
+                  if (.not. p%takes(i)) cycle
                   do c = 1, size(row, 1)
                      if (row(c, i) == 0) cycle
                      held(structure%slot(self%problem%incidence%coordinate_of(row(c, i)))) = &
@@ -170,8 +171,9 @@ contains
       associate (p => entry%law%prediction)
          n = self%problem%fourier%harmonic(h)
          slope = cmplx(p%stiffness(element, component), kind=wp)
-         if (p%order(component) > 0 .and. .not. (n == 0 .and. work%linear_rests(element))) then
-            slope = slope*cmplx(0.0_wp, self%rate_unit(p)*n, wp)
+         if (p%order_of(element, component) > 0 .and. &
+             .not. (n == 0 .and. work%linear_rests(element))) then
+            slope = slope*cmplx(0.0_wp, self%rate_unit(p, element)*n, wp)
          end if
          if (p%has_inertia) slope = slope*p%impedance_ratio(element, component, n, self%frequency())
       end associate
@@ -208,7 +210,7 @@ contains
             do j = 1, n
                matrix(:n, j) = matrix(:n, j) + output*mean%slope(c_out, c_in)*input(j)
             end do
-            if (.not. entry%law%prediction%takes_balance) cycle
+            if (.not. entry%law%prediction%takes(element)) cycle
             j = self%problem%structure%slot(self%problem%incidence%coordinate_of( &
                                             entry%row(c_in, element)))
             matrix(i, :) = matrix(i, :) - mean%force(c_out, c_in)*stiffness(j, :)

@@ -120,7 +120,7 @@ contains
          do i = 1, balance%problem%n_pairs
             do c = 1, 3
                if (balance%problem%joint%row(c, i) == 0) cycle
-               if (law%prediction%by_time .and. law%prediction%order(c) > 0) cycle
+               if (law%prediction%in_time(i) .and. law%prediction%order_of(i, c) > 0) cycle
                call balance%problem%incidence%add_block(balance%problem%joint%row(c, i), h, &
                   cmplx(law%prediction%stiffness(i, c), kind=wp), p)
             end do

@@ -159,7 +159,7 @@ contains
          do i = 1, system%problem%n_pairs
             row = system%problem%joint%row(3, i)
             if (row == 0) cycle
-            if (p%takes_balance) then
+            if (p%takes(i)) then
                free(system%problem%incidence%coordinate_of(row)) = .false.
             else
                call system%problem%incidence%add_block(row, 1, cmplx(p%stiffness(i, 3), kind=wp), &
@@ -276,7 +276,7 @@ contains
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
          if (.not. law%prediction%takes_balance) return
          do i = 1, size(closed)
-            if (.not. closed(i)) cycle
+            if (.not. closed(i) .or. .not. law%prediction%takes(i)) cycle
             do c = 1, 3
                row = system%problem%joint%row(c, i)
                if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
@@ -299,9 +299,9 @@ contains
       complex(wp) :: slope
 
       associate (law => system%problem%forces%entry(system%problem%forces%pairs)%law)
-         if (law%prediction%takes_balance) return
+         if (.not. law%prediction%some_are_free()) return
          do i = 1, size(closed)
-            if (.not. closed(i)) cycle
+            if (.not. closed(i) .or. law%prediction%takes(i)) cycle
             do c = 1, 3
                row = system%problem%joint%row(c, i)
                if (row == 0 .or. .not. law%slope_at_rest(i, c) > 0.0_wp) cycle
@@ -334,8 +334,8 @@ contains
 
       slope = cmplx(law%prediction%stiffness(pair, component)*law%slope_at_rest(pair, component), &
                     kind=wp)
-      if (law%prediction%order(component) > 0) then
-         slope = cmplx(0.0_wp, system%rate_unit(law%prediction)*harmonic, wp)*slope
+      if (law%prediction%order_of(pair, component) > 0) then
+         slope = cmplx(0.0_wp, system%rate_unit(law%prediction, pair)*harmonic, wp)*slope
       end if
    end function elastic_slope
 

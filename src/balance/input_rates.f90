@@ -14,40 +14,43 @@ module fw_input_rates
 contains
 
    !> Rates say nothing of mean positions: an element that comes to rest takes them beside.
-   pure subroutine take_means(fourier, order, y, mean)
+   pure subroutine take_means(fourier, prediction, y, mean)
       type(fourier_type), intent(in) :: fourier
-      integer, intent(in) :: order(:)
+      type(prediction_type), intent(in) :: prediction
       real(wp), intent(in) :: y(:, :, :)
       !> (element, tangential component).
       real(wp), intent(inout) :: mean(:, :)
-      integer :: c
+      integer :: c, i
 
       mean = 0.0_wp
       if (.not. fourier%has_constant()) return
       do c = 1, min(size(mean, 2), size(y, 2))
-         if (order(c) > 0) mean(:, c) = y(:, c, 1)
+         do i = 1, size(y, 1)
+            if (prediction%order_of(i, c) > 0) mean(i, c) = y(i, c, 1)
+         end do
       end do
    end subroutine take_means
 
    !> Replace inputs from displacements by inputs from velocities, where the law takes these.
-   pure subroutine take_rates(fourier, unit, order, y)
+   pure subroutine take_rates(fourier, omega, prediction, y)
       type(fourier_type), intent(in) :: fourier
-      real(wp), intent(in) :: unit
-      integer, intent(in) :: order(:)
+      real(wp), intent(in) :: omega
+      type(prediction_type), intent(in) :: prediction
       real(wp), intent(inout) :: y(:, :, :)
       real(wp) :: cosine, n
       integer :: i, c, h, k
 
       do h = 1, fourier%n_retained
          k = fourier%column(h)
-         n = unit*real(fourier%harmonic(h), wp)
          do c = 1, size(y, 2)
-            if (order(c) == 0) cycle
-            if (fourier%harmonic(h) == 0) then
-               y(:, c, k) = 0.0_wp
-               cycle
-            end if
+            if (prediction%order(c) == 0) cycle
             do i = 1, size(y, 1)
+               if (prediction%order_of(i, c) == 0) cycle
+               if (fourier%harmonic(h) == 0) then
+                  y(i, c, k) = 0.0_wp
+                  cycle
+               end if
+               n = merge(omega, 1.0_wp, prediction%in_time(i))*real(fourier%harmonic(h), wp)
                ! d/dtau (a cos n tau + b sin n tau) = n b cos n tau - n a sin n tau.
                cosine = y(i, c, k)
                y(i, c, k) = n*y(i, c, k + 1)

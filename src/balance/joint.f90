@@ -6,7 +6,7 @@ module fw_joint
    use fw_cyclic_relative, only: cyclic_relative, new_cyclic_relative
    use fw_error, only: error_type, fatal_error, status_input
    use fw_force_law, only: law_facts
-   use fw_laws, only: facts_of
+   use fw_laws, only: facts_of, pairs_are_rigid
    use fw_model, only: model_type
    use fw_relative, only: relative_type, new_relative
    use fw_text, only: to_text
@@ -45,9 +45,9 @@ contains
       logical, intent(in) :: skip_idle
       type(joint_type), intent(out) :: self
       type(error_type), allocatable, intent(out) :: error
-      integer, allocatable :: side_1(:), side_2(:), sector_2(:)
-      logical, allocatable :: moving(:)
-      integer :: i, c, n_pairs, n_rows, n_springs
+      integer, allocatable :: side_1(:), side_2(:), sector_2(:), first(:)
+      logical, allocatable :: moving(:), rigid(:)
+      integer :: i, c, k, n_pairs, n_rows, n_springs
 
       ! Before the rows are numbered: what never moves needs none.
       call find_moving_dofs(model, contact, springs, moving)
@@ -58,7 +58,13 @@ contains
       n_springs = springs%n_springs/model%cyclic%n_solved()
       allocate (side_1(0), side_2(0), sector_2(0))
       n_rows = 0
-      do i = 1, n_pairs
+      ! Rigid pairs first: their displacements are to be coordinates, on which those of others may
+      ! depend.
+      rigid = pairs_are_rigid(contact)
+      first = [pack([(i, i=1, n_pairs)], rigid(:n_pairs)), &
+               pack([(i, i=1, n_pairs)], .not. rigid(:n_pairs))]
+      do k = 1, n_pairs
+         i = first(k)
          do c = 1, 3
             ! Ground against ground: the component is absent.
             if (contact%side_1(c, i) == 0 .and. contact%side_2(c, i) == 0) cycle
@@ -149,6 +155,7 @@ contains
       integer, allocatable :: diameter(:)
       integer :: h, i, k, n, row
       integer :: place(2)
+      logical, allocatable :: rigid(:, :)
 
       if (.not. model%cyclic%is_cyclic) return
       if (model%cyclic%is_mistuned) then
@@ -159,12 +166,13 @@ contains
          call self%cyclic%lay_out(model%cyclic, harmonic, self%relative)
          diameter = model%cyclic%nodal_diameter(harmonic)
       end if
-      facts = facts_of(contact%law)
+      facts = facts_of(contact)
       if (.not. facts%needs_independent .or. contact%n_pairs == 0) return
       n = contact%n_pairs/model%cyclic%n_solved()
+      rigid = spread(pairs_are_rigid(contact), 1, 3)
       do h = 1, size(diameter)
          k = diameter(h)
-         row = self%cyclic%first_dependent(k, [(any(self%row(:, :n) == i), &
+         row = self%cyclic%first_dependent(k, [(any(self%row(:, :n) == i .and. rigid(:, :n)), &
                                                 i=1, self%cyclic%n_rows)])
          if (row == 0) cycle
          place = findloc(self%row, row)
@@ -256,7 +264,7 @@ contains
       if (model%waves%n_waves() > 0) symmetric = symmetric .and. &
          all(modulo(model%waves%harmonic, 2) == 1)
       if (contact%n_pairs > 0) then
-         facts = facts_of(contact%law)
+         facts = facts_of(contact)
          symmetric = symmetric .and. facts%is_odd .and. all(joint%row(3, :) == 0) .and. &
                      contact%memory /= memory_carried
       end if
@@ -270,13 +278,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(*), parameter :: component(*) = [character(2) :: 't1', 't2', 'n']
       type(law_facts) :: facts
+      logical :: rigid(contact%n_pairs)
       integer :: i, c
 
-      facts = facts_of(contact%law)
+      facts = facts_of(contact)
       if (.not. facts%needs_independent) return
+      rigid = pairs_are_rigid(contact)
       do i = 1, contact%n_pairs
          do c = 1, 3
-            if (self%row(c, i) == 0) cycle
+            if (self%row(c, i) == 0 .or. .not. rigid(i)) cycle
             if (self%relative%independent(self%row(c, i))) cycle
             call fatal_error(error, '&contact pair '//to_text(i)//', '//trim(component(c))// &
                              ': its relative displacement follows from that of earlier pairs, '// &

@@ -81,6 +81,7 @@ contains
          allocate (self%law, source=problem%forces%entry(problem%forces%pairs)%law)
          ! Where no dof presses, a constant does: an input all the same.
          if (problem%n_pairs > 0) self%law%present(3, :) = .true.
+         call self%law%take_prediction()
          self%fourier = new_fourier(maxval(f%harmonic), f%n_time)
          call self%law%reserve(self%fourier, self%work)
          allocate (self%column(f%n_coefficients))
@@ -155,6 +156,8 @@ contains
       call clear(state, slope)
       if (is_per_pair(parameter%number)) then
          call by_pair(self, state, parameter, slope)
+         ! Rigid pairs feel what elastic ones beside them change, but not one another.
+         if (.not. self%law%prediction%takes(parameter%element)) call answer_balance(state, slope)
       else
          select case (parameter%number)
          case (spring_coefficient)
@@ -370,7 +373,7 @@ contains
                  work => state%work(state%problem%forces%pairs), b => state%problem%incidence)
          if (.not. entry%law%prediction%takes_balance) return
          do i = 1, size(entry%row, 2)
-            if (work%linear_state(i) == pair_open) cycle
+            if (work%linear_state(i) == pair_open .or. .not. entry%law%prediction%takes(i)) cycle
             do c = 1, 3
                work%input((c - 1)*nc + 1:c*nc, i) = 0.0_wp
                if (entry%row(c, i) == 0) cycle

@@ -104,7 +104,7 @@ contains
                       (work%state(i) == pair_open .or. c < first)) cycle
                   slope = slope_of(system, k, i, c)
                   if (.not. abs(slope) > 0.0_wp) cycle
-                  if (entry%law%prediction%takes_balance) then
+                  if (entry%law%prediction%takes(i)) then
                      held(system%problem%incidence%coordinate_of(row)) = .true.
                   else
                      call system%problem%incidence%add_block(row, h, &

@@ -57,7 +57,7 @@ contains
          associate (entry => state%problem%forces%entry(k), work => state%work(k))
             if (.not. entry%law%prediction%takes_balance) cycle
             call gather_outputs(state, entry, m, vector, work)
-            call pull_inputs(state, entry, m, work, product, weight)
+            call pull_inputs(state, entry, m, .true., work, product, weight)
          end associate
       end do
       call add_without_balance(state, m, nc, weight, product)
@@ -84,8 +84,11 @@ contains
                work%input((c - 1)*nc + 1:c*nc, i) = slope(i, c, :)
             end do
          end do
-         call pull_inputs(state, entry, size(product, 1), work, product, weight)
+         if (entry%law%prediction%some_are_free()) then
+            call pull_inputs(state, entry, size(product, 1), .false., work, product)
+         end if
          if (.not. entry%law%prediction%takes_balance) return
+         call pull_inputs(state, entry, size(product, 1), .true., work, product, weight)
       end associate
       call add_without_balance(state, size(product, 1), nc, weight, product)
    end subroutine pull_forces
@@ -106,9 +109,9 @@ contains
       product = product + pulled
       do k = 1, state%problem%forces%n_laws
          associate (entry => state%problem%forces%entry(k), work => state%work(k))
-            if (entry%law%prediction%takes_balance) cycle
+            if (.not. entry%law%prediction%some_are_free()) cycle
             call gather_outputs(state, entry, m, weight, work)
-            call pull_inputs(state, entry, m, work, product)
+            call pull_inputs(state, entry, m, .false., work, product)
          end associate
       end do
    end subroutine add_without_balance
@@ -147,11 +150,13 @@ contains
       end do
    end subroutine gather_outputs
 
-   !> Add Y^T G^T input to the product, and take S^T G^T input off `balance`, where that is there.
-   subroutine pull_inputs(state, entry, m, work, product, balance)
+   !> Add Y^T G^T input to the product, and take S^T G^T input off `balance`, where that is there:
+   !> of the elements that take the balance, or of the others.
+   subroutine pull_inputs(state, entry, m, takes, work, product, balance)
       type(balance_state), intent(in) :: state
       type(force_entry), intent(in) :: entry
       integer, intent(in) :: m
+      logical, intent(in) :: takes
       type(force_workspace), intent(inout) :: work
       real(wp), intent(inout) :: product(:, :)
       real(wp), intent(inout), optional :: balance(:, :)
@@ -160,18 +165,19 @@ contains
       nc = state%problem%fourier%n_coefficients
       do i = 1, size(entry%row, 2)
          if (work%linear_state(i) == pair_open) cycle
+         if (entry%law%prediction%takes(i) .neqv. takes) cycle
          call multiply_block(work, i)
          do c = 1, size(entry%row, 1)
             if (entry%row(c, i) == 0) cycle
             associate (p => entry%law%prediction, h => work%output((c - 1)*nc + 1:c*nc, i))
-               if (p%takes_balance .and. present(balance)) then
+               if (present(balance)) then
                   j = state%problem%incidence%coordinate_of(entry%row(c, i))
                   balance(j, :) = balance(j, :) - h
                end if
                ! Backwards through what makes an input of a displacement.
                if (p%has_inertia) call turn_back(state, p, i, c, h)
-               if (p%order(c) > 0) then
-                  call take_back(state, work%linear_rests(i), state%rate_unit(p), h)
+               if (p%order_of(i, c) > 0) then
+                  call take_back(state, work%linear_rests(i), state%rate_unit(p, i), h)
                end if
                call state%problem%incidence%scatter_row(entry%row(c, i), &
                                                         state%problem%incidence%identity, m, &

@@ -23,7 +23,7 @@ contains
                do i = 1, system%problem%n_pairs
                   row = entry%row(3, i)
                   if (row == 0) cycle
-                  if (entry%law%prediction%takes_balance) then
+                  if (entry%law%prediction%takes(i)) then
                      fixed(system%problem%structure%slot( &
                            system%problem%incidence%coordinate_of(row))) = .true.
                   else
@@ -132,7 +132,7 @@ contains
                if (c == 3 .and. system%problem%fourier%harmonic(h) == 0) then
                   gap = law%prediction%gap(i) + system%depth(i)
                end if
-               if (law%prediction%takes_balance) then
+               if (law%prediction%takes(i)) then
                   j = system%problem%incidence%coordinate_of(row)
                   n_held(system%problem%structure%slot(j)) = &
                      n_held(system%problem%structure%slot(j)) + 1

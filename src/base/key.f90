@@ -45,6 +45,8 @@ module fw_key
          bind_integers, bind_matrix, bind_integer_matrix
       !> A word of a list, as its position in the list.
       procedure(word_binding), deferred :: bind_word
+      !> One word for all of a shape, or one for each.
+      procedure(words_binding), deferred :: bind_words
       !> Numbers and texts mixed, which the visitor's owner takes apart.
       procedure(list_binding), deferred :: bind_list
       !> Tell an extent that shapes name, and what a shape stands for.
@@ -117,6 +119,16 @@ module fw_key
          integer, intent(inout) :: choice
          character(*), intent(in) :: words(:)
       end subroutine word_binding
+
+      subroutine words_binding(self, key, choices, words)
+         import :: key_visitor, key_type
+         implicit none (type, external)
+         class(key_visitor), intent(inout) :: self
+         type(key_type), intent(in) :: key
+         !> Positions in `words`, one for all or one for each of the shape; the defaults on entry.
+         integer, allocatable, intent(inout) :: choices(:)
+         character(*), intent(in) :: words(:)
+      end subroutine words_binding
 
       subroutine list_binding(self, key, accepts, most, values, is_text)
          import :: key_visitor, key_type, string_type

@@ -334,7 +334,7 @@ contains
          if (next > max(contraction*change, round_off)) then
             seen = factor_seen_only*max(tail%distance_from(point%coefficients), next)
             ! Rigid pairs may find other states of stick and slip with more harmonics.
-            told = told .and. is_rigid(self%case%contact%law) .and. self%case%contact%n_pairs > 0
+            told = told .and. is_rigid(self%case%contact) .and. self%case%contact%n_pairs > 0
             return
          end if
          seen = factor_seen*tail%distance_from(point%coefficients)
@@ -348,7 +348,7 @@ contains
          else
             bound = factor_of_tail*tail%distance_from(point%coefficients)
          end if
-         if (is_rigid(self%case%contact%law) .and. .not. all_know_tails(level%system)) then
+         if (is_rigid(self%case%contact) .and. .not. all_know_tails(level%system)) then
             bound = max(bound, part_of_step*last_step(self, point))
          end if
       end associate
@@ -387,7 +387,7 @@ contains
 
       bound = unknown
       order = order_elastic
-      if (is_rigid(self%case%contact%law)) then
+      if (is_rigid(self%case%contact)) then
          order = order_rigid
          if (is_like_structure(self%level(self%current, self%doublings)%system)) then
             order = order_massless
@@ -402,7 +402,7 @@ contains
                  relative_distance(point%coefficients, self%level(k, self%doublings)%coefficients)
          exit
       end do
-      if (is_rigid(self%case%contact%law) .and. bound <= self%case%harmonics%accuracy) then
+      if (is_rigid(self%case%contact) .and. bound <= self%case%harmonics%accuracy) then
          call bound_by_decay(self, point, bound, iterations, error)
       end if
    end subroutine bound_by_order

@@ -483,14 +483,16 @@ contains
    pure real(wp) function displacement_scale(system) result(scale)
       type(balance_state), intent(in) :: system
       real(wp) :: stiffness
-      integer :: c
+      integer :: c, i
 
       stiffness = 0.0_wp
       associate (p => system%problem%forces%entry(system%problem%forces%pairs)%law%prediction)
          do c = 1, size(p%stiffness, 2)
-            ! A velocity in time is no displacement.
-            if (p%by_time .and. p%order(c) > 0) cycle
-            if (size(p%stiffness, 1) > 0) stiffness = max(stiffness, maxval(p%stiffness(:, c)))
+            do i = 1, size(p%stiffness, 1)
+               ! A velocity in time is no displacement.
+               if (p%in_time(i) .and. p%order_of(i, c) > 0) cycle
+               stiffness = max(stiffness, p%stiffness(i, c))
+            end do
          end do
       end associate
       scale = 0.0_wp

@@ -5,7 +5,7 @@ module fw_joint_modes
    use fw_formed_stiffness, only: harmonic_load
    use fw_kinds, only: wp
    use fw_modes, only: find_modes, mode_type
-   use fw_laws, only: new_law
+   use fw_laws, only: build_law
    use fw_pair_law, only: pair_law
    use fw_sector_modes, only: find_sector_modes
    implicit none (type, external)
@@ -152,11 +152,10 @@ contains
       if (state == state_free) return
       rigid = hold*maxval(abs(stiffness))
       associate (contact => case%contact)
-         call new_law(contact%law, law)
-         call law%build(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0)
+         call build_law(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0, law)
          do i = 1, contact%n_pairs
             do c = merge(1, 3, state == state_stuck), 3
-               if (.not. law%prediction%takes_balance .and. law%prediction%order(c) == 0) then
+               if (.not. law%prediction%takes(i) .and. law%prediction%order_of(i, c) == 0) then
                   call add_spring(contact%side_1(c, i), contact%side_2(c, i), &
                                   law%prediction%stiffness(i, c), stiffness)
                else

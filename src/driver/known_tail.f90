@@ -299,7 +299,7 @@ contains
          do i = 1, system%problem%n_pairs
             do c = 1, 3
                if (system%problem%joint%row(c, i) == 0) cycle
-               if (.not. p%takes_balance) then
+               if (.not. p%takes(i)) then
                   call system%problem%incidence%add_block(system%problem%joint%row(c, i), h, &
                      cmplx(slope(c, i)*p%stiffness(i, c), kind=wp), matrix)
                   cycle
@@ -363,6 +363,7 @@ contains
          if (.not. is_like) return
          h = maxval(system%problem%fourier%harmonic)
          do i = 1, system%problem%n_pairs
+            if (.not. p%takes(i)) cycle
             do component = 1, 3
                if (system%problem%joint%row(component, i) == 0) cycle
                if (system%problem%joint%idle(component, i)) cycle
@@ -397,6 +398,7 @@ contains
          if (.not. know) return
          s = (maxval(system%problem%fourier%harmonic) + 1)*system%frequency()
          do i = 1, system%problem%n_pairs
+            if (.not. p%takes(i)) cycle
             know = know .and. any(s**2*p%inertia(i, 1:2) > p%stiffness(i, 1:2))
          end do
       end associate

@@ -134,11 +134,9 @@ contains
                     new => laws%entry(k)%law%prediction)
             if (.not. new%takes_balance) cycle
             ! The structure gave it, and has not changed.
-            new%stiffness = old%stiffness
-            if (.not. allocated(old%inertia)) cycle
-            new%inertia = old%inertia
-            new%damping = old%damping
+            call new%take_eps(old)
          end associate
+         call laws%entry(k)%law%take_prediction()
       end do
       do k = 1, laws%n_laws
          call move_alloc(laws%entry(k)%law, problem%forces%entry(k)%law)

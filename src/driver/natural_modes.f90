@@ -8,7 +8,7 @@ module fw_natural_modes
    use fw_error, only: error_type, fatal_error, status_input
    use fw_hermitian, only: congruence, is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
-   use fw_laws, only: new_law
+   use fw_laws, only: build_law
    use fw_pair_law, only: pair_law
    use fw_sector, only: add_sector_spring, sector_at, sector_rows
    use fw_sector_relative, only: new_sector_relative, sector_relative
@@ -187,21 +187,19 @@ contains
       integer :: c, i
 
       associate (contact => case%contact)
-         call new_law(contact%law, law)
-         call law%build(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0)
+         call build_law(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0, law)
          allocate (held(0, 0))
          do c = 1, 3
             call sector_rows(case%model, k, contact%side_1(c, :), contact%side_2(c, :), &
                              contact%sector_2, rows)
             allocate (is_held(contact%n_pairs))
             is_held = contact%side_1(c, :) /= 0 .or. contact%side_2(c, :) /= 0
-            if (.not. law%prediction%takes_balance .and. law%prediction%order(c) == 0) then
-               do i = 1, contact%n_pairs
-                  if (.not. is_held(i)) cycle
-                  call add_sector_spring(rows(i, :), law%prediction%stiffness(i, c), stiffness)
-               end do
-               is_held = .false.
-            end if
+            do i = 1, contact%n_pairs
+               if (.not. is_held(i)) cycle
+               if (law%prediction%takes(i) .or. law%prediction%order_of(i, c) > 0) cycle
+               call add_sector_spring(rows(i, :), law%prediction%stiffness(i, c), stiffness)
+               is_held(i) = .false.
+            end do
             call join(rows, is_held, held)
             deallocate (is_held)
          end do

@@ -7,6 +7,7 @@ module fw_remarks
    use fw_kinds, only: pi, wp
    use fw_lapack, only: dpotrf
    use fw_harmonics_options, only: method_hbm, sampling_uniform
+   use fw_law_text, only: law_text
    use fw_laws, only: facts_of, law_under_accuracy, law_words, is_of_high_order
    use fw_parameters, only: modal_damping, rayleigh_mass, rayleigh_stiffness
    use fw_peak, only: found_bound, found_unresolved, peak_type
@@ -87,8 +88,8 @@ contains
             'metals is below '//to_text(highest_friction))
          call case%contact%constants%first_unused(name)
          if (len_trim(name) > 0) call remarks%add('constant not used', &
-            "the model gives contact%"//trim(name)//", which contact%law = '"// &
-            trim(law_words(case%contact%law))//"' does not take")
+            'the model gives contact%'//trim(name)//', which contact%law = '// &
+            law_text(case%contact)//' does not take')
       end if
       ! A mode has none.
       if (.not. (is_shaken(case) .or. analyses(case%analysis)%is_free)) then
@@ -171,7 +172,7 @@ contains
       integer :: solved
 
       associate (contact => case%contact)
-         word = "'"//trim(law_words(contact%law))//"'"
+         word = law_text(contact)
          if (contact%law_is_chosen) then
             call remarks%add('law chosen', 'nothing was said of contact%law: rigid friction '// &
                'is taken, by '//word//trim(why_not_rigid(case)))
@@ -215,7 +216,7 @@ contains
 
       associate (contact => case%contact)
          if (contact%n_pairs == 0) return
-         facts = facts_of(contact%law)
+         facts = facts_of(contact)
          if (.not. facts%has_tail) return
          if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1))) then
             call remarks%add('two directions', 'slip in two directions is solved with the '// &

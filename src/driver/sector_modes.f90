@@ -6,7 +6,7 @@ module fw_sector_modes
    use fw_error, only: error_type
    use fw_hermitian, only: is_regular, solve_hermitian_eigen
    use fw_kinds, only: wp
-   use fw_laws, only: new_law
+   use fw_laws, only: build_law
    use fw_modes, only: least_width, mode_type
    use fw_pair_law, only: pair_law
    use fw_sector, only: add_sector_spring, sector_at, sector_rows
@@ -155,15 +155,14 @@ contains
                                                               stiffness)
          end do
          rigid = hold*maxval(abs(stiffness))
-         call new_law(contact%law, law)
-         call law%build(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0)
+         call build_law(contact, contact%side_1 /= 0 .or. contact%side_2 /= 0, law)
          do c = first_component, 3
             call sector_rows(case%model, k, contact%side_1(c, :), contact%side_2(c, :), &
                              contact%sector_2, rows)
             ! Of all sectors, those of the first.
             do i = 1, contact%n_pairs/contact%n_alike
                spring = rigid
-               if (.not. law%prediction%takes_balance .and. law%prediction%order(c) == 0) then
+               if (.not. law%prediction%takes(i) .and. law%prediction%order_of(i, c) == 0) then
                   spring = law%prediction%stiffness(i, c)
                end if
                call add_sector_spring(rows(i, :), spring, stiffness)

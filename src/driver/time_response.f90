@@ -201,7 +201,7 @@ contains
             do c = 1, 2
                r = structure%row(c, i)
                if (r == 0) cycle
-               if (p%order(c) > 0) then
+               if (p%order_of(i, c) > 0) then
                   state%corrected(c, i) = dot_product(structure%rows(:, r), state%displacement)
                else if (p%stiffness(i, c) > 0.0_wp) then
                   state%corrected(c, i) = contact%x(i, c)/p%stiffness(i, c)

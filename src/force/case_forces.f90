@@ -2,7 +2,7 @@
 module fw_case_forces
    use fw_contact_data, only: contact_type, spring_type
    use fw_force_list, only: force_list
-   use fw_laws, only: new_law
+   use fw_laws, only: build_law
    use fw_pair_law, only: pair_law
    use fw_polynomial_law, only: new_polynomial
    implicit none (type, external)
@@ -31,8 +31,7 @@ contains
                          reshape(spring_row, [1, springs%n_springs]))
       end if
       ! Without pairs the law is built all the same, empty: nothing has to ask whether there is one.
-      call new_law(contact%law, law)
-      call law%build(contact, pair_row > 0)
+      call build_law(contact, pair_row > 0, law)
       if (by_events .and. law%facts%has_events) then
          call law%located(located)
          call move_alloc(located, law)

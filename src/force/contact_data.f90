@@ -21,8 +21,10 @@ module fw_contact_data
       integer :: n_pairs = 0
       !> Sectors whose pairs these are, sector after sector.
       integer :: n_alike = 1
-      !> Which law, a number in `law_words` (fw_laws).
+      !> Which law, a number in `law_words` (fw_laws): of the first pair where pairs differ.
       integer :: law = 1
+      !> That of each pair (n_pairs); not allocated where all pairs have one.
+      integer, allocatable :: law_of(:)
       !> Signed dof numbers of (t1, t2, n), 0 where there is none (3, n_pairs).
       integer, allocatable :: side_1(:, :), side_2(:, :)
       !> Sector of side 2 from that of side 1, in cyclic structures (n_pairs); 0 where it is not

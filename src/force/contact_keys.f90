@@ -9,7 +9,7 @@ module fw_contact_keys
    use fw_key, only: key, key_visitor
    use fw_key_range, only: above, at_least, dof_numbers, from_to
    use fw_kinds, only: wp
-   use fw_laws, only: law_help, law_words, new_law
+   use fw_laws, only: law_help, law_words, laws_of, new_law, pairs_of_law
    use fw_pair_law, only: pair_law
    implicit none (type, external)
    private
@@ -35,14 +35,21 @@ contains
       call keys%set_size('n_pairs', contact%n_pairs)
    end subroutine bind_pairs
 
-   !> The law, by a word of fw_laws.
+   !> The law of all pairs, or one for each, by words of fw_laws.
    subroutine bind_law(keys, contact)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
+      integer, allocatable :: numbers(:)
 
+      numbers = [contact%law]
+      if (allocated(contact%law_of)) numbers = contact%law_of
       ! Without a word fw_usual_law takes one.
-      call keys%bind_word(key('law', law_help, absent="'rigid' where it goes"), &
-                          contact%law, law_words)
+      call keys%bind_words(key('law', law_help, shape='n_pairs', &
+                               absent="'rigid' where it goes"), numbers, law_words)
+      if (size(numbers) == 0) return
+      contact%law = numbers(1)
+      if (allocated(contact%law_of)) deallocate (contact%law_of)
+      if (any(numbers /= numbers(1))) contact%law_of = numbers
    end subroutine bind_law
 
    !> Dofs of both sides; a pair between one side and the ground has no side 2.
@@ -99,39 +106,54 @@ contains
                          only='pairs without a normal dof'), contact%normal_load, needed)
    end subroutine bind_normal_load
 
-   !> Which constants the laws have: the visitor is not asked for any.
-   subroutine ask_laws(keys, contact)
+   !> Which constants the laws have, and which of them pairs need: the visitor is not asked for any.
+   subroutine ask_laws(keys, contact, slides, closes)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
+      !> Of the pairs, where there are some (n_pairs): as of bind_laws.
+      logical, intent(in), optional :: slides(:), closes(:)
       class(pair_law), allocatable :: law
+      integer, allocatable :: pair(:)
       integer :: k
 
       contact%constants%is_asked = .true.
       do k = 1, size(law_words)
          contact%constants%word = law_words(k)
          call new_law(k, law)
-         call law%bind_keys(keys, contact, .false., .false.)
+         if (present(slides) .and. present(closes)) then
+            pair = pairs_of_law(contact, k)
+            call law%bind_keys(keys, contact, any(slides(pair)), any(closes(pair)))
+         else
+            call law%bind_keys(keys, contact, .false., .false.)
+         end if
       end do
       contact%constants%is_asked = .false.
    end subroutine ask_laws
 
-   !> The keys that belong to one law or some, those of the law of the case first: keys that laws
-   !> share are needed as it says.
+   !> The keys that belong to one law or some, those of the laws of the case first: keys that laws
+   !> share are needed as these say.
    subroutine bind_laws(keys, contact, slides, closes)
       class(key_visitor), intent(inout) :: keys
       type(contact_type), intent(inout) :: contact
-      !> Whether there are tangential dofs, normal dofs.
-      logical, intent(in) :: slides, closes
+      !> Which pairs have tangential dofs, normal dofs (n_pairs).
+      logical, intent(in) :: slides(:), closes(:)
       class(pair_law), allocatable :: law
+      integer, allocatable :: numbers(:), pair(:)
       integer :: k
 
-      call ask_laws(keys, contact)
-      contact%constants%law = contact%law
+      numbers = laws_of(contact)
+      call ask_laws(keys, contact, slides, closes)
       contact%constants%is_in_use = .true.
-      call new_law(contact%law, law)
-      call law%bind_keys(keys, contact, slides, closes)
+      contact%constants%is_partial = size(numbers) > 1
+      do k = 1, size(numbers)
+         contact%constants%law = numbers(k)
+         pair = pairs_of_law(contact, numbers(k))
+         call new_law(numbers(k), law)
+         call law%bind_keys(keys, contact, any(slides(pair)), any(closes(pair)))
+      end do
+      contact%constants%is_partial = .false.
       do k = 1, size(law_words)
-         if (k == contact%law) cycle
+         if (any(k == numbers)) cycle
          contact%constants%law = k
          contact%constants%is_in_use = .false.
          call new_law(k, law)

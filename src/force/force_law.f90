@@ -18,12 +18,18 @@ module fw_force_law
    private
 
    public :: force_law, force_workspace, law_room
-   public :: prediction_type, law_facts
+   public :: input_facts, prediction_type, law_facts
    public :: pair_stuck, pair_open, pair_mixed
 
    !> State of an element over the whole period: its derivative is the identity, zero, or any other
    !> and then stored.
    integer, parameter :: pair_stuck = 1, pair_open = 2, pair_mixed = 3
+
+   !> What the input of one element is made of, see prediction_type.
+   type :: input_facts
+      integer :: order(3) = 0
+      logical :: by_time = .false., takes_balance = .false., has_inertia = .false.
+   end type input_facts
 
    !> What the input y of a law is made of.
    type :: prediction_type
@@ -34,6 +40,10 @@ module fw_force_law
       !> The balance without the law's own force is a part of y: the law is rigid, and stiffness is
       !> a number of the method, of the order of the structure's own.
       logical :: takes_balance = .false.
+      !> Of a law whose elements differ in these and in `has_inertia`, what each takes
+      !> (n_elements): those of the law are then the highest order, and whether any element does.
+      !> Who deals with one element asks `order_of`, `in_time` and `takes`.
+      type(input_facts), allocatable :: own(:)
       !> Makes the input of the displacement or its derivative (n_elements, 3 or 1): [force/length]
       !> where y is a force.
       real(wp), allocatable :: stiffness(:, :)
@@ -48,6 +58,11 @@ module fw_force_law
       !> does not exist: minus the dead load [force] (n_elements).
       real(wp), allocatable :: gap(:), load(:)
    contains
+      procedure :: order_of
+      procedure :: in_time
+      procedure :: takes
+      procedure :: some_are_free
+      procedure :: take_eps
       procedure :: impedance_ratio
    end type prediction_type
 
@@ -162,7 +177,10 @@ module fw_force_law
       procedure :: reserve
       procedure :: take_elements
       procedure :: set_offset
+      procedure :: take_prediction
       procedure(evaluate_interface), deferred :: evaluate
+      procedure :: evaluate_free
+      procedure :: evaluate_rigid
       procedure(linearize_interface), deferred :: linearize
       procedure :: form_jacobian
       procedure :: sample
@@ -230,6 +248,56 @@ contains
       allocate (self%slip_derivative, source=self%input)
    end subroutine measure_slip
 
+   !> Derivative of the relative displacement that a component of an element takes.
+   elemental integer function order_of(self, element, component) result(order)
+      class(prediction_type), intent(in) :: self
+      integer, intent(in) :: element, component
+
+      order = self%order(component)
+      if (allocated(self%own)) order = self%own(element)%order(component)
+   end function order_of
+
+   !> Whether derivatives that an element takes are by t.
+   elemental logical function in_time(self, element)
+      class(prediction_type), intent(in) :: self
+      integer, intent(in) :: element
+
+      in_time = self%by_time
+      if (allocated(self%own)) in_time = self%own(element)%by_time
+   end function in_time
+
+   !> Whether the balance is a part of the input of an element.
+   elemental logical function takes(self, element)
+      class(prediction_type), intent(in) :: self
+      integer, intent(in) :: element
+
+      takes = self%takes_balance
+      if (allocated(self%own)) takes = self%own(element)%takes_balance
+   end function takes
+
+   !> Whether the inputs of some elements are without the balance.
+   pure logical function some_are_free(self)
+      class(prediction_type), intent(in) :: self
+
+      some_are_free = .not. self%takes_balance
+      if (allocated(self%own)) some_are_free = .not. all(self%own%takes_balance)
+   end function some_are_free
+
+   !> Of the elements that take the balance, the stiffness, mass and damping that the structure gave
+   !> another prediction of the same elements.
+   pure subroutine take_eps(self, other)
+      class(prediction_type), intent(inout) :: self
+      class(prediction_type), intent(in) :: other
+      integer :: i
+
+      do i = 1, size(self%stiffness, 1)
+         if (self%takes(i)) self%stiffness(i, :) = other%stiffness(i, :)
+      end do
+      if (.not. allocated(other%inertia)) return
+      self%inertia = other%inertia
+      self%damping = other%damping
+   end subroutine take_eps
+
    !> E_n over the stiffness, a factor of the complex coefficient uc - i us of a displacement.
    elemental complex(wp) function impedance_ratio(self, element, component, harmonic, omega) &
       result(ratio)
@@ -262,6 +330,34 @@ contains
       allocate (self%prediction%stiffness(n, self%n_components), source=0.0_wp)
       allocate (self%prediction%gap(n), self%prediction%load(n), source=0.0_wp)
    end subroutine take_elements
+
+   !> The prediction was given other numbers from outside: nothing of most laws depends on them
+   !> but what asks the prediction itself.
+   subroutine take_prediction(self)
+      class(force_law), intent(inout) :: self
+
+      associate (unused => self)
+      end associate
+   end subroutine take_prediction
+
+   !> `evaluate` for the elements whose inputs are without the balance alone: of a law that has
+   !> both, whose other inputs need these forces first.
+   subroutine evaluate_free(self, fourier, work)
+      class(force_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      if (self%prediction%some_are_free()) call self%evaluate(fourier, work)
+   end subroutine evaluate_free
+
+   !> And for those that take the balance alone.
+   subroutine evaluate_rigid(self, fourier, work)
+      class(force_law), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      if (self%prediction%takes_balance) call self%evaluate(fourier, work)
+   end subroutine evaluate_rigid
 
    !> What `linearize` has left to whoever needs the jacobian: nothing of most laws.
    subroutine form_jacobian(self, fourier, work)

@@ -18,6 +18,9 @@ module fw_force_list
       integer, allocatable :: row(:, :)
       !> The same in the order of inputs and forces: all first components, then the others.
       integer, allocatable :: rows(:)
+      !> Of those the ones whose inputs are without the balance, and those that take it; 0 for the
+      !> others.
+      integer, allocatable :: free_rows(:), rigid_rows(:)
    end type force_entry
 
    type :: force_list
@@ -46,13 +49,29 @@ contains
          call move_alloc(self%entry(k)%law, longer(k)%law)
          call move_alloc(self%entry(k)%row, longer(k)%row)
          call move_alloc(self%entry(k)%rows, longer(k)%rows)
+         call move_alloc(self%entry(k)%free_rows, longer(k)%free_rows)
+         call move_alloc(self%entry(k)%rigid_rows, longer(k)%rigid_rows)
       end do
       self%n_laws = self%n_laws + 1
       allocate (longer(self%n_laws)%law, source=law)
       longer(self%n_laws)%row = row
-      longer(self%n_laws)%rows = reshape(transpose(row), [size(row)])
+      call list_rows(longer(self%n_laws))
       call move_alloc(longer, self%entry)
    end subroutine add
+
+   !> The rows of an entry in the order of inputs and forces.
+   pure subroutine list_rows(entry)
+      type(force_entry), intent(inout) :: entry
+      logical :: takes(size(entry%row, 1), size(entry%row, 2))
+      integer :: i
+
+      do i = 1, size(takes, 2)
+         takes(:, i) = entry%law%prediction%takes(i)
+      end do
+      entry%rows = reshape(transpose(entry%row), [size(entry%row)])
+      entry%free_rows = reshape(transpose(merge(0, entry%row, takes)), [size(entry%row)])
+      entry%rigid_rows = reshape(transpose(merge(entry%row, 0, takes)), [size(entry%row)])
+   end subroutine list_rows
 
    !> Workspaces of all laws, for one that evaluates (n_laws).
    subroutine reserve(self, fourier, work)

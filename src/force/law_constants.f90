@@ -2,6 +2,7 @@
 !> in `bind_keys` and takes their values when it is built, and nobody else knows them.
 module fw_law_constants
    use fw_key, only: key_type, key_visitor
+   use fw_key_range, only: range_type
    use fw_kinds, only: wp
    implicit none (type, external)
    private
@@ -10,8 +11,11 @@ module fw_law_constants
 
    type :: constant_type
       character(24) :: name = ''
-      !> Number of the law that declared it.
+      !> Number of the law that declared it first, and of all that did.
       integer :: law = 0
+      integer, allocatable :: laws(:)
+      !> What its values may be.
+      type(range_type) :: range
       !> One for each pair; not allocated where none was given.
       real(wp), allocatable :: values(:)
    end type constant_type
@@ -23,11 +27,15 @@ module fw_law_constants
       !> Whether laws are only asked for the names of their keys: before any is read, so that each
       !> key can name all the laws that have it.
       logical :: is_asked = .false.
-      !> Whether that law is the one of the case, which takes what the model offers.
+      !> Whether that law is one of the case, which takes what the model offers.
       logical :: is_in_use = .true.
+      !> Whether others have pairs of the case too, whose values do not count.
+      logical :: is_partial = .false.
       type(constant_type), allocatable, private :: constant(:)
       !> The keys of all laws that were asked; `only` says which have them: law = 'one', 'another'.
       type(key_type), allocatable :: named(:)
+      !> Whether a law that was asked needs them.
+      logical, allocatable, private :: named_is_needed(:)
       !> What the model has, with the number of the law that took it (0: none).
       type(constant_type), allocatable, private :: offered(:)
    contains
@@ -38,8 +46,11 @@ module fw_law_constants
       procedure :: set
       procedure :: get
       procedure :: has
+      procedure :: of_pairs
       procedure :: first_of_others
       procedure :: is_of_law
+      procedure :: is_taken
+      procedure :: first_wrong
    end type law_constants
 
 contains
@@ -53,20 +64,33 @@ contains
       logical, intent(in) :: needed
       type(constant_type) :: new
       type(key_type) :: shown
+      logical :: is_needed
       integer :: k
 
       if (self%is_asked) then
-         call note_law(self, key)
+         call note_law(self, key, needed)
          return
       end if
       if (.not. allocated(self%constant)) allocate (self%constant(0))
-      if (place_of(self%constant, key%name) > 0) return
+      k = place_of(self%constant, key%name)
+      if (k > 0) then
+         self%constant(k)%laws = [self%constant(k)%laws, self%law]
+         return
+      end if
       shown = key
+      is_needed = needed
       k = 0
       if (allocated(self%named)) k = findloc(self%named%name, key%name, dim=1)
-      if (k > 0) shown%only = self%named(k)%only
+      if (k > 0) then
+         shown%only = self%named(k)%only
+         is_needed = needed .or. (self%is_in_use .and. self%named_is_needed(k))
+      end if
       new%name = key%name
       new%law = self%law
+      new%laws = [self%law]
+      new%range = key%range
+      ! Values of pairs whose law has no such constant are not looked at: see first_wrong.
+      if (self%is_partial) shown%range = range_type()
       k = 0
       ! For another law the values of the model would look as if the case had given them.
       if (self%is_in_use) k = place_of(self%offered, key%name)
@@ -74,22 +98,25 @@ contains
          new%values = self%offered(k)%values
          self%offered(k)%law = self%law
       end if
-      call keys%bind(shown, new%values, needed .and. k == 0)
+      call keys%bind(shown, new%values, is_needed .and. k == 0)
       self%constant = [self%constant, new]
    end subroutine bind
 
    !> The law that declares now has this constant.
-   subroutine note_law(self, key)
+   subroutine note_law(self, key, needed)
       class(law_constants), intent(inout) :: self
       type(key_type), intent(in) :: key
+      logical, intent(in) :: needed
       integer :: k
 
-      if (.not. allocated(self%named)) allocate (self%named(0))
+      if (.not. allocated(self%named)) allocate (self%named(0), self%named_is_needed(0))
       k = findloc(self%named%name, key%name, dim=1)
       if (k > 0) then
          self%named(k)%only = trim(self%named(k)%only)//", '"//trim(self%word)//"'"
+         self%named_is_needed(k) = self%named_is_needed(k) .or. needed
       else
          self%named = [self%named, key]
+         self%named_is_needed = [self%named_is_needed, needed]
          self%named(size(self%named))%only = "law = '"//trim(self%word)//"'"
       end if
    end subroutine note_law
@@ -156,6 +183,7 @@ contains
       if (k == 0) then
          new%name = name
          new%law = self%law
+         new%laws = [self%law]
          self%constant = [self%constant, new]
          k = size(self%constant)
       end if
@@ -190,23 +218,86 @@ contains
       if (k > 0) has = allocated(self%constant(k)%values)
    end function has
 
-   !> Whether a law of a number declares a constant, of those whose keys were asked for first.
-   pure logical function is_of_law(self, law, name)
+   !> Whether one of some laws declares a constant, of those whose keys were asked for first.
+   pure logical function is_of_law(self, laws, name)
       class(law_constants), intent(in) :: self
-      integer, intent(in) :: law
+      !> Their numbers.
+      integer, intent(in) :: laws(:)
       character(*), intent(in) :: name
       integer :: k
 
       is_of_law = .false.
       k = place_of(self%constant, name)
-      if (k > 0) is_of_law = self%constant(k)%law == law
+      if (k > 0) is_of_law = any(self%constant(k)%law == laws)
    end function is_of_law
 
-   !> A constant that was given but that only other laws than `law` declare, and the first of
-   !> these; law 0 where there is none.
-   subroutine first_of_others(self, law, name, other)
+   !> Whether pairs of the law of a number take a constant.
+   pure logical function is_taken(self, law, name)
       class(law_constants), intent(in) :: self
       integer, intent(in) :: law
+      character(*), intent(in) :: name
+      integer :: k
+
+      k = place_of(self%constant, name)
+      is_taken = .false.
+      if (k > 0) is_taken = any(self%constant(k)%laws == law)
+   end function is_taken
+
+   !> The first value that a pair of several laws takes and that it may not have; pair 0 where
+   !> there is none.
+   subroutine first_wrong(self, law_of, name, pair, value, range)
+      class(law_constants), intent(in) :: self
+      !> Number of the law of each pair.
+      integer, intent(in) :: law_of(:)
+      ! allow(C072): a text of the caller
+      character(*), intent(out) :: name
+      integer, intent(out) :: pair
+      real(wp), intent(out) :: value
+      type(range_type), intent(out) :: range
+      integer :: k
+
+      pair = 0
+      name = ''
+      value = 0.0_wp
+      if (.not. allocated(self%constant)) return
+      do k = 1, size(self%constant)
+         associate (constant => self%constant(k))
+            if (.not. allocated(constant%values)) cycle
+            if (size(constant%values) /= size(law_of)) cycle
+            do pair = 1, size(law_of)
+               if (.not. any(constant%laws == law_of(pair))) cycle
+               if (constant%range%holds(constant%values(pair))) cycle
+               name = constant%name
+               value = constant%values(pair)
+               range = constant%range
+               return
+            end do
+         end associate
+      end do
+      pair = 0
+   end subroutine first_wrong
+
+   !> The values of some pairs alone.
+   pure type(law_constants) function of_pairs(self, pair) result(own)
+      class(law_constants), intent(in) :: self
+      !> Their numbers.
+      integer, intent(in) :: pair(:)
+      integer :: k
+
+      if (.not. allocated(self%constant)) return
+      own%constant = self%constant
+      do k = 1, size(own%constant)
+         if (.not. allocated(own%constant(k)%values)) cycle
+         if (size(own%constant(k)%values) < maxval([pair, 0])) cycle
+         own%constant(k)%values = own%constant(k)%values(pair)
+      end do
+   end function of_pairs
+
+   !> A constant that was given but that only other laws than `laws` declare, and the first of
+   !> these; law 0 where there is none.
+   subroutine first_of_others(self, laws, name, other)
+      class(law_constants), intent(in) :: self
+      integer, intent(in) :: laws(:)
       ! allow(C072): a text of the caller
       character(*), intent(out) :: name
       integer, intent(out) :: other
@@ -216,7 +307,8 @@ contains
       other = 0
       if (.not. allocated(self%constant)) return
       do k = 1, size(self%constant)
-         if (self%constant(k)%law == law .or. .not. allocated(self%constant(k)%values)) cycle
+         if (any(self%constant(k)%law == laws)) cycle
+         if (.not. allocated(self%constant(k)%values)) cycle
          name = self%constant(k)%name
          other = self%constant(k)%law
          return

@@ -1,5 +1,5 @@
 !> The laws of contact pairs by their words: a new law is a word and a line here, and a file of its
-!> own.
+!> own. Pairs of one case may have different ones.
 module fw_laws
    use fw_contact_data, only: contact_type
    use fw_force_law, only: law_facts
@@ -7,11 +7,12 @@ module fw_laws
    use fw_pair_law, only: pair_law
    use fw_regularised, only: regularised_friction
    use fw_rigid_law, only: friction_of_high_order
+   use fw_several_laws, only: common_facts, several_laws
    implicit none (type, external)
    private
 
-   public :: law_words, law_help, law_number, new_law, facts_of, is_rigid
-   public :: law_under_accuracy, usual_law, is_of_high_order, is_viscous
+   public :: law_words, law_help, law_number, new_law, build_law, laws_of, pairs_of_law, facts_of
+   public :: is_rigid, pairs_are_rigid, law_under_accuracy, usual_law, is_of_high_order, is_viscous
 
    character(*), parameter :: law_words(*) = &
       [character(13) :: 'dlft', 'dlft_velocity', 'penalty', 'rigid', 'regularised']
@@ -35,33 +36,155 @@ contains
       end select
    end subroutine new_law
 
-   !> What holds of the law of a number.
+   !> The law of all pairs of a case, built: one, or several as one.
+   subroutine build_law(contact, present, law)
+      type(contact_type), intent(in) :: contact
+      !> Components in use (3, n_pairs).
+      logical, intent(in) :: present(:, :)
+      class(pair_law), allocatable, intent(out) :: law
+      class(pair_law), allocatable :: member
+      type(several_laws), allocatable :: all
+      integer, allocatable :: numbers(:), pair(:)
+      integer :: k
+
+      numbers = laws_of(contact)
+      if (size(numbers) == 1) then
+         call new_law(numbers(1), law)
+         call law%build(contact, present)
+         return
+      end if
+      allocate (all)
+      do k = 1, size(numbers)
+         pair = pairs_of_law(contact, numbers(k))
+         call new_law(numbers(k), member)
+         call member%build(part_of(contact, pair), present(:, pair))
+         call all%add(member, pair)
+      end do
+      call all%join(present)
+      call move_alloc(all, law)
+   end subroutine build_law
+
+   !> Numbers of the laws that the pairs of a case have, each once, in the order of their pairs.
+   pure function laws_of(contact) result(numbers)
+      type(contact_type), intent(in) :: contact
+      integer, allocatable :: numbers(:)
+      integer :: i
+
+      numbers = [contact%law]
+      if (.not. allocated(contact%law_of)) return
+      do i = 1, size(contact%law_of)
+         if (all(numbers /= contact%law_of(i))) numbers = [numbers, contact%law_of(i)]
+      end do
+   end function laws_of
+
+   !> The pairs that have the law of a number.
+   pure function pairs_of_law(contact, number) result(pair)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: number
+      integer, allocatable :: pair(:)
+      integer :: i
+
+      pair = [(i, i=1, merge(contact%n_pairs, 0, number == contact%law))]
+      if (.not. allocated(contact%law_of)) return
+      pair = pack([(i, i=1, size(contact%law_of))], contact%law_of == number)
+   end function pairs_of_law
+
+   !> Some pairs of a contact, with what laws take of them.
+   pure type(contact_type) function part_of(contact, pair) result(part)
+      type(contact_type), intent(in) :: contact
+      integer, intent(in) :: pair(:)
+
+      part%n_pairs = size(pair)
+      part%penalty_scale = contact%penalty_scale
+      part%memory = contact%memory
+      part%side_1 = contact%side_1(:, pair)
+      part%side_2 = contact%side_2(:, pair)
+      part%mu = contact%mu(pair)
+      part%gap = contact%gap(pair)
+      part%normal_load = contact%normal_load(pair)
+      part%constants = contact%constants%of_pairs(pair)
+      if (allocated(contact%tangential_stiffness)) then
+         part%tangential_stiffness = contact%tangential_stiffness(pair)
+      end if
+      if (allocated(contact%normal_stiffness)) then
+         part%normal_stiffness = contact%normal_stiffness(pair)
+      end if
+   end function part_of
+
+   !> What holds of the pairs of a case together.
    !> For checks of the input, which come before any pair is built.
-   type(law_facts) function facts_of(number) result(facts)
+   type(law_facts) function facts_of(contact) result(facts)
+      type(contact_type), intent(in) :: contact
+      integer, allocatable :: numbers(:)
+      type(law_facts), allocatable :: each(:)
+      integer :: k
+
+      numbers = laws_of(contact)
+      allocate (each(size(numbers)))
+      do k = 1, size(numbers)
+         each(k) = facts_of_law(numbers(k))
+      end do
+      facts = each(1)
+      if (size(each) > 1) facts = common_facts(each)
+   end function facts_of
+
+   type(law_facts) function facts_of_law(number) result(facts)
       integer, intent(in) :: number
       class(pair_law), allocatable :: law
 
       call new_law(number, law)
       facts = law%facts
-   end function facts_of
+   end function facts_of_law
 
-   !> Whether the law of a number predicts from the balance.
+   !> Whether the law of each pair predicts from the balance (n_pairs).
    !> Rigid laws have no stiffness of their own, hence no derivative in time.
-   logical function is_rigid(number)
-      integer, intent(in) :: number
-      class(pair_law), allocatable :: law
+   function pairs_are_rigid(contact) result(rigid)
+      type(contact_type), intent(in) :: contact
+      logical :: rigid(contact%n_pairs)
+      integer, allocatable :: numbers(:)
+      integer :: k
 
-      call new_law(number, law)
-      is_rigid = law%prediction%takes_balance
+      numbers = laws_of(contact)
+      do k = 1, size(numbers)
+         rigid(pairs_of_law(contact, numbers(k))) = law_is_rigid(numbers(k))
+      end do
+   end function pairs_are_rigid
+
+   !> Whether some pairs of a case are rigid; of a case without pairs, what its law is.
+   logical function is_rigid(contact)
+      type(contact_type), intent(in) :: contact
+      integer, allocatable :: numbers(:)
+      integer :: k
+
+      numbers = laws_of(contact)
+      is_rigid = .false.
+      do k = 1, size(numbers)
+         is_rigid = is_rigid .or. law_is_rigid(numbers(k))
+      end do
    end function is_rigid
 
-   !> Whether pairs of the law of a number hold nothing at rest: their friction is one of rates.
-   logical function is_viscous(number)
+   logical function law_is_rigid(number)
       integer, intent(in) :: number
       class(pair_law), allocatable :: law
 
       call new_law(number, law)
-      is_viscous = law%prediction%order(1) > 0 .and. .not. law%prediction%takes_balance
+      law_is_rigid = law%prediction%takes_balance
+   end function law_is_rigid
+
+   !> Whether some pairs hold nothing at rest: their friction is one of rates.
+   logical function is_viscous(contact)
+      type(contact_type), intent(in) :: contact
+      class(pair_law), allocatable :: law
+      integer, allocatable :: numbers(:)
+      integer :: k
+
+      numbers = laws_of(contact)
+      is_viscous = .false.
+      do k = 1, size(numbers)
+         call new_law(numbers(k), law)
+         is_viscous = is_viscous .or. (law%prediction%order(1) > 0 .and. &
+                                       .not. law%prediction%takes_balance)
+      end do
    end function is_viscous
 
    !> The law that has the solutions of the law of a number and knows its forces in every harmonic;
@@ -72,11 +195,11 @@ contains
       integer :: k
 
       same = number
-      facts = facts_of(number)
+      facts = facts_of_law(number)
       ! Rigid, and known to the integration in time: Coulomb's friction, whatever the method.
-      if (.not. (is_rigid(number) .and. facts%is_integrated)) return
+      if (.not. (law_is_rigid(number) .and. facts%is_integrated)) return
       do k = 1, size(law_words)
-         facts = facts_of(k)
+         facts = facts_of_law(k)
          if (facts%has_tail) same = k
       end do
    end function law_with_tail
@@ -89,7 +212,7 @@ contains
       logical, intent(in) :: by_instants
 
       number = contact%law
-      if (contact%n_pairs == 0 .or. by_instants) return
+      if (contact%n_pairs == 0 .or. by_instants .or. allocated(contact%law_of)) return
       ! Two directions are solved by the displacement law only.
       if (any(all(contact%side_1(1:2, :) /= 0 .or. contact%side_2(1:2, :) /= 0, dim=1))) return
       number = law_with_tail(number)

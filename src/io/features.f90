@@ -10,7 +10,8 @@ module fw_features
    use fw_force_law, only: law_facts
    use fw_harmonics_options, only: method_hbm, method_hdhb, sampling_events, sampling_uniform
    use fw_kinds, only: wp
-   use fw_laws, only: facts_of, is_viscous, law_words
+   use fw_law_text, only: law_text
+   use fw_laws, only: facts_of, is_viscous
    use fw_parameters, only: harmonic_scale, static_scale
    use fw_resonance_options, only: condition_phase
    use fw_solver_options, only: continuation_arclength, jacobian_analytic, scheme_bdf, &
@@ -53,8 +54,8 @@ contains
       character(:), allocatable :: text
 
       text = trim(phrase)
-      if (index(phrase, law_mark) == 1) text = "contact%law = '"// &
-         trim(law_words(case%contact%law))//"' ("//trim(phrase)//')'
+      if (index(phrase, law_mark) == 1) text = 'contact%law = '//law_text(case%contact)//' ('// &
+         trim(phrase)//')'
    end function feature_text
 
    subroutine look_up(case, phrase, asked, known)
@@ -191,7 +192,7 @@ contains
       logical :: pairs
 
       pairs = case%contact%n_pairs > 0
-      if (pairs) facts = facts_of(case%contact%law)
+      if (pairs) facts = facts_of(case%contact)
       known = .true.
       select case (phrase)
       case ('a case without contact pairs')
@@ -202,7 +203,7 @@ contains
          asked = has_two_tangents(case)
       case ('a law of velocities, whose pairs do not stick')
          asked = pairs
-         if (pairs) asked = is_viscous(case%contact%law)
+         if (pairs) asked = is_viscous(case%contact)
       case ('a law that takes integrals between its events')
          asked = pairs .and. facts%needs_projection
       case ('a law without forces above the harmonics of the balance')

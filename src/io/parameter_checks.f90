@@ -5,7 +5,8 @@ module fw_parameter_checks
    use fw_contact_data, only: contact_type
    use fw_error, only: error_type, fatal_error, status_input
    use fw_kinds, only: wp
-   use fw_laws, only: is_rigid, law_words
+   use fw_law_text, only: law_text
+   use fw_laws, only: laws_of, pairs_are_rigid
    use fw_model, only: model_type
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
@@ -85,11 +86,11 @@ contains
       end if
       if (any(number == [tangential_stiffness, normal_stiffness])) then
          call parameter_key(number, key)
-         if (is_rigid(contact%law)) then
-            reason = "contact%law = '"//trim(law_words(contact%law))//"' is rigid: its eps is a"// &
+         if (all(pairs_are_rigid(contact))) then
+            reason = 'contact%law = '//law_text(contact)//' is rigid: its eps is a'// &
                      ' number of the method, on which exact solutions do not depend'
-         else if (.not. contact%constants%is_of_law(contact%law, key)) then
-            reason = "contact%law = '"//trim(law_words(contact%law))//"' has no "//trim(key)
+         else if (.not. contact%constants%is_of_law(laws_of(contact), key)) then
+            reason = 'contact%law = '//law_text(contact)//' has no '//trim(key)
          end if
       end if
       if (allocated(reason) .or. any(pairs_of(contact, number))) return

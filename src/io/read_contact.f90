@@ -6,12 +6,15 @@ module fw_read_contact
    use fw_contact_data, only: contact_type, spring_type
    use fw_contact_keys, only: bind_pairs, bind_law, bind_sides, bind_friction, bind_gap, &
       bind_normal_load, bind_laws, bind_march, bind_n_springs, bind_springs
+   use fw_key_range, only: range_type
    use fw_kinds, only: wp
-   use fw_laws, only: law_words, is_rigid
+   use fw_law_text, only: law_text
+   use fw_laws, only: law_words, laws_of, is_rigid
    use fw_model_file, only: file_model_type
    use fw_reader, only: reader_type
    use fw_text, only: to_text
    use fw_text_list, only: name_sectors
+   use fw_values, only: range_text, real_kind
    implicit none (type, external)
    private
 
@@ -42,9 +45,9 @@ contains
       call read_law(reader, contact)
       call bind_march(reader, contact)
       scale = contact%penalty_scale
-      if (.not. is_rigid(contact%law) .and. abs(scale - 1.0_wp) > 0.0_wp) then
-         call reader%refuse('contact', 'penalty_scale', "has no meaning with law = '"// &
-                            trim(law_words(contact%law))//"': "// &
+      if (.not. is_rigid(contact) .and. abs(scale - 1.0_wp) > 0.0_wp) then
+         call reader%refuse('contact', 'penalty_scale', 'has no meaning with law = '// &
+                            law_text(contact)//': '// &
                             'scale the stiffnesses themselves')
       end if
    end subroutine read_contact
@@ -118,6 +121,7 @@ contains
          return
       end if
       contact%n_alike = n_sectors
+      if (allocated(contact%law_of)) contact%law_of = [(contact%law_of, j=1, n_sectors)]
       contact%n_pairs = n*n_sectors
       contact%side_1 = reshape([(contact%side_1, j=1, n_sectors)], [3, contact%n_pairs])
       contact%side_2 = reshape([(contact%side_2, j=1, n_sectors)], [3, contact%n_pairs])
@@ -224,20 +228,46 @@ contains
       character(24) :: name
       integer :: other
 
-      call bind_laws(reader, contact, any(has_tangent(contact)), any(has_normal(contact)))
-      call contact%constants%first_of_others(contact%law, name, other)
+      call bind_laws(reader, contact, has_tangent(contact), has_normal(contact))
+      call contact%constants%first_of_others(laws_of(contact), name, other)
       if (other > 0) then
          call reader%refuse('contact', trim(name), "belongs to law = '"//trim(law_words(other))// &
-                            "', but law = '"//trim(law_words(contact%law))// &
-                            "': remove it or change the law")
+                            "', but law = "//law_text(contact)//': remove it or change the law')
       end if
       ! Components of their own beside the constants: results and restarts hold them.
       contact%tangential_stiffness = contact%constants%get('tangential_stiffness', contact%n_pairs)
       contact%normal_stiffness = contact%constants%get('normal_stiffness', contact%n_pairs)
       if (reader%failed()) return
+      if (allocated(contact%law_of)) call check_values(reader, contact)
       if (contact%constants%has('normal_stiffness')) call check_normal_zeros(reader, contact)
       if (contact%constants%has('tangential_stiffness')) call check_zeros(reader, contact)
    end subroutine read_law
+
+   !> Values count where the law of the pair takes them.
+   subroutine check_values(reader, contact)
+      type(reader_type), intent(inout) :: reader
+      type(contact_type), intent(in) :: contact
+      type(range_type) :: range
+      character(24) :: name
+      real(wp) :: value
+      integer :: i
+
+      call contact%constants%first_wrong(contact%law_of, name, i, value, range)
+      if (i > 0) call reader%refuse('contact', trim(name), '= '//to_text(value)//' for pair '// &
+                                    to_text(i)//": must be "//range_text(real_kind, range))
+   end subroutine check_values
+
+   !> Which pairs have a law that takes a constant.
+   pure function take(contact, name) result(takes)
+      type(contact_type), intent(in) :: contact
+      character(*), intent(in) :: name
+      logical :: takes(contact%n_pairs)
+      integer :: i
+
+      takes = .true.
+      if (.not. allocated(contact%law_of)) return
+      takes = [(contact%constants%is_taken(contact%law_of(i), name), i=1, contact%n_pairs)]
+   end function take
 
    !> A stiffness of 0 is none.
    subroutine check_normal_zeros(reader, contact)
@@ -245,7 +275,8 @@ contains
       type(contact_type), intent(in) :: contact
       integer :: i
 
-      i = findloc(has_normal(contact) .and. contact%normal_stiffness <= 0.0_wp, .true., 1)
+      i = findloc(has_normal(contact) .and. take(contact, 'normal_stiffness') .and. &
+                  contact%normal_stiffness <= 0.0_wp, .true., 1)
       if (i > 0) call reader%refuse('contact', 'normal_stiffness', '= 0 for pair '// &
                                     to_text(i)//': must be above 0 where there is a normal dof')
    end subroutine check_normal_zeros
@@ -258,7 +289,7 @@ contains
       logical :: slides(contact%n_pairs)
       integer :: i
 
-      slides = has_tangent(contact)
+      slides = has_tangent(contact) .and. take(contact, 'tangential_stiffness')
       do i = 1, contact%n_pairs
          if (contact%tangential_stiffness(i) > 0.0_wp .or. .not. slides(i)) cycle
          if (any(contact%tangential_stiffness > 0.0_wp .and. is_parallel(contact, i))) cycle

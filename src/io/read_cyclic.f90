@@ -160,7 +160,7 @@ contains
 
       n_pairs = contact%n_pairs/contact%n_alike
       if (.not. cyclic%is_cyclic .or. n_pairs < 2) return
-      facts = facts_of(contact%law)
+      facts = facts_of(contact)
       n = cyclic%n_sectors
       do i = 2, n_pairs
          do k = 1, i - 1

@@ -49,6 +49,7 @@ module fw_reader
       procedure :: bind_logical
       procedure :: bind_text
       procedure :: bind_word
+      procedure :: bind_words
       procedure :: bind_list
       procedure :: bind_reals
       procedure :: bind_integers
@@ -234,31 +235,75 @@ contains
       integer, intent(inout) :: choice
       character(*), intent(in) :: words(:)
       character(:), allocatable :: accepts
-      integer :: i, k, found
+      integer :: i
 
       accepts = words_text(words)
       call self%note(key, 'word', accepts, quoted_text(trim(words(choice))), words)
       call self%find_scalar(self%group, trim(key%name), accepts, .false., i)
-      if (i > 0) then
-         found = 0
-         associate (value => self%namelist%entries(i)%values(1))
-            do k = 1, size(words)
-               if (lower_case(value%text) == lower_case(words(k))) found = k
-            end do
-            ! The right word without quotes: what a namelist READ would not take either.
-            if (found > 0 .and. .not. value%quoted &
-                .and. .not. allocated(self%namelist%entries(i)%raw)) then
-               call self%refuse_value(i, quoted_text(trim(words(found)))//', in quotes')
-            else if (found > 0) then
-               choice = found
-            else
-               call self%refuse_value(i, accepts//did_you_mean(lower_case(value%text), &
-                                                               to_strings(words)))
-            end if
-         end associate
-      end if
+      if (i > 0) call take_word(self, i, self%namelist%entries(i)%values(1), accepts, words, choice)
       call self%amend(self%group, trim(key%name), quoted_text(trim(words(choice))))
    end subroutine bind_word
+
+   !> The place of a value among words; left alone where it is none of them.
+   subroutine take_word(self, i_entry, value, accepts, words, choice)
+      type(reader_type), intent(inout) :: self
+      integer, intent(in) :: i_entry
+      type(value_type), intent(in) :: value
+      character(*), intent(in) :: accepts, words(:)
+      integer, intent(inout) :: choice
+      integer :: found, k
+
+      found = 0
+      do k = 1, size(words)
+         if (lower_case(value%text) == lower_case(words(k))) found = k
+      end do
+      ! The right word without quotes: what a namelist READ would not take either.
+      if (found > 0 .and. .not. value%quoted .and. &
+          .not. allocated(self%namelist%entries(i_entry)%raw)) then
+         call self%refuse_value(i_entry, quoted_text(trim(words(found)))//', in quotes', value)
+      else if (found > 0) then
+         choice = found
+      else
+         call self%refuse_value(i_entry, accepts//did_you_mean(lower_case(value%text), &
+                                                               to_strings(words)), value)
+      end if
+   end subroutine take_word
+
+   subroutine bind_words(self, key, choices, words)
+      class(reader_type), intent(inout) :: self
+      type(key_type), intent(in) :: key
+      integer, allocatable, intent(inout) :: choices(:)
+      character(*), intent(in) :: words(:)
+      type(value_type), allocatable :: values(:)
+      character(:), allocatable :: accepts, text
+      integer :: i, k, n
+
+      accepts = words_text(words)
+      call self%note(key, 'word', accepts, quoted_text(trim(words(choices(1)))), words)
+      call self%find_last(self%group, trim(key%name), accepts, i)
+      if (i > 0) then
+         n = product(self%extents(key%shape))
+         k = value_count(self%namelist%entries(i))
+         if (k /= 1 .and. k /= n) then
+            call self%refuse(self%group, trim(key%name), 'has '//to_text(k)//' values: must be '// &
+                             'one for all, or one for each of '//trim(key%shape)//' = '// &
+                             to_text(n)//', '//accepts)
+            return
+         end if
+         call multiply_out(self%namelist%entries(i)%values, values)
+         choices = [(choices(1), k=1, size(values))]
+         do k = 1, size(values)
+            call take_word(self, i, values(k), accepts, words, choices(k))
+         end do
+      end if
+      if (all(choices == choices(1))) choices = choices(:1)
+      text = ''
+      do k = 1, size(choices)
+         if (k > 1) text = text//', '
+         text = text//quoted_text(trim(words(choices(k))))
+      end do
+      call self%amend(self%group, trim(key%name), text)
+   end subroutine bind_words
 
    !> Values that may be numbers or texts, as `observe` has them; what they are is up to the caller.
    subroutine bind_list(self, key, accepts, most, values, is_text)

@@ -10,7 +10,7 @@ module fw_time_structure
    use fw_contact_data, only: contact_type, spring_type
    use fw_error, only: error_type, fatal_error, status_failure
    use fw_lapack, only: dgemm, dsyevd
-   use fw_laws, only: new_law
+   use fw_laws, only: build_law
    use fw_load_waves, only: load_waves
    use fw_model, only: model_type
    use fw_pair_law, only: pair_law
@@ -92,8 +92,7 @@ contains
       allocate (self%rows(self%n_dof, 3*contact%n_pairs + self%n_springs), source=0.0_wp)
       allocate (self%mu(0), self%gap(0), self%normal_load(0))
       if (contact%n_pairs == 0) return
-      call new_law(contact%law, law)
-      call law%build(contact, present)
+      call build_law(contact, present, law)
       self%mu = law%mu
       ! Worn depth opens the contact further (docs/theory.md, Motion).
       self%gap = law%prediction%gap
@@ -102,7 +101,7 @@ contains
       do i = 1, contact%n_pairs
          do c = 1, 3
             if (.not. present(c, i)) cycle
-            if (.not. law%prediction%takes_balance) then
+            if (.not. law%prediction%takes(i)) then
                associate (stiffness => law%prediction%stiffness(i, c))
                   if (stiffness <= 0.0_wp) cycle
                   self%compliance(self%n_rows + 1) = 1.0_wp/stiffness

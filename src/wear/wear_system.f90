@@ -224,7 +224,7 @@ contains
          do i = 1, self%n_extra
             if (problem%joint%row(3, i) == 0) cycle
             stiffness = self%normal(i)
-            if (takes_balance(self)) then
+            if (takes_balance(self, i)) then
                stiffness = problem%structure%static_stiffness(problem%coordinate_of(3, i))
             end if
             if (stiffness > 0.0_wp) compression = max(compression, pressure(i)/stiffness)
@@ -530,12 +530,13 @@ contains
       end do
    end subroutine corner
 
-   !> Whether the pairs take the balance: their predictions need Z_n z.
-   pure logical function takes_balance(self)
+   !> Whether a pair takes the balance: its prediction needs Z_n z.
+   pure logical function takes_balance(self, pair)
       class(wear_system), intent(in) :: self
+      integer, intent(in) :: pair
 
       associate (forces => self%vibration%problem%forces)
-         takes_balance = forces%entry(forces%pairs)%law%prediction%takes_balance
+         takes_balance = forces%entry(forces%pairs)%law%prediction%takes(pair)
       end associate
    end function takes_balance
 
@@ -566,6 +567,7 @@ contains
    subroutine find_slopes(self)
       type(wear_system), intent(inout) :: self
       complex(wp), allocatable :: stiffness(:, :)
+      logical, allocatable :: rigid(:)
       integer :: h, j
 
       call reserve_slopes(self)
@@ -575,11 +577,13 @@ contains
             self%slopes(:, j) = 0.0_wp
             call add_inputs(self, self%wearing(j), self%slopes(:, j))
          end do
-         if (.not. takes_balance(self)) return
+         rigid = [(takes_balance(self, self%wearing(j)), j=1, self%n_linear_extra)]
+         if (.not. any(rigid)) return
          allocate (stiffness(b%active%n_used, b%active%n_active))
          do h = 1, fourier%n_retained
             call b%problem%structure%active_block(b%structure_state, h, stiffness)
             do j = 1, self%n_linear_extra
+               if (.not. rigid(j)) cycle
                call add_balance(self, h, self%wearing(j), b%active%n_active, stiffness, &
                                 self%slopes(:, j))
             end do
@@ -628,7 +632,9 @@ contains
                   ! d/dtau is a factor i n of the complex coefficient. Of a factor in the inputs,
                   ! the gradient uc + i us takes the same.
                   turn = one
-                  if (p%order(c) > 0) turn = cmplx(0.0_wp, b%rate_unit(p)*n, wp)
+                  if (p%order_of(pair, c) > 0) then
+                     turn = cmplx(0.0_wp, b%rate_unit(p, pair)*n, wp)
+                  end if
                   turn = turn*p%impedance_ratio(pair, c, n, b%frequency())
                   turn = turn*gradient(g, (c - 1)*nc + k, n)
                   turned(k) = real(turn, wp)

@@ -17,7 +17,7 @@ module support_models
    public :: random_type, random_structure, chain_structure, new_contact, new_springs_data
    public :: new_case, new_system, solve_dense
    public :: damping_none, damping_rayleigh, damping_general
-   public :: law_dlft, law_dlft_velocity, law_penalty, law_rigid
+   public :: law_dlft, law_dlft_velocity, law_penalty, law_regularised, law_rigid
 
    integer, parameter :: damping_none = 0, damping_rayleigh = 1, damping_general = 2
 
@@ -43,6 +43,7 @@ module support_models
    integer, parameter :: law_dlft = findloc(law_words, 'dlft', dim=1)
    integer, parameter :: law_dlft_velocity = findloc(law_words, 'dlft_velocity', dim=1)
    integer, parameter :: law_penalty = findloc(law_words, 'penalty', dim=1)
+   integer, parameter :: law_regularised = findloc(law_words, 'regularised', dim=1)
    integer, parameter :: law_rigid = findloc(law_words, 'rigid', dim=1)
 
 contains

@@ -1,0 +1,403 @@
+!> Pairs of several laws as one law of all pairs. A member is a law with its own pairs; here their
+!> inputs, forces, states and derivatives stand in the order of all pairs, so that nobody else has
+!> to know which law a pair has.
+!>
+!> Members that follow events keep doing so beside members that decide at instants.
+module fw_several_laws
+   use fw_force_law, only: force_workspace, input_facts, law_facts, law_room, pair_mixed
+   use fw_fourier, only: fourier_type
+   use fw_kinds, only: wp
+   use fw_pair_law, only: pair_law
+   implicit none (type, external)
+   private
+
+   public :: several_laws, common_facts
+
+   type :: member_type
+      class(pair_law), allocatable :: law
+      !> Its pairs among all (n_elements of the law).
+      integer, allocatable :: pair(:)
+   end type member_type
+
+   type, extends(pair_law) :: several_laws
+      type(member_type), allocatable, private :: member(:)
+      !> Of each pair its member, and its place there (n_elements).
+      integer, allocatable, private :: of_member(:), place(:)
+   contains
+      procedure :: add
+      procedure :: join
+      procedure :: take_prediction
+      procedure :: reserve
+      procedure :: evaluate
+      procedure :: evaluate_free
+      procedure :: evaluate_rigid
+      procedure :: linearize
+      procedure :: sample
+      procedure :: coefficients
+      procedure :: tail
+      procedure :: fractions
+      procedure :: slope_at_rest
+      procedure :: instants_wanted
+      procedure :: located
+   end type several_laws
+
+   !> A workspace for each member.
+   type, extends(law_room) :: members_room
+      type(force_workspace), allocatable :: work(:)
+   end type members_room
+
+contains
+
+   !> Append a law whose pairs are built.
+   subroutine add(self, law, pair)
+      class(several_laws), intent(inout) :: self
+      class(pair_law), allocatable, intent(inout) :: law
+      !> Its pairs among all.
+      integer, intent(in) :: pair(:)
+      type(member_type), allocatable :: longer(:)
+      integer :: m, n
+
+      n = 0
+      if (allocated(self%member)) n = size(self%member)
+      allocate (longer(n + 1))
+      do m = 1, n
+         call move_alloc(self%member(m)%law, longer(m)%law)
+         call move_alloc(self%member(m)%pair, longer(m)%pair)
+      end do
+      call move_alloc(law, longer(n + 1)%law)
+      longer(n + 1)%pair = pair
+      call move_alloc(longer, self%member)
+   end subroutine add
+
+   !> Once all members are there: what the law of all pairs is.
+   subroutine join(self, present)
+      class(several_laws), intent(inout) :: self
+      !> Which components exist (3, n_pairs).
+      logical, intent(in) :: present(:, :)
+      integer :: i, m, n
+
+      n = size(present, 2)
+      call self%take_pairs([(0.0_wp, i=1, n)], present)
+      allocate (self%of_member(n), self%place(n), self%prediction%own(n))
+      do m = 1, size(self%member)
+         associate (law => self%member(m)%law, at => self%member(m)%pair)
+            self%of_member(at) = m
+            self%place(at) = [(i, i=1, size(at))]
+            self%mu(at) = law%mu
+            self%prediction%stiffness(at, :) = law%prediction%stiffness
+            self%prediction%gap(at) = law%prediction%gap
+            self%prediction%load(at) = law%prediction%load
+            self%prediction%own(at) = input_facts(law%prediction%order, law%prediction%by_time, &
+                                                  law%prediction%takes_balance, &
+                                                  law%prediction%has_inertia)
+            ! That of the rigid members, which alone have one.
+            if (law%prediction%takes_balance) self%prediction%scale = law%prediction%scale
+         end associate
+      end do
+      associate (p => self%prediction)
+         p%order = [(maxval(p%own%order(m)), m=1, 3)]
+         p%by_time = any(p%own%by_time)
+         p%takes_balance = any(p%own%takes_balance)
+         p%has_inertia = any(p%own%has_inertia)
+      end associate
+      call find_facts(self)
+   end subroutine join
+
+   subroutine find_facts(self)
+      class(several_laws), intent(inout) :: self
+      type(law_facts), allocatable :: facts(:)
+      integer :: m
+
+      allocate (facts(size(self%member)))
+      do m = 1, size(facts)
+         facts(m) = self%member(m)%law%facts
+      end do
+      self%facts = common_facts(facts)
+   end subroutine find_facts
+
+   !> What holds of pairs of several laws together.
+   pure type(law_facts) function common_facts(facts) result(shared)
+      type(law_facts), intent(in) :: facts(:)
+
+      shared%is_odd = all(facts%is_odd)
+      shared%remembers = any(facts%remembers)
+      shared%needs_independent = any(facts%needs_independent)
+      shared%has_events = any(facts%has_events)
+      shared%follows_events = all(facts%follows_events)
+      shared%needs_projection = any(facts%needs_projection)
+      shared%measures_slip = all(facts%measures_slip)
+      shared%has_tail = all(facts%has_tail)
+      ! Multipliers are found by marching one law.
+      shared%has_multipliers = .false.
+      shared%is_integrated = all(facts%is_integrated)
+      ! Those that follow events need none.
+      associate (sampled => .not. facts%follows_events .or. shared%follows_events)
+         shared%fewest_instants = maxval(facts%fewest_instants, mask=sampled)
+         shared%instants_per_harmonic = maxval(facts%instants_per_harmonic, mask=sampled)
+         shared%instants_with_separation = maxval(facts%instants_with_separation, mask=sampled)
+         shared%further_instants = maxval(facts%further_instants, mask=sampled)
+      end associate
+   end function common_facts
+
+   !> Hand on what was changed from outside.
+   subroutine take_prediction(self)
+      class(several_laws), intent(inout) :: self
+      integer :: m
+
+      do m = 1, size(self%member)
+         associate (law => self%member(m)%law, at => self%member(m)%pair)
+            law%present = self%present(:, at)
+            law%mu = self%mu(at)
+            law%prediction%stiffness = self%prediction%stiffness(at, :)
+            law%prediction%gap = self%prediction%gap(at)
+            law%prediction%load = self%prediction%load(at)
+            if (allocated(self%prediction%inertia) .and. law%prediction%has_inertia) then
+               law%prediction%inertia = self%prediction%inertia(at, :)
+               law%prediction%damping = self%prediction%damping(at, :)
+            end if
+         end associate
+      end do
+   end subroutine take_prediction
+
+   subroutine reserve(self, fourier, work)
+      class(several_laws), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(out) :: work
+      type(members_room), allocatable :: room
+      integer :: m
+
+      call work%reserve(self%n_elements, self%n_components, fourier)
+      allocate (room)
+      allocate (room%work(size(self%member)))
+      do m = 1, size(self%member)
+         call self%member(m)%law%reserve(fourier, room%work(m))
+      end do
+      call move_alloc(room, work%room)
+   end subroutine reserve
+
+   subroutine evaluate(self, fourier, work)
+      class(several_laws), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      call self%evaluate_free(fourier, work)
+      call self%evaluate_rigid(fourier, work)
+   end subroutine evaluate
+
+   subroutine evaluate_free(self, fourier, work)
+      class(several_laws), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      call evaluate_members(self, .false., fourier, work)
+   end subroutine evaluate_free
+
+   subroutine evaluate_rigid(self, fourier, work)
+      class(several_laws), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+
+      call evaluate_members(self, .true., fourier, work)
+   end subroutine evaluate_rigid
+
+   !> Those that take the balance, or the others.
+   subroutine evaluate_members(self, takes_balance, fourier, work)
+      class(several_laws), intent(in) :: self
+      logical, intent(in) :: takes_balance
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+      integer :: m
+
+      select type (room => work%room)
+      type is (members_room)
+         do m = 1, size(self%member)
+            associate (law => self%member(m)%law, own => room%work(m))
+               if (law%prediction%takes_balance .neqv. takes_balance) cycle
+               call take_inputs(self%member(m)%pair, work, own)
+               call law%evaluate(fourier, own)
+               call give_forces(self%member(m)%pair, own, work)
+               if (self%facts%follows_events) cycle
+               ! Some decide at instants: all forces are there at these.
+               call law%sample(own)
+               work%force_time(self%member(m)%pair, :, :) = own%force_time
+            end associate
+         end do
+      end select
+   end subroutine evaluate_members
+
+   !> From the workspace of all pairs to that of a member.
+   pure subroutine take_inputs(at, work, own)
+      integer, intent(in) :: at(:)
+      type(force_workspace), intent(in) :: work
+      type(force_workspace), intent(inout) :: own
+
+      own%prediction = work%prediction(at, :, :)
+      own%offset = work%offset(at)
+      own%mean = work%mean(at, :)
+      own%x_start = work%x_start(at, :)
+      own%rate = work%rate
+      if (work%measures_slip .and. .not. allocated(own%slip)) call own%measure_slip()
+      own%measures_slip = work%measures_slip
+      own%differentiates_slip = work%differentiates_slip
+   end subroutine take_inputs
+
+   !> And back.
+   pure subroutine give_forces(at, own, work)
+      integer, intent(in) :: at(:)
+      type(force_workspace), intent(in) :: own
+      type(force_workspace), intent(inout) :: work
+
+      work%force(at, :, :) = own%force
+      work%rests(at) = own%rests
+      work%scale(at) = own%scale
+      work%drift(at) = own%drift
+      work%pressure(at) = own%pressure
+      work%turns(at) = own%turns
+      work%x(at, :) = own%x
+      work%state(at) = own%state
+      if (own%measures_slip) work%slip(at) = own%slip
+   end subroutine give_forces
+
+   subroutine linearize(self, fourier, work)
+      class(several_laws), intent(in) :: self
+      type(fourier_type), intent(in) :: fourier
+      type(force_workspace), intent(inout) :: work
+      integer :: i, m, n
+
+      n = self%n_components*fourier%n_coefficients
+      if (.not. allocated(work%jacobian)) allocate (work%jacobian(n, n, self%n_elements))
+      select type (room => work%room)
+      type is (members_room)
+         do m = 1, size(self%member)
+            associate (own => room%work(m), at => self%member(m)%pair)
+               call self%member(m)%law%linearize(fourier, own)
+               if (own%waits) call self%member(m)%law%form_jacobian(fourier, own)
+               work%linear_state(at) = own%linear_state
+               work%linear_rests(at) = own%linear_rests
+               do i = 1, size(at)
+                  if (own%linear_state(i) /= pair_mixed) cycle
+                  work%jacobian(:, :, at(i)) = own%jacobian(:, :, i)
+               end do
+               if (own%measures_slip) work%slip_derivative(:, at) = own%slip_derivative
+            end associate
+         end do
+      end select
+   end subroutine linearize
+
+   !> At as many instants as `force_time` has.
+   subroutine sample(self, work)
+      class(several_laws), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      integer :: m
+
+      select type (room => work%room)
+      type is (members_room)
+         do m = 1, size(self%member)
+            associate (own => room%work(m), at => self%member(m)%pair, &
+                       n => size(work%force_time, 3))
+               if (size(own%force_time, 3) /= n) then
+                  deallocate (own%force_time)
+                  allocate (own%force_time(size(at), self%n_components, n), source=0.0_wp)
+               end if
+               call self%member(m)%law%sample(own)
+               work%force_time(at, :, :) = own%force_time
+            end associate
+         end do
+      end select
+   end subroutine sample
+
+   subroutine coefficients(self, work, computed, fourier, force)
+      class(several_laws), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      type(fourier_type), intent(in) :: computed
+      type(fourier_type), intent(in) :: fourier
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp), allocatable :: of_member(:, :, :)
+      integer :: m
+
+      select type (room => work%room)
+      type is (members_room)
+         do m = 1, size(self%member)
+            of_member = force(self%member(m)%pair, :, :)
+            call self%member(m)%law%coefficients(room%work(m), computed, fourier, of_member)
+            force(self%member(m)%pair, :, :) = of_member
+         end do
+      end select
+   end subroutine coefficients
+
+   subroutine tail(self, work, highest, force)
+      class(several_laws), intent(in) :: self
+      type(force_workspace), intent(inout) :: work
+      integer, intent(in) :: highest
+      real(wp), intent(inout) :: force(:, :, :)
+      real(wp), allocatable :: of_member(:, :, :)
+      integer :: m
+
+      select type (room => work%room)
+      type is (members_room)
+         do m = 1, size(self%member)
+            of_member = force(self%member(m)%pair, :, :)
+            call self%member(m)%law%tail(room%work(m), highest, of_member)
+            force(self%member(m)%pair, :, :) = of_member
+         end do
+      end select
+   end subroutine tail
+
+   pure subroutine fractions(self, work, share)
+      class(several_laws), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      real(wp), intent(out) :: share(:, :)
+      real(wp), allocatable :: of_member(:, :)
+      integer :: m
+
+      share = 0.0_wp
+      select type (room => work%room)
+      type is (members_room)
+         do m = 1, size(self%member)
+            of_member = share(:, self%member(m)%pair)
+            call self%member(m)%law%fractions(room%work(m), of_member)
+            share(:, self%member(m)%pair) = of_member
+         end do
+      end select
+   end subroutine fractions
+
+   pure real(wp) function slope_at_rest(self, element, component) result(slope)
+      class(several_laws), intent(in) :: self
+      integer, intent(in) :: element, component
+
+      slope = self%member(self%of_member(element))%law%slope_at_rest(self%place(element), component)
+   end function slope_at_rest
+
+   pure integer function instants_wanted(self, work) result(n)
+      class(several_laws), intent(in) :: self
+      type(force_workspace), intent(in) :: work
+      integer :: m
+
+      n = 0
+      select type (room => work%room)
+      type is (members_room)
+         do m = 1, size(self%member)
+            n = max(n, self%member(m)%law%instants_wanted(room%work(m)))
+         end do
+      end select
+   end function instants_wanted
+
+   !> Members that know of events follow them, the others stay.
+   subroutine located(self, law)
+      class(several_laws), intent(in) :: self
+      class(pair_law), allocatable, intent(out) :: law
+      type(several_laws), allocatable :: copy
+      class(pair_law), allocatable :: found
+      integer :: m
+
+      allocate (copy, source=self)
+      do m = 1, size(copy%member)
+         if (.not. copy%member(m)%law%facts%has_events) cycle
+         call copy%member(m)%law%located(found)
+         call move_alloc(found, copy%member(m)%law)
+      end do
+      call find_facts(copy)
+      call move_alloc(copy, law)
+   end subroutine located
+
+end module fw_several_laws
