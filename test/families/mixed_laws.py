@@ -21,7 +21,8 @@ COUNT = 100
 SMALL = (0, 1, 2, 3, 5, 8)
 COLUMNS = {"solved": "solved", "failed": "ended in words", "mixed": "with rigid and elastic pairs",
            "open": "with pairs that open", "balance": "balance off",
-           "elastic": "elastic forces off", "smooth": "smooth forces off", "rigid": "rigid forces off"}
+           "elastic": "elastic forces off", "smooth": "smooth forces off",
+           "rigid": "rigid forces off"}
 ZERO = ("balance", "elastic", "smooth", "rigid")
 
 LAWS = ("penalty", "regularised", "dlft", "dlft_velocity")
