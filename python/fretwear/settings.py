@@ -32,6 +32,10 @@ UNITS: dict[str, str] = {
     "contact%tangential_stiffness": "F/L",
     "contact%normal_stiffness": "F/L",
     "contact%slip_speed": "L/s",
+    "contact%weakening_speed": "L/s",
+    "contact%mu_viscous": "s/L",
+    "contact%speed_1": "L/s",
+    "contact%speed_2": "L/s",
     "spring%coefficient": "F/L^power",
     "load%static": "F",
     "load%cosine": "F",
@@ -203,6 +207,20 @@ class Contact(TypedDict, total=False):
     #: [L/s] sliding velocity du/dt at which tanh(1) = 76 % of the friction acts; only: law =
     #: 'regularised' (required with tangential dofs)
     slip_speed: ArrayLike
+    #: friction coefficient of fast sliding, to which mu falls; only: law = 'regularised' (default:
+    #: mu)
+    mu_dynamic: ArrayLike
+    #: [L/s] over which friction falls from mu to mu_dynamic; only: law = 'regularised' (required
+    #: with mu_dynamic)
+    weakening_speed: ArrayLike
+    #: of the speed in exp(-(v/weakening_speed)**e); only: law = 'regularised' (default: 1)
+    weakening_exponent: ArrayLike
+    #: [s/L] what mu gains with the sliding speed; only: law = 'regularised' (default: 0)
+    mu_viscous: ArrayLike
+    #: [L/s] velocity of side 2 along t1: a belt or a disk; only: law = 'regularised' (default: 0)
+    speed_1: ArrayLike
+    #: [L/s] the same along t2; only: law = 'regularised' (default: 0)
+    speed_2: ArrayLike
     #: multiplies the automatic eps of the rigid laws; only: law = 'dlft', 'dlft_velocity', 'rigid'
     #: (default: 1)
     penalty_scale: float

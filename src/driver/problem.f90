@@ -274,7 +274,8 @@ contains
          if (.not. joint%half_wave_symmetric) then
             call fatal_error(error, '&harmonics parity = ''odd'': the response has even '// &
                              'harmonics, because of a static load, a load of an even '// &
-                             'harmonic, a normal dof or an even spring power; use '// &
+                             'harmonic, a normal dof, a moving side or an even spring '// &
+                             'power; use '// &
                              '''auto'' or ''all''', status_input)
             return
          end if

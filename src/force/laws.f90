@@ -115,24 +115,31 @@ contains
    !> For checks of the input, which come before any pair is built.
    type(law_facts) function facts_of(contact) result(facts)
       type(contact_type), intent(in) :: contact
-      integer, allocatable :: numbers(:)
+      type(contact_type) :: part
+      integer, allocatable :: numbers(:), pair(:)
       type(law_facts), allocatable :: each(:)
       integer :: k
 
       numbers = laws_of(contact)
       allocate (each(size(numbers)))
       do k = 1, size(numbers)
-         each(k) = facts_of_law(numbers(k))
+         pair = pairs_of_law(contact, numbers(k))
+         part%n_pairs = size(pair)
+         part%constants = contact%constants%of_pairs(pair)
+         each(k) = facts_of_law(numbers(k), part)
       end do
       facts = each(1)
       if (size(each) > 1) facts = common_facts(each)
    end function facts_of
 
-   type(law_facts) function facts_of_law(number) result(facts)
+   type(law_facts) function facts_of_law(number, contact) result(facts)
       integer, intent(in) :: number
+      !> The pairs that have it.
+      type(contact_type), intent(in), optional :: contact
       class(pair_law), allocatable :: law
 
       call new_law(number, law)
+      if (present(contact)) call law%take_facts(contact)
       facts = law%facts
    end function facts_of_law
 

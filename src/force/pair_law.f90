@@ -20,6 +20,7 @@ module fw_pair_law
       procedure :: build
       procedure :: bind_keys
       procedure :: take_constants
+      procedure :: take_facts
       procedure :: take_pairs
       procedure :: slope_at_rest
       procedure :: located
@@ -77,6 +78,15 @@ contains
       associate (unused => self, unused_contact => contact)
       end associate
    end subroutine take_constants
+
+   !> Facts that depend on the constants of the pairs, which are read but need not be built.
+   subroutine take_facts(self, contact)
+      class(pair_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+
+      associate (unused => self, unused_contact => contact)
+      end associate
+   end subroutine take_facts
 
    !> Pairs that touch, without a load.
    pure subroutine take_pairs(self, mu, present)

@@ -1,30 +1,48 @@
 !> Regularised Coulomb friction: the friction force is a smooth function of the sliding velocity,
 !>
-!>   lambda_t = mu p tanh(|v|/v_0) v/|v|,    v = du_t/dt [length/s],    p = max(-y_n, 0),
+!>   lambda_t = p mu(|v|) tanh(|v|/v_0) v/|v|,    v = du_t/dt - V [length/s],    p = max(-y_n, 0),
+!>   mu(s) = mu_d + (mu - mu_d) exp(-(s/v_w)**e) + mu_v s,
 !>
 !> with one or two tangential directions. p is the constant normal load, or that of a unilateral
-!> spring, y_n = k_n (u_n + gap + depth). There is no stick: below v_0 a pair creeps, so that a
-!> tangential static load is never carried. For v_0 towards 0 it is the law 'dlft_velocity'.
+!> spring, y_n = k_n (u_n + gap + depth). Friction may weaken with the speed, from mu to mu_d over
+!> v_w (Stribeck), and grow with it (viscous); V is the speed of side 2, of a belt or a disk. There
+!> is no stick: below v_0 a pair creeps, so that a tangential static load is never carried. For v_0
+!> towards 0 it is the law 'dlft_velocity'.
 module fw_regularised
    use fw_contact_data, only: contact_type
    use fw_force_law, only: force_workspace, law_facts, pair_mixed, pair_open
    use fw_fourier, only: fourier_type
    use fw_key, only: key, key_visitor
-   use fw_key_range, only: above
+   use fw_key_range, only: above, at_least, at_most, operator(.and.)
    use fw_kinds, only: wp
    use fw_lapack, only: dgemm
    use fw_pair_law, only: normal_stiffness_key, pair_law
    implicit none (type, external)
    private
 
-   public :: regularised_law, regularised_friction
+   public :: regularised_law, regularised_friction, sliding_type
+
+   !> What friction does beside mu and v_0 where a pair slides.
+   type :: sliding_type
+      !> Whether it weakens to mu_d, over v_w with an exponent.
+      logical :: weakens = .false.
+      real(wp) :: mu_dynamic = 0.0_wp, weakening_speed = 1.0_wp, exponent = 1.0_wp
+      !> mu_v [time/length].
+      real(wp) :: viscous = 0.0_wp
+      !> V along t1 and t2 [length/time].
+      real(wp) :: speed(2) = 0.0_wp
+   end type sliding_type
 
    type, extends(pair_law) :: regularised_law
       !> v_0: tanh(1) = 76 % of the friction acts there (n_elements) [length/s].
       real(wp), allocatable :: slip_speed(:)
+      !> (n_elements)
+      type(sliding_type), allocatable :: sliding(:)
    contains
       procedure :: bind_keys
+      procedure :: take_pairs
       procedure :: take_constants
+      procedure :: take_facts
       procedure :: evaluate
       procedure :: linearize
       procedure :: slope_at_rest
@@ -61,7 +79,49 @@ contains
          'tanh(1) = 76 % of the friction acts', above(0.0_wp), 'L/s', 'n_pairs', &
          absent='required with tangential dofs'), slides)
       call contact%constants%bind(keys, normal_stiffness_key(), closes)
+      associate (constants => contact%constants)
+         call constants%bind(keys, key('mu_dynamic', 'friction coefficient of fast sliding, '// &
+            'to which mu falls', at_least(0.0_wp), '', 'n_pairs', absent='mu'), .false.)
+         call constants%bind(keys, key('weakening_speed', 'over which friction falls from mu '// &
+            'to mu_dynamic', above(0.0_wp), 'L/s', 'n_pairs', absent='required with mu_dynamic'), &
+            constants%has('mu_dynamic'))
+         call constants%bind(keys, key('weakening_exponent', 'of the speed in exp(-(v/'// &
+            'weakening_speed)**e)', at_least(1.0_wp) .and. at_most(2.0_wp), '', 'n_pairs', &
+            absent='1'), .false.)
+         call constants%bind(keys, key('mu_viscous', 'what mu gains with the sliding speed', &
+            at_least(0.0_wp), 's/L', 'n_pairs', absent='0'), .false.)
+         call constants%bind(keys, key('speed_1', 'velocity of side 2 along t1: a belt or a disk', &
+            unit='L/s', shape='n_pairs', absent='0'), .false.)
+         call constants%bind(keys, key('speed_2', 'the same along t2', unit='L/s', &
+            shape='n_pairs', absent='0'), .false.)
+      end associate
    end subroutine bind_keys
+
+   !> Pairs without weakening.
+   pure subroutine take_pairs(self, mu, present)
+      class(regularised_law), intent(inout) :: self
+      real(wp), intent(in) :: mu(:)
+      logical, intent(in) :: present(:, :)
+
+      call self%take_elements(present)
+      self%mu = mu
+      self%two_directions = any(present(2, :))
+      if (allocated(self%sliding)) deallocate (self%sliding)
+      allocate (self%sliding(size(mu)))
+   end subroutine take_pairs
+
+   !> A moving side tells one direction from the other.
+   subroutine take_facts(self, contact)
+      class(regularised_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+      integer :: n
+
+      n = contact%n_pairs
+      associate (constants => contact%constants)
+         self%facts%is_odd = all(abs(constants%get('speed_1', n)) <= 0.0_wp) .and. &
+                             all(abs(constants%get('speed_2', n)) <= 0.0_wp)
+      end associate
+   end subroutine take_facts
 
    subroutine take_constants(self, contact)
       class(regularised_law), intent(inout) :: self
@@ -76,7 +136,52 @@ contains
          end do
          where (self%present(3, :)) p%stiffness(:, 3) = contact%normal_stiffness
       end associate
+      call take_sliding(self, contact)
+      call self%take_facts(contact)
    end subroutine take_constants
+
+   subroutine take_sliding(self, contact)
+      class(regularised_law), intent(inout) :: self
+      type(contact_type), intent(in) :: contact
+      integer :: n
+
+      n = self%n_elements
+      associate (constants => contact%constants)
+         self%sliding%weakens = constants%has('mu_dynamic')
+         self%sliding%mu_dynamic = constants%get('mu_dynamic', n)
+         self%sliding%weakening_speed = constants%get('weakening_speed', n, default=1.0_wp)
+         self%sliding%exponent = constants%get('weakening_exponent', n, default=1.0_wp)
+         self%sliding%viscous = constants%get('mu_viscous', n)
+         self%sliding%speed(1) = constants%get('speed_1', n)
+         self%sliding%speed(2) = constants%get('speed_2', n)
+      end associate
+   end subroutine take_sliding
+
+   !> mu at a sliding speed.
+   elemental real(wp) function friction_at(sliding, mu, s) result(friction)
+      type(sliding_type), intent(in) :: sliding
+      real(wp), intent(in) :: mu, s
+
+      friction = mu
+      if (sliding%weakens) friction = sliding%mu_dynamic + (mu - sliding%mu_dynamic)* &
+                                      exp(-(s/sliding%weakening_speed)**sliding%exponent)
+      friction = friction + sliding%viscous*s
+   end function friction_at
+
+   !> Its slope.
+   elemental real(wp) function friction_slope(sliding, mu, s) result(slope)
+      type(sliding_type), intent(in) :: sliding
+      real(wp), intent(in) :: mu, s
+      real(wp) :: r
+
+      slope = sliding%viscous
+      if (.not. sliding%weakens) return
+      associate (e => sliding%exponent)
+         r = s/sliding%weakening_speed
+         slope = slope - (mu - sliding%mu_dynamic)*e*r**(e - 1.0_wp)*exp(-r**e)/ &
+                 sliding%weakening_speed
+      end associate
+   end function friction_slope
 
    subroutine evaluate(self, fourier, work)
       class(regularised_law), intent(in) :: self
@@ -95,8 +200,8 @@ contains
          work%prediction_time(:, 3, k) = work%prediction_time(:, 3, k) + work%offset
       end do
       ! One pass over the instants is the period: there is no memory to march.
-      call rub(self%n_elements, fourier%n_time, self%mu, self%slip_speed, work%prediction_time, &
-               work%force_time, work%pressure)
+      call rub(self%n_elements, fourier%n_time, self%mu, self%slip_speed, self%sliding, &
+               work%prediction_time, work%force_time, work%pressure)
       call work%measure_scale()
       work%turns = 1
       call fourier%to_coefficients(3*self%n_elements, work%force_time, work%force, work%fft, &
@@ -114,24 +219,27 @@ contains
    pure integer function instants_wanted(self, work) result(n)
       class(regularised_law), intent(in) :: self
       type(force_workspace), intent(in) :: work
-      real(wp) :: fastest
+      real(wp) :: fastest, narrowest
       integer :: i
 
       fastest = 0.0_wp
       do i = 1, self%n_elements
          if (.not. self%mu(i) > 0.0_wp .or. work%state(i) == pair_open) cycle
+         narrowest = self%slip_speed(i)
+         if (self%sliding(i)%weakens) narrowest = min(narrowest, self%sliding(i)%weakening_speed)
          fastest = max(fastest, norm2(maxval(abs(work%prediction_time(i, 1:2, :)), dim=2)) &
-                       /self%slip_speed(i))
+                       /narrowest)
       end do
       n = ceiling(min(instants_of_turn*fastest, 0.5_wp*real(huge(n), wp)))
    end function instants_wanted
 
    !> Forces at the instants, and the smallest pressure of each pair.
-   pure subroutine rub(n_pairs, n_time, mu, slip_speed, y, lambda, pressure)
+   pure subroutine rub(n_pairs, n_time, mu, slip_speed, sliding, y, lambda, pressure)
       integer, intent(in) :: n_pairs, n_time
       real(wp), intent(in) :: mu(n_pairs), slip_speed(n_pairs), y(n_pairs, 3, n_time)
+      type(sliding_type), intent(in) :: sliding(n_pairs)
       real(wp), intent(inout) :: lambda(n_pairs, 3, n_time), pressure(n_pairs)
-      real(wp) :: p, factor
+      real(wp) :: p, factor, speed, v(2)
       integer :: i, k
 
       pressure = huge(1.0_wp)
@@ -139,10 +247,12 @@ contains
          do i = 1, n_pairs
             p = max(-y(i, 3, k), 0.0_wp)
             ! mu p tanh(s) v/|v| with s = |v|/v_0, written without the quotient v/|v|.
-            factor = mu(i)*p/slip_speed(i)* &
-                     tanh_over(sqrt(y(i, 1, k)**2 + y(i, 2, k)**2)/slip_speed(i))
-            lambda(i, 1, k) = factor*y(i, 1, k)
-            lambda(i, 2, k) = factor*y(i, 2, k)
+            v = y(i, 1:2, k) - sliding(i)%speed
+            speed = sqrt(v(1)**2 + v(2)**2)
+            factor = friction_at(sliding(i), mu(i), speed)*p/slip_speed(i)* &
+                     tanh_over(speed/slip_speed(i))
+            lambda(i, 1, k) = factor*v(1)
+            lambda(i, 2, k) = factor*v(2)
             lambda(i, 3, k) = -p
             pressure(i) = min(pressure(i), p)
          end do
@@ -171,8 +281,8 @@ contains
       do i = 1, self%n_elements
          if (work%state(i) /= pair_mixed) cycle
          do k = 1, fourier%n_time
-            call differentiate(self%mu(i), self%slip_speed(i), work%prediction_time(i, :, k), &
-                               slope(:, :, k))
+            call differentiate(self%mu(i), self%slip_speed(i), self%sliding(i), &
+                               work%prediction_time(i, :, k), slope(:, :, k))
          end do
          do c_out = 1, 3
             do c_in = 1, 3
@@ -189,40 +299,50 @@ contains
 
    !> Derivative of the force at an instant (input, output): along the velocity the slope of tanh,
    !> across it the force turns with the velocity.
-   pure subroutine differentiate(mu, slip_speed, y, slope)
+   pure subroutine differentiate(mu, slip_speed, sliding, y, slope)
       real(wp), intent(in) :: mu, slip_speed, y(3)
+      type(sliding_type), intent(in) :: sliding
       real(wp), intent(out) :: slope(3, 3)
-      real(wp) :: e(2), speed, s, turning, along
+      real(wp) :: e(2), v(2), speed, s, turning, along, friction
       integer :: a, b
 
       slope = 0.0_wp
       if (y(3) >= 0.0_wp) return
-      speed = sqrt(y(1)**2 + y(2)**2)
+      v = y(1:2) - sliding%speed
+      speed = sqrt(v(1)**2 + v(2)**2)
       s = speed/slip_speed
       e = 0.0_wp
-      if (speed > 0.0_wp) e = y(1:2)/speed
+      if (speed > 0.0_wp) e = v/speed
+      friction = friction_at(sliding, mu, speed)
       ! y(3) = -p. The matrix is turning (1 - e e^T) + along e e^T (docs/theory.md, The balance).
-      turning = -mu*y(3)/slip_speed*tanh_over(s)
-      along = -mu*y(3)/slip_speed*(1.0_wp - tanh(s)**2)
+      turning = -friction*y(3)/slip_speed*tanh_over(s)
+      along = -friction*y(3)/slip_speed*(1.0_wp - tanh(s)**2) &
+              - y(3)*friction_slope(sliding, mu, speed)*tanh(s)
       do b = 1, 2
          do a = 1, 2
             slope(a, b) = (along - turning)*e(a)*e(b)
          end do
          slope(b, b) = slope(b, b) + turning
-         slope(3, b) = -mu*tanh(s)*e(b)
+         slope(3, b) = -friction*tanh(s)*e(b)
       end do
       slope(3, 3) = 1.0_wp
    end subroutine differentiate
 
    !> With a constant normal load a pair about rest is a damper; how much it bears otherwise only
-   !> the solution tells, and a guess without friction serves.
+   !> the solution tells, and a guess without friction serves. On a moving side it is one of the
+   !> mean force over the mean speed.
    pure real(wp) function slope_at_rest(self, element, component) result(slope)
       class(regularised_law), intent(in) :: self
       integer, intent(in) :: element, component
 
+      real(wp) :: speed
+
       slope = merge(1.0_wp, 0.0_wp, self%present(component, element))
-      if (component < 3) slope = slope*self%mu(element)*self%prediction%load(element)/ &
-                                 self%slip_speed(element)
+      if (component == 3) return
+      speed = norm2(self%sliding(element)%speed)
+      slope = slope*friction_at(self%sliding(element), self%mu(element), speed)* &
+              self%prediction%load(element)/self%slip_speed(element)* &
+              tanh_over(speed/self%slip_speed(element))
    end function slope_at_rest
 
    !> The friction coefficient, and slip_speed.
@@ -239,18 +359,22 @@ contains
       type(force_workspace), intent(in) :: work
       real(wp), intent(inout) :: force(:, :, :)
       real(wp) :: values(self%n_elements, 3, fourier%n_time)
-      real(wp) :: p, s, factor
+      real(wp) :: p, s, factor, v(2)
       integer :: i, k
 
       values = 0.0_wp
       do k = 1, fourier%n_time
          do i = 1, self%n_elements
-            associate (v => work%prediction_time(i, 1:2, k), v_0 => self%slip_speed(i))
-               ! d lambda_t/d mu = lambda_t/mu, d lambda_t/d v_0 = -mu p/v_0**2 (1 - tanh(s)**2) v.
+            associate (v_0 => self%slip_speed(i), sliding => self%sliding(i))
+               v = work%prediction_time(i, 1:2, k) - sliding%speed
+               ! mu(s) by mu, and d lambda_t/d v_0 = -mu(s) p/v_0**2 (1 - tanh(s)**2) v.
                p = -work%force_time(i, 3, k)
                s = norm2(v)/v_0
                factor = p/v_0*tanh_over(s)
-               if (number == 2) factor = -self%mu(i)*p/v_0**2*(1.0_wp - tanh(s)**2)
+               if (sliding%weakens) factor = factor*exp( &
+                                    -(norm2(v)/sliding%weakening_speed)**sliding%exponent)
+               if (number == 2) factor = -friction_at(sliding, self%mu(i), norm2(v))*p/v_0**2* &
+                                         (1.0_wp - tanh(s)**2)
                values(i, 1:2, k) = factor*v
             end associate
          end do

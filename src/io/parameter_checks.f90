@@ -10,9 +10,10 @@ module fw_parameter_checks
    use fw_model, only: model_type
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: harmonic_scale, is_of_matrices, is_per_pair, is_per_spring, &
-      normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, parameter_key, &
-      parameter_words, parameters, positive, rotation_speed, static_scale, tangential_stiffness
+   use fw_parameters, only: friction_coefficient, harmonic_scale, is_of_matrices, is_per_pair, &
+      is_per_spring, normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, &
+      parameter_key, parameter_words, parameters, positive, rotation_speed, static_scale, &
+      tangential_stiffness
    use fw_values, only: number_text
    implicit none (type, external)
    private
@@ -92,6 +93,10 @@ contains
          else if (.not. contact%constants%is_of_law(laws_of(contact), key)) then
             reason = 'contact%law = '//law_text(contact)//' has no '//trim(key)
          end if
+      end if
+      if (number == friction_coefficient .and. (contact%constants%has('mu_dynamic') .or. &
+                                                contact%constants%has('mu_viscous'))) then
+         reason = 'friction that weakens or grows with the speed is not in proportion to mu'
       end if
       if (allocated(reason) .or. any(pairs_of(contact, number))) return
       select case (parameters(number)%pairs)

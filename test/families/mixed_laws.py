@@ -8,7 +8,8 @@ TITLE = "Pairs of several laws"
 TEXT = """
 Chains of two to six masses with two to four pairs, each with a law of its own of `penalty`,
 `regularised`, `dlft` and `dlft_velocity`; some have a normal dof that opens and closes under
-a preload, some stick. One frequency, 3 to 15 harmonics, 2,048 instants.
+a preload, some stick; half of the smooth ones weaken and grow with the sliding speed, a third slides
+on a moving side. One frequency, 3 to 15 harmonics, 2,048 instants.
 
 The judge takes the displacements and the forces of the result. The balance of every harmonic is
 written anew, and has to hold to 1e-7 of the load. The forces of elastic pairs are marched over
@@ -52,6 +53,11 @@ def drawn(seed):
             "gap": random.uniform(-0.5, 0.2) if normal else 0.0,
             "kt": random.uniform(0.3, 3.0), "kn": random.uniform(0.5, 4.0),
             "v0": random.uniform(0.1, 0.5)})
+        fast = random.random() < 0.5
+        pairs[-1] |= {"dynamic": pairs[-1]["mu"] * (random.uniform(0.3, 1.0) if fast else 1.0),
+                      "weakening": random.uniform(0.2, 1.0), "exponent": random.uniform(1.0, 2.0),
+                      "viscous": random.uniform(0.0, 0.2) if fast else 0.0,
+                      "speed": random.normal() * 0.3 if random.random() < 0.3 else 0.0}
     first = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(mass, stiffness)).real.clip(1e-6).min())
     return {"mass": mass, "damping": damping, "stiffness": stiffness, "pairs": pairs,
             "cosine": random.normal(size=n), "sine": random.normal(size=n),
@@ -79,6 +85,9 @@ def text(case):
         lines.append(f"tangential_stiffness = {of('kt')}")
     if "regularised" in used:
         lines.append(f"slip_speed = {of('v0')}")
+        lines += [f"{key} = {of(name)}" for key, name in (
+            ("mu_dynamic", "dynamic"), ("weakening_speed", "weakening"),
+            ("weakening_exponent", "exponent"), ("mu_viscous", "viscous"), ("speed_1", "speed"))]
     if used & {"penalty", "regularised"}:
         lines.append(f"normal_stiffness = {of('kn')}")
     lines += ["/", "&load"] + [f"{key} = {row(case[key])}" for key in ("cosine", "sine", "static")]
@@ -132,8 +141,11 @@ def own_forces(pair, u, force, stiffness, omega):
     limit = pair["mu"] * pressure
     displacement = u[:, pair["t"] - 1]
     if pair["law"] == "regularised":
-        speed = omega * series(displacement, tau)[1]
-        tangential = limit * np.tanh(speed / pair["v0"])
+        speed = omega * series(displacement, tau)[1] - pair["speed"]
+        fallen = np.exp(-(abs(speed) / pair["weakening"])**pair["exponent"])
+        friction = pair["dynamic"] + (pair["mu"] - pair["dynamic"]) * fallen \
+            + pair["viscous"] * abs(speed)
+        tangential = friction * pressure * np.tanh(speed / pair["v0"])
     else:
         y = pair["kt"] * displacement
         if rigid:
