@@ -5,7 +5,7 @@ module fw_model_changes
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: matrix_change, model_type
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_model_keys, only: model_options
    use fw_parameters, only: is_of_matrices, modal_damping, rayleigh_mass, rayleigh_stiffness, &
       rotation_speed
@@ -23,7 +23,7 @@ contains
    !> The changes by those of the wanted parameters that change matrices.
    subroutine find_changes(options, raw, wanted, model, error)
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       integer, intent(in) :: wanted(:)
       !> Complete, with rotation and damping.
       type(model_type), intent(inout) :: model
@@ -44,7 +44,7 @@ contains
 
    subroutine find_change(options, raw, parameter, model, change, error)
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       integer, intent(in) :: parameter
       type(model_type), intent(in) :: model
       type(matrix_change), intent(out) :: change
@@ -75,7 +75,7 @@ contains
    !> d/d Omega of K + Omega**2 K_r, of the load likewise, and of the damping that follows K.
    subroutine change_by_speed(options, raw, model, change, error)
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(model_type), intent(in) :: model
       type(matrix_change), intent(inout) :: change
       type(error_type), allocatable, intent(out) :: error

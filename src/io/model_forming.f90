@@ -6,7 +6,7 @@ module fw_model_forming
    use fw_kinds, only: wp
    use fw_model, only: model_type
    use fw_model_changes, only: find_changes
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_model_keys, only: model_options
    implicit none (type, external)
    private
@@ -17,7 +17,7 @@ module fw_model_forming
    type :: model_origin
       type(model_options) :: options
       !> As it was given, checked.
-      type(file_model_type) :: raw
+      type(raw_model) :: raw
       !> Static loads of any other key, before their factor (n_dof).
       real(wp), allocatable :: static(:)
       !> Parameters of fw_parameters by which responses are to be differentiated.
@@ -29,7 +29,7 @@ contains
    !> Mass, stiffness, damping and static load; what else the model has stays.
    subroutine form_structure(options, raw, static, wanted, model, error)
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       !> As in model_origin.
       real(wp), intent(in) :: static(:)
       integer, intent(in) :: wanted(:)
@@ -43,7 +43,7 @@ contains
    !> Mass, stiffness and static load at speed, and damping without that of modes.
    subroutine form_matrices(options, raw, static, model)
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       real(wp), intent(in) :: static(:)
       type(model_type), intent(inout) :: model
 
@@ -70,7 +70,7 @@ contains
    !> given are not needed any more.
    subroutine finish_structure(options, raw, wanted, model, error)
       type(model_options), intent(in) :: options
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       integer, intent(in) :: wanted(:)
       type(model_type), intent(inout) :: model
       type(error_type), allocatable, intent(out) :: error
@@ -90,7 +90,7 @@ contains
    !> Centrifugal stiffness and load grow with the square of the speed.
    subroutine add_rotation(speed, raw, model)
       real(wp), intent(in) :: speed
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(model_type), intent(inout) :: model
 
       if (speed <= 0.0_wp) return

@@ -7,7 +7,7 @@ module fw_read_case
    use fw_harmonics_options, only: method_hbm, most_for_accuracy, usual_accuracy
    use fw_kinds, only: wp
    use fw_load_terms, only: load_terms
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_model_forming, only: form_structure
    use fw_model_keys, only: model_options
    use fw_parameter_sweep, only: as_factor
@@ -96,7 +96,7 @@ contains
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error
       !> The model where the calling program gives it, with mass and stiffness.
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
 
       !$omp critical (fretwear_io)
       call read_groups(input, case, error, memory_model)
@@ -109,7 +109,7 @@ contains
       type(case_input), intent(in) :: input
       type(case_type), intent(inout) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       type(reader_type) :: reader
       character(:), allocatable :: text
 
@@ -142,7 +142,7 @@ contains
       type(reader_type), intent(inout) :: reader
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       type(record_list) :: keys
       character(:), allocatable :: system
 
@@ -209,8 +209,8 @@ contains
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
-      type(file_model_type) :: raw
+      type(raw_model), intent(in), optional :: memory_model
+      type(raw_model) :: raw
 
       ! Sizes (n_dof, n_pairs, n_springs) are told before the arrays whose shapes name them.
       call case%bind_keys(reader)
@@ -286,7 +286,7 @@ contains
    !> The files that the case was read from, after those that are listed already.
    subroutine list_inputs(path, raw, inputs)
       character(*), intent(in) :: path
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       type(string_type), allocatable, intent(inout) :: inputs(:)
       integer :: i
 
@@ -304,9 +304,9 @@ contains
       character(*), intent(in) :: path
       type(case_type), intent(inout) :: case
       !> The parts of the model as they were given.
-      type(file_model_type), intent(out) :: raw
+      type(raw_model), intent(out) :: raw
       type(error_type), allocatable, intent(out) :: error
-      type(file_model_type), intent(in), optional :: memory_model
+      type(raw_model), intent(in), optional :: memory_model
       type(model_options) :: options
       type(load_terms) :: terms
       character(:), allocatable :: worn
@@ -317,7 +317,7 @@ contains
       if (allocated(error)) return
       call read_cyclic(reader, raw%cyclic, n_dof, analyses(case%analysis)%has_points, &
                        case%model%cyclic)
-      call read_contact(reader, raw, analyses(case%analysis)%wears, &
+      call read_contact(reader, raw%contact, analyses(case%analysis)%wears, &
                         case%model%cyclic%n_solved(), case%contact)
       call read_worn(reader, directory_of(path), case%contact, worn, error)
       if (allocated(error)) return

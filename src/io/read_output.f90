@@ -4,7 +4,7 @@ module fw_read_output
    use fw_key, only: key, key_visitor
    use fw_kinds, only: wp
    use fw_model, only: model_type
-   use fw_model_file, only: file_model_type
+   use fw_raw_model, only: raw_model
    use fw_read_nodal, only: observe_nodal
    use fw_paths, only: resolve_path
    use fw_reader, only: reader_type
@@ -40,7 +40,7 @@ contains
    !> Key `observe`: dof numbers or names of the model file; all by default.
    subroutine read_observed(reader, raw, model)
       type(reader_type), intent(inout) :: reader
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       !> Its number of dofs is known.
       type(model_type), intent(inout) :: model
       type(string_type), allocatable :: chosen(:), names(:)
@@ -89,7 +89,7 @@ contains
 
    !> What the model file observes, or every dof.
    subroutine list_default(raw, n_dof, names, rows)
-      type(file_model_type), intent(in) :: raw
+      type(raw_model), intent(in) :: raw
       integer, intent(in) :: n_dof
       type(string_type), allocatable, intent(out) :: names(:)
       real(wp), allocatable, intent(out) :: rows(:, :)
