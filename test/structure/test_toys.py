@@ -68,7 +68,7 @@ def add_quantity(toy):
 
 def add_rule(toy):
     """Histories and a phase do not go together."""
-    toy.change("src/io/rules.f90",
+    toy.change("src/case/rules.f90",
                ("   type(rule_type), parameter :: of_sweeps(*) = [ &\n",
                 "   type(rule_type), parameter :: of_sweeps(*) = [ &\n"
                 "      rule_type('output%histories', 'output%tail', 'toys refuse it'), &\n"))
@@ -115,7 +115,7 @@ contains
 
 end module fw_run_toy
 """)
-    toy.change("src/io/case.f90",
+    toy.change("src/case/case.f90",
                ("'mode', 'resonance']\n   type", "'mode', 'resonance', 'toy']\n   type"),
                ("             analysis_modes, analysis_mode, analysis_resonance\n",
                 "             analysis_modes, analysis_mode, analysis_resonance, analysis_toy\n"),

@@ -47,12 +47,12 @@ contains
    end function knows_feature
 
    !> A phrase as a message shows it: facts of a law with the word of the law.
-   function feature_text(case, phrase) result(text)
+   pure function feature_text(case, phrase) result(text)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: phrase
-      character(:), allocatable :: text
+      character(feature_length + len(law_words) + 20) :: text
 
-      text = trim(phrase)
+      text = phrase
       if (index(phrase, law_mark) == 1) text = "contact%law = '"// &
          trim(law_words(case%contact%law))//"' ("//trim(phrase)//')'
    end function feature_text

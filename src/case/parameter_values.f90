@@ -1,7 +1,7 @@
 !> Values of the parameters of fw_parameters in a case that has been read, and a case with other
 !> values, as if it had been read with them.
 module fw_parameter_values
-   use fw_case, only: case_type
+   use fw_body, only: body_type
    use fw_error, only: error_type
    use fw_kinds, only: wp
    use fw_model, only: model_type
@@ -18,7 +18,7 @@ contains
 
    !> Values that a parameter has: one, or one for each pair or spring.
    pure integer function n_values(case, number)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       !> As in parameter_words.
       integer, intent(in) :: number
 
@@ -29,7 +29,7 @@ contains
 
    !> Values in the case (n_values).
    pure subroutine get_parameter(case, number, values)
-      type(case_type), intent(in) :: case
+      class(body_type), intent(in) :: case
       integer, intent(in) :: number
       real(wp), allocatable, intent(out) :: values(:)
       integer :: k
@@ -62,7 +62,7 @@ contains
    !> Give the case other values. A parameter of the matrices needs `origin`, which the case keeps
    !> where it was read with the parameter among those wanted.
    subroutine put_parameter(case, number, values, error)
-      type(case_type), intent(inout) :: case
+      class(body_type), intent(inout) :: case
       integer, intent(in) :: number
       !> (n_values)
       real(wp), intent(in) :: values(:)
@@ -127,7 +127,7 @@ contains
 
    !> Put the structure together anew.
    subroutine put_of_matrices(case, number, value, error)
-      type(case_type), intent(inout) :: case
+      class(body_type), intent(inout) :: case
       integer, intent(in) :: number
       real(wp), intent(in) :: value
       type(error_type), allocatable, intent(out) :: error
