@@ -9,14 +9,18 @@ module fw_parameter_checks
    use fw_model, only: model_type
    use fw_parameter_sweep, only: as_factor
    use fw_parameter_values, only: get_parameter
-   use fw_parameters, only: harmonic_scale, is_of_matrices, is_per_pair, is_per_spring, &
-      normal_stiffness, not_negative, of_closing, of_pressed, of_sliding, parameter_key, &
-      parameter_words, parameters, positive, rotation_speed, static_scale, tangential_stiffness
+   use fw_parameters, only: friction_coefficient, gap, harmonic_scale, is_of_matrices, &
+      is_per_pair, is_per_spring, normal_load, normal_stiffness, not_negative, of_closing, &
+      of_pressed, of_sliding, parameter_key, parameter_words, parameters, positive, &
+      rotation_speed, static_scale, tangential_stiffness
+   use fw_solver_options, only: continuation_natural
    use fw_values, only: number_text
    implicit none (type, external)
    private
 
    public :: check_parameter, check_parameter_sweep, pairs_of
+
+   character(*), parameter :: swept = 'sweep%parameter'
 
 contains
 
@@ -39,6 +43,9 @@ contains
          call check_of_matrices(case, number, reason)
       else
          call check_of_loads(case%model, number, reason)
+      end if
+      if (.not. (parameters(number)%has_slope .or. asked_by == swept)) then
+         reason = 'its derivative is not known'
       end if
       if (.not. allocated(reason)) return
       call fatal_error(error, asked_by//" = '"//trim(parameter_words(number))//"': "//reason// &
@@ -83,9 +90,10 @@ contains
          reason = 'there are no contact pairs: give group &contact'
          return
       end if
-      if (any(number == [tangential_stiffness, normal_stiffness])) then
+      if (all(number /= [friction_coefficient, normal_load, gap])) then
          call parameter_key(number, key)
-         if (is_rigid(contact%law)) then
+         if (is_rigid(contact%law) .and. any(number == [tangential_stiffness, &
+                                                        normal_stiffness])) then
             reason = "contact%law = '"//trim(law_words(contact%law))//"' is rigid: its eps is a"// &
                      ' number of the method, on which exact solutions do not depend'
          else if (.not. contact%constants%is_of_law(contact%law, key)) then
@@ -135,8 +143,16 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. case%over%is_wanted()) return
-      call check_parameter(case, case%over%number, 'sweep%parameter', error)
-      if (.not. allocated(error)) call check_values(case, error)
+      call check_parameter(case, case%over%number, swept, error)
+      if (allocated(error)) return
+      if (.not. parameters(case%over%number)%has_slope .and. &
+          case%sweep%continuation /= continuation_natural) then
+         call fatal_error(error, swept//" = '"//trim(parameter_words(case%over%number))// &
+                          "': its derivative is not known; use continuation = 'natural'", &
+                          status_input)
+         return
+      end if
+      call check_values(case, error)
    end subroutine check_parameter_sweep
 
    !> Values that the parameter can take: one for all pairs (springs), in its range.
