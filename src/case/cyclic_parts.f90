@@ -40,8 +40,7 @@ module fw_cyclic_parts
       procedure :: bind_parts
    end type cyclic_parts
 
-   character(*), parameter :: square = 'order order', diameter = 'nodal_diameter/', &
-      with_group = 'with its group'
+   character(*), parameter :: group = 'nodal_diameter/K/'
 
 contains
 
@@ -64,7 +63,7 @@ contains
       call to%bind(part('cyclic/left', 'interface', 'dofs from 1 of one interface'), self%left)
       call to%bind(part('cyclic/right', 'interface', 'of the other, which moves as the left '// &
                         'one of the next sector; negative: with the sign turned'), self%right)
-      call to%numbers(part(diameter//'K', '', ''), 0, self%n_sectors/2, numbers)
+      call to%numbers(part(group(:len(group) - 1), '', ''), 0, self%n_sectors/2, numbers)
       do i = 1, size(numbers)
          to%number = numbers(i)
          if (.not. allocated(self%nodal)) allocate (self%nodal(self%n_sectors/2 + 1))
@@ -77,26 +76,25 @@ contains
    subroutine bind_diameter(self, to)
       class(nodal_parts), intent(inout) :: self
       class(part_source), intent(inout) :: to
+      character(*), parameter :: square = 'order order', needed = 'with its group'
 
       call to%set_extent('order', -1)
-      call to%bind(part(diameter//'K/mass', square, 'Hermitian; K = 0, 1, .. N/2 as far as '// &
+      call to%bind(part(group//'mass', square, 'Hermitian; K = 0, 1, .. N/2 as far as '// &
                         'harmonics need them, rigid laws take the mean of all that are there', &
-                        with_group), self%mass)
+                        needed), self%mass)
       if (allocated(self%mass)) call to%set_extent('order', size(self%mass, 1))
-      call to%bind(part(diameter//'K/stiffness', square, 'Hermitian', with_group), self%stiffness)
-      call to%bind(part(diameter//'K/damping', square, 'Hermitian'), self%damping)
-      call to%bind(part(diameter//'K/stiffness_rotation', square, 'Hermitian'), &
-                   self%stiffness_rotation)
-      call to%bind(part(diameter//'K/coriolis', square, 'skew-Hermitian, for each rad/s'), &
-                   self%coriolis)
-      call to%bind(part(diameter//'K/load/static', 'order', 'reduced load of sector 0; without '// &
-                        'it that of /load, on the displacements'), self%load_static)
-      call to%bind(part(diameter//'K/load/cosine', 'order', 'likewise'), self%load_cosine)
-      call to%bind(part(diameter//'K/load/sine', 'order', 'likewise'), self%load_sine)
-      call to%bind(part(diameter//'K/load/static_rotation', 'order', 'likewise'), &
+      call to%bind(part(group//'stiffness', square, 'Hermitian', needed), self%stiffness)
+      call to%bind(part(group//'damping', square, 'Hermitian'), self%damping)
+      call to%bind(part(group//'stiffness_rotation', square, 'Hermitian'), self%stiffness_rotation)
+      call to%bind(part(group//'coriolis', square, 'skew-Hermitian, for each rad/s'), self%coriolis)
+      call to%bind(part(group//'load/static', 'order', 'reduced load of sector 0; without it '// &
+                        'that of /load, on the displacements'), self%load_static)
+      call to%bind(part(group//'load/cosine', 'order', 'likewise'), self%load_cosine)
+      call to%bind(part(group//'load/sine', 'order', 'likewise'), self%load_sine)
+      call to%bind(part(group//'load/static_rotation', 'order', 'likewise'), &
                    self%load_static_rotation)
-      call to%bind(part(diameter//'K/observe/matrix', 'quantity order', 'rows of the '// &
-                        'quantities of /observe/name'), self%observe)
+      call to%bind(part(group//'observe/matrix', 'quantity order', 'rows of the quantities of '// &
+                        '/observe/name'), self%observe)
    end subroutine bind_diameter
 
    !> Forces of the air, by sectors or by nodal diameters.

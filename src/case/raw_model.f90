@@ -65,7 +65,7 @@ contains
       class(part_source), intent(inout) :: to
 
       call bind_structure(self, to)
-      call bind_pairs(self, to)
+      call bind_pairs(self%contact, to)
       call bind_springs(self%springs, to)
       call bind_loads(self, to)
       call bind_observed(self, to)
@@ -96,53 +96,50 @@ contains
                         'model%rotation_speed'), self%coriolis)
    end subroutine bind_structure
 
-   subroutine bind_pairs(self, to)
-      class(raw_model), intent(inout) :: self
+   subroutine bind_pairs(pairs, to)
+      type(contact_type), intent(inout) :: pairs
       class(part_source), intent(inout) :: to
+      character(*), parameter :: each = 'one_or pair'
       real(wp), allocatable :: values(:)
       integer :: k
 
       call to%bind(part('contact/side_1', 'pair 3', 'dof numbers of t1, t2, n, from 1: '// &
-                        'negative with the sign turned, 0 for none', with_pairs), &
-                   self%contact%side_1)
+                        'negative with the sign turned, 0 for none', with_pairs), pairs%side_1)
       call to%bind(part('contact/side_2', 'pair 3', 'of the other side, 0: ground', with_pairs), &
-                   self%contact%side_2)
+                   pairs%side_2)
       call to%bind(part('contact/sector_2', 'pair', 'sector of side 2, counted from that of '// &
-                        'side 1'), self%contact%sector_2)
-      call to%bind(part('contact/mu', 'one_or pair', 'friction coefficient'), self%contact%mu)
-      call to%bind(part('contact/gap', 'one_or pair', 'initial gap; negative: interference'), &
-                   self%contact%gap)
-      call to%bind(part('contact/area', 'one_or pair', 'of a pair'), self%contact%area)
-      call to%bind(part('contact/normal_load', 'one_or pair', 'constant compressive force of '// &
-                        'pairs without a normal dof'), self%contact%normal_load)
+                        'side 1'), pairs%sector_2)
+      call to%bind(part('contact/mu', each, 'friction coefficient'), pairs%mu)
+      call to%bind(part('contact/gap', each, 'initial gap; negative: interference'), pairs%gap)
+      call to%bind(part('contact/area', each, 'of a pair'), pairs%area)
+      call to%bind(part('contact/normal_load', each, 'constant compressive force of pairs '// &
+                        'without a normal dof'), pairs%normal_load)
       do k = 1, size(to%constants)
          associate (key => to%constants(k))
             if (allocated(values)) deallocate (values)
-            call to%bind(part('contact/'//key%name, 'one_or pair', trim(key%help)//'; '// &
-                              trim(key%only)), values)
-            if (allocated(values)) call self%contact%constants%offer(trim(key%name), values)
+            call to%bind(part('contact/'//key%name, each, trim(key%help)//'; '//key%only), values)
+            if (allocated(values)) call pairs%constants%offer(trim(key%name), values)
          end associate
       end do
       call to%note('text', part('contact@law', '', 'the law where the case names none'))
       call to%bind(part('contact/position', 'pair 3', 'coordinates, for pictures', &
-                        storage=by_columns), self%contact%position)
-      call to%bind(part('contact/patch', 'pair', 'name of the surface of each pair'), &
-                   self%contact%patch)
+                        storage=by_columns), pairs%position)
+      call to%bind(part('contact/patch', 'pair', 'name of the surface of each pair'), pairs%patch)
    end subroutine bind_pairs
 
    subroutine bind_springs(springs, to)
       type(spring_type), intent(inout) :: springs
       class(part_source), intent(inout) :: to
+      character(*), parameter :: each = 'one_or spring'
 
       call to%bind(part('spring/side_1', 'spring', 'dof number from 1, signed', with_springs), &
                    springs%side_1)
-      call to%bind(part('spring/side_2', 'one_or spring', '0, the ground, without it'), &
-                   springs%side_2)
-      call to%bind(part('spring/sector_2', 'one_or spring', 'sector of side 2, counted from '// &
-                        'that of side 1; 0 without it'), springs%sector_2)
-      call to%bind(part('spring/coefficient', 'one_or spring', 'force = coefficient * '// &
-                        'elongation**power', with_springs), springs%coefficient)
-      call to%bind(part('spring/power', 'one_or spring', '3 without it'), springs%power)
+      call to%bind(part('spring/side_2', each, '0, the ground, without it'), springs%side_2)
+      call to%bind(part('spring/sector_2', each, 'sector of side 2, counted from that of side '// &
+                        '1; 0 without it'), springs%sector_2)
+      call to%bind(part('spring/coefficient', each, 'force = coefficient * elongation**power', &
+                        with_springs), springs%coefficient)
+      call to%bind(part('spring/power', each, '3 without it'), springs%power)
    end subroutine bind_springs
 
    subroutine bind_loads(self, to)
